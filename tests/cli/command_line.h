@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace command_line {
 

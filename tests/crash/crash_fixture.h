@@ -20,8 +20,8 @@
 #include "core/format/global/voxdag_reader.h"
 #include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
-#include "tests/crash/faulty_files.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/faulty_files.h"
+#include "tests/support/temporary_folder.h"
 
 namespace crash {
 

@@ -4,7 +4,7 @@
 #include "core/base/error.h"
 #include "scheduler/state/job_store.h"
 #include "tests/crash/crash_fixture.h"
-#include "tests/unit/io/flip_bits.h"
+#include "tests/support/flip_bits.h"
 
 namespace crash {
 namespace {

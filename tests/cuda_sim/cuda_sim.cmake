@@ -48,8 +48,7 @@ endif()
 # Whole builds, with the scheduler's workers.
 add_executable(test_cuda_sim_builds cuda_sim/builds/whole_build_test.cc)
 target_link_libraries(test_cuda_sim_builds PRIVATE voxdag_cuda_sim voxdag_scheduler voxdag_generate
-                      GTest::gmock GTest::gtest_main)
-target_sources(test_cuda_sim_builds PRIVATE crash/faulty_files.cc)
+                      test_support GTest::gmock GTest::gtest_main)
 voxdag_compile_quickly(test_cuda_sim_builds)
 target_compile_definitions(test_cuda_sim_builds PRIVATE
   VOXDAG_SHARED_SCENES="${PROJECT_SOURCE_DIR}/../shared/scenes"

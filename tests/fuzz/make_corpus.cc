@@ -15,10 +15,10 @@
 #include "scheduler/state/checkpoint/ingest_record.h"
 #include "tests/fuzz/scene/compressed_scenes.h"
 #include "tests/fuzz/scene/rich_scene.h"
-#include "tests/unit/format/test_artifacts.h"
-#include "tests/unit/format/test_files.h"
-#include "tests/unit/format_color/valued_files.h"
-#include "tests/unit/image/image_files.h"
+#include "tests/support/image_files.h"
+#include "tests/unit/core/format/color/valued_files.h"
+#include "tests/unit/core/format/test_artifacts.h"
+#include "tests/unit/core/format/test_files.h"
 
 namespace voxdag::test {
 namespace {

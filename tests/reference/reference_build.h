@@ -14,7 +14,7 @@
 #include "tests/oracle/dag.h"
 #include "tests/oracle/scenes.h"
 #include "tests/reference/scene_file.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace reference {
 

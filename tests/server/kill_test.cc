@@ -166,7 +166,7 @@ TEST_F(KilledService, DrainsAndResumes) {
 }
 
 // Idle clients do not use up the files that a service may open.
-TEST_F(KilledService, L8_FewOpenFilesLeaveConnections) {
+TEST_F(KilledService, FewOpenFilesLeaveConnections) {
   max_files_ = 64;
   prepare();
   EXPECT_NE(contents(folder_.file("log")).find("connections are limited to 32"), std::string::npos);
@@ -194,7 +194,7 @@ TEST_F(KilledService, L8_FewOpenFilesLeaveConnections) {
 }
 
 // Nothing of the data folder can be read by other users of the machine, whatever their umask is.
-TEST_F(KilledService, HardeningL7_DataIsForTheServiceAlone) {
+TEST_F(KilledService, DataIsForTheServiceAlone) {
   prepare();
   const ClientResponse posted =
       http_->send("POST", "/api/v1/jobs", Json{{"scene", "s.glb"}, {"resolution", 64}}.dump());

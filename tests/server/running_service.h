@@ -12,7 +12,7 @@
 
 #include "client/http_client.h"
 #include "server/service.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag::server {
 

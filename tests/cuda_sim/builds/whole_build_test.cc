@@ -10,10 +10,10 @@
 #include "core/backend/backend.h"
 #include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
-#include "tests/crash/faulty_files.h"
 #include "tests/cuda_sim/sim/faults.h"
 #include "tests/cuda_sim/sim/schedule.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/faulty_files.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "scene/triangle_source.h"
 #include "tests/fuzz/targets/fuzz_target.h"
-#include "tests/unit/io/memory_files.h"
+#include "tests/support/memory_files.h"
 
 namespace voxdag::fuzz {
 

@@ -15,7 +15,7 @@
 #include "tests/oracle/core_types.h"
 #include "tests/oracle/dag.h"
 #include "tests/oracle/scenes.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 

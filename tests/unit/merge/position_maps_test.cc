@@ -6,7 +6,7 @@
 #include <array>
 
 #include "merge/output/merged_rows.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

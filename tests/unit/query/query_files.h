@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/unit/format/test_files.h"
+#include "tests/unit/core/format/test_files.h"
 #include "voxdag/query.h"
 
 // A file, and the cells of each of its grids by brute force.

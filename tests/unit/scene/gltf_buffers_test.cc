@@ -5,8 +5,8 @@
 #include <fstream>
 
 #include "scene/gltf/mesh_data/base64.h"
-#include "tests/unit/base/error_of.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/error_of.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {

@@ -161,7 +161,7 @@ std::string repeated(const std::string& text, size_t count) {
 
 // Every array whose length a file chooses is charged: JSON of a few megabytes took many times its
 // size in memory, unnoticed by the budget.
-TEST(Hardening, M3_ArraysAreCharged) {
+TEST(GltfMemory, ArraysAreCharged) {
   const std::pair<const char*, const char*> arrays[] = {
       {"buffers", R"({"byteLength":1})"},
       {"extensionsUsed", R"("a")"},
@@ -182,7 +182,7 @@ TEST(Hardening, M3_ArraysAreCharged) {
 }
 
 // One element with a large array is charged while it is read.
-TEST(Hardening, M3_ElementsAreCharged) {
+TEST(GltfMemory, ElementsAreCharged) {
   for (const char* section : {R"("nodes":[{"children":[)", R"("scenes":[{"nodes":[)",
                               R"("skins":[{"joints":[)", R"("meshes":[{"primitives":[)"}) {
     const std::string json =
@@ -195,7 +195,7 @@ TEST(Hardening, M3_ElementsAreCharged) {
 }
 
 // The parser collects what stands between strings and numbers, and all digits of a number.
-TEST(Hardening, M3_WhatTheParserCollectsIsBounded) {
+TEST(GltfMemory, WhatTheParserCollectsIsBounded) {
   const std::string rest = R"("asset":{"version":"2.0"}})", blanks(4 << 20, ' ');
   EXPECT_EQ(out_of_memory_message("{" + blanks + rest, uint64_t{2} << 20), "");
   EXPECT_NE(out_of_memory_message(R"({"extras":[)" + repeated("[]", 1 << 20) + "]," + rest,
@@ -207,7 +207,7 @@ TEST(Hardening, M3_WhatTheParserCollectsIsBounded) {
 }
 
 // Strings that are passed over take no memory.
-TEST(Hardening, M3_SkippedStringsAreNotCharged) {
+TEST(GltfMemory, SkippedStringsAreNotCharged) {
   SceneBuilder scene = one_triangle();
   for (int i = 0; i < 1000; ++i) scene.root["extras"].push_back(std::string(4000, 'x'));
   OpenScene open(scene.glb(), {}, uint64_t{2} << 20);
@@ -215,7 +215,7 @@ TEST(Hardening, M3_SkippedStringsAreNotCharged) {
 }
 
 // The matrices of a skin with hundreds of thousands of joints were not charged.
-TEST(Hardening, M3_JointMatricesAreCharged) {
+TEST(GltfMemory, JointMatricesAreCharged) {
   SceneBuilder scene = one_triangle();
   Json& attributes = scene.root["meshes"][0]["primitives"][0]["attributes"];
   attributes["JOINTS_0"] = scene.add_accessor<uint8_t>("VEC4", kU8, std::vector<uint8_t>(12, 0));

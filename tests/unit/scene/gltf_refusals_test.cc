@@ -164,7 +164,7 @@ INSTANTIATE_TEST_SUITE_P(All, GltfRefusal, testing::ValuesIn(kRefusals), test_na
 
 // What a scene contains cannot steer a terminal or forge a line of a log, wherever an error shows
 // it.
-TEST(Hardening, L2_ControlCharactersOfASceneAreNotShown) {
+TEST(GltfMessages, ControlCharactersOfASceneAreNotShown) {
   const std::string hostile =
       "A\n2026-11-21T00:00:00Z done\x1b[31m\x1b]0;title\x07\xc2\x9b"
       "2J\x7f";
@@ -190,7 +190,7 @@ TEST(Hardening, L2_ControlCharactersOfASceneAreNotShown) {
 }
 
 // Garbage is not called broken JSON, and no message names a class of the JSON library.
-TEST(Hardening, L8_GarbageIsNotCalledJson) {
+TEST(GltfMessages, GarbageIsNotCalledJson) {
   for (const char* text : {"\xef\x01\x02\x03", "\xef\xbb\xbf garbage", "\xef", "{broken", "[1,",
                            "\xef\xbb\xbf{\"a\":}"}) {
     const std::string message = error_of_file(text).message();
@@ -260,7 +260,7 @@ TEST(GltfRefusals, DuplicateMembers) {
 }
 
 // The same where the first value is a number and the second an object, which cannot be put into it.
-TEST(Hardening, MemberThatIsANumberAndThenAnObjectIsRefused) {
+TEST(GltfMessages, MemberThatIsANumberAndThenAnObjectIsRefused) {
   const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":{"a":1}}]})";
   EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
 }

@@ -13,7 +13,7 @@
 
 #include "core/base/error.h"
 #include "scene/triangle_source.h"
-#include "tests/unit/io/memory_files.h"
+#include "tests/support/memory_files.h"
 
 namespace voxdag::test {
 

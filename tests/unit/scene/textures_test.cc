@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "scene/textures/texture_set.h"
-#include "tests/crash/faulty_files.h"
-#include "tests/unit/base/error_of.h"
-#include "tests/unit/image/image_files.h"
+#include "tests/support/error_of.h"
+#include "tests/support/faulty_files.h"
+#include "tests/support/image_files.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {

@@ -15,7 +15,7 @@
 #include "scheduler/state/job_status.h"
 #include "scheduler/state/job_store.h"
 #include "scheduler/state/work_folder.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
 #include "tests/unit/scheduler/spheres_build.h"
 

@@ -6,7 +6,7 @@
 
 #include "core/format/global/open_global.h"
 #include "query/dag/selection.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/query/export/corners.h"
 
 namespace voxdag::query {

@@ -9,7 +9,7 @@
 
 #include "core/format/global/open_global.h"
 #include "query/export/export.h"
-#include "tests/unit/format_color/colored_files.h"
+#include "tests/unit/core/format/color/colored_files.h"
 #include "tests/unit/query/export/color_decoders.h"
 #include "tests/unit/query/export/corners.h"
 #include "tests/unit/query/export/stages.h"

@@ -7,7 +7,7 @@
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
 #include "query/export/export.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/query/export/corners.h"
 
 namespace voxdag::query {

@@ -8,10 +8,10 @@
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
 #include "query/export/export.h"
-#include "tests/crash/faulty_files.h"
-#include "tests/unit/base/error_of.h"
-#include "tests/unit/format/test_files.h"
-#include "tests/unit/io/killed.h"
+#include "tests/support/error_of.h"
+#include "tests/support/faulty_files.h"
+#include "tests/support/killed.h"
+#include "tests/unit/core/format/test_files.h"
 #include "tests/unit/query/export/corners.h"
 
 namespace voxdag::query {

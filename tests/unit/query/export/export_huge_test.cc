@@ -10,7 +10,7 @@
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
 #include "query/export/export_job.h"
-#include "tests/unit/format/test_files.h"
+#include "tests/unit/core/format/test_files.h"
 #include "tests/unit/query/export/corners.h"
 
 namespace voxdag::query {

@@ -6,7 +6,7 @@
 
 #include "core/format/global/open_global.h"
 #include "query/export/export.h"
-#include "tests/unit/format/test_files.h"
+#include "tests/unit/core/format/test_files.h"
 #include "tests/unit/query/export/corners.h"
 
 namespace voxdag::query {

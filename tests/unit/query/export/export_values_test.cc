@@ -5,7 +5,7 @@
 
 #include "core/format/global/open_global.h"
 #include "query/export/export.h"
-#include "tests/unit/format_color/valued_files.h"
+#include "tests/unit/core/format/color/valued_files.h"
 
 namespace voxdag::query {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "core/format/global/open_global.h"
 #include "query/lookup/bricks.h"
-#include "tests/unit/format/test_files.h"
+#include "tests/unit/core/format/test_files.h"
 
 namespace voxdag::query {
 namespace {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <optional>
 
-#include "tests/unit/format_color/colored_files.h"
+#include "tests/unit/core/format/color/colored_files.h"
 #include "tests/unit/query/extract/extract_fixture.h"
 
 namespace voxdag::query {

@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <optional>
 
-#include "tests/crash/faulty_files.h"
-#include "tests/unit/base/error_of.h"
-#include "tests/unit/io/killed.h"
+#include "tests/support/error_of.h"
+#include "tests/support/faulty_files.h"
+#include "tests/support/killed.h"
 #include "tests/unit/query/extract/extract_fixture.h"
 
 namespace voxdag::query {

@@ -13,7 +13,7 @@
 #include "core/format/global/verify.h"
 #include "query/extract/extract.h"
 #include "tests/oracle/dag.h"
-#include "tests/unit/format/test_files.h"
+#include "tests/unit/core/format/test_files.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::query {

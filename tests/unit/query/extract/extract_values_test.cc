@@ -1,6 +1,6 @@
 // Compares alpha, normals and materials of an extract, decoded by code written from the document,
 // with the input's.
-#include "tests/unit/format_color/valued_files.h"
+#include "tests/unit/core/format/color/valued_files.h"
 #include "tests/unit/query/extract/extract_fixture.h"
 
 namespace voxdag::query {

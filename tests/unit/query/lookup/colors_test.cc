@@ -4,7 +4,7 @@
 
 #include "core/format/global/voxdag_reader.h"
 #include "query/c/voxdag.h"
-#include "tests/unit/format_color/valued_files.h"
+#include "tests/unit/core/format/color/valued_files.h"
 #include "voxdag/query.h"
 
 namespace voxdag::query {

@@ -8,7 +8,7 @@
 #include "core/base/error.h"
 #include "query/rays/ray_caster.h"
 #include "query/render/views.h"
-#include "tests/unit/base/error_of.h"
+#include "tests/support/error_of.h"
 #include "tests/unit/query/voxel_scene.h"
 
 using namespace voxdag;

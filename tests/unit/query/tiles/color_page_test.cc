@@ -8,8 +8,8 @@
 
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
-#include "tests/unit/base/error_of.h"
-#include "tests/unit/format_color/colored_files.h"
+#include "tests/support/error_of.h"
+#include "tests/unit/core/format/color/colored_files.h"
 
 namespace voxdag {
 namespace {

@@ -7,8 +7,8 @@
 #include "core/format/global/open_global.h"
 #include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
-#include "tests/unit/format_color/colored_files.h"
-#include "tests/unit/io/flip_bits.h"
+#include "tests/support/flip_bits.h"
+#include "tests/unit/core/format/color/colored_files.h"
 
 namespace voxdag {
 namespace {

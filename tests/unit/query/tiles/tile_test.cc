@@ -9,7 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
-#include "tests/unit/base/error_of.h"
+#include "tests/support/error_of.h"
 #include "tests/unit/query/query_files.h"
 #include "tests/unit/query/voxel_scene.h"
 

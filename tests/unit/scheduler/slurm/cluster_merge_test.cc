@@ -6,7 +6,7 @@
 
 #include "core/base/error.h"
 #include "scheduler/slurm/cluster_build.h"
-#include "tests/unit/base/error_of.h"
+#include "tests/support/error_of.h"
 #include "tests/unit/scheduler/slurm/played_slurm.h"
 
 namespace voxdag {

@@ -10,7 +10,7 @@
 #include "scheduler/slurm/cluster_build.h"
 #include "scheduler/slurm/files/batch_file.h"
 #include "scheduler/slurm/run_batch.h"
-#include "tests/unit/base/error_of.h"
+#include "tests/support/error_of.h"
 #include "tests/unit/scheduler/slurm/played_slurm.h"
 
 namespace voxdag {

@@ -20,7 +20,7 @@
 #include "scheduler/run_build.h"
 #include "scheduler/slurm/commands/command_runner.h"
 #include "scheduler/slurm/run_batch.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/spheres_build.h"
 
 namespace voxdag {

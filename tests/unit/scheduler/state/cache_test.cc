@@ -6,7 +6,7 @@
 
 #include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

@@ -14,9 +14,9 @@
 #include "core/io/forwarding_files.h"
 #include "scheduler/triangles/durable_store.h"
 #include "scheduler/triangles/memory_store.h"
-#include "tests/unit/base/error_of.h"
-#include "tests/unit/format/test_artifacts.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/error_of.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/unit/core/format/test_artifacts.h"
 
 namespace voxdag {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "scheduler/state/job_store.h"
 #include "scheduler/state/work_folder.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

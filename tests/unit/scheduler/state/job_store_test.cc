@@ -6,8 +6,8 @@
 #include <functional>
 
 #include "core/base/error.h"
-#include "tests/unit/base/error_of.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/error_of.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

@@ -9,7 +9,7 @@
 #include "core/geometry/fixed_triangle.h"
 #include "scheduler/triangles/surface_store.h"
 #include "scheduler/triangles/triangle_file.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "scheduler/triangles/durable_store.h"
 #include "scheduler/triangles/memory_store.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

@@ -10,8 +10,8 @@
 #include "query/verify/color_sample.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
-#include "tests/unit/base/error_of.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/error_of.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
 #include "tests/unit/scheduler/stages/attributes/painted_scene.h"
 

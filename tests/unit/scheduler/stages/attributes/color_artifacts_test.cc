@@ -9,7 +9,7 @@
 #include "scheduler/run_build.h"
 #include "scheduler/stages/attributes/color_keys.h"
 #include "scheduler/stages/attributes/region_record.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
 #include "tests/unit/scheduler/slurm/played_slurm.h"
 #include "tests/unit/scheduler/stages/attributes/painted_scene.h"

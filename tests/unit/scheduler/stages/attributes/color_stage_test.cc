@@ -12,7 +12,7 @@
 #include "scene/generate/generate.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
 #include "tests/unit/scheduler/stages/attributes/painted_scene.h"
 

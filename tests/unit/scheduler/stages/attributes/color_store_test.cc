@@ -11,7 +11,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/io/forwarding_files.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/attributes/region_record.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

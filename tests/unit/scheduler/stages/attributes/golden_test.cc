@@ -6,7 +6,7 @@
 #include <string>
 
 #include "scheduler/run_build.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/stages/attributes/painted_scene.h"
 
 namespace voxdag {

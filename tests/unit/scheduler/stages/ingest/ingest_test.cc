@@ -10,8 +10,8 @@
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
 #include "scheduler/triangles/memory_store.h"
-#include "tests/unit/base/error_of.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/error_of.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

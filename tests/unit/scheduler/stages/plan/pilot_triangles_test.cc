@@ -6,7 +6,7 @@
 #include <set>
 
 #include "scheduler/triangles/memory_store.h"
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace voxdag {
 namespace {

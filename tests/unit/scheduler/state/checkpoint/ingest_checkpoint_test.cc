@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "tests/unit/io/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
 #include "tests/unit/scheduler/metered_files.h"
 #include "tests/unit/scheduler/spheres_build.h"

@@ -1,0 +1,218 @@
+// Defects that an attack on the program found; each test is named for the entry of the report.
+#include <sys/stat.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "tests/cli/command_line.h"
+#include "tests/cli/serve_process.h"
+
+namespace command_line {
+namespace {
+
+class UnusualInput : public CommandLine {
+ protected:
+  void SetUp() override { make_scene(); }
+  void build() { run_json({"build", "m.glb", "-r", "64", "-o", "m.vdag"}); }
+  // Runs a command that would overwrite `name`, which it must refuse and leave as it is.
+  void expect_refused(const std::string& name, const std::vector<std::string>& args) {
+    SCOPED_TRACE(name);
+    const std::string before = contents(name);
+    expect_error(2, name, args);
+    EXPECT_TRUE(contents(name) == before);
+  }
+};
+
+constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, for a byte that is not UTF-8
+
+// A path is bytes; in JSON those that are not UTF-8 are replaced, and the file has the exact name.
+TEST_F(UnusualInput, PathsNeedNotBeUtf8) {
+  build();
+  const auto expect_output = [&](std::vector<std::string> args, const std::string& suffix) {
+    SCOPED_TRACE(suffix);
+    EXPECT_EQ(run_json(std::move(args)).at("output"), "p" + std::string(kReplacement) + suffix);
+    EXPECT_TRUE(exists("p\xff" + suffix));
+  };
+  expect_output({"generate", "menger", "p\xff.glb", "--level", "1"}, ".glb");
+  expect_output({"render", "m.vdag", "-o", "p\xff.png", "--size", "32x32"}, ".png");
+  expect_output({"build", "m.glb", "-r", "64", "-o", "p\xff.vdag"}, ".vdag");
+  run_json({"info", "p\xff.vdag"});
+  run_json({"verify", "p\xff.vdag"});
+  run_json({"diff", "p\xff.vdag", "m.vdag"});
+}
+
+// In a request there is no replacement for such bytes: they are invalid input, not an invalid
+// answer.
+TEST_F(UnusualInput, ClientsRefuseNamesThatAreNotUtf8) {
+  std::filesystem::create_directory(folder_.file("server"));
+  ServeProcess server(folder_.file("server"));
+  const auto client = [&](std::vector<std::string> args) {
+    args.insert(args.end(), {"--server", server.url()});
+    return args;
+  };
+  expect_error(2, "UTF-8", client({"submit", "m.glb", "-r", "64", "--name", "\xff"}));
+  expect_error(2, "UTF-8", client({"submit", "/none\xff.glb", "-r", "64"}));
+  const std::string id = run_json(client({"submit", "m.glb", "-r", "64", "--wait"})).at("id");
+  const Json report = run_json(client({"download", id, "-o", "d\xff.vdag"}));
+  EXPECT_EQ(report.at("output"), "d" + std::string(kReplacement) + ".vdag");
+  EXPECT_TRUE(exists("d\xff.vdag"));
+  // L6: download replaces results only.
+  put("notes.txt", "mine");
+  expect_refused("notes.txt", client({"download", id, "-o", "notes.txt"}));
+  run_json(client({"download", id, "-o", "notes.txt", "--force"}));
+  run_json(client({"download", id, "-o", "notes.txt"}));
+  EXPECT_EQ(server.stop(), 0);
+}
+
+// Only what the same command has made is replaced, unless --force is given; never the input.
+TEST_F(UnusualInput, ForeignFilesAreNotOverwritten) {
+  build();
+  const std::vector<std::string> render = {"render", "m.vdag", "--size", "32x32", "-o"};
+  const std::vector<std::string> generate = {"generate", "menger", "--level", "1"};
+  for (std::vector<std::string> args : {render, generate}) {
+    SCOPED_TRACE(args[0]);
+    // Neither text, nor a picture and a scene of another program, nor a file cut short.
+    for (const char* bytes : {"mine", "\x89PNG\r\n\x1a\n", "glTF", "g"}) {
+      put("mine", bytes);
+      args.push_back("mine");
+      expect_refused("mine", args);
+      args.back() = "other";
+      std::filesystem::rename(folder_.file("mine"), folder_.file("other.partial"));
+      expect_refused("other.partial", args);
+      std::filesystem::remove(folder_.file("other.partial"));
+      args.pop_back();
+    }
+    put("mine", "mine");
+    args.push_back("mine");
+    args.push_back("--force");
+    run_json(args);
+    args.pop_back();
+    run_json(args);
+    args.back() = folder_.path();
+    expect_error(2, "not a regular file", args);
+  }
+  expect_refused("m.vdag", {"render", "m.vdag", "-o", "m.vdag", "--force"});
+  std::filesystem::create_hard_link(folder_.file("m.vdag"), folder_.file("same.partial"));
+  expect_refused("same.partial", {"render", "m.vdag", "-o", "same", "--force"});
+}
+
+// The files next to the result are as safe as the result.
+TEST_F(UnusualInput, ABuildRefusesToOverwriteItsNeighbors) {
+  for (const char* name : {"q", "q.partial", "q.report.json", "q.report.json.partial"}) {
+    put(name, "mine");
+    expect_refused(name, {"build", "m.glb", "-r", "64", "-o", "q"});
+    std::filesystem::remove(folder_.file(name));
+  }
+  std::filesystem::copy_file(folder_.file("m.glb"), folder_.file("s.partial"));
+  expect_refused("s.partial", {"build", "s.partial", "-r", "64", "-o", "s"});
+  run_json({"build", "m.glb", "-r", "64", "-o", "q"});
+  run_json({"build", "m.glb", "-r", "128", "-o", "q"});
+}
+
+// What is no file is invalid input, whichever command reads it.
+TEST_F(UnusualInput, InputsThatAreNoFilesHaveOneStatus) {
+  build();
+  ASSERT_EQ(mkfifo(folder_.file("pipe").c_str(), 0600), 0);
+  std::filesystem::create_directory(folder_.file("folder"));
+  for (const std::string name : {"pipe", "folder"})
+    for (const std::vector<std::string>& args :
+         std::vector<std::vector<std::string>>{{"build", name, "-r", "64", "-o", "x.vdag"},
+                                               {"info", name},
+                                               {"verify", name},
+                                               {"diff", "m.vdag", name},
+                                               {"render", name, "-o", "x.png"}}) {
+      SCOPED_TRACE(args[0]);
+      expect_error(2, name + " is not a regular file", args);
+    }
+}
+
+// A folder that is missing is noticed before the work is done.
+TEST_F(UnusualInput, AMissingOutputFolderIsNoticedFirst) {
+  build();
+  expect_error(3, "there is no folder none", {"generate", "menger", "none/x.glb", "--level", "1"});
+  expect_error(3, "there is no folder none", {"render", "m.vdag", "-o", "none/x.png"});
+}
+
+// Numbers mean what is written, and an error is one line that says what was expected.
+TEST_F(UnusualInput, NumbersAndMessages) {
+  const std::vector<std::string> build = {"build", "m.glb", "-o", "m.vdag", "-r"};
+  for (const char* number : {"-4", "abc", "64x", "", "99999999999999999999", "6.4"}) {
+    SCOPED_TRACE(number);
+    std::vector<std::string> args = build;
+    args.push_back(number);
+    expect_error(2, "--resolution: '" + std::string(number) + "': expected a whole number", args);
+  }
+  expect_error(2, "--threads: '-1'",
+               {"build", "m.glb", "-o", "m.vdag", "-r", "64", "--threads", "-1"});
+  expect_error(2, "above 0", {"generate", "city", "c.glb", "--triangles", "0"});
+  for (const std::vector<std::string>& args : {std::vector<std::string>{},
+                                               {"biuld"},
+                                               {"info"},
+                                               {"info", "x", "--frob"},
+                                               {"serve", "--port", "x"}}) {
+    const Answer answer = run(args);
+    EXPECT_EQ(answer.status, 2);
+    EXPECT_EQ(answer.err.find("voxdag: error: "), 0u) << answer.err;
+    EXPECT_EQ(answer.err.find('\n'), answer.err.size() - 1) << answer.err;
+    EXPECT_EQ(answer.err.find("Run with"), std::string::npos) << answer.err;
+  }
+}
+
+// Only the command that has the option --force names it. The scene is a triangle, 1000 times
+// 2^32 - 1 times at the same place: more than disks hold.
+TEST_F(UnusualInput, OnlyBuildNamesForce) {
+  Json nodes = Json::array(), roots = Json::array();
+  for (int i = 0; i < 1000; ++i) {
+    nodes.push_back(
+        {{"mesh", 0},
+         {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", 1}}}}}}}});
+    roots.push_back(i);
+  }
+  put("many.gltf", R"({"asset":{"version":"2.0"},"extensionsUsed":["EXT_mesh_gpu_instancing"],
+    "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,)" +
+                       std::string("AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA") + R"("}],
+    "bufferViews":[{"buffer":0,"byteLength":36}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+                 {"componentType":5126,"count":4294967295,"type":"VEC3"}],
+    "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+    "scene":0,"scenes":[{"nodes":)" +
+                       roots.dump() + R"(}],"nodes":)" + nodes.dump() + "}");
+  const std::vector<std::string> scene = {"many.gltf", "-r", "64", "--memory", "64MiB"};
+  const auto with = [&](std::vector<std::string> args) {
+    args.insert(args.begin() + 1, scene.begin(), scene.end());
+    return args;
+  };
+  expect_error(7, "expected more free space (--force builds anyway)",
+               with({"build", "-o", "many.vdag"}));
+  const Answer plan = run(with({"plan"}));
+  EXPECT_EQ(plan.status, 7);
+  EXPECT_EQ(plan.err.find("--force"), std::string::npos) << plan.err;
+}
+
+// A plan keeps what it spills where it may write, wherever TMPDIR points.
+TEST_F(UnusualInput, PlanNeedsNoTmpdir) {
+  for (const char* folder : {"/proc/none", ""}) {
+    SCOPED_TRACE(folder);
+    setenv("TMPDIR", folder, 1);
+    const Answer plan = run({"plan", "m.glb", "-r", "256"});
+    unsetenv("TMPDIR");
+    EXPECT_EQ(plan.status, 0) << plan.err;
+  }
+}
+
+// What cannot be written to the standard output is an error, not an empty file and a success.
+TEST_F(UnusualInput, OutputThatCannotBeWrittenIsAnError) {
+  build();
+  for (const char* command :
+       {"info m.vdag --json", "--version", "verify m.vdag", "token --role read --name me"}) {
+    SCOPED_TRACE(command);
+    const std::string line =
+        "cd " + folder_.path() + " && " VOXDAG_BINARY " " + command + " > /dev/full 2> errors";
+    const int status = std::system(line.c_str());
+    EXPECT_NE(status, 0);
+    EXPECT_NE(contents("errors").find("standard output"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace command_line

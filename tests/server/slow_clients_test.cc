@@ -1,0 +1,167 @@
+// Clients that want the service's memory or its connections for themselves.
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "core/base/clock.h"
+#include "tests/server/running_service.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr size_t kMaxConnections = 40;
+constexpr size_t kAttackers = 64;
+constexpr useconds_t kAttackBegins_us =
+    1'500'000;  // all attackers are waited for then, for more than a second
+
+class SlowClients : public RunningService {
+ protected:
+  SlowClients() { config_.http.limits.max_connections = kMaxConnections; }
+  ~SlowClients() override {
+    for (const int socket : sockets_) close(socket);
+  }
+
+  int port() const { return std::stoi(url().substr(url().rfind(':') + 1)); }
+  // A connection on which these bytes were sent, as far as the service takes them.
+  int open_with(const std::string& bytes) {
+    sockets_.push_back(raw_connect(port()));
+    send(sockets_.back(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    return sockets_.back();
+  }
+  // How many of twenty requests, each on its own connection, are answered 200.
+  int answered() {
+    int count = 0;
+    for (int i = 0; i < 20; ++i)
+      count += raw_exchange(port(), "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                   .starts_with("HTTP/1.1 200");
+    return count;
+  }
+  // How much of `bytes`, sent again and again, the service takes before it closes the connection.
+  size_t bytes_taken(int socket, const std::string& bytes, size_t max_bytes) {
+    size_t total = 0;
+    while (total < max_bytes) {
+      const ssize_t sent = send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+      if (sent <= 0) break;
+      total += static_cast<size_t>(sent);
+    }
+    return total;
+  }
+  // Bytes that the kernel holds for clients of the service.
+  size_t queued_bytes() {
+    std::ifstream table("/proc/net/tcp");
+    std::string line;
+    std::getline(table, line);
+    size_t total = 0;
+    while (std::getline(table, line)) {
+      std::istringstream fields(line);
+      std::string number, local, remote, state, queues;
+      fields >> number >> local >> remote >> state >> queues;
+      if (std::stoul(local.substr(local.find(':') + 1), nullptr, 16) ==
+          static_cast<unsigned long>(port()))
+        total += std::stoul(queues, nullptr, 16);
+    }
+    return total;
+  }
+
+  std::vector<int> sockets_;
+};
+
+// The line before a chunk has a limit, and so have its extension and the fields after the last one.
+TEST_F(SlowClients, LinesOfChunksAreBounded) {
+  start();
+  const std::string head =
+      "PUT /api/v1/scenes/a.glb HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n";
+  constexpr size_t kMaxBytes = 64 << 20;
+  for (const std::string begin : {"", "4;", "4\r\nglTF\r\n0\r\nX: "}) {
+    SCOPED_TRACE(begin);
+    EXPECT_LT(bytes_taken(open_with(head + begin), std::string(1 << 20, '0'), kMaxBytes),
+              kMaxBytes);
+  }
+  EXPECT_EQ(answered(), 20);
+}
+
+// Bodies that hardly arrive are given up when others want to connect.
+TEST_F(SlowClients, SlowBodiesDoNotBlockOthers) {
+  start();
+  for (size_t i = 0; i < kAttackers; ++i)
+    open_with(
+        "POST /api/v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+        "Content-Length: 60000\r\n\r\n{");
+  usleep(kAttackBegins_us);
+  EXPECT_EQ(answered(), 20);
+}
+
+// So are answers that nobody reads, and the kernel holds little of each.
+TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
+  start();
+  std::string requests;
+  for (int i = 0; i < 1000; ++i)
+    requests += "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  for (size_t i = 0; i < kAttackers; ++i) open_with(requests);
+  usleep(kAttackBegins_us);
+  const size_t queued = queued_bytes();
+  EXPECT_GT(queued, kMaxConnections * (50 << 10)) << "the attack is on";
+  EXPECT_LT(queued, kMaxConnections * (300 << 10));
+  EXPECT_EQ(answered(), 20);
+}
+
+// A blank before a colon must not hide how the body ends: what follows would be read as a request.
+TEST_F(SlowClients, ABlankBeforeTheColonIsRejected) {
+  start();
+  const std::string answer = raw_exchange(
+      port(),
+      "POST /api/v1/jobs HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding : chunked\r\n"
+      "\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 400 ")) << answer;
+  EXPECT_EQ(answer.find("HTTP/1.1", 1), std::string::npos) << answer;
+}
+
+TEST_F(SlowClients, TwoHostsAreRejected) {
+  start();
+  EXPECT_TRUE(
+      raw_exchange(port(), "GET /healthz HTTP/1.1\r\nHost: localhost\r\nHost: other\r\n\r\n")
+          .starts_with("HTTP/1.1 400 "));
+}
+
+// Readiness is asked for by several at once, and by anybody.
+TEST_F(SlowClients, ReadinessDoesNotDependOnWhoElseAsks) {
+  config_.transfers.max_requests_per_s = 0;
+  start();
+  std::string requests;
+  for (int i = 0; i < 40; ++i) requests += "GET /readyz HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  requests += "GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+  std::vector<std::string> answers(6);
+  std::vector<std::thread> clients;
+  for (std::string& answer : answers)
+    clients.emplace_back([&, this] { answer = raw_exchange(port(), requests); });
+  for (std::thread& client : clients) client.join();
+  for (const std::string& answer : answers) {
+    EXPECT_EQ(answer.find("HTTP/1.1 503"), std::string::npos);
+    EXPECT_NE(answer.find("{\"status\":\"ready\"}"), std::string::npos);
+  }
+}
+
+// What is refused before it is a request is counted as well.
+TEST_F(SlowClients, MalformedRequestsAreCounted) {
+  start();
+  raw_exchange(port(), "hello\r\n\r\n");
+  EXPECT_NE(http_->get("/metrics").body.find("voxdag_http_requests_total{status=\"400\"} 1"),
+            std::string::npos);
+}
+
+// HEAD has no ranges.
+TEST_F(SlowClients, HeadIgnoresRanges) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 64}});
+  ASSERT_TRUE(until_state(id, "succeeded"));
+  EXPECT_TRUE(raw_exchange(port(), "HEAD /api/v1/jobs/" + id +
+                                       "/dag HTTP/1.1\r\nHost: localhost\r\nRange: bytes=0-3\r\n"
+                                       "Connection: close\r\n\r\n")
+                  .starts_with("HTTP/1.1 200"));
+}
+
+}  // namespace
+}  // namespace voxdag::server

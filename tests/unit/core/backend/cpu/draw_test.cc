@@ -1,0 +1,129 @@
+#include <gtest/gtest.h>
+
+#include "tests/unit/core/backend/cpu/tiles.h"
+
+namespace voxdag::cpu {
+namespace {
+
+// Calls check(triangle, region) for triangles of every kind in tiles of every size, at the origin
+// and anywhere in a grid of 2^20.
+template <class Check>
+void for_many_triangles(int rounds, Check check) {
+  oracle::Random random(1);
+  for (const oracle::SceneKind kind : oracle::kAllKinds)
+    for (int round = 0; round < rounds; ++round) {
+      const int size_log2 = 2 + round % 5;
+      oracle::Region region = random_region(random, size_log2);
+      if (round % 3 == 0) region.low = {0, 0, 0};
+      const uint64_t seed = static_cast<uint64_t>(round);
+      SCOPED_TRACE(testing::Message()
+                   << oracle::kind_name(kind) << ", edge " << region.edge << ", round " << round);
+      for (const oracle::Triangle& t : oracle::make_scene(kind, seed, region, 4)) check(t, region);
+      if (testing::Test::HasFailure()) return;
+    }
+}
+
+// Every kernel sets the voxels that the oracle's separating-axis test sets, no others.
+TEST(Draw, KernelsEqualOracle) {
+  for_many_triangles(120, [](const oracle::Triangle& t, const oracle::Region& region) {
+    if (!is_narrow(t)) return;
+    const Padded<int32_t> narrow(t);
+    const oracle::Voxels truth = oracle::voxelize({t}, region);
+    for (const Kernels* kernels : all_kernels())
+      EXPECT_TRUE(drawn(narrow.triangle, false, region, kernels->draw) == truth) << kernels->name;
+  });
+}
+
+// The 128-bit path sets the same voxels, for triangles that need it and for others.
+TEST(Draw, WideEqualsOracle) {
+  int wide_ones = 0;
+  for_many_triangles(40, [&](const oracle::Triangle& t, const oracle::Region& region) {
+    const Padded<int64_t> wide(t);
+    wide_ones += !is_narrow(t);
+    EXPECT_TRUE(drawn(wide.triangle, false, region, draw_wide) == oracle::voxelize({t}, region));
+  });
+  EXPECT_GT(wide_ones, 50);
+}
+
+// Fixed-point heights are ambiguous for planes that pass exactly through voxel corners or miss them
+// by very little: slopes that are ratios of small numbers, at every offset.
+TEST(Draw, AmbiguousHeightsAreExact) {
+  oracle::Random random(2);
+  const oracle::Region region{{512, 1024, 4096}, 16};
+  for (int round = 0; round < 3000; ++round) {
+    // x = (p y + q z) / n + offset over an area larger than the tile.
+    const int64_t n = 256 * random.between(1, 8), p = random.between(-n, n);
+    const int64_t q = random.between(-n, n), offset = random.between(-600, 600) * 2;
+    const int up = static_cast<int>(random.between(0, 2));
+    oracle::Triangle t;
+    const int64_t corners[3][2] = {{-4, -4}, {20, -4}, {-4, 44}};
+    for (int i = 0; i < 3; ++i) {
+      const int64_t y = corners[i][0] * n, z = corners[i][1] * n;
+      const int64_t height = 8 * 256 + p * corners[i][0] + q * corners[i][1] + offset;
+      t[i][up] = region.low[up] * 256 + (height | 1);
+      t[i][(up + 1) % 3] = (region.low[(up + 1) % 3] * 256 + y) | 1;
+      t[i][(up + 2) % 3] = (region.low[(up + 2) % 3] * 256 + z) | 1;
+    }
+    SCOPED_TRACE(testing::Message() << "round " << round);
+    const Padded<int32_t> narrow(t);
+    const oracle::Voxels truth = oracle::voxelize({t}, region);
+    for (const Kernels* kernels : all_kernels())
+      ASSERT_TRUE(drawn(narrow.triangle, false, region, kernels->draw) == truth) << kernels->name;
+  }
+}
+
+// Bounds by edges are computed in doubles: edges of every length, also those parallel to an axis,
+// that pass through voxel corners or miss them by very little.
+TEST(Draw, AmbiguousEdgesAreExact) {
+  oracle::Random random(4);
+  const int64_t middle = int64_t{1} << 19;
+  const oracle::Region region{{middle, middle, middle}, 16};
+  for (int round = 0; round < 6000; ++round) {
+    const int64_t length = int64_t{1} << random.between(4, 26);
+    oracle::Triangle t;
+    for (int a = 0; a < 3; ++a) {
+      const int64_t corner = (middle + random.between(0, 16)) * 256 + random.between(-1, 1);
+      const int64_t half = random.between(0, 3) == 0 ? 0 : random.between(-length, length);
+      t[0][a] = (corner - half) | 1;
+      t[1][a] = (corner + half + random.between(-2, 2)) | 1;
+      t[2][a] = (corner + random.between(-length, length)) | 1;
+    }
+    SCOPED_TRACE(testing::Message() << "round " << round);
+    const Padded<int32_t> narrow(t);
+    const oracle::Voxels truth = oracle::voxelize({t}, region);
+    for (const Kernels* kernels : all_kernels())
+      ASSERT_TRUE(drawn(narrow.triangle, false, region, kernels->draw) == truth) << kernels->name;
+  }
+}
+
+// Where a triangle covers a cube, drawing its plane alone makes no difference.
+TEST(Draw, InsideIsThePlaneOnly) {
+  oracle::Random random(3);
+  int covered = 0;
+  for (int round = 0; round < 400; ++round) {
+    const oracle::Region around = random_region(random, 9);
+    oracle::Region region{around.low, 32};
+    for (int64_t& low : region.low) low += 32 * random.between(0, 15);
+    const auto scene =
+        oracle::make_scene(oracle::SceneKind::kSpanning, static_cast<uint64_t>(round), around, 9);
+    for (const oracle::Triangle& t : scene) {
+      if (!is_narrow(t)) continue;
+      const Padded<int32_t> narrow(t);
+      const LatticeCube box = box_of(region);
+      const Octants octants = portable_kernels().test_octants(narrow.triangle, box, false);
+      for (int c = 0; c < 8; ++c) {
+        if (!(octants.inside >> c & 1)) continue;
+        ++covered;
+        oracle::Region child{region.low, region.edge / 2};
+        for (int a = 0; a < 3; ++a) child.low[a] += (c >> (2 - a) & 1) * child.edge;
+        const oracle::Voxels truth = oracle::voxelize({t}, child);
+        for (const Kernels* kernels : all_kernels())
+          EXPECT_TRUE(drawn(narrow.triangle, true, child, kernels->draw) == truth) << kernels->name;
+      }
+    }
+  }
+  EXPECT_GT(covered, 50);
+}
+
+}  // namespace
+}  // namespace voxdag::cpu

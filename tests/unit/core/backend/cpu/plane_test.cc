@@ -1,0 +1,129 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdlib>
+#include <memory>
+
+#include "core/backend/cpu/memo/plane_memo.h"
+#include "tests/unit/core/backend/cpu/tiles.h"
+
+namespace voxdag::cpu {
+namespace {
+
+// The tables of a build, with the reducer and the plane memo.
+struct Workshop {
+  explicit Workshop(const Kernels& kernels)
+      : tables(memory, 10), reducer(tables, kernels), planes(memory, tables, reducer, kernels) {}
+
+  MemoryBudget budget{uint64_t{256} << 20};
+  PagePool pool;
+  PooledMemory memory{budget, pool};
+  SubDagTables tables;
+  TileReducer reducer;
+  PlaneMemo planes;
+};
+
+// The node of a cube that the triangle covers, tile by tile.
+NodeRef drawn_node(Workshop& shop, const NarrowTriangle& t, const LatticeCube& box, int size_log2,
+                   TileBricks& tile) {
+  if (size_log2 > kTileLog2) {
+    NodeRef children[8];
+    for (int c = 0; c < 8; ++c)
+      children[c] = drawn_node(shop, t, box.child(c), size_log2 - 1, tile);
+    return shop.tables.add_node(size_log2, children);
+  }
+  TileTriangle<int32_t> in_tile;
+  if (in_tile.set_up(t, true, box)) portable_kernels().draw(in_tile, tile);
+  return shop.reducer.reduce_bricks(tile, size_log2);
+}
+
+// A triangle far larger than the region, through its middle, along a plane whose normal is `n`.
+oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t, 3>& n,
+                          oracle::Random& random) {
+  oracle::Triangle t;
+  int up = 0;
+  for (int a = 1; a < 3; ++a)
+    if (std::abs(n[a]) > std::abs(n[up])) up = a;
+  const int p = (up + 1) % 3, q = (up + 2) % 3;
+  const int64_t reach = 256 * region.edge / std::abs(n[up]) + 1;
+  const int64_t corners[3][2] = {{-reach, -reach}, {2 * reach, -reach}, {-reach, 2 * reach}};
+  const int64_t offset = random.between(-region.edge * 100, region.edge * 100) * 2;
+  for (int i = 0; i < 3; ++i) {
+    // Multiples of n[up] along p and q make the height an integer, so the plane is exactly this
+    // one.
+    const int64_t dp = corners[i][0] * 2 * n[up], dq = corners[i][1] * 2 * n[up];
+    const int64_t middle = region.edge * 128 + 1;
+    t[i][p] = region.low[p] * 256 + middle + dp;
+    t[i][q] = region.low[q] * 256 + middle + dq;
+    t[i][up] = region.low[up] * 256 + middle + offset - (dp * n[p] + dq * n[q]) / n[up];
+  }
+  return t;
+}
+
+// Compares a cube from the memo with the same one drawn, and its children down to the smallest.
+int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, const LatticeCube& box,
+            int size_log2, TileBricks& tile) {
+  const OctreeCounts before = by_memo.tables.counts();
+  NodeRef node;
+  EXPECT_TRUE(by_memo.planes.build(set, {0}, box, size_log2, node));
+  const OctreeCounts counts = by_memo.tables.counts() - before;
+  const OctreeCounts drawn_before = by_drawing.tables.counts();
+  const NodeRef truth = drawn_node(by_drawing, set.narrow({0}), box, size_log2, tile);
+  const OctreeCounts drawn_counts = by_drawing.tables.counts() - drawn_before;
+  EXPECT_EQ(node.exists, truth.exists);
+  EXPECT_EQ(node.hash, truth.hash);
+  EXPECT_EQ(counts.voxels, drawn_counts.voxels);
+  EXPECT_EQ(counts.nodes, drawn_counts.nodes);
+  int compared = 1;
+  if (size_log2 > PlaneMemo::kSmallestLog2 && !testing::Test::HasFailure())
+    for (int c = 0; c < 8; c += 3)
+      compared += compare(by_memo, by_drawing, set, box.child(c), size_log2 - 1, tile);
+  return compared;
+}
+
+// Nodes, hashes and counts from the memo equal those from drawing the same planes: walls, small
+// normals and others.
+TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
+  oracle::Random random(6);
+  const auto tile = std::make_unique<TileBricks>();
+  int compared = 0;
+  for (int round = 0; round < 90; ++round) {
+    std::array<int64_t, 3> n{};
+    const int64_t largest = round % 3 == 0 ? 1 : round % 3 == 1 ? 12 : 300;
+    while (n[0] == 0 && n[1] == 0 && n[2] == 0)
+      for (int64_t& x : n) x = random.between(-largest, largest);
+    const int size_log2 = static_cast<int>(random.between(6, 8));
+    const oracle::Region region = random_region(random, size_log2);
+    const oracle::Triangle t = covering(region, n, random);
+    if (!is_narrow(t)) continue;
+    SCOPED_TRACE(testing::Message() << "round " << round << ", normal " << n[0] << ' ' << n[1]
+                                    << ' ' << n[2] << ", edge " << region.edge);
+    const std::vector<const Kernels*> kernels = all_kernels();
+    Workshop by_memo(*kernels[static_cast<size_t>(round) % kernels.size()]);
+    Workshop by_drawing(portable_kernels());
+    TriangleSet set(by_memo.memory);
+    set.add(axis_major(oracle::fixed(t)));
+    // A triangle's plane is added once it has covered enough tiles; a plane that meets lattice
+    // points exactly may never be.
+    NodeRef node;
+    bool found = false;
+    for (int i = 0; i < 40 && !found; ++i)
+      found = by_memo.planes.build(set, {0}, box_of(region), size_log2, node);
+    if (found) compared += compare(by_memo, by_drawing, set, box_of(region), size_log2, *tile);
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(compared, 500);
+}
+
+// A plane whose coefficients are too large for 64 bits in a large cube is not used there.
+TEST(Planes, HugeNormalsAreNotUsedForLargeCubes) {
+  const oracle::Triangle t{
+      {{1, 1, 100000001}, {(1 << 28) - 1, 3, 7}, {5, (1 << 28) - 3, 100000007}}};
+  const Padded<int32_t> narrow(t);
+  const Plane plane = plane_of(narrow.triangle);
+  EXPECT_TRUE(plane.fits(kTileLog2 - 1));
+  EXPECT_FALSE(plane.fits(12));
+}
+
+}  // namespace
+}  // namespace voxdag::cpu

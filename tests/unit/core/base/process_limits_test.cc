@@ -1,0 +1,72 @@
+#include "core/base/process_limits.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/temporary_folder.h"
+
+namespace voxdag {
+namespace {
+
+class CgroupTest : public testing::Test {
+ protected:
+  void write(const std::string& path, const std::string& text) {
+    const std::string full = mount() + "/" + path;
+    std::filesystem::create_directories(std::filesystem::path(full).parent_path());
+    std::ofstream(full) << text;
+  }
+  std::string mount() const { return folder_.file("cgroup"); }
+
+  TemporaryFolder folder_;
+};
+
+// Version 2: the lowest limit of the process's group and of all above it; siblings do not count.
+TEST_F(CgroupTest, WalksUpInVersion2) {
+  write("slice/box/memory.max", "max\n");
+  write("slice/memory.max", "3000000000\n");
+  write("slice/other/memory.max", "1000\n");
+  EXPECT_EQ(cgroup_memory("0::/slice/box\n", mount()), 3000000000u);
+  write("slice/box/memory.max", "2000000000\n");
+  EXPECT_EQ(cgroup_memory("0::/slice/box\n", mount()), 2000000000u);
+  // As a container sees itself.
+  EXPECT_EQ(cgroup_memory("0::/\n", mount()), UINT64_MAX);
+  write("memory.max", "500000000\n");
+  EXPECT_EQ(cgroup_memory("0::/\n", mount()), 500000000u);
+  EXPECT_EQ(cgroup_memory("0::/not/there\n", mount()), 500000000u);
+}
+
+// A quota is rounded up to whole CPUs; the lowest one on the way up counts.
+TEST_F(CgroupTest, CpuQuotas) {
+  write("slice/box/cpu.max", "max 100000\n");
+  EXPECT_EQ(cgroup_cpus("0::/slice/box\n", mount()), UINT64_MAX);
+  write("slice/cpu.max", "250000 100000\n");
+  EXPECT_EQ(cgroup_cpus("0::/slice/box\n", mount()), 3u);
+  write("slice/box/cpu.max", "1000 100000\n");
+  EXPECT_EQ(cgroup_cpus("0::/slice/box\n", mount()), 1u);
+  EXPECT_EQ(cgroup_cpus("", mount()), UINT64_MAX);
+  // Version 1, where two controllers may be mounted together.
+  write("cpu,cpuacct/pool/cpu.cfs_quota_us", "-1\n");
+  write("cpu,cpuacct/pool/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(cgroup_cpus("4:cpu,cpuacct:/pool\n", mount()), UINT64_MAX);
+  write("cpu,cpuacct/pool/cpu.cfs_quota_us", "400000\n");
+  EXPECT_EQ(cgroup_cpus("4:cpu,cpuacct:/pool\n", mount()), 4u);
+  EXPECT_EQ(cgroup_cpus("4:cpuset:/pool\n", mount()), UINT64_MAX);
+  EXPECT_GE(default_threads(), 1u);
+}
+
+// Version 1, alone or together with version 2, and texts that are not memberships.
+TEST_F(CgroupTest, WalksUpInVersion1) {
+  write("memory/pool/job/memory.limit_in_bytes", "9223372036854771712\n");
+  write("memory/pool/memory.limit_in_bytes", "700000000\n");
+  const std::string membership = "9:name=systemd:/\n4:cpu,memory:/pool/job\n1:cpu:/x\n0::/\n";
+  EXPECT_EQ(cgroup_memory(membership, mount()), 700000000u);
+  EXPECT_EQ(cgroup_memory("4:memory:/pool\n", mount()), 700000000u);
+  EXPECT_EQ(cgroup_memory("4:cpuset:/pool\n", mount()), UINT64_MAX);
+  EXPECT_EQ(cgroup_memory("no line of ours\n", mount()), UINT64_MAX);
+  EXPECT_EQ(cgroup_memory("", mount()), UINT64_MAX);
+}
+
+}  // namespace
+}  // namespace voxdag

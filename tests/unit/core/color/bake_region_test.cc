@@ -1,0 +1,234 @@
+#include "core/color/rule/bake_region.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "core/base/integers.h"
+#include "core/color/color_of.h"
+#include "tests/oracle/overlap.h"
+#include "tests/unit/core/color/looks.h"
+
+namespace voxdag {
+namespace {
+
+using oracle::SceneKind;
+
+// Sums by position in the whole grid.
+using Sums = std::map<std::array<uint32_t, 3>, ColorSum>;
+
+void collect(const ColorGrid& grid, const Cube& region, const std::vector<ColoredCell>& cells,
+             Sums& sums) {
+  const uint32_t down = grid.color_levels - region.level;
+  uint32_t least = 0;
+  for (const ColoredCell& cell : cells) {
+    EXPECT_GE(cell.code, least);  // in Morton order, each once
+    EXPECT_GT(cell.sum.weight, 0u);
+    least = cell.code + 1;
+    std::array<uint32_t, 3> at;
+    morton_decode(cell.code, at[0], at[1], at[2]);
+    for (size_t a = 0; a < 3; ++a) at[a] += region.position[a] << down;
+    EXPECT_TRUE(sums.emplace(at, cell.sum).second);
+  }
+}
+
+// All cubes of a level, one after the other.
+Sums bake_grid(const ColorGrid& grid, uint32_t level, const std::vector<FixedSurface>& surfaces,
+               const TestLooks& looks) {
+  Sums sums;
+  RegionBaker<const TestImages> baker(grid, looks.materials, looks.images);
+  std::vector<ColoredCell> cells;
+  for (uint64_t code = 0; code < uint64_t{1} << (3 * level); ++code) {
+    Cube region{level, {}};
+    morton_decode(code, region.position[0], region.position[1], region.position[2]);
+    baker.bake(region, surfaces, cells);
+    collect(grid, region, cells, sums);
+  }
+  return sums;
+}
+
+std::vector<FixedSurface> scene(const TestLooks& looks, SceneKind kind, uint64_t seed,
+                                const ColorGrid& grid, int count) {
+  const oracle::Region whole{{0, 0, 0}, 1 << grid.levels};
+  return looks.surfaces(oracle::make_scene(kind, seed, whole, count), seed);
+}
+
+// Cells are those that the oracle's overlap test finds, for grids as fine as the voxels and
+// coarser.
+TEST(BakeRegion, CellsAreThoseThatTrianglesTouch) {
+  const TestLooks looks;
+  size_t set = 0;
+  for (const SceneKind kind : oracle::kAllKinds)
+    for (const ColorGrid grid : {ColorGrid{4, 4}, ColorGrid{5, 3}, ColorGrid{9, 3}}) {
+      SCOPED_TRACE(oracle::kind_name(kind) + " " + std::to_string(grid.levels));
+      const auto surfaces = scene(looks, kind, 7, grid, 12);
+      const Sums sums = bake_grid(grid, 0, surfaces, looks);
+      const int64_t edge = int64_t{1} << grid.cell_bits();
+      const uint32_t cells = 1u << grid.color_levels;
+      for (uint32_t x = 0; x < cells; ++x)
+        for (uint32_t y = 0; y < cells; ++y)
+          for (uint32_t z = 0; z < cells; ++z) {
+            const oracle::Point low{x * edge, y * edge, z * edge};
+            const bool touched = std::any_of(surfaces.begin(), surfaces.end(), [&](const auto& s) {
+              return oracle::touches(plain(s.position), low, edge);
+            });
+            ASSERT_EQ(sums.count({x, y, z}), touched ? 1u : 0u) << x << " " << y << " " << z;
+            set += touched;
+          }
+    }
+  EXPECT_GT(set, 5000u);
+}
+
+// Neither the order of the triangles nor the regions that are baked show in any sum.
+TEST(BakeRegion, SumsAreFunctionsOfTheCell) {
+  const TestLooks looks;
+  for (const SceneKind kind : oracle::kAllKinds)
+    for (const ColorGrid grid : {ColorGrid{4, 4}, ColorGrid{8, 4}}) {
+      SCOPED_TRACE(oracle::kind_name(kind));
+      auto surfaces = scene(looks, kind, 3, grid, 40);
+      const Sums whole = bake_grid(grid, 0, surfaces, looks);
+      ASSERT_FALSE(whole.empty());
+      EXPECT_EQ(bake_grid(grid, 1, surfaces, looks), whole);
+      EXPECT_EQ(bake_grid(grid, 4, surfaces, looks), whole);
+      std::reverse(surfaces.begin(), surfaces.end());
+      EXPECT_EQ(bake_grid(grid, 0, surfaces, looks), whole);
+      std::rotate(surfaces.begin(), surfaces.begin() + 13, surfaces.end());
+      EXPECT_EQ(bake_grid(grid, 2, surfaces, looks), whole);
+    }
+}
+
+// The result does not depend on the batches: a covering triangle may follow a touching one.
+TEST(BakeRegion, TrianglesMayComeInParts) {
+  const TestLooks looks;
+  for (const SceneKind kind : oracle::kAllKinds) {
+    SCOPED_TRACE(oracle::kind_name(kind));
+    const ColorGrid grid{8, 4};
+    const auto surfaces = scene(looks, kind, 11, grid, 40);
+    RegionBaker<const TestImages> baker(grid, looks.materials, looks.images);
+    for (const size_t part : {size_t{1}, size_t{7}}) {
+      baker.begin(Cube{});
+      for (size_t at = 0; at < surfaces.size(); at += part)
+        baker.add(std::span(surfaces).subspan(at, std::min(part, surfaces.size() - at)));
+      std::vector<ColoredCell> cells;
+      baker.finish(cells);
+      Sums sums;
+      collect(grid, Cube{}, cells, sums);
+      EXPECT_EQ(sums, bake_grid(grid, 0, surfaces, looks));
+    }
+  }
+}
+
+// More triangles than wait for the end: those that wait are added when there are too many.
+TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
+  TestLooks looks;
+  const ColorGrid grid{10, 2};
+  oracle::Random random(5);
+  oracle::Triangles triangles;
+  for (int i = 0; i < 150000; ++i) {
+    const int64_t at = random.odd(1, 1 << 18);
+    // None has a column, but for the last, in the first cell.
+    triangles.push_back({{{at, 3, 5}, {at | 2, 7, 5}, {at, 3, 9}}});
+  }
+  triangles.push_back({{{1, 1, 1}, {60001, 60001, 1}, {1, 60001, 1}}});
+  std::vector<FixedSurface> surfaces = looks.surfaces(triangles, 1);
+  const Sums sums = bake_grid(grid, 0, surfaces, looks);
+  std::reverse(surfaces.begin(), surfaces.end());
+  EXPECT_EQ(bake_grid(grid, 0, surfaces, looks), sums);
+  ASSERT_EQ(sums.size(), 4u);
+  EXPECT_GE(sums.at({0, 0, 0}).weight, 64u);
+  uint64_t in_others = 0;
+  for (uint32_t x = 1; x < 4; ++x) in_others += sums.at({x, 0, 0}).weight;
+  EXPECT_GT(in_others, 110000u);
+  EXPECT_LT(in_others, 115000u);
+}
+
+// The same triangle in 64 and in 128 bits: a vertex far away along its plane makes it wide.
+TEST(BakeRegion, WideTrianglesCoverWhatNarrowOnesDo) {
+  TestLooks looks;
+  looks.materials.assign(1, Material{});
+  const ColorGrid grid{6, 6};
+  const int64_t far = (int64_t{1} << 40) - 1;
+  auto one_triangle = [](const oracle::Triangle& triangle) {
+    FixedSurface surface;
+    surface.position = fixed(triangle);
+    return std::vector<FixedSurface>{surface};
+  };
+  for (const int64_t h : {int64_t{0}, int64_t{1}}) {
+    const auto narrow = one_triangle({{{-9999, -9999, 4001 - h * 9000},
+                                       {99999, -9999, 4001 + h * 100998},
+                                       {-9999, 99999, 4001 - h * 9000}}});
+    const auto wide = one_triangle({{{-9999, -9999, 4001 - h * 9000},
+                                     {far, -9999, 4001 + h * (far + 999)},
+                                     {-9999, far, 4001 - h * 9000}}});
+    const Sums few = bake_grid(grid, 0, narrow, looks);
+    EXPECT_GE(few.size(), 4096u);
+    EXPECT_EQ(bake_grid(grid, 0, wide, looks), few);
+  }
+}
+
+// The example of docs/color.md.
+TEST(BakeRegion, WorkedExample) {
+  TestLooks looks;
+  looks.materials.assign(1, Material{});
+  looks.materials[0].factor = {32768, 65535, 65535, 65535};
+  FixedSurface surface;
+  surface.position = fixed({{{1, 1, 129}, {1023, 1, 129}, {1, 1023, 129}}});
+  const Sums sums = bake_grid({2, 2}, 0, {surface}, looks);
+  EXPECT_EQ(sums.size(), 13u);  // the longest edge passes through corners of three
+  EXPECT_EQ(sums.at({0, 0, 0}).weight, 1024u);
+  EXPECT_EQ(color_of(sums.at({0, 0, 0})), (Color{{188, 255, 255}, 255}));
+}
+
+// Coordinates of positions and textures at their limits; undefined behavior is for the sanitizers.
+TEST(BakeRegion, HostileCoordinates) {
+  const TestLooks looks;
+  const int64_t far = (int64_t{1} << 40) - 1;
+  const ColorGrid grid{20, 4};
+  oracle::Random random(11);
+  oracle::Triangles triangles;
+  for (int i = 0; i < 60; ++i) {
+    oracle::Triangle t;
+    for (auto& vertex : t)
+      for (auto& x : vertex)
+        x = random.coin() ? (random.coin() ? far : -far) : random.odd(-(1 << 29), 1 << 29);
+    triangles.push_back(t);
+  }
+  auto surfaces = looks.surfaces(triangles, 9, int64_t{1} << 40);
+  const Sums sums = bake_grid(grid, 0, surfaces, looks);
+  EXPECT_GT(sums.size(), 100u);
+  EXPECT_EQ(bake_grid(grid, 1, surfaces, looks), sums);
+  for (const auto& [position, sum] : sums) {
+    EXPECT_LE(sum.seen_weight, 255 * sum.weight);
+    for (size_t c = 0; c < 3; ++c) {
+      EXPECT_LE(sum.plain[c], 65535 * sum.weight);
+      EXPECT_LE(sum.seen[c], 65535 * sum.seen_weight);
+    }
+  }
+}
+
+// The same bits by every compiler, at every level of optimization.
+TEST(BakeRegion, GoldenDigest) {
+  const TestLooks looks;
+  uint64_t digest = 0, covered = 0;
+  // Those whose random numbers all compilers draw in the same order.
+  for (const SceneKind kind :
+       {SceneKind::kDegenerate, SceneKind::kSliver, SceneKind::kWalls, SceneKind::kDiagonal,
+        SceneKind::kSpanning, SceneKind::kThroughCorners, SceneKind::kCrossing, SceneKind::kWide})
+    for (const ColorGrid grid : {ColorGrid{5, 5}, ColorGrid{9, 4}, ColorGrid{20, 3}}) {
+      for (const auto& [at, sum] : bake_grid(grid, 0, scene(looks, kind, 2, grid, 60), looks)) {
+        covered += sum.weight >= 64;
+        const Color color = color_of(sum);
+        for (const uint64_t word :
+             {sum.seen[0], sum.seen[1], sum.seen[2], sum.plain[0], sum.plain[1], sum.plain[2],
+              sum.weight, sum.seen_weight,
+              uint64_t{color.rgb[0]} << 24 | color.rgb[1] << 16 | color.rgb[2] << 8 | color.alpha})
+          digest = mix_bits(digest ^ word) + at[0];
+      }
+    }
+  EXPECT_GT(covered, 10000u);
+  EXPECT_EQ(digest, 10497593858233737049u);
+}
+
+}  // namespace
+}  // namespace voxdag

@@ -1,0 +1,75 @@
+#include "core/format/artifact/artifact_copy.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/oracle/core_types.h"
+#include "tests/unit/core/format/test_artifacts.h"
+#include "tests/unit/core/format/test_files.h"
+
+namespace voxdag {
+namespace {
+
+// A subvolume of 32^3 voxels, built on a grid of 2^10, as an artifact and as a cache entry of it.
+class ArtifactCopyTest : public testing::Test {
+ protected:
+  ArtifactCopyTest() {
+    SegmentWriter segment(system_files(), folder_.path(), 0, budget_);
+    const ArtifactRoot root{{5, {7, 0, 31}}, 0, dag_.root_hash, dag_.voxels, dag_.svo_nodes};
+    // Another artifact first, so that its offsets differ from the entry's.
+    write_artifact(segment, random_rows(1, 50, 10, 1, 64), 10, 64);
+    const ArtifactRef ref =
+        write_artifact(segment, oracle::as_sub_dag(dag_, 10), 10, 64, {&root, 1});
+    write_cache_entry(system_files(), entry_path_, entry_path_ + ".partial",
+                      *system_files().open_read(segment_path(folder_.path(), 0)), ref);
+  }
+  // Reads the entry and copies its artifact for `cube` of a grid of 2^14 voxels per edge.
+  ArtifactReader copy(const Cube& cube) {
+    const CacheEntry entry = read_cache_entry(system_files(), entry_path_);
+    SegmentWriter segment(system_files(), folder_.path(), 1, budget_);
+    const ArtifactRef ref = copy_artifact(*entry.file, entry.ref, cube, 14, segment);
+    segment.flush();
+    return ArtifactReader(system_files().open_read(segment_path(folder_.path(), 1)), ref);
+  }
+
+  TemporaryFolder folder_;
+  MemoryBudget budget_{uint64_t{16} << 20};
+  const oracle::Dag dag_ = oracle::build_dag(random_voxels(4, 32), 64);
+  const std::string entry_path_ = folder_.file("entry.vdart");
+};
+
+// The same rows at another place of another grid, roots and numbers as they were built.
+TEST_F(ArtifactCopyTest, MovesASubDagToAnotherCube) {
+  const Cube cube{9, {1, 2, 3}};
+  const ArtifactReader reader = copy(cube);
+  EXPECT_EQ(read_artifact(reader), oracle::as_sub_dag(dag_, 14));
+  ASSERT_EQ(reader.roots().size(), 1u);
+  EXPECT_EQ(reader.roots()[0].cube, cube);
+  EXPECT_EQ(reader.roots()[0].voxels, dag_.voxels);
+  const CacheEntry entry = read_cache_entry(system_files(), entry_path_);
+  EXPECT_EQ(entry.root.svo_nodes, dag_.svo_nodes);
+  EXPECT_EQ(entry.dag_nodes, dag_.dag_nodes);
+}
+
+TEST_F(ArtifactCopyTest, CubesOfAnotherSizeAreRefused) {
+  EXPECT_EQ(error_of([&] { copy({8, {1, 2, 3}}); }).code(), ErrorCode::kCorrupt);
+}
+
+// Entries are not synced, so a power cut may leave anything: it is an Error, never a wrong
+// artifact.
+TEST_F(ArtifactCopyTest, EveryBitFlipAndTruncationIsCaught) {
+  const ByteString bytes = read_bytes(entry_path_);
+  const auto file = system_files().open_write(entry_path_);
+  for (size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
+    const char flipped = static_cast<char>(bytes[bit / 8] ^ 1 << bit % 8);
+    file->write_at(bit / 8, std::as_bytes(std::span(&flipped, 1)));
+    EXPECT_THROW(copy({9, {1, 2, 3}}), Error) << "bit " << bit;
+    file->write_at(bit / 8, std::as_bytes(std::span(&bytes[bit / 8], 1)));
+  }
+  for (size_t size = bytes.size(); size-- > 0;) {
+    std::filesystem::resize_file(entry_path_, size);
+    EXPECT_THROW(copy({9, {1, 2, 3}}), Error) << size << " bytes";
+  }
+}
+
+}  // namespace
+}  // namespace voxdag

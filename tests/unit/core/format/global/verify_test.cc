@@ -1,0 +1,330 @@
+#include "core/format/global/verify.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <functional>
+
+#include "core/format/checksum.h"
+#include "core/format/global/diff.h"
+#include "core/format/global/global_layout.h"
+#include "core/format/global/open_global.h"
+#include "tests/unit/core/format/test_files.h"
+
+namespace voxdag {
+namespace {
+
+using namespace global_layout;
+using testing::HasSubstr;
+
+void verify(const std::string& path, unsigned threads, uint64_t narrow_words = kNarrowLevelWords) {
+  MemoryBudget budget(uint64_t{1} << 30);
+  NoProgress progress;
+  const CancelToken cancel;
+  const auto file = open_global_file(path);
+  with_reader_errors(
+      [&] { verify_global_file(*file, threads, budget, progress, cancel, narrow_words); });
+}
+void verify(const std::string& path) { verify(path, 3); }
+
+template <class T>
+void put(ByteString& bytes, size_t at, T value) {
+  std::memcpy(bytes.data() + at, &value, sizeof(value));
+}
+
+template <class T>
+T get(const ByteString& bytes, size_t at) {
+  T value;
+  std::memcpy(&value, bytes.data() + at, sizeof(value));
+  return value;
+}
+
+uint64_t checksum_of(const ByteString& bytes, size_t begin, size_t size) {
+  return checksum64(std::as_bytes(std::span(bytes)).subspan(begin, size));
+}
+
+// Corrects all checksums, so that only the contents are wrong.
+void reseal(ByteString& bytes) {
+  const size_t table = get<uint64_t>(bytes, kTableOffsetAt);
+  for (size_t begin = kPageBytes, i = 0; begin < table; begin += kChecksumBlockBytes, ++i)
+    put(bytes, table + 8 * i,
+        checksum_of(bytes, begin, std::min<size_t>(kChecksumBlockBytes, table - begin)));
+  put(bytes, kTableChecksumAt, checksum_of(bytes, table, bytes.size() - table));
+  put(bytes, kHeaderChecksumAt, checksum_of(bytes, 0, kHeaderChecksumAt));
+}
+
+class VerifyTest : public testing::Test {
+ protected:
+  TemporaryFolder folder_;
+  const std::string path_ = folder_.file("scene.vdag");
+};
+
+// For any voxels and hash bits, the writer's file of a correct DAG passes.
+TEST_F(VerifyTest, RightFilesPass) {
+  for (const int edge : {4, 8, 16, 64, 128})
+    for (const uint32_t hash_bits : {4u, 16u, 64u}) {
+      SCOPED_TRACE("edge " + std::to_string(edge) + ", hash bits " + std::to_string(hash_bits));
+      write_global(path_, random_voxels(hash_bits, edge), hash_bits);
+      EXPECT_NO_THROW(verify(path_));
+    }
+  write_global(path_, oracle::Voxels(32));
+  EXPECT_NO_THROW(verify(path_));
+}
+
+// A file of 8^3 voxels, each of its bits turned in place and turned back.
+TEST_F(VerifyTest, EveryBitFlipIsCaught) {
+  write_global(path_, random_voxels(5, 8));
+  const ByteString bytes = read_bytes(path_);
+  const auto file = system_files().open_write(path_);
+  for (size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
+    const char flipped = static_cast<char>(bytes[bit / 8] ^ 1 << bit % 8);
+    file->write_at(bit / 8, std::as_bytes(std::span(&flipped, 1)));
+    EXPECT_THROW(verify(path_), Error) << "bit " << bit;
+    file->write_at(bit / 8, std::as_bytes(std::span(&bytes[bit / 8], 1)));
+  }
+  EXPECT_NO_THROW(verify(path_));
+}
+
+TEST_F(VerifyTest, EveryTruncationIsCaught) {
+  write_global(path_, random_voxels(5, 8));
+  for (size_t size = read_bytes(path_).size(); size-- > 0;) {
+    std::filesystem::resize_file(path_, size);
+    EXPECT_THROW(verify(path_), Error) << size << " bytes";
+  }
+}
+
+TEST_F(VerifyTest, TrailingBytesAreCaught) {
+  write_global(path_, random_voxels(5, 8));
+  for (const size_t more : {1u, 8u, 4096u}) {
+    write_bytes(path_, read_bytes(path_) + ByteString(more, '\0'));
+    EXPECT_THROW(verify(path_), Error) << more << " bytes";
+  }
+}
+
+// A block in the middle of a large file is named.
+TEST_F(VerifyTest, DamagedBlockIsNamed) {
+  oracle::Random random(1);
+  oracle::Voxels noise(128);
+  const auto at_random = [&] { return static_cast<int>(random.between(0, 127)); };
+  for (int i = 0; i < 60000; ++i) noise.set(at_random(), at_random(), at_random());
+  write_global(path_, noise);
+  ByteString bytes = read_bytes(path_);
+  ASSERT_GT(bytes.size(), kPageBytes + 2 * kChecksumBlockBytes);
+  bytes[kPageBytes + kChecksumBlockBytes + 100] ^= 1;
+  write_bytes(path_, bytes);
+  EXPECT_THAT(error_of([&] { verify(path_); }).message(),
+              HasSubstr("bytes 69632 to 135167: the block fails its checksum"));
+}
+
+// DAGs that break one rule each, in files whose checksums are right.
+struct BrokenDag {
+  const char* rule;
+  std::function<void(oracle::Dag&)> break_it;
+  const char* message;
+};
+
+// A brick that no node refers to, in its right place among the others.
+void add_lonely_brick(oracle::Dag& dag) {
+  const uint64_t lonely = 0x0123456789abcdef;
+  dag.bricks.push_back(lonely);
+  std::sort(dag.bricks.begin(), dag.bricks.end(),
+            [](uint64_t a, uint64_t b) { return oracle::brick_hash(a) < oracle::brick_hash(b); });
+  const auto at = std::find(dag.bricks.begin(), dag.bricks.end(), lonely) - dag.bricks.begin();
+  for (oracle::Node& node : dag.levels[0])
+    for (uint32_t& child : node.children) child += child >= at;
+}
+
+// The root without its last child as one more root.
+void add_second_root(oracle::Dag& dag) {
+  std::vector<oracle::Node>& roots = dag.levels.back();
+  oracle::Node root = roots[0];
+  root.mask &= (1u << (std::bit_width(root.mask) - 1)) - 1;
+  root.children.pop_back();
+  std::vector<uint64_t> hashes;
+  for (const uint32_t child : root.children)
+    hashes.push_back(dag.levels[dag.levels.size() - 2][child].hash);
+  root.hash = oracle::node_hash(root.mask, hashes);
+  roots.push_back(root);
+  std::sort(roots.begin(), roots.end());
+}
+
+void PrintTo(const BrokenDag& broken, std::ostream* out) { *out << broken.rule; }
+
+class BrokenDagTest : public VerifyTest, public testing::WithParamInterface<BrokenDag> {};
+
+TEST_P(BrokenDagTest, IsCaughtAndNamed) {
+  oracle::Dag dag = oracle::build_dag(random_voxels(7, 32), 64);
+  ASSERT_GT(dag.bricks.size(), 8u);
+  ASSERT_GT(dag.levels[0].size(), 4u);
+  GetParam().break_it(dag);
+  write_global(path_, dag, grid_of(32));
+  const Error error = error_of([&] { verify(path_); });
+  EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+  EXPECT_THAT(error.message(), HasSubstr(GetParam().message));
+  EXPECT_THAT(error.message(), HasSubstr(path_));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Rules, BrokenDagTest,
+    testing::Values(
+        BrokenDag{"bricks ordered", [](auto& dag) { std::swap(dag.bricks[2], dag.bricks[3]); },
+                  "level 3, word 6: the brick does not follow"},
+        BrokenDag{"bricks unique", [](auto& dag) { dag.bricks[3] = dag.bricks[2]; },
+                  "level 3, word 6: the brick does not follow"},
+        BrokenDag{"no empty brick", [](auto& dag) { dag.bricks[3] = 0; },
+                  "level 3, word 6: the brick is empty"},
+        BrokenDag{"nodes ordered", [](auto& dag) { std::swap(dag.levels[0][1], dag.levels[0][2]); },
+                  "does not follow the one before it in the total order"},
+        BrokenDag{"nodes unique", [](auto& dag) { dag.levels[0][2] = dag.levels[0][1]; },
+                  "does not follow the one before it in the total order"},
+        BrokenDag{"all bricks reachable", add_lonely_brick, " has no parent"},
+        BrokenDag{"mask within 8 bits", [](auto& dag) { dag.levels[0][0].mask |= 256; },
+                  "level 2, word 0: child mask "},
+        BrokenDag{"mask not 0",
+                  [](auto& dag) {
+                    dag.levels[0][0].mask = 0;
+                    dag.levels[0][0].children.clear();
+                  },
+                  "level 2, word 0: child mask 0, expected 1 to 255"},
+        BrokenDag{"one root", add_second_root, "level 0: 2 roots, expected 1"},
+        BrokenDag{"voxels counted", [](auto& dag) { ++dag.voxels; }, "voxels, the DAG has "},
+        BrokenDag{"octree nodes counted", [](auto& dag) { --dag.svo_nodes; },
+                  "octree nodes, the DAG has "}));
+
+// Word offsets that are within the level but begin no node, or are beyond it.
+TEST_F(VerifyTest, ChildrenThatBeginNoNodeAreNamed) {
+  const oracle::Dag dag = oracle::build_dag(random_voxels(7, 32), 64);
+  for (const uint32_t offset : {1u, 1000000u, 0xffffffffu}) {
+    write_global(path_, dag, grid_of(32));
+    ByteString bytes = read_bytes(path_);
+    const size_t parents = get<uint64_t>(bytes, kLevelsAt + 2 * kLevelEntryBytes);
+    put(bytes, parents + 4, offset);
+    reseal(bytes);
+    write_bytes(path_, bytes);
+    EXPECT_THAT(error_of([&] { verify(path_); }).message(),
+                HasSubstr("level 2, word 1: a child at word " + std::to_string(offset) +
+                          ", where no node of level 3 begins"));
+  }
+}
+
+// Bytes that must be zero, with right checksums.
+TEST_F(VerifyTest, NonZeroReservedBytesAndPaddingAreCaught) {
+  write_global(path_, random_voxels(5, 8));
+  const ByteString bytes = read_bytes(path_);
+  const size_t levels_end = kLevelsAt + 2 * kLevelEntryBytes;
+  for (const size_t at :
+       {kAttributeCountAt, kLevelsAt + 24, levels_end, kAttributesAt, kReservedAt,
+        kHeaderChecksumAt - 1, size_t{2 * kPageBytes - 1}, size_t{3 * kPageBytes - 1}}) {
+    ByteString changed = bytes;
+    changed[at] = 1;
+    reseal(changed);
+    write_bytes(path_, changed);
+    EXPECT_THAT(error_of([&] { verify(path_); }).message(),
+                HasSubstr("byte " + std::to_string(at) + ": "));
+  }
+}
+
+TEST_F(VerifyTest, OtherNodeOrdersAreNotRead) {
+  write_global(path_, random_voxels(5, 8));
+  ByteString bytes = read_bytes(path_);
+  put(bytes, kNodeOrderAt, uint32_t{2});
+  reseal(bytes);
+  write_bytes(path_, bytes);
+  EXPECT_EQ(error_of([&] { verify(path_); }).code(), ErrorCode::kUnsupportedVersion);
+}
+
+// Several defects in a file of many spans: any number of threads reports the first.
+TEST_F(VerifyTest, TheFirstDefectIsReported) {
+  oracle::Random random(3);
+  oracle::Voxels noise(256);
+  const auto at_random = [&] { return static_cast<int>(random.between(0, 255)); };
+  for (int i = 0; i < 1600000; ++i) noise.set(at_random(), at_random(), at_random());
+  write_global(path_, noise);
+  const ByteString bytes = read_bytes(path_);
+  const auto words_end = static_cast<int64_t>(get<uint64_t>(bytes, kTableOffsetAt));
+  for (int round = 0; round < 8; ++round) {
+    ByteString changed = bytes;
+    for (int i = 0; i < 4; ++i)
+      changed[static_cast<size_t>(random.between(kPageBytes, words_end - 1))] ^= 1;
+    reseal(changed);
+    write_bytes(path_, changed);
+    const std::string message = error_of([&] { verify(path_, 1); }).message();
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(error_of([&] { verify(path_, 4); }).message(), message);
+  }
+}
+
+// Hash bits are part of the order: a file that claims others than it was made with is caught.
+TEST_F(VerifyTest, WrongHashBitsAreCaught) {
+  write_global(path_, random_voxels(3, 64), 64);
+  ByteString bytes = read_bytes(path_);
+  put(bytes, kHashBitsAt, uint32_t{8});
+  reseal(bytes);
+  write_bytes(path_, bytes);
+  EXPECT_THROW(verify(path_), Error);
+}
+
+// Random changes under right checksums: never a crash, and a file that passes is one whose walk
+// agrees with its header.
+class MutationTest : public VerifyTest, public testing::WithParamInterface<uint64_t> {};
+
+TEST_P(MutationTest, NeverCrashesAReader) {
+  const std::string original = folder_.file("original.vdag");
+  write_global(original, oracle::build_dag(random_voxels(11, 16), 64), grid_of(16), 64, GetParam());
+  const ByteString bytes = read_bytes(original);
+  const auto whole = open_global_file(original);
+  write_bytes(path_, bytes);
+  const auto file_to_change = system_files().open_write(path_);
+  const size_t words_end = get<uint64_t>(bytes, kTableOffsetAt);
+  int refused = 0;
+  for (uint64_t seed = 0; seed < 5000; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    oracle::Random random(seed);
+    ByteString changed = bytes;
+    for (int64_t i = random.between(1, 4); i > 0; --i) {
+      // In the header's fields, in a level's first words, or anywhere.
+      const size_t at = static_cast<size_t>(
+          random.coin()   ? random.between(0, 300)
+          : random.coin() ? random.between(1, 3) * 4096 + random.between(0, 60)
+                          : random.between(0, static_cast<int64_t>(words_end) - 1));
+      changed[at] =
+          static_cast<char>(random.coin() ? random.between(0, 16) : random.between(0, 255));
+    }
+    const uint64_t table = get<uint64_t>(changed, kTableOffsetAt);
+    if (table >= kPageBytes && table + 8 == changed.size()) reseal(changed);
+    put(changed, kHeaderChecksumAt, checksum_of(changed, 0, kHeaderChecksumAt));
+    file_to_change->write_at(0, std::as_bytes(std::span(changed)));
+    try {
+      const auto file = open_global_file(path_);
+      with_reader_errors([&] {
+        for (int i = 0; i < 64; ++i)
+          file->voxel(random.between(-1, 16), random.between(-1, 16), random.between(-1, 16));
+      });
+      if (file->grid_levels() == 4) {
+        MemoryBudget budget(uint64_t{1} << 30);
+        const CancelToken cancel;
+        diff_global_files(*file, *whole, 2, budget, cancel);
+      }
+      verify(path_, 3, GetParam());
+      struct {
+        bool node(uint32_t, int64_t, int64_t, int64_t, uint64_t) { return true; }
+        void brick(int64_t, int64_t, int64_t, uint64_t mask, uint64_t) {
+          voxels += static_cast<uint64_t>(popcount64(mask));
+        }
+        uint64_t voxels = 0;
+      } counter;
+      file->walk(counter);
+      EXPECT_EQ(counter.voxels, file->voxels());
+    } catch (const Error& error) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 2500);
+}
+
+INSTANTIATE_TEST_SUITE_P(NarrowWords, MutationTest, testing::Values(2, kNarrowLevelWords),
+                         testing::PrintToStringParamName());
+
+}  // namespace
+}  // namespace voxdag

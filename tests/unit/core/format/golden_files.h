@@ -1,0 +1,21 @@
+// What the files in tests/golden were made from.
+#pragma once
+
+#include "tests/unit/core/format/test_artifacts.h"
+#include "tests/unit/core/format/test_files.h"
+
+namespace voxdag {
+
+// The worked example of docs/format.md: on a grid of 8^3, the floor y = 0 and a pillar of height 8
+// on its corner.
+inline oracle::Dag floor_and_pillar() {
+  oracle::Voxels voxels(8);
+  for (int x = 0; x < 8; ++x)
+    for (int z = 0; z < 8; ++z) voxels.set(x, 0, z);
+  for (int y = 0; y < 8; ++y) voxels.set(0, y, 0);
+  return oracle::build_dag(voxels, 64);
+}
+
+inline Grid floor_and_pillar_grid() { return Grid::given({-1, 0, -1}, 2, 3); }
+
+}  // namespace voxdag

@@ -1,0 +1,163 @@
+#include "core/geometry/grid.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "core/base/error.h"
+#include "tests/support/error_of.h"
+
+namespace voxdag {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+WorldBounds bounds(std::array<double, 3> low, std::array<double, 3> high) {
+  WorldBounds b;
+  b.low = low;
+  b.high = high;
+  b.empty = false;
+  return b;
+}
+
+void expect_error(ErrorCode code, const std::function<void()>& call) {
+  try {
+    call();
+    ADD_FAILURE() << "no error, expected " << error_name(code);
+  } catch (const Error& error) {
+    EXPECT_STREQ(error_name(error.code()), error_name(code)) << error.message();
+  }
+}
+
+// Bounds grow from nothing, by all three vertices of every triangle.
+TEST(WorldBounds, GrowByTriangles) {
+  WorldBounds b = bounds_of({});
+  EXPECT_TRUE(b.empty);
+  const WorldTriangle point{{{5, -6, 7}, {5, -6, 7}, {5, -6, 7}}};
+  b.add(bounds_of({&point, 1}));
+  EXPECT_FALSE(b.empty);
+  EXPECT_EQ(b.low, (std::array<double, 3>{5, -6, 7}));
+  EXPECT_EQ(b.low, b.high);
+  for (int i = 0; i < 3; ++i) {
+    WorldTriangle triangles[2] = {point, point};
+    triangles[1].v[i][0] = 4;
+    triangles[0].v[i][1] = 6;
+    const WorldBounds grown = bounds_of(triangles);
+    EXPECT_EQ(grown.low, (std::array<double, 3>{4, -6, 7})) << i;
+    EXPECT_EQ(grown.high, (std::array<double, 3>{5, 6, 7})) << i;
+  }
+}
+
+// The default cube, from manually computed numbers (all exact in binary).
+TEST(Grid, DefaultCubeIsThatOfTheDesign) {
+  const Grid grid = Grid::around(bounds({-1, 2, 10}, {7, 4, 11}), 10);
+  EXPECT_EQ(grid.levels, 10u);
+  EXPECT_EQ(grid.resolution(), 1024);
+  EXPECT_EQ(grid.edge, 8.000244140625);  // 8 (1 + 2^-15)
+  EXPECT_EQ(grid.origin[0], 3 - 4.0001220703125);
+  EXPECT_EQ(grid.origin[1], 3 - 4.0001220703125);
+  EXPECT_EQ(grid.origin[2], 10.5 - 4.0001220703125);
+}
+
+// The cube depends on the scene alone: a finer grid splits the voxels of a coarser one, so voxel
+// positions of all resolutions nest.
+TEST(Grid, VoxelsNestAcrossResolutions) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int i = 0; i < 2000; ++i) {
+    const double scale = std::ldexp(1.0, static_cast<int>(random() % 60) - 30);
+    WorldTriangle t;
+    for (auto& vertex : t.v)
+      for (double& x : vertex) x = scale * (uniform(random) + (i % 3 ? 0 : 100));
+    const WorldBounds b = bounds_of({&t, 1});
+    FixedTriangle coarse, fine;
+    for (uint32_t levels = 2; levels < 20; ++levels) {
+      const Grid grid = Grid::around(b, levels), next = Grid::around(b, levels + 1);
+      ASSERT_EQ(grid.edge, next.edge);
+      ASSERT_EQ(grid.origin, next.origin);
+      ASSERT_EQ(snap_triangle(grid, t, coarse), SnapResult::kInside);
+      ASSERT_EQ(snap_triangle(next, t, fine), SnapResult::kInside);
+      for (int k = 0; k < 9; ++k) {
+        const int64_t u = coarse.v[k / 3][k % 3], w = fine.v[k / 3][k % 3];
+        ASSERT_EQ(u & 1, 1);
+        ASSERT_EQ(u >> 8, w >> 9) << "levels " << levels;
+        ASSERT_TRUE(u > 0 && u < grid.resolution() * kUnitsPerVoxel) << u;
+      }
+    }
+  }
+}
+
+// A scene without triangles or extent still has a cube: edge 1 around it.
+TEST(Grid, WithoutExtentHasEdgeOne) {
+  const Grid none = Grid::around(WorldBounds{}, 4);
+  EXPECT_EQ(none.edge, 1.0);
+  EXPECT_EQ(none.origin, (std::array<double, 3>{-0.5, -0.5, -0.5}));
+  const Grid point = Grid::around(bounds({3, 4, 5}, {3, 4, 5}), 4);
+  EXPECT_EQ(point.edge, 1.0);
+  EXPECT_EQ(point.origin, (std::array<double, 3>{2.5, 3.5, 4.5}));
+}
+
+// An extent beyond the doubles is an error, not a grid of infinities.
+TEST(Grid, ExtentMustBeFinite) {
+  const double most = std::numeric_limits<double>::max();
+  expect_error(ErrorCode::kLimit, [&] { Grid::around(bounds({-most, 0, 0}, {most, 0, 0}), 4); });
+}
+
+// The cube a user gives is taken as it is; nonsense is refused.
+TEST(Grid, GivenCube) {
+  const Grid grid = Grid::given({1, 2, 3}, 0.3, 5);
+  EXPECT_EQ(grid.origin, (std::array<double, 3>{1, 2, 3}));
+  EXPECT_EQ(grid.edge, 0.3);
+  EXPECT_EQ(grid.levels, 5u);
+  for (const double edge : {0.0, -1.0, kInfinity, kNan})
+    expect_error(ErrorCode::kInvalidInput, [&] { Grid::given({0, 0, 0}, edge, 5); });
+  for (const double x : {kInfinity, -kInfinity, kNan})
+    expect_error(ErrorCode::kInvalidInput, [&] { Grid::given({0, x, 0}, 1, 5); });
+}
+
+// --voxel-size: edge = V R, centered; a scene that fills it or more does not fit.
+TEST(Grid, OfAVoxelSize) {
+  const WorldBounds b = bounds({0, 10, 20}, {4, 11, 21});
+  const Grid grid = Grid::with_voxel_size(b, 0.5, 4);
+  EXPECT_EQ(grid.edge, 8.0);
+  EXPECT_EQ(grid.origin, (std::array<double, 3>{-2, 6.5, 16.5}));
+  expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, 0.25, 4); });
+  expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, 0.125, 4); });
+  EXPECT_EQ(Grid::with_voxel_size(WorldBounds{}, 2, 2).edge, 8.0);
+  for (const double size : {0.0, -1.0, kInfinity, kNan})
+    expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, size, 4); });
+}
+
+// A grid whose origin or edge is not a finite number cannot be stored: it is refused, where it used
+// to give a file that no command opens.
+TEST(GridLimits, AGridOutOfTheRangeOfDoublesIsRefused) {
+  const WorldBounds far = bounds({1.5e308, 0, 0}, {1.5e308, 1, 1});
+  EXPECT_EQ(error_of([&] { Grid::around(far, 6); }).code(), ErrorCode::kLimit);
+  EXPECT_EQ(error_of([&] { Grid::with_voxel_size(far, 1, 6); }).code(), ErrorCode::kLimit);
+  EXPECT_EQ(error_of([] { Grid::with_voxel_size({}, 1e308, 10); }).code(), ErrorCode::kLimit);
+  EXPECT_TRUE(std::isfinite(Grid::with_voxel_size({}, 1e304, 10).origin[0]));
+}
+
+// Four to 2^20 voxels per edge, powers of two only.
+TEST(Grid, ResolutionsAreLimited) {
+  for (uint32_t levels = 2; levels <= 20; ++levels) {
+    EXPECT_EQ(levels_of_resolution(uint64_t{1} << levels), levels);
+    EXPECT_NO_THROW(Grid::around(WorldBounds{}, levels));
+  }
+  for (const uint64_t r : {uint64_t{0}, uint64_t{1}, uint64_t{2}, uint64_t{5}, uint64_t{1023},
+                           uint64_t{1} << 21, (uint64_t{1} << 32) + 4, UINT64_MAX})
+    expect_error(ErrorCode::kInvalidInput, [&] { levels_of_resolution(r); });
+  for (const uint32_t levels : {0u, 1u, 21u, 64u, 0xffffffffu}) {
+    expect_error(ErrorCode::kInvalidInput, [&] { Grid::around(WorldBounds{}, levels); });
+    expect_error(ErrorCode::kInvalidInput, [&] { Grid::given({0, 0, 0}, 1, levels); });
+    expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size({}, 1, levels); });
+  }
+}
+
+}  // namespace
+}  // namespace voxdag

@@ -1,0 +1,318 @@
+// Regression tests of defects that attacks on builds found.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <thread>
+
+#include "core/base/error.h"
+#include "scheduler/plan_build.h"
+#include "scheduler/run_build.h"
+#include "scheduler/state/build_locks.h"
+#include "scheduler/state/job_store.h"
+#include "scheduler/state/work_folder.h"
+#include "tests/support/error_of.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/unit/scheduler/interruptions.h"
+#include "tests/unit/scheduler/metered_files.h"
+#include "tests/unit/scheduler/spheres_build.h"
+
+namespace voxdag {
+namespace {
+
+class Warnings : public NoProgress {
+ public:
+  void warn(std::string_view message) override {
+    text += std::string(message) + "\n";
+    if (on_warning) on_warning();
+  }
+  std::string text;
+  std::function<void()> on_warning;
+};
+
+class BuildProtection : public testing::Test {
+ protected:
+  void SetUp() override { write_spheres(scene(), 20000); }
+  std::string scene() const { return folder_.file("scene.glb"); }
+  std::string output() const { return folder_.file("out.vdag"); }
+  BuildSpec spec() const { return spheres_build(scene(), output()); }
+  BuildContext context() { return {files_, warnings_, cancel_}; }
+
+  const TemporaryFolder folder_;
+  MeteredFiles files_;
+  Warnings warnings_;
+  CancelToken cancel_;
+};
+
+// A build that was killed holds its locks until the system has taken it apart. The next one waits
+// for each of them, and says so.
+TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
+  for (const std::string& path : {OutputLock::path_of(output()), output() + ".work/lock"}) {
+    SCOPED_TRACE(path);
+    std::filesystem::create_directories(output() + ".work");
+    auto held = system_files().try_lock(path);
+    ASSERT_TRUE(held);
+    warnings_.text.clear();
+    warnings_.on_warning = [&] { held.reset(); };
+    const BuildReport report = run_build(spec(), context());
+    EXPECT_EQ(report.sha256.size(), 64u);
+    EXPECT_NE(warnings_.text.find("is in use by another build: waiting up to 30 s"),
+              std::string::npos)
+        << warnings_.text;
+    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
+  }
+}
+
+// A lock that stays is an error that a later try may not have: the service tries again.
+TEST_F(BuildProtection, ALockThatStaysIsATransientError) {
+  BuildSpec impatient = spec();
+  impatient.run.lock_wait_s = 0.1;
+  const OutputLock output_lock(files_, output());
+  const Error by_output = error_of([&] { run_build(impatient, context()); });
+  EXPECT_EQ(by_output.code(), ErrorCode::kIo);
+  EXPECT_NE(by_output.message().find("is being written by another process"), std::string::npos);
+  impatient.run.output = folder_.file("other.vdag");
+  const WorkFolder work(context(), folder_.file("other.vdag.work"), 0);
+  const Error by_folder = error_of([&] { run_build(impatient, context()); });
+  EXPECT_EQ(by_folder.code(), ErrorCode::kIo);
+  EXPECT_NE(by_folder.message().find("is in use by process"), std::string::npos);
+}
+
+// Whoever waits for a lock can be stopped.
+TEST_F(BuildProtection, WaitingCanBeCanceled) {
+  const OutputLock output_lock(files_, output());
+  std::thread user([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    cancel_.cancel();
+  });
+  const Error error = error_of([&] { run_build(spec(), context()); });
+  user.join();
+  EXPECT_EQ(error.code(), ErrorCode::kCanceled);
+}
+
+// A few bytes can describe billions of triangles: what neither memory nor disk can hold is refused
+// before it is read, by `plan` as well.
+TEST_F(BuildProtection, TrianglesThatFitNowhereAreRefusedBeforeTheyAreRead) {
+  write_spheres(scene(), 700000);
+  BuildSpec tight = spec();
+  tight.run.memory_bytes = uint64_t{64} << 20;
+  files_.free_bytes = 1'000'000;
+  const Error error = error_of([&] { run_build(tight, context()); });
+  EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
+  EXPECT_NE(error.message().find("triangles, which take"), std::string::npos) << error.message();
+  EXPECT_EQ(error.message().find("--force"), std::string::npos) << error.message();
+  EXPECT_FALSE(files_.bytes_written.contains(output() + ".work/triangles.vdspill"));
+  EXPECT_EQ(error_of([&] { plan_build(tight, context()); }).code(), ErrorCode::kNoSpace);
+  tight.run.memory_bytes = uint64_t{512} << 20;
+  EXPECT_NO_THROW(plan_build(tight, context()));
+}
+
+// The device of two folders decides whether one disk must hold everything, not their free space.
+TEST_F(BuildProtection, DisksAreToldApartByTheirDevice) {
+  BuildSpec large = spec();
+  large.geometry.resolution = 4096;
+  files_.free_bytes = 100'000;
+  const auto refusal = [&] { return error_of([&] { run_build(large, context()); }).message(); };
+  EXPECT_NE(refusal().find("the build is estimated"), std::string::npos) << refusal();
+  files_.other_disk = output() + ".work";
+  EXPECT_NE(refusal().find("the build's work folder is"), std::string::npos) << refusal();
+}
+
+// A build that waits for another one's output holds a lock that has a name once it gets it, even if
+// the other one has published its file: a third one has to wait.
+TEST_F(BuildProtection, ALockOfTheOutputHasAName) {
+  auto first = std::make_unique<OutputLock>(files_, output());
+  std::unique_ptr<OutputLock> second;
+  std::thread waiting([&] { second.reset(new OutputLock(lock_output(context(), output(), 30))); });
+  // What the first build does at its end, and before that if its merge restarts.
+  for (int file = 0; file < 2; ++file) {
+    std::ofstream(output() + ".partial") << "levels";
+    if (file) std::filesystem::rename(output() + ".partial", output());
+    std::filesystem::remove(output() + ".partial");
+    EXPECT_EQ(system_files().try_lock(OutputLock::path_of(output())), nullptr);
+  }
+  first.reset();
+  waiting.join();
+  EXPECT_EQ(error_of([&] { OutputLock(files_, output()); }).code(), ErrorCode::kIo);
+  second.reset();
+  EXPECT_FALSE(std::filesystem::exists(OutputLock::path_of(output())));
+}
+
+// The same with whole builds: the second waits, the third waits for the second, and the file is
+// that of the last.
+TEST_F(BuildProtection, ABuildHoldsItsOutputUntilItEnds) {
+  // Holds the lock while it looks, as the third build would.
+  class Looking : public NoProgress {
+   public:
+    explicit Looking(const std::string& output) : path_(OutputLock::path_of(output)) {}
+    void begin_stage(std::string_view, uint64_t, std::string_view) override { look(); }
+    void end_stage() override { look(); }
+    int looks = 0;
+
+   private:
+    void look() {
+      ++looks;
+      EXPECT_EQ(system_files().try_lock(path_), nullptr);
+    }
+    const std::string path_;
+  } looking(output());
+  const BuildReport report = run_build(spec(), {files_, looking, cancel_});
+  EXPECT_GT(looking.looks, 6);  // the last time after the output has got its name
+  EXPECT_EQ(report.sha256.size(), 64u);
+  EXPECT_FALSE(std::filesystem::exists(OutputLock::path_of(output())));
+}
+
+// A file of that name that is somebody else's stays.
+TEST_F(BuildProtection, AForeignFileOfTheLocksNameStays) {
+  std::ofstream(OutputLock::path_of(output())) << "mine";
+  run_build(spec(), context());
+  EXPECT_EQ(read_small_file(files_, OutputLock::path_of(output()), 10), "mine");
+}
+
+// A link in a work folder, or a pipe, does not lead a build to a file of somebody else.
+TEST_F(BuildProtection, LinksInTheWorkFolderAreNotFollowed) {
+  const std::string victim = folder_.file("victim.txt"), work = output() + ".work";
+  std::ofstream(victim) << "precious";
+  for (const char* name : {"lock", "triangles.vdspill", "segment-0.vdseg", "job.db", "merge"}) {
+    SCOPED_TRACE(name);
+    std::filesystem::create_directories(work);
+    std::filesystem::create_symlink(victim, work + "/" + name);
+    const Error by_build = error_of([&] { run_build(spec(), context()); });
+    EXPECT_EQ(by_build.code(), ErrorCode::kInvalidInput) << by_build.message();
+    BuildSpec planned = spec();
+    planned.run.work_folder = work;
+    EXPECT_EQ(error_of([&] { plan_build(planned, context()); }).code(), ErrorCode::kInvalidInput);
+    EXPECT_EQ(read_small_file(files_, victim, 100), "precious");
+    std::filesystem::remove_all(work);
+  }
+  std::filesystem::create_directories(work);
+  ASSERT_EQ(mkfifo((work + "/lock").c_str(), 0600), 0);
+  EXPECT_EQ(error_of([&] { run_build(spec(), context()); }).code(), ErrorCode::kInvalidInput);
+}
+
+// The folder of a plan is made for it and seen by nobody else, whatever names others have taken.
+TEST_F(BuildProtection, APlanTakesAFolderOfItsOwn) {
+  const std::string temporary = folder_.file("tmp"), victim = folder_.file("victim.txt");
+  const std::string foreseen = temporary + "/voxdag-plan-" + std::to_string(getpid());
+  std::filesystem::create_directories(foreseen);
+  std::ofstream(victim) << "precious";
+  std::filesystem::create_symlink(victim, foreseen + "/lock");
+  const char* before = std::getenv("TMPDIR");
+  const std::string restored = before ? before : "";
+  setenv("TMPDIR", temporary.c_str(), 1);
+  class Looking : public NoProgress {
+   public:
+    explicit Looking(std::string folder) : folder_(std::move(folder)) {}
+    void begin_stage(std::string_view, uint64_t, std::string_view) override {
+      for (const auto& entry : std::filesystem::directory_iterator(folder_))
+        if (std::filesystem::exists(entry.path() / "lock") &&
+            !std::filesystem::is_symlink(entry.path() / "lock"))
+          others_may |= (entry.status().permissions() & std::filesystem::perms(077)) !=
+                        std::filesystem::perms::none;
+        else
+          ++foreign;
+    }
+    bool others_may = false;
+    int foreign = 0;
+
+   private:
+    const std::string folder_;
+  } looking(temporary);
+  EXPECT_NO_THROW(plan_build(spec(), {files_, looking, cancel_}));
+  before ? setenv("TMPDIR", restored.c_str(), 1) : unsetenv("TMPDIR");
+  EXPECT_FALSE(looking.others_may);
+  EXPECT_GT(looking.foreign, 0);
+  EXPECT_EQ(read_small_file(files_, victim, 100), "precious");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temporary), {}), 1);
+}
+
+// Rows that got lost are an error, not a file without their voxels.
+TEST_F(BuildProtection, ABuildNoticesMissingRows) {
+  const std::string expected = run_build(spec(), context()).sha256;
+  std::filesystem::remove(output());
+  build_until(spec(), "build", 40);
+  SqlDatabase(output() + ".work/job.db", SqlDatabase::Mode::kReadWrite)
+      .execute("PRAGMA foreign_keys = OFF; DELETE FROM subvolume WHERE id % 2 = 0");
+  EXPECT_EQ(error_of([&] { run_build(spec(), context()); }).code(), ErrorCode::kCorrupt);
+  BuildSpec again = spec();
+  again.run.restart = true;
+  EXPECT_EQ(run_build(again, context()).sha256, expected);
+}
+
+// A damaged row of the job does not prevent starting over.
+TEST_F(BuildProtection, ADamagedJobStartsOver) {
+  build_until(spec(), "build", 5);
+  SqlDatabase(output() + ".work/job.db", SqlDatabase::Mode::kReadWrite)
+      .execute("UPDATE job SET subvolumes = subvolumes + 1");
+  EXPECT_EQ(error_of([&] { run_build(spec(), context()); }).code(), ErrorCode::kCorrupt);
+  BuildSpec again = spec();
+  again.run.restart = true;
+  EXPECT_EQ(run_build(again, context()).subvolumes_reused, 0u);
+}
+
+// A scene whose files have names of the build's own is refused, and they stay.
+TEST_F(BuildProtection, ABuildDoesNotDestroyItsScene) {
+  BuildSpec inside = spec();
+  inside.run.work_folder = folder_.file("w");
+  for (const char* name : {"segment-5.vdseg", "triangles.vdspill", "merge/merge-1"}) {
+    SCOPED_TRACE(name);
+    const std::string path = inside.run.work_folder + "/" + name;
+    std::filesystem::create_directories(inside.run.work_folder + "/merge");
+    std::filesystem::copy_file(scene(), path);
+    inside.geometry.scenes = {path};
+    EXPECT_EQ(error_of([&] { run_build(inside, context()); }).code(), ErrorCode::kInvalidInput);
+    EXPECT_EQ(error_of([&] { plan_build(inside, context()); }).code(), ErrorCode::kInvalidInput);
+    EXPECT_TRUE(std::filesystem::exists(path));
+    std::filesystem::remove_all(inside.run.work_folder);
+  }
+  const std::string text = folder_.file("scene.gltf");
+  for (const std::string name :
+       {"out.vdag.partial", "out.vdag.lock", "w/segment-5.vdseg", "w/triangles.vdspill"}) {
+    SCOPED_TRACE(name);
+    std::filesystem::create_directories(inside.run.work_folder);
+    std::ofstream(text) << R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+      "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+      "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3",
+        "min":[0,0,0],"max":[0,0,0]}],
+      "bufferViews":[{"buffer":0,"byteLength":36}],
+      "buffers":[{"byteLength":36,"uri":")"
+                        << name << R"("}]})";
+    std::ofstream(folder_.file(name)) << std::string(36, '\0');
+    inside.geometry.scenes = {text};
+    const Error error = error_of([&] { run_build(inside, context()); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+    EXPECT_NE(error.message().find("is read and would be"), std::string::npos) << error.message();
+    EXPECT_EQ(std::filesystem::file_size(folder_.file(name)), 36u);
+    std::filesystem::remove(folder_.file(name));
+  }
+}
+
+// Options that cannot be met are refused before anything is read or made.
+TEST_F(BuildProtection, OptionsAreCheckedFirst) {
+  BuildSpec wrong = spec();
+  wrong.geometry.voxel_size = 0;
+  EXPECT_EQ(error_of([&] { run_build(wrong, context()); }).code(), ErrorCode::kInvalidInput);
+  EXPECT_EQ(files_.bytes_read[scene()], 0u);
+  wrong = spec();
+  wrong.run.cache_folder = folder_.path() + "/./x/";
+  wrong.run.work_folder = folder_.file("x");
+  EXPECT_NE(error_of([&] { run_build(wrong, context()); }).message().find("two folders"),
+            std::string::npos);
+  for (std::string RunOptions::*folder : {&RunOptions::work_folder, &RunOptions::cache_folder}) {
+    wrong = spec();
+    wrong.run.*folder = scene();
+    const Error error = error_of([&] { run_build(wrong, context()); });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+    EXPECT_NE(error.message().find("expected a folder"), std::string::npos) << error.message();
+    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
+  }
+}
+
+}  // namespace
+}  // namespace voxdag

@@ -1,0 +1,153 @@
+#include "server/disk/disk_space.h"
+
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+#include "core/io/forwarding_files.h"
+#include "tests/support/temporary_folder.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr uint64_t kMiB = uint64_t{1} << 20;
+
+// A disk whose free space the test sets.
+class SmallDisk : public ForwardingFiles {
+ public:
+  SmallDisk() : ForwardingFiles(system_files()) {}
+  uint64_t free_space(const std::string&) override { return free; }
+  uint64_t free = 100 * kMiB;
+};
+
+// Writes until the disk is full; written bytes are no longer free.
+uint64_t fill(SmallDisk& disk, DiskSpace::Reservation& space, uint64_t bytes) {
+  constexpr uint64_t kPiece = kMiB / 4;
+  uint64_t written = 0;
+  try {
+    for (; written < bytes; written += kPiece) {
+      space.use(kPiece);
+      disk.free -= kPiece;
+    }
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
+  }
+  return written;
+}
+
+bool fits(DiskSpace& space, uint64_t announced) {
+  try {
+    DiskSpace::Reservation reservation(space, announced);
+    return true;
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
+    return false;
+  }
+}
+
+// An upload that cannot fit is refused when it begins, one of unknown size when the part of the
+// disk that stays free is reached.
+TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
+  const TemporaryFolder folder;
+  SmallDisk disk;
+  DiskSpace space(disk, folder.path(), 30 * kMiB);
+  EXPECT_TRUE(fits(space, 70 * kMiB));
+  EXPECT_FALSE(fits(space, 70 * kMiB + 1));
+  {
+    DiskSpace::Reservation whole(space, 70 * kMiB);
+    EXPECT_EQ(fill(disk, whole, 70 * kMiB), 70 * kMiB) << "all that was announced fits";
+    EXPECT_EQ(disk.free, 30 * kMiB);
+    EXPECT_FALSE(fits(space, 1));
+    EXPECT_FALSE(space.is_low());
+  }
+  disk.free = 90 * kMiB;
+  DiskSpace::Reservation unknown(space, 0);
+  const uint64_t written = fill(disk, unknown, 100 * kMiB);
+  EXPECT_LE(written, 60 * kMiB);
+  EXPECT_GT(written, 40 * kMiB);
+  EXPECT_FALSE(space.is_low());
+}
+
+// Those who announce all of the disk and send little of it keep nobody out; what they do send next
+// has its place.
+TEST(DiskReservations, UploadsThatSendSlowlyKeepNobodyOut) {
+  const TemporaryFolder folder;
+  SmallDisk disk;
+  DiskSpace space(disk, folder.path(), 30 * kMiB);
+  DiskSpace::Reservation slow(space, 70 * kMiB);
+  EXPECT_EQ(fill(disk, slow, kMiB), kMiB);
+  EXPECT_TRUE(fits(space, 60 * kMiB));
+  DiskSpace::Reservation other(space, 62 * kMiB);
+  EXPECT_EQ(fill(disk, other, 62 * kMiB), 62 * kMiB);
+  EXPECT_EQ(fill(disk, slow, 7 * kMiB), 7 * kMiB) << "was reserved";
+  EXPECT_EQ(fill(disk, slow, kMiB), 0u);
+  EXPECT_EQ(disk.free, 30 * kMiB);
+}
+
+// The same number of bytes is reserved at the end as at the beginning.
+TEST(DiskReservations, UploadsGiveBackWhatTheyReserved) {
+  const TemporaryFolder folder;
+  SmallDisk disk;
+  DiskSpace space(disk, folder.path(), 30 * kMiB);
+  for (const uint64_t announced : {uint64_t{0}, kMiB, 20 * kMiB}) {
+    DiskSpace::Reservation broken(space, announced);
+    fill(disk, broken, 9 * kMiB);
+    disk.free = 100 * kMiB;
+  }
+  EXPECT_TRUE(fits(space, 70 * kMiB));
+}
+
+// Other programs also write to the disk.
+TEST(DiskReservations, AnUploadStopsIfTheDiskFillsUp) {
+  const TemporaryFolder folder;
+  SmallDisk disk;
+  DiskSpace space(disk, folder.path(), 30 * kMiB);
+  DiskSpace::Reservation upload(space, 60 * kMiB);
+  disk.free = 20 * kMiB;
+  EXPECT_LE(fill(disk, upload, 60 * kMiB), 9 * kMiB);
+}
+
+TEST(DiskReservations, ABallastGivesRoomForDeletions) {
+  const TemporaryFolder folder;
+  SmallDisk disk;
+  disk.free = 0;
+  DiskSpace space(disk, folder.path(), 0);
+  space.restore_ballast();
+  EXPECT_FALSE(space.drop_ballast()) << "there was no room";
+  disk.free = 100 * kMiB;
+  space.restore_ballast();
+  EXPECT_TRUE(disk.exists(folder.file("ballast")));
+  EXPECT_TRUE(space.drop_ballast());
+  EXPECT_FALSE(space.drop_ballast());
+  space.restore_ballast();
+  const DiskSpace next(disk, folder.path(), 0);
+  EXPECT_FALSE(disk.exists(folder.file("ballast"))) << "the databases need room to open";
+}
+
+// A ballast that could be written in part only would be too small.
+TEST(DiskReservations, ABallastIsWholeOrAbsent) {
+  class FailingDisk : public SmallDisk {
+   public:
+    class File : public ForwardingWriter {
+     public:
+      using ForwardingWriter::ForwardingWriter;
+      void sync() override { throw Error(ErrorCode::kNoSpace, "the test's disk is full"); }
+    };
+    std::unique_ptr<WritableFile> create(const std::string& path) override {
+      auto file = SmallDisk::create(path);
+      if (fails) return std::make_unique<File>(std::move(file));
+      return file;
+    }
+    bool fails = true;
+  };
+  const TemporaryFolder folder;
+  FailingDisk disk;
+  DiskSpace space(disk, folder.path(), 0);
+  EXPECT_THROW(space.restore_ballast(), Error);
+  EXPECT_FALSE(disk.exists(folder.file("ballast")));
+  disk.fails = false;
+  space.restore_ballast();
+  EXPECT_TRUE(space.drop_ballast());
+}
+
+}  // namespace
+}  // namespace voxdag::server

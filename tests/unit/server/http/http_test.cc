@@ -1,0 +1,167 @@
+#include <gtest/gtest.h>
+
+#include "core/base/clock.h"
+#include "server/http/connection/connection_table.h"
+#include "server/http/message/byte_range.h"
+#include "server/http/message/headers.h"
+#include "server/http/message/problem.h"
+#include "server/http/message/target.h"
+
+namespace voxdag::server {
+namespace {
+
+using Kind = RangeAnswer::Kind;
+using Ranges = std::vector<ByteRange>;
+
+// Ranges are clipped to the end of the file.
+TEST(ByteRanges, AreClippedToTheFile) {
+  EXPECT_EQ(parse_ranges("bytes=0-9", 100).ranges, (Ranges{{0, 10}}));
+  EXPECT_EQ(parse_ranges("bytes=90-", 100).ranges, (Ranges{{90, 100}}));
+  EXPECT_EQ(parse_ranges("bytes=-5", 100).ranges, (Ranges{{95, 100}}));
+  EXPECT_EQ(parse_ranges("bytes=-500", 100).ranges, (Ranges{{0, 100}}));
+  EXPECT_EQ(parse_ranges("bytes=99-200", 100).ranges, (Ranges{{99, 100}}));
+  EXPECT_EQ(parse_ranges("Bytes= 0-0 , 5-9 ,,", 100).ranges, (Ranges{{0, 1}, {5, 10}}));
+  EXPECT_EQ(parse_ranges("bytes=0-0, 200-300", 100).ranges, (Ranges{{0, 1}}));
+}
+
+TEST(ByteRanges, OutsideTheFileAreUnsatisfiable) {
+  for (const char* header : {"bytes=100-", "bytes=100-200", "bytes=-0", "bytes=200-300,400-",
+                             "bytes=18446744073709551615-", "bytes=99999999999999999999999-"}) {
+    SCOPED_TRACE(header);
+    EXPECT_EQ(parse_ranges(header, 100).kind, Kind::kUnsatisfiable);
+  }
+}
+
+// A malformed or excessive header is ignored: the answer is the whole file.
+TEST(ByteRanges, MalformedOrExcessiveHeadersAreIgnored) {
+  for (const char* header :
+       {"", "bytes", "bytes=", "bytes=-", "bytes=5-4", "bytes=a-b", "bytes=1", "items=0-1",
+        "bytes=0-1-2", "bytes=+0-1", "bytes=0-99,0-99", "bytes= - ",
+        "bytes=0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0,0-0"}) {
+    SCOPED_TRACE(header);
+    EXPECT_EQ(parse_ranges(header, 100).kind, Kind::kWhole);
+  }
+}
+
+TEST(ContentRange, IsParsed) {
+  ByteRange range;
+  uint64_t total = 0;
+  ASSERT_TRUE(parse_content_range("bytes 5-9/20", range, total));
+  EXPECT_EQ(range, (ByteRange{5, 10}));
+  EXPECT_EQ(total, 20u);
+  for (const char* header :
+       {"", "bytes 5-9", "bytes 5-9/*", "bytes */20", "bytes 9-5/20", "bytes 5-20/20", "5-9/20",
+        "bytes 5/20-9", "bytes -9/20", "bytes 0-18446744073709551615/18446744073709551615"}) {
+    SCOPED_TRACE(header);
+    EXPECT_FALSE(parse_content_range(header, range, total));
+  }
+}
+
+TEST(Target, IsParsed) {
+  const Target target = parse_target("/api/v1/jobs/a%20b?limit=5&state=a%2Cb+c&empty");
+  EXPECT_EQ(target.segments, (std::vector<std::string>{"api", "v1", "jobs", "a b"}));
+  EXPECT_EQ(target.query.at("limit"), "5");
+  EXPECT_EQ(target.query.at("state"), "a,b c");
+  EXPECT_EQ(target.query.at("empty"), "");
+  EXPECT_TRUE(parse_target("/").segments.empty());
+  EXPECT_EQ(parse_target("http://host:80/x").segments, (std::vector<std::string>{"x"}));
+}
+
+// Dots and encoded slashes are parts of names; segments are never joined.
+TEST(Target, DoesNotResolveDots) {
+  EXPECT_EQ(parse_target("/a/../b").segments, (std::vector<std::string>{"a", "..", "b"}));
+  EXPECT_EQ(parse_target("/a/..%2f..%2fetc").segments,
+            (std::vector<std::string>{"a", "../../etc"}));
+  EXPECT_EQ(parse_target("//a").segments, (std::vector<std::string>{"", "a"}));
+}
+
+TEST(Target, RejectsMalformedTargets) {
+  for (const char* text : {"", "x", "*", "/%", "/%2", "/%zz", "/%00", "/a%0d%0ab", "/?a=1&a=2"}) {
+    SCOPED_TRACE(text);
+    EXPECT_THROW(parse_target(text), Problem);
+  }
+}
+
+TEST(Headers, CompareCaseInsensitively) {
+  const HeaderMap headers = {{"Content-Type", "a"}};
+  EXPECT_EQ(header_value(headers, "content-TYPE"), "a");
+  EXPECT_EQ(header_value(headers, "content"), "");
+  EXPECT_EQ(trimmed(" \t a b \t"), "a b");
+  EXPECT_EQ(trimmed(" "), "");
+}
+
+// A full table closes the longest waiting connection for a new one, never one with a request.
+TEST(ConnectionTable, EvictsTheLongestWaiting) {
+  HttpLimits limits;
+  limits.max_connections = 4;
+  limits.max_per_client = 2;
+  ConnectionTable table(limits);
+  ConnectionTable::Place first, second, third, more;
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(table.admit(-1, "10.0.0.9", more));
+    table.set_working(more);
+  }
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", first));
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", second));
+  EXPECT_FALSE(table.admit(-1, "10.0.0.1", third)) << "the limit per client";
+  table.set_working(first);
+  ASSERT_TRUE(table.admit(-1, "10.0.0.2", third)) << "the second one waits and is evicted";
+  table.remove(second);
+  table.set_working(third);
+  EXPECT_FALSE(table.admit(-1, "10.0.0.3", second)) << "all have requests";
+  table.remove(first);
+  table.remove(third);
+  EXPECT_EQ(table.size(), 2u);
+}
+
+// Connections that wait for their client within a body or an answer are also closed, unless they
+// wait only briefly.
+TEST(SlowConnections, SlowTransfersAreEvicted) {
+  HttpLimits limits;
+  limits.max_connections = 4;
+  ConnectionTable table(limits);
+  ConnectionTable::Place slow, fast, other, more;
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", more));
+  table.set_working(more);
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", more));
+  table.set_working(more);
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", slow));
+  ASSERT_TRUE(table.admit(-1, "10.0.0.2", fast));
+  table.set_waiting(slow, wall_seconds() - 2, false);
+  table.set_waiting(fast, wall_seconds(), false);
+  EXPECT_TRUE(table.admit(-1, "10.0.0.3", other));
+  table.remove(slow);
+  table.set_working(other);
+  EXPECT_FALSE(table.admit(-1, "10.0.0.3", slow)) << "only the fast one waits";
+}
+
+// New connections do not pile up while the threads of the evicted ones have no time to end.
+TEST(SlowConnections, EvictedConnectionsAreBounded) {
+  HttpLimits limits;
+  limits.max_connections = 8;
+  ConnectionTable table(limits);
+  ConnectionTable::Place place;
+  size_t admitted = 0;
+  while (admitted < 100 && table.admit(-1, "10.0.0.1", place)) ++admitted;
+  EXPECT_EQ(admitted, 11u);
+}
+
+// The addresses of one /64 are one client, and so are the two spellings of an IPv4 address.
+TEST(SlowConnections, AnIpv6NetworkIsOneClient) {
+  EXPECT_EQ(client_of("10.0.0.1"), "10.0.0.1");
+  EXPECT_EQ(client_of("::ffff:10.0.0.1"), "10.0.0.1");
+  EXPECT_EQ(client_of("2001:db8:1:2:3:4:5:6"), client_of("2001:db8:1:2:ffff::1"));
+  EXPECT_NE(client_of("2001:db8:1:2::1"), client_of("2001:db8:1:3::1"));
+  EXPECT_EQ(client_of("fe80::1%eth0"), "fe80::/64");
+  HttpLimits limits;
+  limits.max_per_client = 2;
+  ConnectionTable table(limits);
+  ConnectionTable::Place place;
+  EXPECT_TRUE(table.admit(-1, "2001:db8::1", place));
+  EXPECT_TRUE(table.admit(-1, "2001:db8::2", place));
+  EXPECT_FALSE(table.admit(-1, "2001:db8::3", place));
+  EXPECT_TRUE(table.admit(-1, "2001:db8:0:1::3", place));
+}
+
+}  // namespace
+}  // namespace voxdag::server

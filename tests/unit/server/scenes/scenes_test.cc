@@ -1,0 +1,394 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "core/db/sqlite.h"
+#include "core/format/checksum.h"
+#include "core/io/forwarding_files.h"
+#include "server/base/request_error.h"
+#include "server/disk/data_folder.h"
+#include "server/scenes/scene_store.h"
+#include "server/scenes/scene_upload.h"
+#include "tests/support/temporary_folder.h"
+
+namespace voxdag::server {
+namespace {
+
+// Calls a function of the test before a file is removed.
+class RemovalHook : public ForwardingFiles {
+ public:
+  RemovalHook() : ForwardingFiles(system_files()) {}
+  void remove(const std::string& path) override {
+    if (before_removal) std::exchange(before_removal, nullptr)();
+    ForwardingFiles::remove(path);
+  }
+  std::function<void()> before_removal;
+};
+
+class Scenes : public testing::Test {
+ protected:
+  void reopen() {
+    store_.reset();
+    store_ = make_store(false);
+  }
+  std::unique_ptr<SceneStore> make_store(bool adopt) {
+    return std::make_unique<SceneStore>(
+        files_, folder_.path(), [this](const std::string& line) { log_ += line + "\n"; }, adopt);
+  }
+  std::optional<RequestError> refusal(const std::function<void()>& act) {
+    try {
+      act();
+      return {};
+    } catch (const RequestError& error) {
+      return error;
+    }
+  }
+  void put(const std::string& name, const std::string& bytes) {
+    SceneUpload upload(*store_, name, 0, bytes.size());
+    upload.write(bytes);
+    upload.finish("", "", true);
+    upload.publish();
+  }
+  std::string contents(const std::string& name) {
+    return read_small_file(system_files(), store_->path(name), 1 << 20);
+  }
+
+  TemporaryFolder folder_;
+  RemovalHook files_;
+  std::string log_;
+  std::unique_ptr<SceneStore> store_ = make_store(false);
+};
+
+TEST(SceneName, IsAPlainFileName) {
+  EXPECT_TRUE(is_scene_name("a.glb"));
+  EXPECT_TRUE(is_scene_name("Sponza_2-x.1.gltf"));
+  for (const char* name : {"", ".glb", "a", "a.obj", "../a.glb", "a/b.glb", "-a.glb", "a b.glb",
+                           "a\0.glb", "ä.glb", "a.glb\n", "a.glb/"}) {
+    SCOPED_TRACE(name);
+    EXPECT_FALSE(is_scene_name(name));
+  }
+  EXPECT_FALSE(is_scene_name(std::string(125, 'a') + ".glb"));
+}
+
+TEST_F(Scenes, ArriveInOneGo) {
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 5);
+    upload.write("hel");
+    upload.write("lo");
+    EXPECT_FALSE(store_->find("a.glb")->complete);
+    EXPECT_TRUE(upload.finish("", sha256_hex("hello"), true));
+    EXPECT_EQ(upload.publish(), sha256_hex("hello"));
+  }
+  reopen();
+  const auto scene = store_->find("a.glb");
+  ASSERT_TRUE(scene && scene->complete);
+  EXPECT_EQ(scene->size, 5u);
+  EXPECT_EQ(scene->sha256, sha256_hex("hello"));
+  EXPECT_EQ(contents("a.glb"), "hello");
+  EXPECT_FALSE(store_->upload("a.glb"));
+}
+
+// What arrived before the connection broke is not lost, even if the service restarts.
+TEST_F(Scenes, ContinueWhereTheyBrokeOff) {
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 10);
+    upload.write("01234");
+  }
+  reopen();
+  ASSERT_EQ(store_->upload("a.glb")->offset, 5u);
+  EXPECT_EQ(store_->upload("a.glb")->total, 10u);
+  const auto wrong = refusal([&] { SceneUpload(*store_, "a.glb", 4, 10); });
+  ASSERT_TRUE(wrong);
+  EXPECT_EQ(wrong->kind(), RequestError::Kind::kConflict);
+  EXPECT_EQ(wrong->upload_offset, 5u);
+  EXPECT_EQ(refusal([&] { SceneUpload(*store_, "a.glb", 5, 11); })->kind(),
+            RequestError::Kind::kInvalid);
+  SceneUpload upload(*store_, "a.glb", 5, 10);
+  upload.write("56789");
+  EXPECT_TRUE(upload.finish(sha256_hex("56789"), sha256_hex("0123456789"), true));
+  EXPECT_EQ(upload.publish(), sha256_hex("0123456789"));
+}
+
+TEST_F(Scenes, DropAPartOfTheWrongDigest) {
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 10);
+    upload.write("01234");
+    EXPECT_FALSE(upload.finish("", "", false));
+  }
+  {
+    SceneUpload upload(*store_, "a.glb", 5, 10);
+    upload.write("x6789");
+    EXPECT_EQ(refusal([&] { upload.finish(sha256_hex("56789"), "", true); })->kind(),
+              RequestError::Kind::kInvalid);
+  }
+  EXPECT_EQ(store_->upload("a.glb")->offset, 5u);
+}
+
+TEST_F(Scenes, DropAWholeOfTheWrongDigest) {
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 5);
+    upload.write("hello");
+    EXPECT_EQ(refusal([&] { upload.finish("", sha256_hex("other"), true); })->kind(),
+              RequestError::Kind::kInvalid);
+  }
+  EXPECT_FALSE(store_->find("a.glb"));
+}
+
+TEST_F(Scenes, AreWrittenByOneRequestAtATime) {
+  SceneUpload upload(*store_, "a.glb", 0, 5);
+  EXPECT_EQ(refusal([&] { SceneUpload(*store_, "a.glb", 0, 5); })->kind(),
+            RequestError::Kind::kConflict);
+  EXPECT_FALSE(refusal([&] { SceneUpload(*store_, "b.glb", 0, 5); }));
+}
+
+// The old scene is kept until the new one is complete.
+TEST_F(Scenes, AreReplacedAtOnce) {
+  put("a.glb", "old");
+  SceneUpload upload(*store_, "a.glb", 0, 3);
+  upload.write("new");
+  EXPECT_EQ(contents("a.glb"), "old");
+  EXPECT_TRUE(store_->find("a.glb")->complete);
+  upload.finish("", "", true);
+  upload.publish();
+  EXPECT_EQ(contents("a.glb"), "new");
+}
+
+TEST_F(Scenes, AreListedByNameAndRemoved) {
+  for (const char* name : {"b.glb", "a.glb", "c.glb"}) put(name, "x");
+  auto page = store_->list("", 2);
+  ASSERT_EQ(page.size(), 2u);
+  EXPECT_EQ(page[1].name, "b.glb");
+  EXPECT_EQ(store_->list("b.glb", 5).at(0).name, "c.glb");
+  EXPECT_TRUE(store_->remove("a.glb"));
+  EXPECT_FALSE(store_->remove("a.glb"));
+  EXPECT_FALSE(store_->find("a.glb"));
+}
+
+// Neither the bytes that arrive nor the record of them may disappear under a request.
+TEST_F(Scenes, AreNotRemovedWhileTheyArrive) {
+  SceneUpload upload(*store_, "a.glb", 0, 5);
+  upload.write("hel");
+  EXPECT_EQ(refusal([&] { store_->remove("a.glb"); })->kind(), RequestError::Kind::kConflict);
+  upload.write("lo");
+  EXPECT_TRUE(upload.finish("", "", true));
+  upload.publish();
+  EXPECT_EQ(contents("a.glb"), "hello");
+}
+
+TEST_F(Scenes, AreNotCompleteWithoutTheirBytes) {
+  const std::string part = folder_.file("parts/a.glb");
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 5);
+    upload.write("hello");
+    EXPECT_TRUE(upload.finish("", "", true));
+    system_files().remove(part);
+    EXPECT_THROW(upload.publish(), Error);
+  }
+  EXPECT_FALSE(store_->find("a.glb"));
+  {
+    SceneUpload upload(*store_, "a.glb", 0, 5);
+    upload.write("hello");
+    EXPECT_TRUE(upload.finish("", "", true));
+    write_file_atomically(system_files(), part, "he");
+    EXPECT_THROW(upload.publish(), Error);
+  }
+  EXPECT_FALSE(store_->find("a.glb"));
+  // A crash after the digest was recorded.
+  for (const char* left : {"", "hello", "hallo"}) {
+    SCOPED_TRACE(left);
+    { SceneUpload(*store_, "a.glb", 0, 5).write("hello"); }
+    system_files().remove(part);
+    if (*left) write_file_atomically(system_files(), store_->path("a.glb"), left);
+    SqlDatabase(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite)
+        .execute("UPDATE upload SET sha256 = '" + sha256_hex("hello") + "'");
+    reopen();
+    EXPECT_EQ(store_->find("a.glb").has_value(), std::string_view(left) == "hello");
+    store_->remove("a.glb");
+    if (*left && system_files().exists(store_->path("a.glb")))
+      system_files().remove(store_->path("a.glb"));
+  }
+}
+
+// The file of an upload that was lost, or is shorter than recorded, is sent again.
+TEST_F(Scenes, StartOverIfTheirBytesAreLost) {
+  const std::string part = folder_.file("parts/a.glb");
+  for (const char* left : {"", "0123"}) {
+    SCOPED_TRACE(left);
+    { SceneUpload(*store_, "a.glb", 0, 10).write("01234"); }
+    system_files().remove(part);
+    if (*left) write_file_atomically(system_files(), part, left);
+    const auto lost = refusal([&] { SceneUpload(*store_, "a.glb", 5, 10); });
+    ASSERT_TRUE(lost);
+    EXPECT_EQ(lost->kind(), RequestError::Kind::kConflict);
+    EXPECT_EQ(lost->upload_offset, 0u);
+    EXPECT_FALSE(store_->upload("a.glb"));
+  }
+  SceneUpload upload(*store_, "a.glb", 0, 2);
+  upload.write("ok");
+  EXPECT_TRUE(upload.finish("", "", true));
+  upload.publish();
+  EXPECT_EQ(contents("a.glb"), "ok");
+}
+
+// A lost database costs no scene, and files not created by an upload are not touched.
+TEST_F(Scenes, StayWithoutTheirDatabase) {
+  put("a.glb", "hello");
+  store_.reset();
+  for (const char* suffix : {"", "-wal", "-shm"})
+    std::filesystem::remove(folder_.file("scenes.db") + suffix);
+  write_file_atomically(system_files(), folder_.file("files/README"), "x");
+  for (const char* name : {"parts/b.glb", "parts/README"})
+    write_file_atomically(system_files(), folder_.file(name), "x");
+  for (int i = 0; i < 2; ++i) EXPECT_THROW(make_store(false), Error) << "and made no database";
+  store_ = make_store(true);
+  const auto scene = store_->find("a.glb");
+  ASSERT_TRUE(scene && scene->complete);
+  EXPECT_EQ(scene->sha256, sha256_hex("hello"));
+  EXPECT_EQ(scene->size, 5u);
+  EXPECT_EQ(store_->list("", 10).size(), 2u);
+  EXPECT_NE(log_.find("a.glb adopted"), std::string::npos) << log_;
+  EXPECT_NE(log_.find("b.glb: adopted"), std::string::npos) << log_;
+  // A part of which nobody knows how much was synced: it can be sent again, or removed.
+  const auto part = store_->upload("b.glb");
+  ASSERT_TRUE(part);
+  EXPECT_EQ(part->offset, 0u);
+  reopen();
+  store_->remove_stale_uploads(1e12);
+  EXPECT_FALSE(store_->find("b.glb"));
+  EXPECT_FALSE(system_files().exists(folder_.file("parts/b.glb")));
+  for (const char* name : {"files/README", "parts/README"})
+    EXPECT_TRUE(system_files().exists(folder_.file(name))) << name;
+}
+
+// A crash in the middle of a removal: the next start finishes it.
+TEST_F(Scenes, AreRemovedInTheEnd) {
+  put("a.glb", "hello");
+  system_files().rename(store_->path("a.glb"), store_->path("a.glb") + kDeleted);
+  reopen();
+  EXPECT_FALSE(store_->find("a.glb"));
+  EXPECT_FALSE(has_entries(system_files(), folder_.file("files")));
+}
+
+// A deletion that failed midway removes its marked files, not later uploads.
+TEST_F(Scenes, AreNotRemovedByAnEarlierDeletion) {
+  put("a.glb", "old");
+  const std::string marked = store_->path("a.glb") + kDeleted;
+  {
+    SqlDatabase outside(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite);
+    const SqlTransaction locked(outside);
+    EXPECT_THROW(store_->remove("a.glb"), Error);
+  }
+  EXPECT_TRUE(system_files().exists(marked));
+  put("a.glb", "new");
+  EXPECT_FALSE(system_files().exists(marked));
+  for (const bool at_start : {false, true}) {
+    SCOPED_TRACE(at_start);
+    system_files().create(marked)->close();  // as if the mark had outlived the upload
+    at_start ? reopen() : store_->finish_removals();
+    EXPECT_FALSE(system_files().exists(marked));
+    ASSERT_TRUE(store_->find("a.glb"));
+    EXPECT_EQ(contents("a.glb"), "new");
+  }
+}
+
+// Nor does it take the upload in progress.
+TEST_F(Scenes, KeepAnUploadFromAnEarlierDeletion) {
+  put("a.glb", "old");
+  { SceneUpload(*store_, "a.glb", 0, 10).write("01234"); }
+  system_files().rename(store_->path("a.glb"), store_->path("a.glb") + kDeleted);
+  reopen();
+  EXPECT_EQ(store_->upload("a.glb")->offset, 5u);
+  EXPECT_FALSE(store_->find("a.glb")->complete);
+  EXPECT_NE(log_.find("scene a.glb: finished a deletion"), std::string::npos) << log_;
+}
+
+// What a start drops, or cannot finish, is in the log.
+TEST_F(Scenes, AreNotDroppedSilently) {
+  { SceneUpload(*store_, "a.glb", 0, 5).write("hello"); }
+  system_files().remove(folder_.file("parts/a.glb"));
+  SqlDatabase(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite)
+      .execute("UPDATE upload SET sha256 = 'x'");
+  reopen();
+  EXPECT_FALSE(store_->find("a.glb"));
+  EXPECT_NE(log_.find("scene a.glb: failed to finish its upload"), std::string::npos) << log_;
+}
+
+// All bytes have arrived, but the service stopped, or a job began to use the scene.
+TEST_F(Scenes, AreFinishedByAnEmptyPart) {
+  for (const std::optional<uint64_t> total : {std::optional<uint64_t>(5), {}}) {
+    for (const bool stopped : {false, true}) {
+      {
+        SceneUpload upload(*store_, "a.glb", 0, total);
+        upload.write("hel");
+        upload.finish("", "", false);
+      }
+      {
+        SceneUpload upload(*store_, "a.glb", 3, total);
+        upload.write("lo");
+        const auto check = [&] {
+          if (stopped) throw std::runtime_error("stopped");
+        };
+        if (stopped)
+          EXPECT_THROW(upload.finish("", "", true, check), std::runtime_error);
+        else
+          EXPECT_TRUE(upload.finish("", "", true, check));
+      }
+      reopen();
+      ASSERT_EQ(store_->upload("a.glb")->offset, 5u);
+      EXPECT_EQ(refusal([&] { SceneUpload(*store_, "a.glb", 6, 6); })->upload_offset, 5u);
+      SceneUpload upload(*store_, "a.glb", 5, 5);
+      EXPECT_TRUE(upload.finish("", sha256_hex("hello"), true));
+      upload.publish();
+      EXPECT_EQ(contents("a.glb"), "hello");
+    }
+  }
+}
+
+// Nothing is acknowledged that is recorded in a database without a name.
+TEST_F(Scenes, AreNotRecordedInADatabaseThatIsGone) {
+  put("b.glb", "old");
+  { SceneUpload(*store_, "old.glb", 0, 5).write("x"); }
+  SceneUpload upload(*store_, "a.glb", 0, 5);
+  upload.write("hello");
+  EXPECT_TRUE(upload.finish("", "", true));
+  for (const char* suffix : {"", "-wal", "-shm"})
+    std::filesystem::remove(folder_.file("scenes.db") + suffix);
+  EXPECT_THROW(upload.publish(), Error);
+  EXPECT_FALSE(system_files().exists(store_->path("a.glb")));
+  EXPECT_THROW(SceneUpload(*store_, "c.glb", 0, 5), Error);
+  EXPECT_THROW(store_->remove("b.glb"), Error);
+  EXPECT_THROW(store_->remove_stale_uploads(1e12), Error);
+  EXPECT_EQ(contents("b.glb"), "old");
+}
+
+// An upload of which nothing arrived leaves nothing.
+TEST_F(Scenes, LeaveNothingWithoutABeginning) {
+  { SceneUpload(*store_, "a.glb", 0, 5); }
+  EXPECT_FALSE(store_->find("a.glb"));
+  EXPECT_FALSE(system_files().exists(folder_.file("parts/a.glb")));
+}
+
+// A part that arrives while old uploads are removed.
+TEST_F(Scenes, AreNotStaleOnceTheyGoOn) {
+  for (const char* name : {"a.glb", "b.glb"}) SceneUpload(*store_, name, 0, 5).write("he");
+  SqlDatabase(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite)
+      .execute("UPDATE upload SET updated_s = 1000");
+  files_.before_removal = [&] { SceneUpload(*store_, "b.glb", 2, 5).write("ll"); };
+  store_->remove_stale_uploads(2000);
+  EXPECT_FALSE(store_->upload("a.glb"));
+  ASSERT_TRUE(store_->upload("b.glb"));
+  EXPECT_EQ(store_->upload("b.glb")->offset, 4u);
+  EXPECT_NE(log_.find("a.glb: removed its unfinished upload"), std::string::npos) << log_;
+}
+
+TEST_F(Scenes, DropStaleUploads) {
+  { SceneUpload(*store_, "a.glb", 0, 5).write("abc"); }
+  store_->remove_stale_uploads(0);
+  EXPECT_TRUE(store_->upload("a.glb"));
+  store_->remove_stale_uploads(1e12);
+  EXPECT_FALSE(store_->upload("a.glb"));
+  EXPECT_FALSE(system_files().exists(folder_.file("parts/a.glb")));
+}
+
+}  // namespace
+}  // namespace voxdag::server
