@@ -1,4 +1,4 @@
-// The databases in the data folder: each records the files in folders beside it.
+// The databases in the data folder: each records the files in some of its folders.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace voxdag::server {
 
 struct StoreFormat {
   const char* records;     // "a queue"
-  const char* files;       // what the folders beside it hold: "jobs"
+  const char* files;       // what the folders hold: "jobs"
   int64_t application_id;  // PRAGMA application_id
   int64_t version;         // PRAGMA user_version
   const char* schema;
