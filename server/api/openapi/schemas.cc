@@ -264,7 +264,7 @@ void add_manifests(Json& all) {
 
 void add_subvolumes(Json& all) {
   const std::vector<Member> members = {
-      {"resolution", count()}, {"built", count()}, {"total", count()}};
+      {"resolution", at_least(4)}, {"built", count()}, {"total", count()}};
   const auto with_cubes = [&](size_t values) {
     std::vector<Member> all_members = members;
     all_members.push_back({"cubes", array(array_of(values, count()))});

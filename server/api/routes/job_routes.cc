@@ -17,6 +17,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxKeyChars = 255;
+constexpr const char* kJobs = "/api/v1/jobs";
+constexpr const char* kJob = "/api/v1/jobs/{id}";
 
 const Parameter kDryRun = {"dry_run", "return an estimate instead of queuing the job",
                            "^(true|false)$"};
@@ -260,18 +262,9 @@ Router::Handler freeing_space(Router::Handler handler) {
   };
 }
 
-}  // namespace
-
-Job find_job(JobQueue& queue, const std::string& id) {
-  auto job = queue.find(id);
-  if (!job) throw not_found("no such job: expected the id of a job that was not deleted");
-  return std::move(*job);
-}
-
-void add_job_routes(Router& router) {
-  const std::string jobs = "/api/v1/jobs", job = jobs + "/{id}";
+void add_list_routes(Router& router) {
   router.add({.method = "POST",
-              .pattern = jobs,
+              .pattern = kJobs,
               .role = Role::kSubmit,
               .id = "postJob",
               .summary = "Queue a build, or estimate one",
@@ -284,15 +277,18 @@ void add_job_routes(Router& router) {
               .problems = {404, 408, 409, 413, 415, 422, 507}},
              post_job);
   router.add({.method = "GET",
-              .pattern = jobs,
+              .pattern = kJobs,
               .id = "listJobs",
               .summary = "Jobs, newest first",
               .tag = "jobs",
               .query = {kJobStates, kJobLimit, kJobCursor},
               .answers = {{200, "a page of jobs", {json_content("JobList")}}}},
              list_jobs);
+}
+
+void add_one_job_routes(Router& router) {
   router.add({.method = "GET",
-              .pattern = job,
+              .pattern = kJob,
               .id = "getJob",
               .summary = "One job",
               .tag = "jobs",
@@ -300,7 +296,7 @@ void add_job_routes(Router& router) {
               .problems = {404}},
              get_job);
   router.add({.method = "PATCH",
-              .pattern = job,
+              .pattern = kJob,
               .role = Role::kAdmin,
               .id = "patchJob",
               .summary = "Change a job's priority",
@@ -310,7 +306,7 @@ void add_job_routes(Router& router) {
               .problems = {404, 408, 413, 415}},
              patch_job);
   router.add({.method = "DELETE",
-              .pattern = job,
+              .pattern = kJob,
               .role = Role::kAdmin,
               .id = "deleteJob",
               .summary = "Delete an ended job and its files",
@@ -318,9 +314,12 @@ void add_job_routes(Router& router) {
               .answers = {{204, "deleted"}},
               .problems = {404, 409}},
              freeing_space(delete_job));
+}
+
+void add_action_routes(Router& router) {
   const auto add_action = [&](const std::string& name, const std::string& summary, auto handler) {
     router.add({.method = "POST",
-                .pattern = job + '/' + name,
+                .pattern = std::string(kJob) + '/' + name,
                 .role = Role::kSubmit,
                 .id = name + "Job",
                 .summary = summary,
@@ -333,6 +332,20 @@ void add_job_routes(Router& router) {
   add_action("suspend", "Suspend a job at its next checkpoint", act(&Dispatcher::suspend));
   add_action("resume", "Resume a suspended job", act(&Dispatcher::resume));
   add_action("retry", "Retry a failed or canceled job", retry_job);
+}
+
+}  // namespace
+
+Job find_job(JobQueue& queue, const std::string& id) {
+  auto job = queue.find(id);
+  if (!job) throw not_found("no such job: expected the id of a job that was not deleted");
+  return std::move(*job);
+}
+
+void add_job_routes(Router& router) {
+  add_list_routes(router);
+  add_one_job_routes(router);
+  add_action_routes(router);
 }
 
 }  // namespace voxdag::server
