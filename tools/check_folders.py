@@ -109,7 +109,7 @@ INCLUDED_BY = {
 }
 
 # Below these folders a folder and its parent may still include each other. The list may only shrink.
-NESTED_CYCLES_LEFT = ("merge/", "query/export/", "scene/", "server/")
+NESTED_CYCLES_LEFT = ("merge/", "query/export/", "scene/")
 
 # Third-party headers, and the folders where each may be included.
 THIRD_PARTY = {
