@@ -1,5 +1,8 @@
+#include <algorithm>
+#include <cctype>
 #include <cstring>
 #include <filesystem>
+#include <regex>
 #include <span>
 
 #include "core/base/error.h"
