@@ -189,7 +189,7 @@ Json describe_problems() {
 std::string openapi_document(const Router& router) {
   std::vector<Route> routes = router.routes();
   std::erase_if(routes, [](const Route& route) { return route.id.empty(); });
-  Json paths, tags = Json::array();
+  Json paths = Json::object(), tags = Json::array();
   const Json problems = describe_problems();
   for (const Route& route : routes) {
     for (const int status : problems_of(route))
