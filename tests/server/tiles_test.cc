@@ -327,14 +327,14 @@ TEST_F(View, NoticesThatTheFileWasReplaced) {
 TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   build("64");
   const FileTileSource file(path_, system_files().open_read(path_)->identity());
-  EXPECT_NO_THROW(file.expect_whole());
+  EXPECT_NO_THROW(file.expect_readable());
   std::filesystem::resize_file(path_, 4096);
   try {
     query::encode_tile(file.dag(), kTileLevels, {0, 0});
   } catch (const Error&) {
     // Or the zeros make a tile.
   }
-  EXPECT_THROW(file.expect_whole(), Error);
+  EXPECT_THROW(file.expect_readable(), Error);
 }
 
 // Somebody truncates the file after it is mapped, before or while its header and tables are read.
