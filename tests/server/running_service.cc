@@ -29,7 +29,8 @@ RunningService::RunningService() {
 
 RunningService::~RunningService() {
   stop();
-  EXPECT_EQ(log_.find("the OpenAPI document lacks"), std::string::npos) << log_;
+  if (!injects_statuses_)
+    EXPECT_EQ(log_.find("the OpenAPI document lacks"), std::string::npos) << log_;
 }
 
 void RunningService::start() {

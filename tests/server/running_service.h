@@ -53,6 +53,7 @@ class RunningService : public testing::Test {
   TemporaryFolder folder_;
   ServerConfig config_;
   FileSystem* files_ = &system_files();
+  bool injects_statuses_ = false;  // a test throws errors that no handler throws
   std::unique_ptr<HttpClient> http_;
 
  private:

@@ -40,6 +40,7 @@ TEST_F(ServiceFailures, NoFailureEndsTheService) {
   std::mutex mutex;
   std::set<std::string> failed;
   config_.retention.finished_jobs = 0;
+  injects_statuses_ = true;
   config_.before_step = [&](const std::string& step) {
     const std::string name = std::regex_replace(step, std::regex("[0-9a-f]{16}"), "ID");
     std::lock_guard lock(mutex);
