@@ -13,33 +13,32 @@
 namespace voxdag::server {
 namespace {
 
-using nlohmann::json;
-
 constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
 
 [[noreturn]] void fail(const std::string& name, const std::string& expected) {
   throw Error(ErrorCode::kInvalidInput, "'" + name + "': expected " + expected);
 }
 
-void read_value(const json& value, const std::string& name, std::string& out) {
+void read_value(const nlohmann::json& value, const std::string& name, std::string& out) {
   if (!value.is_string()) fail(name, "a string");
   out = value.get<std::string>();
 }
 
-void read_value(const json& value, const std::string& name, std::vector<std::string>& out) {
+void read_value(const nlohmann::json& value, const std::string& name,
+                std::vector<std::string>& out) {
   if (!value.is_array()) fail(name, "a list of strings");
   out.clear();
-  for (const json& item : value) read_value(item, name, out.emplace_back());
+  for (const nlohmann::json& item : value) read_value(item, name, out.emplace_back());
 }
 
-void read_value(const json& value, const std::string& name, double& out) {
+void read_value(const nlohmann::json& value, const std::string& name, double& out) {
   if (!value.is_number() || value.get<double>() < 0) fail(name, "a number that is not negative");
   out = value.get<double>();
 }
 
 // Sizes may have a unit.
 template <std::integral Integer>
-void read_value(const json& value, const std::string& name, Integer& out) {
+void read_value(const nlohmann::json& value, const std::string& name, Integer& out) {
   if constexpr (std::is_same_v<Integer, uint64_t>) {
     if (value.is_string()) {
       out = parse_size(value.get<std::string>(), name);
@@ -58,14 +57,14 @@ class Members {
  public:
   template <class T>
   Members& add(const std::string& name, T& out) {
-    readers_[name] = [name, &out](const json& value) { read_value(value, name, out); };
+    readers_[name] = [name, &out](const nlohmann::json& value) { read_value(value, name, out); };
     return *this;
   }
   Members& nest(const std::string& name, const Members& members) {
-    readers_[name] = [name, members](const json& value) { members.read(value, name); };
+    readers_[name] = [name, members](const nlohmann::json& value) { members.read(value, name); };
     return *this;
   }
-  void read(const json& object, const std::string& where) const {
+  void read(const nlohmann::json& object, const std::string& where) const {
     if (!object.is_object()) fail(where, "an object");
     for (const auto& [name, value] : object.items()) {
       const auto reader = readers_.find(name);
@@ -75,7 +74,7 @@ class Members {
   }
 
  private:
-  std::map<std::string, std::function<void(const json&)>> readers_;
+  std::map<std::string, std::function<void(const nlohmann::json&)>> readers_;
 };
 
 Members members_of(ServerConfig& c) {
@@ -138,8 +137,8 @@ Members members_of(ServerConfig& c) {
 void read_config(FileSystem& files, const std::string& path, ServerConfig& config) {
   const std::string text = read_small_file(files, path, kMaxConfigBytes);
   try {
-    members_of(config).read(json::parse(text), "the file");
-  } catch (const json::exception& error) {
+    members_of(config).read(nlohmann::json::parse(text), "the file");
+  } catch (const nlohmann::json::exception& error) {
     throw Error(ErrorCode::kInvalidInput, path + ": expected JSON; " + std::string(error.what()));
   } catch (const Error& error) {
     throw Error(error.code(), path + ": " + error.message());

@@ -15,8 +15,6 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(JobError, code, message, at_s, transient)
 
 namespace {
 
-using nlohmann::json;
-
 constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 
 // Interrupted runs in a row after which a job is tried again at once, and after which it is not
@@ -106,8 +104,9 @@ void columns(Row& row, JobRow& r) {
 }
 
 JobRow row_of(const Job& job) {
-  return {job, json_text(json(job.scenes)), job.error ? json_text(json(*job.error)) : "",
-          json_text(json(job.warnings))};
+  return {job, json_text(nlohmann::json(job.scenes)),
+          job.error ? json_text(nlohmann::json(*job.error)) : "",
+          json_text(nlohmann::json(job.warnings))};
 }
 
 constexpr const char* kNoRequest = R"({"scene":[],"resolution":0,"options":{}})";
@@ -120,8 +119,8 @@ Job read_job(const SqlStatement& statement) {
   bool damaged = false;
   const auto read = [&](const std::string& text, auto& value) {
     try {
-      json::parse(text).get_to(value);
-    } catch (const json::exception&) {
+      nlohmann::json::parse(text).get_to(value);
+    } catch (const nlohmann::json::exception&) {
       damaged = true;
     }
   };
@@ -130,7 +129,9 @@ Job read_job(const SqlStatement& statement) {
     value = instead;
     damaged = true;
   };
-  const auto is_json = [](const std::string& text) { return text.empty() || json::accept(text); };
+  const auto is_json = [](const std::string& text) {
+    return text.empty() || nlohmann::json::accept(text);
+  };
   read(row.scenes, job.scenes);
   read(row.warnings, job.warnings);
   if (!row.error.empty()) read(row.error, job.error.emplace());
