@@ -4,9 +4,9 @@
 Each case is built several times, and medians are shown; cases that take more than a minute are
 built once. `plot` draws the values of --json.
 
-With --study FOLDER, an optional external reference program (see study.py) runs before every build. The
-ratio is CPU seconds of the whole `voxdag build` (reading, artifacts, merge, final file) divided by CPU
-seconds of the reference's build in memory.
+With --study FOLDER, an optional external reference program (see study.py) runs before every build.
+The ratio is CPU seconds of the whole `voxdag build` (reading, artifacts, merge, final file) divided
+by CPU seconds of the reference's build in memory.
 """
 
 import argparse
@@ -23,9 +23,16 @@ from study import Study, same_work
 CASES = (
     [f"sponza:{1 << levels}" for levels in range(13, 18)]
     + [f"dragon_100k:{1 << levels}" for levels in range(13, 16)]
-    + [f"{HAIRBALL}:4096", f"{HAIRBALL}:8192", "minecraft_terrain:16384", "wooden_staircase:16384"])
-SHORT_CASES = ["sponza:8192", "sponza:16384", "dragon_100k:8192", f"{HAIRBALL}:4096",
-               "minecraft_terrain:16384", "wooden_staircase:16384"]
+    + [f"{HAIRBALL}:4096", f"{HAIRBALL}:8192", "minecraft_terrain:16384", "wooden_staircase:16384"]
+)
+SHORT_CASES = [
+    "sponza:8192",
+    "sponza:16384",
+    "dragon_100k:8192",
+    f"{HAIRBALL}:4096",
+    "minecraft_terrain:16384",
+    "wooden_staircase:16384",
+]
 LONG_S = 60  # of one build
 
 
@@ -93,22 +100,56 @@ def growth(cases):
         first, last = own[0], own[-1]
         doublings = (last["resolution"] // first["resolution"]).bit_length() - 1
         if doublings:
-            grown.append({
-                "scene": scene, "from": first["resolution"], "to": last["resolution"],
-                **{name: (last[name] / first[name]) ** (1 / doublings)
-                   for name in ("cpu_s", "voxels", "dag_nodes", "bytes")}})
+            grown.append(
+                {
+                    "scene": scene,
+                    "from": first["resolution"],
+                    "to": last["resolution"],
+                    **{
+                        name: (last[name] / first[name]) ** (1 / doublings)
+                        for name in ("cpu_s", "voxels", "dag_nodes", "bytes")
+                    },
+                }
+            )
     return grown
 
 
 def print_builds(cases):
     measure.print_table(
-        ["case", "voxels", "DAG nodes", "subvol.", "CPU s", "wall s", "wall / CPU", "peak MiB",
-         "file MiB", "peak disk / file", "voxels/CPU s", "ns/octree node", "DAG nodes/CPU s"],
-        [[c["case"], amount(c["voxels"]), amount(c["dag_nodes"]), c["subvolumes"],
-          f"{c['cpu_s']:.2f}", f"{c['wall_s']:.2f}", f"{c['wall_over_cpu']:.2f}",
-          f"{c['peak_rss_bytes'] / measure.MIB:.0f}", f"{c['bytes'] / measure.MIB:.0f}",
-          f"{c['peak_disk_bytes'] / c['bytes']:.1f}", amount(c["voxels_per_cpu_s"]),
-          f"{c['ns_per_svo_node']:.1f}", amount(c["dag_nodes_per_cpu_s"])] for c in cases])
+        [
+            "case",
+            "voxels",
+            "DAG nodes",
+            "subvol.",
+            "CPU s",
+            "wall s",
+            "wall / CPU",
+            "peak MiB",
+            "file MiB",
+            "peak disk / file",
+            "voxels/CPU s",
+            "ns/octree node",
+            "DAG nodes/CPU s",
+        ],
+        [
+            [
+                c["case"],
+                amount(c["voxels"]),
+                amount(c["dag_nodes"]),
+                c["subvolumes"],
+                f"{c['cpu_s']:.2f}",
+                f"{c['wall_s']:.2f}",
+                f"{c['wall_over_cpu']:.2f}",
+                f"{c['peak_rss_bytes'] / measure.MIB:.0f}",
+                f"{c['bytes'] / measure.MIB:.0f}",
+                f"{c['peak_disk_bytes'] / c['bytes']:.1f}",
+                amount(c["voxels_per_cpu_s"]),
+                f"{c['ns_per_svo_node']:.1f}",
+                amount(c["dag_nodes_per_cpu_s"]),
+            ]
+            for c in cases
+        ],
+    )
 
 
 def print_stages(cases):
@@ -118,9 +159,15 @@ def print_stages(cases):
     for case in cases:
         stages = case["stages_cpu_s"]
         total = sum(stages.values()) or 1
-        rows.append([case["case"]] + [
-            f"{stages[name]:.2f} ({100 * stages[name] / total:.0f} %)" if name in stages else "-"
-            for name in names])
+        rows.append(
+            [case["case"]]
+            + [
+                f"{stages[name]:.2f} ({100 * stages[name] / total:.0f} %)"
+                if name in stages
+                else "-"
+                for name in names
+            ]
+        )
     measure.print_table(["case"] + names, rows)
 
 
@@ -130,11 +177,28 @@ def print_ratios(cases):
         return
     print("\nCompared with the external reference (one thread, in memory):\n")
     measure.print_table(
-        ["case", "build CPU s", "reference CPU s", "ratio", "build wall s", "reference wall s",
-         "same work"],
-        [[c["case"], f"{c['cpu_s']:.2f}", f"{c['study_cpu_s']:.2f}", f"{c['ratio']:.2f}",
-          f"{c['wall_s']:.2f}", f"{c['study_wall_s']:.2f}", "yes" if c["same_work"] else "NO"]
-         for c in cases])
+        [
+            "case",
+            "build CPU s",
+            "reference CPU s",
+            "ratio",
+            "build wall s",
+            "reference wall s",
+            "same work",
+        ],
+        [
+            [
+                c["case"],
+                f"{c['cpu_s']:.2f}",
+                f"{c['study_cpu_s']:.2f}",
+                f"{c['ratio']:.2f}",
+                f"{c['wall_s']:.2f}",
+                f"{c['study_wall_s']:.2f}",
+                "yes" if c["same_work"] else "NO",
+            ]
+            for c in cases
+        ],
+    )
 
 
 def print_growth(grown):
@@ -143,21 +207,34 @@ def print_growth(grown):
     print("\nGrowth per doubling of R, geometric mean:\n")
     measure.print_table(
         ["scene", "R", "CPU time", "voxels", "DAG nodes", "file"],
-        [[g["scene"], f"{g['from']} to {g['to']}"] +
-         [f"{g[name]:.2f}" for name in ("cpu_s", "voxels", "dag_nodes", "bytes")] for g in grown])
+        [
+            [g["scene"], f"{g['from']} to {g['to']}"]
+            + [f"{g[name]:.2f}" for name in ("cpu_s", "voxels", "dag_nodes", "bytes")]
+            for g in grown
+        ],
+    )
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     measure.add_common_options(parser)
     add_hairball_option(parser)
-    parser.add_argument("--study", type=Path, metavar="FOLDER",
-                        help="sources of an external reference program to compare with")
+    parser.add_argument(
+        "--study",
+        type=Path,
+        metavar="FOLDER",
+        help="sources of an external reference program to compare with",
+    )
     parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--case", action="append", metavar="SCENE:R",
-                        help="build this case instead of the default ones")
-    parser.add_argument("--short", action="store_true",
-                        help="only cases of less than five minutes in total")
+    parser.add_argument(
+        "--case",
+        action="append",
+        metavar="SCENE:R",
+        help="build this case instead of the default ones",
+    )
+    parser.add_argument(
+        "--short", action="store_true", help="only cases of less than five minutes in total"
+    )
     options = parser.parse_args()
 
     names = options.case or (SHORT_CASES if options.short else CASES)

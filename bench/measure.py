@@ -4,6 +4,7 @@ CPU time is user + system time of the whole process tree, wall time from start t
 the largest resident set of any process of the tree.
 """
 
+import contextlib
 import json
 import os
 import statistics
@@ -60,10 +61,8 @@ class DiskWatch:
         total = 0
         for folder, _, names in os.walk(self.folder):  # skips removed folders
             for name in names:
-                try:
+                with contextlib.suppress(FileNotFoundError):  # removed since it was listed
                     total += os.stat(os.path.join(folder, name)).st_blocks * 512
-                except FileNotFoundError:
-                    pass  # removed since it was listed
         self.peak_bytes = max(self.peak_bytes, total)
 
     def watch(self):
@@ -85,7 +84,9 @@ def build(voxdag, scene, resolution, scratch, *options):
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         output = Path(folder) / "out.vdag"
         with DiskWatch(Path(folder)) as disk:
-            taken = run([voxdag, "build", scene, "-r", resolution, "-o", output, "--json", *options])
+            taken = run(
+                [voxdag, "build", scene, "-r", resolution, "-o", output, "--json", *options]
+            )
         taken.peak_disk_bytes = disk.peak_bytes
         return taken, json.loads(taken.stdout)
 
@@ -93,8 +94,11 @@ def build(voxdag, scene, resolution, scratch, *options):
 def machine():
     """The machine and the time, for the header of a report."""
     model = next(
-        (line.split(":", 1)[1].strip()
-         for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name")),
+        (
+            line.split(":", 1)[1].strip()
+            for line in Path("/proc/cpuinfo").read_text().splitlines()
+            if line.startswith("model name")
+        ),
         os.uname().machine,
     )
     return {
@@ -140,12 +144,18 @@ def print_table(heads, rows):
 
 
 def add_common_options(parser):
-    parser.add_argument("--voxdag", type=Path, default=REPO / "build/cpu/voxdag",
-                        help="the program to measure")
-    parser.add_argument("--scenes", type=Path, default=REPO / "../shared/scenes",
-                        help="folder of .glb scenes")
-    parser.add_argument("--scratch", type=Path, default=None,
-                        help="folder for results and work folders (default: the system's)")
+    parser.add_argument(
+        "--voxdag", type=Path, default=REPO / "build/cpu/voxdag", help="the program to measure"
+    )
+    parser.add_argument(
+        "--scenes", type=Path, default=REPO / "../shared/scenes", help="folder of .glb scenes"
+    )
+    parser.add_argument(
+        "--scratch",
+        type=Path,
+        default=None,
+        help="folder for results and work folders (default: the system's)",
+    )
     parser.add_argument("--json", type=Path, help="also write the values to this JSON file")
 
 

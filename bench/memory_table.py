@@ -42,10 +42,12 @@ CASES = {
 def measure_case(name, options, folder):
     make_scene, resolution, budget_mib = CASES[name]
     scene = make_scene(options, folder)
-    large_run, large = measure.build(options.voxdag, scene, resolution, options.scratch,
-                                     "--memory", LARGE)
-    small_run, small = measure.build(options.voxdag, scene, resolution, options.scratch,
-                                     "--memory", f"{budget_mib}MiB")
+    large_run, large = measure.build(
+        options.voxdag, scene, resolution, options.scratch, "--memory", LARGE
+    )
+    small_run, small = measure.build(
+        options.voxdag, scene, resolution, options.scratch, "--memory", f"{budget_mib}MiB"
+    )
     peak = max(small["peak_rss_bytes"], small_run.peak_rss_bytes)
     return {
         "case": f"{name}:{resolution}",
@@ -67,13 +69,40 @@ def measure_case(name, options, folder):
 
 def print_cases(cases):
     measure.print_table(
-        ["case", "scene MiB", "budget MiB", "VmHWM MiB", "max RSS MiB", "within budget", "spilled MiB",
-         "splits", "passes", "wall s", f"VmHWM at {LARGE}", f"wall s at {LARGE}", "same bytes"],
-        [[c["case"], f"{c['scene_bytes'] / MIB:.0f}", f"{c['budget_bytes'] / MIB:.0f}",
-          f"{c['vm_hwm_bytes'] / MIB:.0f}", f"{c['max_rss_bytes'] / MIB:.0f}",
-          "yes" if c["within_budget"] else "NO", f"{c['spill_bytes'] / MIB:.0f}", c["split"],
-          c["merge_passes"], f"{c['wall_s']:.1f}", f"{c['large_vm_hwm_bytes'] / MIB:.0f}",
-          f"{c['large_wall_s']:.1f}", "yes" if c["same_bytes"] else "NO"] for c in cases])
+        [
+            "case",
+            "scene MiB",
+            "budget MiB",
+            "VmHWM MiB",
+            "max RSS MiB",
+            "within budget",
+            "spilled MiB",
+            "splits",
+            "passes",
+            "wall s",
+            f"VmHWM at {LARGE}",
+            f"wall s at {LARGE}",
+            "same bytes",
+        ],
+        [
+            [
+                c["case"],
+                f"{c['scene_bytes'] / MIB:.0f}",
+                f"{c['budget_bytes'] / MIB:.0f}",
+                f"{c['vm_hwm_bytes'] / MIB:.0f}",
+                f"{c['max_rss_bytes'] / MIB:.0f}",
+                "yes" if c["within_budget"] else "NO",
+                f"{c['spill_bytes'] / MIB:.0f}",
+                c["split"],
+                c["merge_passes"],
+                f"{c['wall_s']:.1f}",
+                f"{c['large_vm_hwm_bytes'] / MIB:.0f}",
+                f"{c['large_wall_s']:.1f}",
+                "yes" if c["same_bytes"] else "NO",
+            ]
+            for c in cases
+        ],
+    )
 
 
 def main():

@@ -36,8 +36,11 @@ def measure_case(scene, resolution, options):
         "plan_cpu_s": plan_run.cpu_s,
         "likely": likely,
         "truth": truth,
-        "missed": [name for name, factor in WITHIN.items()
-                   if not 1 / factor <= likely[name] / truth[name] <= factor],
+        "missed": [
+            name
+            for name, factor in WITHIN.items()
+            if not 1 / factor <= likely[name] / truth[name] <= factor
+        ],
     }
 
 
@@ -48,25 +51,42 @@ def print_cases(cases):
         return text + (" !" if name in case["missed"] else "")
 
     print("Estimate / truth, ! if out of bounds:\n")
-    measure.print_table(["case"] + SHOWN + ["plan's own CPU s"],
-                        [[c["case"]] + [cell(c, name) for name in SHOWN] + [f"{c['plan_cpu_s']:.2f}"]
-                         for c in cases])
+    measure.print_table(
+        ["case"] + SHOWN + ["plan's own CPU s"],
+        [
+            [c["case"]] + [cell(c, name) for name in SHOWN] + [f"{c['plan_cpu_s']:.2f}"]
+            for c in cases
+        ],
+    )
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     measure.add_common_options(parser)
-    parser.add_argument("--scene", action="append", type=Path, metavar="FILE.glb",
-                        help="this scene instead of all in --scenes")
-    parser.add_argument("--resolution", action="append", type=int, metavar="R",
-                        help=f"this resolution instead of {RESOLUTIONS}")
+    parser.add_argument(
+        "--scene",
+        action="append",
+        type=Path,
+        metavar="FILE.glb",
+        help="this scene instead of all in --scenes",
+    )
+    parser.add_argument(
+        "--resolution",
+        action="append",
+        type=int,
+        metavar="R",
+        help=f"this resolution instead of {RESOLUTIONS}",
+    )
     options = parser.parse_args()
 
     facts = measure.machine()
     print(measure.machine_line(facts) + "\n", flush=True)
     scenes = options.scene or sorted(options.scenes.glob("*.glb"))
-    cases = [measure_case(scene, resolution, options)
-             for scene in scenes for resolution in options.resolution or RESOLUTIONS]
+    cases = [
+        measure_case(scene, resolution, options)
+        for scene in scenes
+        for resolution in options.resolution or RESOLUTIONS
+    ]
     print_cases(cases)
     measure.write_json(options.json, {"machine": facts, "cases": cases})
     return 1 if any(case["missed"] for case in cases) else 0

@@ -1,7 +1,8 @@
 """An optional reference: an external program that builds a DAG in memory, given by --study FOLDER.
 
-The folder is not part of this repository; the benchmarks run without it. It contains C++ sources of one
-program, with main() in bench.cpp, that is called as `study MESH.obj LEVELS` and prints one line:
+The folder is not part of this repository; the benchmarks run without it. It contains C++ sources of
+one program, with main() in bench.cpp, that is called as `study MESH.obj LEVELS` and prints one
+line:
 
     BUILD cpu SECONDS s (wall SECONDS) | voxels COUNT ... dag COUNT nodes
 
@@ -38,8 +39,18 @@ class Study:
         text = header.read_text().replace("_mm256_load_si256(", "_mm256_loadu_si256(")
         header.write_text(text)
         self.program = self.folder / "study"
-        run(["g++", "-std=c++20", "-O3", "-march=native", "-w", "-o", self.program,
-             self.folder / "bench.cpp"])
+        run(
+            [
+                "g++",
+                "-std=c++20",
+                "-O3",
+                "-march=native",
+                "-w",
+                "-o",
+                self.program,
+                self.folder / "bench.cpp",
+            ]
+        )
 
     def supports(self, scene):
         return scene in MESHES or scene == HAIRBALL
@@ -59,8 +70,11 @@ class Study:
         """CPU and wall seconds, voxels and DAG nodes of the build stage at R = 2^levels."""
         mesh = self.mesh_of(scene, scene_path)
         text = run([self.program, mesh, levels]).stdout
-        found = re.search(r"BUILD cpu ([\d.]+) s \(wall ([\d.]+)\) \| voxels ([\d.e+]+).*"
-                          r"dag ([\d.e+]+) nodes", text)
+        found = re.search(
+            r"BUILD cpu ([\d.]+) s \(wall ([\d.]+)\) \| voxels ([\d.e+]+).*"
+            r"dag ([\d.e+]+) nodes",
+            text,
+        )
         if not found:
             raise SystemExit(f"expected a line 'BUILD cpu ...' from {self.program}: {text}")
         cpu_s, wall_s, voxels, dag_nodes = map(float, found.groups())
@@ -69,5 +83,7 @@ class Study:
 
 def same_work(study, report):
     """True if the counts of the reference and of the build are close enough."""
-    return (abs(study["voxels"] / report["voxels"] - 1) <= VOXELS_WITHIN
-            and abs(study["dag_nodes"] / report["dag_nodes"] - 1) <= NODES_WITHIN)
+    return (
+        abs(study["voxels"] / report["voxels"] - 1) <= VOXELS_WITHIN
+        and abs(study["dag_nodes"] / report["dag_nodes"] - 1) <= NODES_WITHIN
+    )

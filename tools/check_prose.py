@@ -104,7 +104,9 @@ def prose_of(path):
 
 
 def tracked_files(paths):
-    listing = subprocess.run(["git", "ls-files", "-z", *paths], check=True, capture_output=True, text=True)
+    listing = subprocess.run(
+        ["git", "ls-files", "-z", *paths], check=True, capture_output=True, text=True
+    )
     return [path for path in listing.stdout.split("\0") if path and path not in LEFT_OUT]
 
 
@@ -119,7 +121,9 @@ def main():
         for number, text in prose_of(path):
             lines[folder] += 1
             for cure, pattern in COMPILED.items():
-                places[folder] += [f"{path}:{number}: [{cure}] {text.strip()}"] * len(pattern.findall(text))
+                places[folder] += [f"{path}:{number}: [{cure}] {text.strip()}"] * len(
+                    pattern.findall(text)
+                )
     failed = False
     for folder in sorted(lines):
         rate = 1000 * len(places[folder]) / max(lines[folder], MIN_LINES)
@@ -127,7 +131,9 @@ def main():
         failed |= is_above
         if arguments.list or is_above:
             print("\n".join(places[folder]))
-        print(f"{folder}: {lines[folder]} lines of prose, {rate:.1f} places per 1,000 lines (at most {MAX_PER_1000})")
+        print(
+            f"{folder}: {lines[folder]} lines of prose, {rate:.1f} places per 1,000 lines (at most {MAX_PER_1000})"
+        )
     return 1 if failed else 0
 
 

@@ -1,22 +1,26 @@
 #!/usr/bin/env python3
 """What the viewer costs, in headless Chromium with WebGL on the CPU.
 
-    bench/viewer/measure.py views FILE.vdag [--budget MIB]   bytes, tiles, seconds, steps of the cameras, each in a
-                                                             separate browser; then all in one
-    bench/viewer/measure.py pictures FILE.vdag               compared with `voxdag render`
-    bench/viewer/measure.py frames FILE.vdag --other WEB     CPU time of a frame, also of another version's server/web
-    bench/viewer/measure.py first FILE.vdag                  the times of the first picture
-    bench/viewer/measure.py flight FILE.vdag --seconds 600   memory, sampled every ten seconds
+    bench/viewer/measure.py views FILE.vdag [--budget MIB]
+    bench/viewer/measure.py pictures FILE.vdag
+    bench/viewer/measure.py frames FILE.vdag --other WEB
+    bench/viewer/measure.py first FILE.vdag
+    bench/viewer/measure.py flight FILE.vdag --seconds 600
 
---cameras takes a file with lines of a name and the camera options of `voxdag render`, as sponza.txt here; without it, named views. Bytes,
-tiles and steps do not depend on the load of the machine; the other figures do, so the load is printed. Needs Playwright,
-numpy and Pillow.
+- views: bytes, tiles, seconds, steps of the cameras, each in a separate browser; then all in one
+- pictures: compared with `voxdag render`
+- frames: CPU time of a frame, also of the server/web folder of another version
+- first: the times of the first picture
+- flight: memory, sampled every ten seconds
+
+--cameras takes a file with lines of a name and the camera options of `voxdag render`, as sponza.txt
+here; without it, named views. Bytes, tiles and steps do not depend on the load of the machine; the
+other figures do, so the load is printed. Needs Playwright, numpy and Pillow.
 """
 
 import argparse
 import contextlib
 import json
-import mmap
 import os
 import re
 import statistics
@@ -35,11 +39,28 @@ import numpy as np
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent / "tests" / "browser"))
 
-from in_page import FIRST, FLIGHT, FRAMES, HITS, IN_LARGE_PARTS, KEEP_ENTRIES, LIGHT_STEPS, REQUESTS, UNTIL_COMPLETE  # noqa: E402
+from figures import compared, cpu_s, descendants, describe, mapped, places_of, resident, row, sums  # noqa: E402
+from in_page import (  # noqa: E402
+    FIRST,
+    FLIGHT,
+    FRAMES,
+    HITS,
+    IN_LARGE_PARTS,
+    KEEP_ENTRIES,
+    LIGHT_STEPS,
+    REQUESTS,
+    UNTIL_COMPLETE,
+)
 from programs import DagFile, Server, Voxdag, free_port  # noqa: E402
 from visitor import Visitor  # noqa: E402
 
-OPTIONS = ["--no-sandbox", "--disable-gpu-watchdog", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+OPTIONS = [
+    "--no-sandbox",
+    "--disable-gpu-watchdog",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
 WINDOW = (320, 50)  # of the window, beyond the canvas
 NAMED_VIEWS = ("iso", "auto", "front", "top")
 STEP_MS = 600_000
@@ -61,14 +82,22 @@ class Measurement:
             self.cameras = {name: self.cameras[name] for name in arguments.only.split(",")}
 
     def server(self):
-        return Server([self.voxdag.program, "view", self.dag, "--port", free_port()], self.folder, "view")
+        return Server(
+            [self.voxdag.program, "view", self.dag, "--port", free_port()], self.folder, "view"
+        )
 
     @contextlib.contextmanager
     def visitor(self, width=None, height=None):
         """A separate browser with a canvas of this size."""
         browser = self.play.chromium.launch(executable_path="/usr/bin/chromium", args=OPTIONS)
-        visitor = Visitor(browser, self.folder, "measured", (width or self.width) + WINDOW[0], (height or self.height) + WINDOW[1],
-                          device_scale_factor=1)
+        visitor = Visitor(
+            browser,
+            self.folder,
+            "measured",
+            (width or self.width) + WINDOW[0],
+            (height or self.height) + WINDOW[1],
+            device_scale_factor=1,
+        )
         visitor.timeout_ms = STEP_MS
         visitor.context.set_default_timeout(STEP_MS)
         visitor.context.add_init_script(KEEP_ENTRIES)
@@ -96,19 +125,34 @@ class Measurement:
                 spent_s = cpu_s(server.process.pid) - before_s
                 asked[name], bytes_of = sums(visitor.page.evaluate(REQUESTS, 0))
                 hits = visitor.page.evaluate(HITS)
-                self.say(view=name, **row(done), server_cpu_s=spent_s, asked=len(asked[name]), bytes=bytes_of,
-                         widest=round(hits["widest"], 3), hits=round(hits["hits"], 3), **places_of(files, hits["places"]),
-                         steps=describe(hits["steps"]))
+                self.say(
+                    view=name,
+                    **row(done),
+                    server_cpu_s=spent_s,
+                    asked=len(asked[name]),
+                    bytes=bytes_of,
+                    widest=round(hits["widest"], 3),
+                    hits=round(hits["hits"], 3),
+                    **places_of(files, hits["places"]),
+                    steps=describe(hits["steps"]),
+                )
                 if self.arguments.light:
                     light = visitor.page.evaluate(LIGHT_STEPS)
-                    self.say(view=name, sun=describe(light["sun"]), sky=describe(light["sky"]),
-                             pass_ms=light["passMs"])
+                    self.say(
+                        view=name,
+                        sun=describe(light["sun"]),
+                        sky=describe(light["sky"]),
+                        pass_ms=light["passMs"],
+                    )
         counts = {}
         for tiles in asked.values():
             for tile in tiles:
                 counts[tile] = counts.get(tile, 0) + 1
-        self.say(tiles_of_all=len(counts), tiles_in_views={n: sum(c == n for c in counts.values()) for n in set(counts.values())},
-                 shared={f"{a} {b}": len(asked[a] & asked[b]) for a in asked for b in asked if a < b})
+        self.say(
+            tiles_of_all=len(counts),
+            tiles_in_views={n: sum(c == n for c in counts.values()) for n in set(counts.values())},
+            shared={f"{a} {b}": len(asked[a] & asked[b]) for a in asked for b in asked if a < b},
+        )
         self.session(asked)
 
     def session(self, asked):
@@ -123,14 +167,22 @@ class Measurement:
                 requests = visitor.page.evaluate(REQUESTS, 0)
                 tiles, bytes_of = sums(requests[seen:])
                 seen = len(requests)
-                self.say(session=name, **row(done), evicted_here=done["evicted"] - evicted, asked=len(tiles), bytes=bytes_of,
-                         server_cpu_s=cpu_s(server.process.pid) - before_s, not_asked_in_its_own=len(tiles - asked.get(name, set())))
+                self.say(
+                    session=name,
+                    **row(done),
+                    evicted_here=done["evicted"] - evicted,
+                    asked=len(tiles),
+                    bytes=bytes_of,
+                    server_cpu_s=cpu_s(server.process.pid) - before_s,
+                    not_asked_in_its_own=len(tiles - asked.get(name, set())),
+                )
                 evicted = done["evicted"]
             tiles, bytes_of = sums(requests)
             self.say(session="all", asked=len(tiles), bytes=bytes_of)
 
     def pictures(self):
         from PIL import Image
+
         out = Path(self.arguments.output)
         out.mkdir(parents=True, exist_ok=True)
         for name, camera in self.cameras.items():
@@ -141,18 +193,39 @@ class Measurement:
                 depths, _ = visitor.capture(width, height)
                 light = visitor.page.evaluate("voxdagViewer.renderer.light")
             ours = np.frombuffer(pixels, np.uint8).reshape(height, width, 4)[:, :, :3]
-            reference, picture = np.array(self.voxdag.render(self.dag, camera, width, height)), out / f"{name}_render.png"
-            self.voxdag.run("render", self.dag, "-o", picture, *camera.split(), "--force", "--size", f"{width}x{height}",
-                            "--samples", 4)
+            reference, picture = (
+                np.array(self.voxdag.render(self.dag, camera, width, height)),
+                out / f"{name}_render.png",
+            )
+            self.voxdag.run(
+                "render",
+                self.dag,
+                "-o",
+                picture,
+                *camera.split(),
+                "--force",
+                "--size",
+                f"{width}x{height}",
+                "--samples",
+                4,
+            )
             its = np.asarray(Image.open(picture).convert("RGB"))
             Image.fromarray(ours).save(out / f"{name}_viewer.png")
-            self.say(view=name, **compared(np.array(depths).reshape(height, width), reference.reshape(height, width),
-                                           ours.astype(float), its.astype(float)),
-                     light={key: light[key] for key in ("sun", "exposure", "skyReach", "hazeStart")})
+            self.say(
+                view=name,
+                **compared(
+                    np.array(depths).reshape(height, width),
+                    reference.reshape(height, width),
+                    ours.astype(float),
+                    its.astype(float),
+                ),
+                light={key: light[key] for key in ("sun", "exposure", "skyReach", "hazeStart")},
+            )
 
     def frames(self):
-        """Measures both versions alternating, from files in a folder, with the tiles of one server. The cost of a frame is the
-        CPU time of the browser's graphics process, which does not depend on the load."""
+        """Measures both versions alternating, from files in a folder, with the tiles of one server.
+        The cost of a frame is the CPU time of the browser's graphics process, which does not depend
+        on the load."""
         own = Path(__file__).resolve().parent.parent.parent / "server" / "web"
         with contextlib.ExitStack() as stack:
             server, visitors, known = stack.enter_context(self.server()), {}, set()
@@ -171,12 +244,26 @@ class Measurement:
                 for _ in range(self.arguments.rounds):
                     for version, (visitor, pid) in visitors.items():
                         before_s = cpu_s(pid)
-                        measured = visitor.page.evaluate(FRAMES, [self.arguments.frames, self.width, self.height])
+                        measured = visitor.page.evaluate(
+                            FRAMES, [self.arguments.frames, self.width, self.height]
+                        )
                         costs[version].append((cpu_s(pid) - before_s) / self.arguments.frames)
-                        self.say(version=version, view=name, cpu_s_per_frame=round(costs[version][-1], 3), **measured)
+                        self.say(
+                            version=version,
+                            view=name,
+                            cpu_s_per_frame=round(costs[version][-1], 3),
+                            **measured,
+                        )
                 ratios = [b / a for a, b in zip(costs["this"], costs["other"])]
-                self.say(view=name, **{version: round(statistics.median(each), 3) for version, each in costs.items()},
-                         times_as_fast=round(statistics.median(ratios), 2), ratios=[round(r, 2) for r in ratios])
+                self.say(
+                    view=name,
+                    **{
+                        version: round(statistics.median(each), 3)
+                        for version, each in costs.items()
+                    },
+                    times_as_fast=round(statistics.median(ratios), 2),
+                    ratios=[round(r, 2) for r in ratios],
+                )
 
     def first(self):
         camera = next(iter(self.cameras.values()))
@@ -189,15 +276,25 @@ class Measurement:
                     while measured is None:
                         visitor.page.wait_for_timeout(50)
                         measured = visitor.page.evaluate(FIRST)
-                    requests = [each for each in visitor.page.evaluate(REQUESTS, 0) if each[1] < measured["first"]]
+                    requests = [
+                        each
+                        for each in visitor.page.evaluate(REQUESTS, 0)
+                        if each[1] < measured["first"]
+                    ]
                 measured["bytes"] = sums(requests)[1]
                 page = [each for each in requests if "/api/" not in each[0]]
                 measured["page_done"] = max(each[2] for each in page)
-                measured["manifest_done"] = max(each[2] for each in requests if each[0].endswith("/tiles"))
+                measured["manifest_done"] = max(
+                    each[2] for each in requests if each[0].endswith("/tiles")
+                )
                 found.append(measured)
                 self.say(**measured)
-        self.say(medians={key: round(statistics.median(each[key] for each in found))
-                          for key in ("page_done", "manifest_done", "begin", "compile", "first")})
+        self.say(
+            medians={
+                key: round(statistics.median(each[key] for each in found))
+                for key in ("page_done", "manifest_done", "begin", "compile", "first")
+            }
+        )
 
     def flight(self):
         rows, seconds = [], self.arguments.seconds
@@ -211,116 +308,54 @@ class Measurement:
                 visitor.page.wait_for_timeout(10_000)
                 session.send("HeapProfiler.collectGarbage")
                 state = visitor.statistics()
-                requests = visitor.page.evaluate("[itsFlight.frames, performance.getEntriesByType('resource').length]")
-                rows.append({"s": round(time.monotonic() - begin), "heap": session.send("Runtime.getHeapUsage")["usedSize"] / MIB,
-                             "gpu_process": sum(resident(pid) for pid in descendants("gpu-process")),
-                             "page_process": sum(resident(pid) for pid in descendants("renderer")),
-                             "server": resident(server.process.pid), "server_own": resident(server.process.pid, "RssAnon"),
-                             "pool": state["poolBytes"] / MIB, "tile_bytes": state["tileBytes"] / MIB, "tiles": state["tiles"],
-                             "requested": state["requested"], "evicted": state["evicted"],
-                             "fetched": state["fetchedBytes"] / MIB, "frames": requests[0]})
+                requests = visitor.page.evaluate(
+                    "[itsFlight.frames, performance.getEntriesByType('resource').length]"
+                )
+                rows.append(
+                    {
+                        "s": round(time.monotonic() - begin),
+                        "heap": session.send("Runtime.getHeapUsage")["usedSize"] / MIB,
+                        "gpu_process": sum(resident(pid) for pid in descendants("gpu-process")),
+                        "page_process": sum(resident(pid) for pid in descendants("renderer")),
+                        "server": resident(server.process.pid),
+                        "server_own": resident(server.process.pid, "RssAnon"),
+                        "pool": state["poolBytes"] / MIB,
+                        "tile_bytes": state["tileBytes"] / MIB,
+                        "tiles": state["tiles"],
+                        "requested": state["requested"],
+                        "evicted": state["evicted"],
+                        "fetched": state["fetchedBytes"] / MIB,
+                        "frames": requests[0],
+                    }
+                )
                 self.say(**{key: round(value, 1) for key, value in rows[-1].items()})
             visitor.page.evaluate("itsFlight.stopped = true")
         for minute in range(int(seconds // 60)):
             of = [each for each in rows if 60 * minute < each["s"] <= 60 * (minute + 1)]
-            self.say(minute=minute + 1, **{key: [round(f([each[key] for each in of]), 1) for f in (min, statistics.median, max)]
-                                           for key in of[0] if key != "s"} if of else {})
-
-
-def mapped(path):
-    with open(path, "rb") as file:
-        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-
-
-def cpu_s(pid):
-    fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def resident(pid, which="VmRSS"):
-    """Resident memory in MiB; 0 if the process has ended."""
-    with contextlib.suppress(OSError):
-        found = re.search(rf"{which}:\s+(\d+) kB", Path(f"/proc/{pid}/status").read_text(encoding="utf-8"))
-        return int(found[1]) / 1024 if found else 0
-    return 0
-
-
-def descendants(kind):
-    """Those of this process that are of a kind of the browser's."""
-    parents, commands = {}, {}
-    for folder in Path("/proc").iterdir():
-        with contextlib.suppress(OSError, ValueError):
-            pid = int(folder.name)
-            parents[pid] = int((folder / "stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[1])
-            commands[pid] = (folder / "cmdline").read_bytes().decode(errors="replace")
-    def is_ours(pid):
-        while pid in parents and pid != os.getpid():
-            pid = parents[pid]
-        return pid == os.getpid()
-    return [pid for pid, command in commands.items() if f"--type={kind}" in command and is_ours(pid)]
-
-
-def row(done):
-    return {key: round(done[key], 3) for key in ("completeS", "doneS", "firstPictureS", "compileS", "coarsePixels")} | {
-        key: done[key] for key in ("full", "width", "height", "tiles", "tileBytes", "poolBytes", "evicted", "fetchedBytes")}
-
-
-def sums(requests):
-    """The nodes of the requested tiles, as text, and the bytes of the page, the manifest and the tiles."""
-    tiles, bytes_of = set(), {"page": 0, "manifest": 0, "tiles": 0}
-    for address, _, _, size in requests:
-        if single := re.search(r"/tiles/(\d+)/(\d+)\?", address):
-            tiles.add(f"{single[1]}.{single[2]}")
-        elif nodes := re.search(r"[?&]nodes=([0-9.,]+)", address):
-            tiles.update(nodes[1].split(","))
-        bytes_of["page" if "/api/" not in address else "manifest" if address.endswith("/tiles") else "tiles"] += size
-    return tiles, bytes_of
-
-
-def places_of(files, text):
-    """How many tiles, at how many places, the rays of a picture went through."""
-    places = set()
-    for place in text.split():
-        level, *at = map(int, place.split(","))
-        while level >= 0 and (level, *at) not in places:
-            places.add((level, *at))
-            above = max(0, level - 3)
-            at, level = [x >> (level - above) for x in at], above if level > 0 else -1
-    tiles = {}
-    for level, *at in places:
-        shift = files.levels - level
-        offset = files.find([x << shift for x in at], level)
-        if offset is not None:  # else it is a neighbor of the cell that was hit
-            tiles[level, offset] = tiles.get((level, offset), 0) + 1
-    return {"tiles_seen": len(tiles), "places_seen": sum(tiles.values()), "max_places": max(tiles.values())}
-
-
-def describe(histogram):
-    total, cumulated = sum(histogram), np.cumsum(histogram)
-    return {"rays": total, "mean": round(float(np.dot(histogram, np.arange(len(histogram)))) / max(1, total), 1),
-            "p99": int(np.searchsorted(cumulated, 0.99 * total)), "max": int(np.max(np.nonzero(histogram)[0], initial=0))}
-
-
-def compared(depths, reference, ours, its):
-    """Brightness difference of the pixels that hit, in total and in regions of 8 x 8."""
-    ours_hit, its_hit = np.isfinite(depths), np.isfinite(reference)
-    both, off = ours_hit & its_hit, (ours - its).mean(axis=2)
-    regions = []
-    for rows, marks in zip(np.array_split(off, 8), np.array_split(both, 8)):
-        for part, mark in zip(np.array_split(rows, 8, axis=1), np.array_split(marks, 8, axis=1)):
-            regions.append(round(float(part[mark].mean()), 1) if mark.sum() >= 100 else None)
-    sky = ~ours_hit & ~its_hit
-    return {"same_mask": round(float((ours_hit == its_hit).mean()), 5), "hits": round(float(both.mean()), 3),
-            "mean_viewer": round(float(ours.mean(axis=2)[both].mean()), 1), "mean_render": round(float(its.mean(axis=2)[both].mean()), 1),
-            "mean_off": round(float(off[both].mean()), 2), "rms": round(float(np.sqrt((off[both] ** 2).mean())), 1),
-            "sky_off": round(float(off[sky].mean()), 2) if sky.any() else None,
-            "region_off": max((r for r in regions if r is not None), key=abs), "regions": regions}
+            self.say(
+                minute=minute + 1,
+                **{
+                    key: [
+                        round(f([each[key] for each in of]), 1)
+                        for f in (min, statistics.median, max)
+                    ]
+                    for key in of[0]
+                    if key != "s"
+                }
+                if of
+                else {},
+            )
 
 
 @contextlib.contextmanager
 def served(folder, server_url):
     """A server of the files of a version of the viewer, that asks another one for all else."""
-    kinds = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".html": "text/html"}
+    kinds = {
+        ".js": "text/javascript",
+        ".css": "text/css",
+        ".svg": "image/svg+xml",
+        ".html": "text/html",
+    }
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
@@ -354,22 +389,29 @@ def served(folder, server_url):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=["views", "session", "pictures", "frames", "first", "flight"])
+    parser.add_argument(
+        "what", choices=["views", "session", "pictures", "frames", "first", "flight"]
+    )
     parser.add_argument("file")
     parser.add_argument("--voxdag", default="build/quick/voxdag", help="the program")
     parser.add_argument("--cameras", help="a file of names and cameras")
     parser.add_argument("--only", help="some of the names, with commas")
     parser.add_argument("--size", default="1920x1080", help="of the canvas")
     parser.add_argument("--budget", type=int, help="of the tiles, in MiB")
-    parser.add_argument("--light", action="store_true", help="views: steps of the rays to the sun and the sky, too")
+    parser.add_argument(
+        "--light", action="store_true", help="views: steps of the rays to the sun and the sky, too"
+    )
     parser.add_argument("--other", help="frames: the folder server/web of another version")
     parser.add_argument("--rounds", type=int, default=3, help="frames, first: how often")
     parser.add_argument("--frames", type=int, default=8, help="frames: of one turn")
     parser.add_argument("--seconds", type=float, default=600, help="flight: how long")
-    parser.add_argument("--leg", type=float, default=12, help="flight: seconds from one camera to the next")
+    parser.add_argument(
+        "--leg", type=float, default=12, help="flight: seconds from one camera to the next"
+    )
     parser.add_argument("--output", default="pictures", help="pictures: the folder")
     arguments = parser.parse_args()
     from playwright.sync_api import sync_playwright
+
     with tempfile.TemporaryDirectory(prefix="measure-viewer-") as folder, sync_playwright() as play:
         measurement = Measurement(arguments, play, Path(folder))
         if arguments.what == "session":

@@ -9,7 +9,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
-SKIPPED = 77  # what ctest counts as skipped
+SKIPPED = 77  # ctest reports this exit status as skipped
 
 WATCH_POLICY = """
 window.violations = [];
@@ -20,7 +20,7 @@ delete window.showSaveFilePicker;  // it would open a dialog that nobody answers
 
 
 def missing():
-    """What a test in a browser needs and this machine lacks, or None."""
+    """Returns the missing requirement of browser tests, or None."""
     if importlib.util.find_spec("playwright") is None:
         return "no Playwright here (pip install playwright)"
     if not chromium_path():
@@ -38,6 +38,7 @@ def in_chromium(name, screenshots, check, options=()):
         print(f"skipped: {lack}")
         return SKIPPED
     from playwright.sync_api import sync_playwright
+
     # Chromium's sandbox does not work for root.
     options = [*options, *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     with tempfile.TemporaryDirectory(prefix=f"check-{name}-") as scratch, sync_playwright() as play:
@@ -51,7 +52,7 @@ def in_chromium(name, screenshots, check, options=()):
 
 
 class Window:
-    """Records every error that the browser reports; leave() fails if there were any."""
+    """A page that records every error the browser reports. leave() fails if there were any."""
 
     timeout_ms = 120_000  # for each step, on a slow machine
 
@@ -62,7 +63,7 @@ class Window:
         self.begin(pictures, name)
 
     def another(self, name):
-        """A window with the cache and the options of this one, which opens sooner than one of its own."""
+        """Returns a window that shares the cache and options of this one, so it opens faster."""
         other = copy.copy(self)
         other.owns_context = False
         other.begin(self.pictures, name)
@@ -73,7 +74,7 @@ class Window:
         self.page = self.context.new_page()
         self.page.add_init_script(WATCH_POLICY)
         self.errors = []
-        self.expected = None  # pattern of console errors that the current step causes
+        self.expected = None  # pattern of the console errors that the current step causes
         self.page.on("console", self.on_console)
         self.page.on("pageerror", lambda error: self.errors.append(f"page error: {error}"))
 

@@ -1,4 +1,4 @@
-"""The generated city of the viewer's test, the cameras that look at it, and what `voxdag render` sees there."""
+"""The generated city of the viewer's test, its cameras, and the pictures of `voxdag render`."""
 
 import json
 
@@ -7,7 +7,7 @@ from programs import DagFile, read_npy
 
 
 class City:
-    """Built once, in a folder that several processes may read."""
+    """Built once, in a folder that several processes read."""
 
     def __init__(self, folder):
         self.folder, self.built = folder, folder / "city_8192.vdag"
@@ -23,7 +23,9 @@ class City:
 
     def load(self):
         self.cameras = json.loads((self.folder / "cameras.json").read_text(encoding="utf-8"))
-        self.references = {name: read_npy(self.path_of(name), WIDTH, HEIGHT) for name in self.cameras}
+        self.references = {
+            name: read_npy(self.path_of(name), WIDTH, HEIGHT) for name in self.cameras
+        }
         self.dag = DagFile(self.built)
         return self
 
@@ -31,10 +33,15 @@ class City:
         return self.folder / f"depth-{name}.npy"
 
     def make_cameras(self, voxdag):
-        """From far to near. Two see much sky; one looks straight down; in the last a voxel has many pixels."""
+        """Cameras from far to near: two with much sky, one straight down, one with large voxels."""
         views = {name: voxdag.named_view(self.built, name) for name in ("iso", "top", "inside")}
         dag = DagFile(self.built)
         inside = numbers(views["inside"])
         eye, target = inside[:3], inside[3:6]
-        return {"wide": views["iso"], "top": views["top"], "inside": views["inside"],
-                "street": street_camera(dag, eye), "near": near_camera(dag, eye, target)}
+        return {
+            "wide": views["iso"],
+            "top": views["top"],
+            "inside": views["inside"],
+            "street": street_camera(dag, eye),
+            "near": near_camera(dag, eye, target),
+        }

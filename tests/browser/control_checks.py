@@ -1,6 +1,5 @@
 """Mouse, touch, keyboard, panel, address and messages of the viewer."""
 
-import json
 import math
 import re
 
@@ -8,7 +7,7 @@ from picture_checks import HEIGHT, WIDTH, address, numbers
 from visitor import PIXEL_RATIO
 
 PICK = "async ([x, y]) => (await voxdagViewer.renderer.pick(x, y)).position"
-CAMERA_DIGITS = 5  # that `render` prints agree with what it was given
+CAMERA_DIGITS = 5  # digits that `render` prints and keeps
 
 
 def distance(a, b):
@@ -22,11 +21,14 @@ def center_of(page):
 
 def wait_for_pick(page):
     page.locator('[data-fact="voxel"]').wait_for()
-    return {name: page.locator(f'[data-fact="{name}"]').inner_text() for name in ("voxel", "scene", "level", "node")}
+    return {
+        name: page.locator(f'[data-fact="{name}"]').inner_text()
+        for name in ("voxel", "scene", "level", "node")
+    }
 
 
 def check_pick(visitor, dag, camera):
-    """A picked voxel is one of the file, with its node, and where the picture says that it is."""
+    """A picked voxel and its node are in the file, at the place that the picture shows."""
     visitor.show(camera)
     page = visitor.page
     page.mouse.click(*center_of(page))
@@ -44,7 +46,7 @@ def check_pick(visitor, dag, camera):
         assert voxel[axis] - 0.01 <= in_voxels <= voxel[axis] + 1.01, facts
     eye = visitor.camera()["eye"]
     forward = [b - a for a, b in zip(eye, visitor.camera()["target"])]
-    # In the center of the picture: nothing of the file is nearer along the ray.
+    # In the center of the picture, no voxel of the file is nearer along the ray.
     far = distance(eye, [(scene[axis] - dag.origin[axis]) / size for axis in range(3)])
     for step in range(int(far) - 2):
         cell = [math.floor(a + step * f / math.hypot(*forward)) for a, f in zip(eye, forward)]
@@ -53,13 +55,15 @@ def check_pick(visitor, dag, camera):
 
 
 def check_measure(visitor):
-    """The distance between two picks is that of their positions."""
+    """The measured distance equals the distance of the two positions."""
     page = visitor.page
     x, y = center_of(page)
     first = numbers(wait_for_pick(page)["scene"])
     page.get_by_role("button", name="Measure from here").click()
     page.mouse.click(x + 25, y + 20)
-    visitor.wait_until("document.querySelector('[data-fact=\"measure\"]')?.textContent.startsWith('0 ') === false")
+    visitor.wait_until(
+        "document.querySelector('[data-fact=\"measure\"]')?.textContent.startsWith('0 ') === false"
+    )
     second = numbers(wait_for_pick(page)["scene"])
     in_scene = numbers(page.locator('[data-fact="measure"]').inner_text())[1]
     assert first != second and math.isclose(in_scene, distance(first, second), rel_tol=1e-3)
@@ -69,7 +73,7 @@ def check_measure(visitor):
     assert all(a < b for a, b in zip(low, high))
     page.get_by_label("Show only what is in a box").uncheck()
     assert page.evaluate("voxdagViewer.viewer.options.clip") is None
-    # A click into the sky: what is measured from stays, and so do its buttons.
+    # A click into the sky keeps the start of the measurement and its buttons.
     page.evaluate("voxdagViewer.viewer.panel.pick.set(null)")
     page.get_by_role("button", name="Measure from here", pressed=True).wait_for()
     page.get_by_role("button", name="Clear").click()
@@ -80,14 +84,20 @@ def check_measure(visitor):
 
 
 def steady_place(reference, radius=3):
-    """In pixels of the page's canvas: where the distances around differ least, none being that of the sky."""
+    """Returns the canvas pixel whose neighborhood has the most even distances, all of them hits."""
+
     def spread(place):
         x, y = place
-        around = [reference[row * WIDTH + column] for row in range(y - radius, y + radius + 1)
-                  for column in range(x - radius, x + radius + 1)]
+        around = [
+            reference[row * WIDTH + column]
+            for row in range(y - radius, y + radius + 1)
+            for column in range(x - radius, x + radius + 1)
+        ]
         return max(around) / min(around)
 
-    places = [(x, y) for x in range(radius, WIDTH - radius, 2) for y in range(radius, HEIGHT - radius, 2)]
+    places = [
+        (x, y) for x in range(radius, WIDTH - radius, 2) for y in range(radius, HEIGHT - radius, 2)
+    ]
     x, y = min((place for place in places if math.isfinite(spread(place))), key=spread)
     return (x + 0.5) / PIXEL_RATIO, (y + 0.5) / PIXEL_RATIO
 
@@ -109,10 +119,16 @@ def check_mouse(visitor, camera, reference):
 
     orbited = drag("left", 60, 10)
     assert orbited["target"] == before["target"] and distance(orbited["eye"], before["eye"]) > 1
-    assert math.isclose(distance(orbited["eye"], orbited["target"]), distance(before["eye"], before["target"]), rel_tol=1e-9)
+    assert math.isclose(
+        distance(orbited["eye"], orbited["target"]),
+        distance(before["eye"], before["target"]),
+        rel_tol=1e-9,
+    )
     panned = drag("right", 40, 0)
     shift = [b - a for a, b in zip(orbited["eye"], panned["eye"])]
-    assert distance(shift, [b - a for a, b in zip(orbited["target"], panned["target"])]) < 1e-6 * math.hypot(*shift)
+    assert distance(
+        shift, [b - a for a, b in zip(orbited["target"], panned["target"])]
+    ) < 1e-6 * math.hypot(*shift)
 
     visitor.show(camera)
     cursor = steady_place(reference)
@@ -123,20 +139,31 @@ def check_mouse(visitor, camera, reference):
     for _ in range(3):
         eye = visitor.camera()["eye"]
         page.mouse.wheel(0, -200)
-        visitor.wait_until("(eye) => voxdagViewer.camera.eye[0] !== eye[0] && voxdagViewer.viewer.controls.anchor.point", eye)
+        visitor.wait_until(
+            "(eye) => voxdagViewer.camera.eye[0] !== eye[0] &&"
+            " voxdagViewer.viewer.controls.anchor.point",
+            eye,
+        )
     zoomed = visitor.camera()
     assert distance(zoomed["eye"], point) < 0.8 * distance(before["eye"], point)
     again = page.evaluate(PICK, cursor)
-    assert distance(point, again) < 0.1 * distance(zoomed["eye"], point), "the cursor's place has moved"
+    assert distance(point, again) < 0.1 * distance(zoomed["eye"], point), (
+        "the cursor's place has moved"
+    )
     page.mouse.dblclick(*on_page)
-    visitor.wait_until("([x]) => Math.abs(voxdagViewer.camera.target[0] - x) < 1e-6 + Math.abs(x) / 50", again)
+    visitor.wait_until(
+        "([x]) => Math.abs(voxdagViewer.camera.target[0] - x) < 1e-6 + Math.abs(x) / 50", again
+    )
     assert visitor.camera()["eye"] == zoomed["eye"]
     page.get_by_role("button", name="Reset").click()
-    visitor.wait_until("(eye) => Math.hypot(...voxdagViewer.camera.eye.map((c, axis) => c - eye[axis])) > 1", zoomed["eye"])
+    visitor.wait_until(
+        "(eye) => Math.hypot(...voxdagViewer.camera.eye.map((c, axis) => c - eye[axis])) > 1",
+        zoomed["eye"],
+    )
 
 
 def check_camera_text(visitor, voxdag, built, camera):
-    """The same string in the panel, in the address, and of `render`."""
+    """Panel, address and `render` print the same camera."""
     page = visitor.page
     visitor.show(camera, complete=False)
     page.keyboard.press("w")
@@ -144,7 +171,9 @@ def check_camera_text(visitor, voxdag, built, camera):
     printed = voxdag.printed_camera(built, text)
     mine = numbers(text)
     theirs = [*printed["camera"], *printed["target"], printed["fov"]]
-    assert all(math.isclose(a, b, rel_tol=10 ** -CAMERA_DIGITS, abs_tol=1e-9) for a, b in zip(mine, theirs)), (mine, theirs)
+    assert all(
+        math.isclose(a, b, rel_tol=10**-CAMERA_DIGITS, abs_tol=1e-9) for a, b in zip(mine, theirs)
+    ), (mine, theirs)
     before, address = visitor.camera(), page.url
     visitor.show(camera, complete=False)
     page.get_by_label("Take the camera of").fill(f"voxdag render x.vdag {text} --samples 2")
@@ -153,13 +182,15 @@ def check_camera_text(visitor, voxdag, built, camera):
     assert distance(visitor.camera()["eye"], before["eye"]) < 1e-3 + 1e-6 * size
     assert visitor.camera_text() == text and page.url == address
     visitor.open(address)
-    assert visitor.camera_text() == text and page.url == address, "the address does not bring the camera back"
+    assert visitor.camera_text() == text and page.url == address, (
+        "the address does not bring the camera back"
+    )
     page.get_by_label("Take the camera of").fill("--camera 1,2")
     page.keyboard.press("Enter")
     page.get_by_text("Expected --camera X,Y,Z.").wait_for()
 
 
-# Goes to an address while the camera glides elsewhere; resolves when nothing moves.
+# Follows an address while the camera glides elsewhere. Resolves when nothing moves.
 FOLLOW = """async ([elsewhere, hash]) => {
   const {viewer} = voxdagViewer;
   if (elsewhere) viewer.flyToText(elsewhere);
@@ -171,23 +202,34 @@ FOLLOW = """async ([elsewhere, hash]) => {
   while (viewer.motion.flight) await new Promise((resolve) => requestAnimationFrame(resolve));
   return glides;
 }"""
-# Parts of addresses with the numbers that are taken for them, in a grid of that resolution.
-BOXES = [("-5,1.6,0,9e99,10.2,1e300", lambda edge: {"low": [0, 2, 0], "high": [edge, 10, edge]}),
-         ("1e9,0,0,2e9,9,9", lambda edge: None), ("1.1,0,0,1.4,9,9", lambda edge: None)]
+# Members of addresses, and the values that the viewer uses for them in a grid of `resolution`.
+BOXES = [
+    ("-5,1.6,0,9e99,10.2,1e300", lambda edge: {"low": [0, 2, 0], "high": [edge, 10, edge]}),
+    ("1e9,0,0,2e9,9,9", lambda edge: None),
+    ("1.1,0,0,1.4,9,9", lambda edge: None),
+]
 
 
 def check_addresses(visitor, resolution, cameras):
-    """An address is followed in a glide, too; what it has that cannot be used is said or brought to what can be."""
+    """An address takes effect during a glide. Invalid values are reported or clamped."""
     page = visitor.page
     visitor.show(cameras["street"], complete=False)
     wanted = visitor.camera()
     visitor.show(cameras["top"], complete=False)
     page.emulate_media(reduced_motion="no-preference")
-    assert page.evaluate(FOLLOW, [cameras["wide"], address("", cameras["street"])[1:]]), "no glide: the check sees nothing"
+    assert page.evaluate(FOLLOW, [cameras["wide"], address("", cameras["street"])[1:]]), (
+        "no glide: the check sees nothing"
+    )
     page.emulate_media(reduced_motion="reduce")
     off = distance(visitor.camera()["eye"], wanted["eye"])
-    assert off < 1e-3 * resolution, f"an address that came in a glide was lost: {off} voxels from its place"
-    for refused in ("#camera=1,2,x&target=0,0,0", "#camera=1,2,NaN&target=0,0,0", "#camera=1,2,3&target=0,0,0&fov=1e9"):
+    assert off < 1e-3 * resolution, (
+        f"an address that came in a glide was lost: {off} voxels from its place"
+    )
+    for refused in (
+        "#camera=1,2,x&target=0,0,0",
+        "#camera=1,2,NaN&target=0,0,0",
+        "#camera=1,2,3&target=0,0,0&fov=1e9",
+    ):
         page.evaluate(FOLLOW, [None, refused])
         page.locator("#status.bad", has_text="The camera of the address cannot be used.").wait_for()
         page.locator("#scene").focus()
@@ -204,7 +246,10 @@ def check_addresses(visitor, resolution, cameras):
 
 
 def focused(page):
-    return page.evaluate("document.activeElement.id || document.activeElement.textContent || document.activeElement.tagName")
+    return page.evaluate(
+        "document.activeElement.id || document.activeElement.textContent ||"
+        " document.activeElement.tagName"
+    )
 
 
 def tab_to(page, wanted, max_steps=60):
@@ -217,40 +262,60 @@ def tab_to(page, wanted, max_steps=60):
     raise AssertionError(f"the Tab key does not reach {wanted}; it is at {focused(page)}")
 
 
-OPPOSITE = {"ArrowLeft": "ArrowRight", "ArrowUp": "ArrowDown", "w": "s", "e": "q", "a": "d", "+": "-"}
+OPPOSITE = {
+    "ArrowLeft": "ArrowRight",
+    "ArrowUp": "ArrowDown",
+    "w": "s",
+    "e": "q",
+    "a": "d",
+    "+": "-",
+}
 
 
 def check_keyboard(visitor, url, camera):
-    """All of it without a mouse, from the top of the page."""
+    """Every action works without a mouse, starting at the top of the page."""
     visitor.open(url)
     visitor.show(camera, complete=False)
     page = visitor.page
     page.evaluate("document.activeElement.blur()")
     tab_to(page, "#home")
     tab_to(page, "#scene")
-    for key, what in (("ArrowLeft", "orbit"), ("ArrowUp", "orbit"), ("w", "fly"), ("e", "rise"), ("a", "fly left"), ("+", "zoom in")):
+    for key, what in (
+        ("ArrowLeft", "orbit"),
+        ("ArrowUp", "orbit"),
+        ("w", "fly"),
+        ("e", "rise"),
+        ("a", "fly left"),
+        ("+", "zoom in"),
+    ):
         before = visitor.camera()["eye"]
         page.keyboard.press(key)
         moved = visitor.camera()["eye"]
         assert moved != before, f"{key} does not {what}"
         page.keyboard.press(OPPOSITE[key])
-        # How far depends on how long a key is down, but not where to.
+        # The distance depends on how long a key is down, the direction does not.
         back = visitor.camera()["eye"]
         along = sum((m - b) * (k - m) for b, m, k in zip(before, moved, back))
         assert along < 0, f"{OPPOSITE[key]} is not the opposite of {key}"
     before = visitor.camera()["eye"]
     page.keyboard.press("r")
-    visitor.wait_until("(eye) => voxdagViewer.camera.eye.some((c, axis) => Math.abs(c - eye[axis]) > 1)", before)
+    visitor.wait_until(
+        "(eye) => voxdagViewer.camera.eye.some((c, axis) => Math.abs(c - eye[axis]) > 1)", before
+    )
     visitor.show(camera, complete=False)
     page.keyboard.press("f")
     before = visitor.camera()
     page.keyboard.press("ArrowRight")
-    assert visitor.camera()["eye"] == before["eye"] and visitor.camera()["target"] != before["target"], "no flight"
+    assert (
+        visitor.camera()["eye"] == before["eye"] and visitor.camera()["target"] != before["target"]
+    ), "no flight"
     page.keyboard.press("f")
     visitor.show(camera, complete=False)
     page.keyboard.press("Enter")
     wait_for_pick(page)
-    visitor.wait_until("document.getElementById('announcer').textContent.startsWith('Picked voxel')")
+    visitor.wait_until(
+        "document.getElementById('announcer').textContent.startsWith('Picked voxel')"
+    )
     page.keyboard.press("m")
     page.get_by_role("button", name="Measure from here", pressed=True).wait_for()
     page.keyboard.press("c")
@@ -298,12 +363,16 @@ def check_keyboard_in_panel(visitor):
         assert part in page.url, f"{part} is not in the address {page.url}"
     page.reload()
     visitor.wait_until("Boolean(window.voxdagViewer)")
-    assert page.evaluate(f"[{option}.level, {option}.wire, {option}.occlusion]") == [level - 1, 0, True]
+    assert page.evaluate(f"[{option}.level, {option}.wire, {option}.occlusion]") == [
+        level - 1,
+        0,
+        True,
+    ]
     visitor.picture("options")
 
 
 def check_phone(visitor, url, camera):
-    """390 x 844: nothing is wider; one finger orbits, two fingers zoom, a tap picks."""
+    """At 390 x 844 nothing overflows; one finger orbits, two fingers zoom, a tap picks."""
     visitor.open(url)
     page = visitor.page
     box = page.locator("#scene").bounding_box()
@@ -314,15 +383,22 @@ def check_phone(visitor, url, camera):
     session = visitor.context.new_cdp_session(page)
 
     def touch(kind, *points):
-        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints":
-                     [{"x": px, "y": py, "id": i} for i, (px, py) in enumerate(points)]})
+        session.send(
+            "Input.dispatchTouchEvent",
+            {
+                "type": kind,
+                "touchPoints": [{"x": px, "y": py, "id": i} for i, (px, py) in enumerate(points)],
+            },
+        )
 
     before = visitor.camera()
     touch("touchStart", (x, y))
     for step in (10, 30, 60):
         touch("touchMove", (x + step, y))
     touch("touchEnd")
-    assert visitor.camera()["target"] == before["target"] and visitor.camera()["eye"] != before["eye"]
+    assert (
+        visitor.camera()["target"] == before["target"] and visitor.camera()["eye"] != before["eye"]
+    )
     before = visitor.camera()
     touch("touchStart", (x - 30, y))
     touch("touchStart", (x - 30, y), (x + 30, y))
@@ -330,120 +406,21 @@ def check_phone(visitor, url, camera):
         touch("touchMove", (x - step, y), (x + step, y))
     touch("touchEnd")
     after = visitor.camera()
-    assert distance(after["eye"], after["target"]) < 0.6 * distance(before["eye"], before["target"]), "no pinch"
+    assert distance(after["eye"], after["target"]) < 0.6 * distance(
+        before["eye"], before["target"]
+    ), "no pinch"
     visitor.show(camera, complete=False)
     page.touchscreen.tap(x, y)
     page.get_by_role("button", name="Panel").tap()
     wait_for_pick(page)
     for button in page.locator("#tools button:visible").all():
         size = button.bounding_box()
-        assert size["width"] >= 24 and size["height"] >= 24, f"too small for a finger: {button.inner_text()} {size}"
-        assert 0 <= size["x"] and size["x"] + size["width"] <= 390, f"out of reach: {button.inner_text()} {size}"
+        assert size["width"] >= 24 and size["height"] >= 24, (
+            f"too small for a finger: {button.inner_text()} {size}"
+        )
+        assert size["x"] >= 0 and size["x"] + size["width"] <= 390, (
+            f"out of reach: {button.inner_text()} {size}"
+        )
     box = page.locator("#scene").bounding_box()
     assert box["height"] >= 844 * 0.4, "the panel leaves too little of the picture"
     visitor.picture("panel")
-
-
-NO_WEBGL = """
-const get_context = HTMLCanvasElement.prototype.getContext;
-HTMLCanvasElement.prototype.getContext = function(kind, ...more) {
-  return kind === "webgl2" ? null : get_context.call(this, kind, ...more);
-};
-"""
-# A driver that offers WebGL2, but cannot compile the shaders.
-NO_PROGRAMS = """
-const parameter = WebGL2RenderingContext.prototype.getProgramParameter;
-WebGL2RenderingContext.prototype.getProgramParameter = function(program, name) {
-  return name === this.LINK_STATUS ? false : parameter.call(this, program, name);
-};
-"""
-
-
-def check_without_webgl(visitor, url, still, lack=NO_WEBGL):
-    """A message, with the command for a picture; for a job its still picture."""
-    visitor.page.add_init_script(lack)
-    visitor.open(f"{url}#camera=1,2.5,-3e2&target=0,0,0&fov=$(id)", wait=False)
-    page = visitor.page
-    page.get_by_text("needs WebGL2").wait_for()
-    command = page.get_by_text("voxdag render FILE.vdag").inner_text()
-    assert command.endswith(" --camera 1,2.5,-3e2 --target 0,0,0"), f"not to be copied to a shell: {command}"
-    if still:
-        visitor.wait_until("document.querySelector('img.still')?.naturalWidth > 100")
-    visitor.picture("no-webgl")
-
-
-def check_expired_token(visitor, viewer, token):
-    """A token that expires is asked for again: before the manifest or the first tile at once, while others load by a message."""
-    page, expired = visitor.page, []
-
-    def expire(route):
-        if expired[0].search(route.request.url):
-            route.continue_(headers={**route.request.headers, "authorization": "Bearer expired"})
-        else:
-            route.continue_()
-
-    with visitor.expecting("status of 401"):
-        page.route(re.compile("/tiles"), expire)
-        expired[:] = [re.compile(r"/tiles$")]
-        visitor.open(viewer, wait=False)
-        page.get_by_label("Token").wait_for()
-        expired[:] = [re.compile(r"/tiles/0/0")]
-        page.get_by_label("Token").fill(token)
-        with page.expect_response(expired[0]):
-            page.keyboard.press("Enter")
-        visitor.wait_until("document.querySelector('#message:not([hidden]) input')?.value === ''")
-        for part in ("panel", "tools", "scene"):
-            assert page.locator(f"#{part}").is_hidden(), f"#{part} is shown next to the form"
-        expired[:] = [re.compile(r"/tiles/batch|/tiles/[1-9]")]
-        page.get_by_label("Token").fill(token)
-        page.keyboard.press("Enter")
-        page.get_by_text("The service no longer accepts the token").wait_for()
-        depths, _ = visitor.capture(64, 36)
-        assert any(math.isfinite(d) for d in depths), "nothing is drawn without a token"
-        page.unroute(re.compile("/tiles"))
-        page.locator("#status:not(.bad)").wait_for(state="attached")
-    page.evaluate("voxdagViewer.renderer.complete()")
-
-
-def check_job(visitor, server, voxdag, scene, token):
-    """From the job's page to the viewer, or right into it by a token; and in the place of the picture."""
-    headers = {"Authorization": f"Bearer {token}"} if token else {}
-    token_file = ["--token-file", scene.parent / "token"] if token else []
-    job = json.loads(voxdag.run("submit", scene, "-r", 256, "--server", server.url, "--json", *token_file))
-    page = visitor.page
-    viewer = f"{server.url}/viewer.html?job={job['id']}"
-    if token:
-        # A job that ends right after the viewer saw it run has nothing partial, which Chromium reports as an error.
-        while json.loads(server.get(f"/api/v1/jobs/{job['id']}", headers))["state"] != "succeeded":
-            page.wait_for_timeout(100)
-        with visitor.expecting("status of 401"):
-            visitor.open(viewer, wait=False)
-            page.get_by_label("Token").fill(token)
-            page.keyboard.press("Enter")
-            visitor.wait_until("Boolean(window.voxdagViewer)")
-    else:
-        visitor.open(f"{server.url}/#/jobs/{job['id']}", wait=False)
-        page.locator('[data-action="view"]').click()
-        visitor.wait_until("Boolean(window.voxdagViewer)")
-    depths, _ = visitor.capture(64, 36)
-    assert any(math.isfinite(d) for d in depths) and any(math.isinf(d) for d in depths)
-    visitor.picture("job")
-    page.locator("#home").click()
-    page.locator(".title-row .state.succeeded").wait_for()
-    while not json.loads(server.get(f"/api/v1/jobs/{job['id']}", headers))["preview"]:
-        page.wait_for_timeout(200)
-    page.locator(".picture img").wait_for()
-    page.locator('[data-action="look"]').click()
-    page.locator(".picture canvas").wait_for()
-    page.keyboard.press("h")
-    page.get_by_role("dialog").wait_for()
-    page.keyboard.press("Escape")
-    assert page.url.endswith(f"#/jobs/{job['id']}"), "the picture's camera has replaced the page's address"
-    visitor.picture("page")
-    page.evaluate("window.embedded = document.querySelector('.picture canvas').getContext('webgl2')")
-    assert not page.evaluate("embedded.isContextLost()")
-    page.evaluate("location.hash = '#/jobs'")
-    visitor.wait_until("embedded.isContextLost()")  # the page lives on, and a browser has few contexts
-    if token:
-        check_expired_token(visitor, viewer, token)
-    return viewer

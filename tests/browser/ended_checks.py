@@ -1,4 +1,4 @@
-"""Looks at jobs that have ended and are tried again, and at files and jobs that are not there."""
+"""Jobs that ended and are retried, and files and jobs that do not exist."""
 
 import json
 import signal
@@ -7,7 +7,7 @@ from running_checks import RESOLUTION, SCENE, SUBVOLUME, Job
 
 IS_RESULT = "Boolean(window.voxdagViewer) && !voxdagViewer.running"
 
-# When the page has asked for its job, and what is passed on of it: "answer" or "lose".
+# Times at which the page requested its job, and whether to "answer" or "lose" a request.
 ASKED = """
 window.asked = {times: [], way: "answer"};
 const plainFetch = window.fetch;
@@ -21,7 +21,7 @@ window.fetch = (url, options) => {
 """
 
 
-# As if the tab was chosen again, which ends a pause.
+# As if the user returned to the tab, which ends a pause.
 WAKE = "document.dispatchEvent(new Event('visibilitychange'))"
 
 
@@ -31,11 +31,13 @@ def heading(visitor, text):
 
 def expect_no_cubes(visitor):
     cubes = visitor.page.locator(".cubes-view")
-    assert cubes.count() == 1 and cubes.is_hidden(), "a job that has ended says when its subvolumes will be shown"
+    assert cubes.count() == 1 and cubes.is_hidden(), (
+        "a job that has ended says when its subvolumes will be shown"
+    )
 
 
 def check_retry_of_canceled(visitor, server):
-    """A page that is opened after the job was canceled asks again, ever less, until it can draw."""
+    """A page of a canceled job polls at growing intervals until it can draw."""
     page = visitor.page
     page.add_init_script(ASKED)
     job = Job(server, RESOLUTION, subvolume=SUBVOLUME, threads=1)
@@ -52,12 +54,14 @@ def check_retry_of_canceled(visitor, server):
     visitor.wait_until("asked.times.length >= 3")
     times = page.evaluate("asked.times.slice(0, 3)")
     assert times[1] - times[0] < times[2] - times[1], f"the pauses do not grow: {times}"
-    assert link.evaluate("(link) => link === document.activeElement"), "asking again takes the focus away"
+    assert link.evaluate("(link) => link === document.activeElement"), (
+        "asking again takes the focus away"
+    )
     page.evaluate(f"asked.way = 'lose', {WAKE}")
     heading(visitor, "This job was canceled.")
     page.get_by_text("The service does not answer. It is asked again.").wait_for()
     server.send("POST", f"{job.path}/retry")
-    # The plan of the first attempt is known all the time.
+    # The plan of the first attempt is available throughout.
     job.hold_at_work()
     assert job.known("partial/tiles").get("camera"), "a job at work cannot be drawn"
     page.evaluate(f"asked.way = 'answer', {WAKE}")
@@ -68,7 +72,7 @@ def check_retry_of_canceled(visitor, server):
 
 
 def check_never_planned(visitor, server):
-    """A job that was canceled before its plan has no cubes; it is deleted while it is viewed."""
+    """A job canceled before its plan has no cubes. It is deleted while its page is open."""
     page = visitor.page
     holder = Job(server, RESOLUTION, subvolume=SUBVOLUME, threads=1)
     holder.hold_at_work()
@@ -95,13 +99,15 @@ def expect_no_such_job(visitor):
     page = visitor.page
     page.get_by_text("no such job").wait_for()
     page.get_by_text("not_found · HTTP 404").wait_for()
-    assert page.get_by_role("button", name="Try again").count() == 0, "a job that is not there is offered again"
+    assert page.get_by_role("button", name="Try again").count() == 0, (
+        "a job that is not there is offered again"
+    )
 
 
 def check_no_such_job(visitor, url):
     for job in ("zz", "", "a" * 33, "ABC", "1/../2"):
         asked = []
-        visitor.page.on("request", record := lambda request: asked.append(request.url))
+        visitor.page.on("request", record := lambda request, asked=asked: asked.append(request.url))
         visitor.open(f"{url}/viewer.html?job={job}", wait=False)
         expect_no_such_job(visitor)
         visitor.page.remove_listener("request", record)
@@ -117,7 +123,7 @@ def expect_no_file(visitor):
 
 
 def check_removed_file(visitor, server, built):
-    """The page says that the file is not there, until it is there again."""
+    """The page reports a missing file until it exists again."""
     away = built.with_suffix(".away")
     with visitor.expecting("status of 404"):
         built.rename(away)
@@ -140,4 +146,6 @@ def check_ended_jobs(visitor, server, scene):
         visitor.open(f"{server.url}/viewer.html", wait=False)
         expect_no_file(visitor)
     jobs = json.loads(server.get("/api/v1/jobs"))["jobs"]
-    assert all(job["state"] in ("succeeded", "failed", "canceled", "canceling") for job in jobs), jobs
+    assert all(job["state"] in ("succeeded", "failed", "canceled", "canceling") for job in jobs), (
+        jobs
+    )

@@ -1,14 +1,16 @@
-"""Tiles that fail or are late and lost servers leave no holes, and the picture is right afterwards."""
+"""Failed or late tiles and lost servers leave no holes, and the final picture is right."""
 
-import re
 import time
 
 from picture_checks import HEIGHT, MIN_EQUAL_DEPTH, PLAIN, WIDTH, assert_equal, compare, holes
 
-CONNECTION_LOST = "ERR_CONNECTION_REFUSED|ERR_FAILED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE|Failed to load resource"
+CONNECTION_LOST = (
+    "ERR_CONNECTION_REFUSED|ERR_FAILED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE"
+    "|Failed to load resource"
+)
 
 
-# Requests for all tiles but the root's "arrive", "fail", or are "late" until their turn comes.
+# Requests for all tiles but the root "arrive", "fail", or are "late" until released.
 TILES = """
 window.tiles = {way: "%s", pauseMs: 0, asked: 0, held: []};
 const plainFetch = window.fetch;
@@ -25,13 +27,13 @@ window.fetch = async (url, options) => {
 
 
 def check_missing_tiles(visitor, url, way, cameras, references):
-    """Without any tile but the root's only detail is missing; it is there once the tiles come."""
+    """With the root tile alone only detail is missing; it appears once the tiles arrive."""
     name, camera = "street", cameras["street"]
     visitor.page.add_init_script(TILES % way)
     visitor.open(f"{url}/{PLAIN}")
     visitor.show(camera, complete=False)
     visitor.wait_until("tiles.asked > 0")
-    visitor.page.wait_for_timeout(200)  # whatever comes of that
+    visitor.page.wait_for_timeout(200)  # and ignores the result
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert holes(references[name], depths) < 0.005, f"tiles that are {way} leave holes"
     _, near, _ = compare(references[name], depths, camera)
@@ -53,14 +55,14 @@ window.fetch = (url, options) =>
 
 
 def check_hanging_request(visitor, url):
-    """One request without an answer does not hold up what the pictures ask for."""
+    """One request without an answer does not delay the other tiles of a view."""
     visitor.page.add_init_script(HANG)
     visitor.open(f"{url}/{PLAIN}")
     visitor.wait_until("hangs > 0")
     visitor.wait_until("performance.getEntriesByName('voxdag: tiles of the first view').length > 0")
 
 
-# A browser that compiles when it is asked for the result; how many programs it was given before that.
+# A browser that compiles when a program's result is queried. Counts the programs linked before.
 SERIAL_COMPILER = """
 const {getExtension, linkProgram, getProgramParameter} = WebGL2RenderingContext.prototype;
 const serial = window.serial = {linked: 0, beforeResult: 0};
@@ -79,7 +81,7 @@ WebGL2RenderingContext.prototype.getProgramParameter = function(program, name) {
 
 
 def check_serial_compiler(visitor, url):
-    """All programs of the first picture are given to the compiler before one is waited for."""
+    """All programs of the first picture are linked before the first result is queried."""
     visitor.page.add_init_script(SERIAL_COMPILER)
     visitor.open(f"{url}/{PLAIN}")
     visitor.wait_until("voxdagViewer.renderer.hasDrawn")
@@ -87,7 +89,7 @@ def check_serial_compiler(visitor, url):
 
 
 def check_restart(visitor, server, cameras, references):
-    """Asks for tiles while the server is gone; the picture is completed when it is there again."""
+    """Requests tiles while the server is down; the picture completes after its restart."""
     visitor.open(f"{server.url}/{PLAIN}")
     visitor.show(cameras["top"])
     with visitor.expecting(CONNECTION_LOST):
@@ -104,36 +106,45 @@ def check_restart(visitor, server, cameras, references):
     visitor.page.locator("#status:not(.bad)").wait_for(state="attached")
 
 
-# Puts the first camera, which the sun follows, within the scene. Whether the view is complete within
-# two minutes: a busy machine draws slowly.
+# Places the first camera, which determines the sun, inside the scene. Resolves to whether the view
+# is complete within two minutes: a busy machine draws slowly.
 COMPLETE_WITH_SUN = """async (pauseMs) => {
   const {viewer, renderer, camera, manifest} = voxdagViewer, {eye, target} = camera.get();
   renderer.light.placeSun(eye, target.map((c, axis) => c - eye[axis]));
   renderer.light.outside = false;
-  renderer.sun.idleTrials = 6, renderer.sun.fewestMissing = 0;  // of 8 that may wait for tiles in vain
+  renderer.sun.idleTrials = 6,
+  renderer.sun.fewestMissing = 0;  // of 8 that may wait for tiles in vain
   tiles.pauseMs = pauseMs;
   tiles.asked = 0;
   viewer.setOptions({shadows: true});
-  return Promise.race([renderer.complete().then(() => true),
-                       new Promise((resolve) => setTimeout(() => resolve(false), 120000))]);
+  return Promise.race([
+    renderer.complete().then(() => true),
+    new Promise((resolve) => setTimeout(() => resolve(false), 120000))
+  ]);
 }"""
 
 
 def check_late_sun(visitor, url, camera):
-    """From within the scene a view is complete with the sun in its place, though the tiles for it come late."""
+    """A view inside the scene completes with a placed sun even if its tiles are late."""
     visitor.page.add_init_script(TILES % "arrive")
     visitor.open(f"{url}/{PLAIN}")
     visitor.show(camera)
     before = visitor.page.evaluate("voxdagViewer.renderer.light.sun")
     assert visitor.page.evaluate(COMPLETE_WITH_SUN, 1500), "the view is never complete"
     assert visitor.page.evaluate("tiles.asked") > 0, "the sun needs no tile: the check sees nothing"
-    assert visitor.page.evaluate("voxdagViewer.renderer.light.sun") != before, "the sun has not moved"
+    assert visitor.page.evaluate("voxdagViewer.renderer.light.sun") != before, (
+        "the sun has not moved"
+    )
 
 
-# Draws and picks as soon as the context is back, when programs and tiles are not.
+# Draws and picks as soon as the context is restored, before programs and tiles are.
 LOSE = """() => {
   const {viewer, renderer} = voxdagViewer;
-  window.lost = {context: renderer.context.gl.getExtension("WEBGL_lose_context"), restored: 0, errors: []};
+  window.lost = {
+    context: renderer.context.gl.getExtension("WEBGL_lose_context"),
+    restored: 0,
+    errors: []
+  };
   viewer.canvas.addEventListener("webglcontextrestored", async () => {
     ++lost.restored;
     try {
@@ -148,7 +159,7 @@ LOSE = """() => {
 }"""
 
 
-# The first context is lost as soon as it is made.
+# The first context is lost as soon as it is created.
 LOSE_AT_ONCE = """
 const itsContext = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function(kind, ...more) {
@@ -160,14 +171,17 @@ HTMLCanvasElement.prototype.getContext = function(kind, ...more) {
   return made;
 };
 """
-LOSSES = {"before the page": "earlyLoss.loseContext();",
-          "while programs compile": "setTimeout(() => earlyLoss.loseContext());"}
+LOSSES = {
+    "before the page": "earlyLoss.loseContext();",
+    "while programs compile": "setTimeout(() => earlyLoss.loseContext());",
+}
 LOSE_AND_RESTORE = """earlyLoss.loseContext();
-    addEventListener("webglcontextlost", () => setTimeout(() => earlyLoss.restoreContext()), true);"""
+addEventListener("webglcontextlost", () => setTimeout(() => earlyLoss.restoreContext()), true);"""
 
 
 def hold_page(visitor):
-    """The context is there, and what happens to it is said, before the page's main module runs."""
+    """Delays the page's main module, so the context exists and changes before it runs."""
+
     def hold(route):
         time.sleep(0.5)
         route.continue_()
@@ -176,7 +190,7 @@ def hold_page(visitor):
 
 
 def check_early_loss(visitor, url, when, camera, reference):
-    """A context that is lost before anything can be drawn is waited for, and the page then begins."""
+    """If the context is lost before the first frame, the page waits for it and then starts."""
     page = visitor.page
     visitor.page.add_init_script(LOSE_AT_ONCE % LOSSES[when])
     if when == "before the page":
@@ -184,8 +198,12 @@ def check_early_loss(visitor, url, when, camera, reference):
     with visitor.expecting("CONTEXT_LOST|Context lost"):
         visitor.open(f"{url}/{PLAIN}", wait=False)
         page.get_by_text("The graphics card is not available").wait_for()
-        assert not page.evaluate("Boolean(window.voxdagViewer)"), "it began before the context was lost: the check sees nothing"
-        assert page.locator('[data-tool="screenshot"]').is_disabled(), "a picture is to be saved that is not there"
+        assert not page.evaluate("Boolean(window.voxdagViewer)"), (
+            "it began before the context was lost: the check sees nothing"
+        )
+        assert page.locator('[data-tool="screenshot"]').is_disabled(), (
+            "a picture is to be saved that is not there"
+        )
         page.locator("#scene").press("p")
         page.get_by_text("There is no picture yet.").wait_for(state="attached")
         page.evaluate("earlyLoss.restoreContext()")
@@ -197,7 +215,7 @@ def check_early_loss(visitor, url, when, camera, reference):
 
 
 def check_brief_loss(visitor, url):
-    """A context that is lost and back before the page's main module runs is as good as another."""
+    """A context lost and restored before the main module runs works like a new one."""
     visitor.page.add_init_script(LOSE_AT_ONCE % LOSE_AND_RESTORE)
     hold_page(visitor)
     with visitor.expecting("CONTEXT_LOST|Context lost"):
@@ -206,7 +224,7 @@ def check_brief_loss(visitor, url):
 
 
 def check_lost_context(visitor, url, camera, reference):
-    """A lost context is said, and after it all is as it was: also if it is lost again while that is made."""
+    """A lost context is reported and restored, even after a second loss in between."""
     page = visitor.page
     visitor.open(f"{url}/{PLAIN}")
     visitor.show(camera)

@@ -1,4 +1,4 @@
-"""What the viewer's test starts: `voxdag` for scenes and pictures, and the two servers of the viewer."""
+"""Programs that the viewer's test starts: `voxdag`, and the two servers of the viewer."""
 
 import json
 import re
@@ -21,7 +21,9 @@ class Voxdag:
         return self.run_both(*words).stdout
 
     def run_both(self, *words):
-        done = subprocess.run([self.program, *map(str, words)], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [self.program, *map(str, words)], capture_output=True, text=True, check=False
+        )
         assert done.returncode == 0, f"voxdag {' '.join(map(str, words))}:\n{done.stderr}"
         return done
 
@@ -32,22 +34,56 @@ class Voxdag:
         return built
 
     def render(self, built, camera, width, height, path=None):
-        """Distances along the rays, row by row from the top; what is infinite is sky."""
+        """Returns the distances along the rays, rows from the top; the sky is infinite."""
         path = path or self.folder / "depth.npy"
-        self.run("render", built, "-o", self.folder / "picture.png", *camera.split(), "--force",
-                 "--size", f"{width}x{height}", "--samples", 1, "--depth", path)
+        self.run(
+            "render",
+            built,
+            "-o",
+            self.folder / "picture.png",
+            *camera.split(),
+            "--force",
+            "--size",
+            f"{width}x{height}",
+            "--samples",
+            1,
+            "--depth",
+            path,
+        )
         return read_npy(path, width, height)
 
     def named_view(self, built, name):
-        """The camera that `render` prints for a view, as its options."""
-        printed = self.run("render", built, "-o", self.folder / "view.png", "--view", name, "--size", "48x27",
-                           "--samples", 1, "--force")
+        """Returns the camera options that `render` prints for a named view."""
+        printed = self.run(
+            "render",
+            built,
+            "-o",
+            self.folder / "view.png",
+            "--view",
+            name,
+            "--size",
+            "48x27",
+            "--samples",
+            1,
+            "--force",
+        )
         return re.search(r"--camera .*", printed)[0]
 
     def printed_camera(self, built, camera):
-        """The camera that `render` prints when it gets these options."""
-        printed = self.run("render", built, "-o", self.folder / "view.png", *camera.split(), "--size", "16x9",
-                           "--samples", 1, "--force", "--json")
+        """Returns the camera that `render` prints for these options."""
+        printed = self.run(
+            "render",
+            built,
+            "-o",
+            self.folder / "view.png",
+            *camera.split(),
+            "--size",
+            "16x9",
+            "--samples",
+            1,
+            "--force",
+            "--json",
+        )
         return json.loads(printed)
 
 
@@ -55,10 +91,10 @@ def read_npy(path, width, height):
     data = path.read_bytes()
     assert data[:6] == b"\x93NUMPY", "not an npy file"
     (length,) = struct.unpack_from("<H", data, 8)
-    header = data[10:10 + length].decode()
+    header = data[10 : 10 + length].decode()
     assert "'<f4'" in header and f"({height}, {width})" in header.replace(",)", ")"), header
     depths = array("f")
-    depths.frombytes(data[10 + length:])
+    depths.frombytes(data[10 + length :])
     assert len(depths) == width * height
     return depths
 
@@ -70,7 +106,7 @@ def free_port():
 
 
 class Server:
-    """A server process that says on one of its outputs where it listens."""
+    """A server process that prints its address."""
 
     def __init__(self, command, folder, name):
         self.command, self.log_path = [str(word) for word in command], folder / f"{name}.log"
@@ -95,17 +131,25 @@ class Server:
         self.process.wait()
 
     def get(self, path, headers=None):
-        with urllib.request.urlopen(urllib.request.Request(self.url + path, headers=headers or {})) as answer:
+        with urllib.request.urlopen(
+            urllib.request.Request(self.url + path, headers=headers or {})
+        ) as answer:
             return answer.read()
 
     def post(self, path, body, headers=None):
-        request = urllib.request.Request(self.url + path, json.dumps(body).encode(), method="POST",
-                                         headers={"Content-Type": "application/json", **(headers or {})})
+        request = urllib.request.Request(
+            self.url + path,
+            json.dumps(body).encode(),
+            method="POST",
+            headers={"Content-Type": "application/json", **(headers or {})},
+        )
         with urllib.request.urlopen(request) as answer:
             return json.load(answer)
 
     def send(self, method, path, data=None):
-        with urllib.request.urlopen(urllib.request.Request(self.url + path, data, method=method)) as answer:
+        with urllib.request.urlopen(
+            urllib.request.Request(self.url + path, data, method=method)
+        ) as answer:
             return answer.read()
 
     def __enter__(self):
@@ -121,21 +165,24 @@ class Server:
 
 
 class DagFile:
-    """A reader of .vdag files by docs/format.md alone: one voxel at a time."""
+    """A reader of .vdag files, written from docs/format.md alone. Reads single voxels."""
 
     def __init__(self, path):
         self.data = path.read_bytes()
         self.levels = struct.unpack_from("<I", self.data, 16)[0]
         self.origin = struct.unpack_from("<3d", self.data, 32)
         self.edge = struct.unpack_from("<d", self.data, 56)[0]
-        self.resolution = 2 ** self.levels
-        self.offsets = [struct.unpack_from("<Q", self.data, 128 + 32 * level)[0] for level in range(self.levels - 1)]
+        self.resolution = 2**self.levels
+        self.offsets = [
+            struct.unpack_from("<Q", self.data, 128 + 32 * level)[0]
+            for level in range(self.levels - 1)
+        ]
 
     def word(self, level, index):
         return struct.unpack_from("<I", self.data, self.offsets[level] + 4 * index)[0]
 
     def find(self, voxel, level):
-        """The word offset of the node of `level` around a voxel; None where there are no voxels."""
+        """Returns the word offset of the node of `level` that contains a voxel; None if empty."""
         offset = 0
         for above in range(level):
             shift = self.levels - 1 - above
@@ -151,6 +198,13 @@ class DagFile:
         if brick is None:
             return False
         x, y, z = voxel
-        bit = (32 * (x >> 1 & 1) + 16 * (y >> 1 & 1) + 8 * (z >> 1 & 1) + 4 * (x & 1) + 2 * (y & 1) + (z & 1))
+        bit = (
+            32 * (x >> 1 & 1)
+            + 16 * (y >> 1 & 1)
+            + 8 * (z >> 1 & 1)
+            + 4 * (x & 1)
+            + 2 * (y & 1)
+            + (z & 1)
+        )
         mask = self.word(self.levels - 2, brick) | self.word(self.levels - 2, brick + 1) << 32
         return bool(mask >> bit & 1)

@@ -1,4 +1,4 @@
-"""Picks and tiles that come and go at the same time, the end of the first view, and what moves by itself."""
+"""Picks while tiles load or leave, the end of the first view, and reduced motion."""
 
 import math
 
@@ -7,25 +7,32 @@ from failure_checks import TILES
 from picture_checks import HEIGHT, PLAIN, WIDTH, address, assert_equal
 from visitor import PIXEL_RATIO
 
-# A pick, and the distance that a picture of the same moment has at its place.
+# A pick, and the distance at the same pixel of a picture from the same moment.
 PICK_AND_DEPTH = """async ([x, y, width, height, ratio]) => {
   const {renderer} = voxdagViewer, picking = renderer.pick(x, y);
   const {depth} = await renderer.capture({width, height});
-  return [await picking, depth[Math.floor(y * ratio) * width + Math.floor(x * ratio)], renderer.statistics().loading];
+  return [
+    await picking, depth[Math.floor(y * ratio) * width + Math.floor(x * ratio)],
+    renderer.statistics().loading
+  ];
 }"""
 
 
 def check_one_pick(pick, dag):
-    """The cell is one of the file's, and so is the node."""
+    """The picked cell and its node are in the file."""
     assert pick is not None, "nothing is picked"
     offset = dag.find(pick["voxel"], pick["nodeLevel"])
     assert str(offset) == pick["nodeOffset"], f"not the node around the voxel, {offset}: {pick}"
-    in_file = dag.is_set(pick["voxel"]) if pick["level"] == dag.levels else dag.find(pick["voxel"], min(pick["level"], dag.levels - 2))
+    in_file = (
+        dag.is_set(pick["voxel"])
+        if pick["level"] == dag.levels
+        else dag.find(pick["voxel"], min(pick["level"], dag.levels - 2))
+    )
     assert in_file is not None and in_file is not False, f"the file has no such cell: {pick}"
 
 
 def check_picks_while_loading(visitor, url, dag, camera, reference):
-    """What is picked is what the picture shows at that time: without tiles, while they arrive, and with all of them."""
+    """A pick agrees with the current picture: without tiles, while they arrive, and with all."""
     visitor.page.add_init_script(TILES % "late")
     visitor.open(f"{url}/{PLAIN}")
     visitor.show(camera, complete=False)
@@ -33,13 +40,17 @@ def check_picks_while_loading(visitor, url, dag, camera, reference):
     x, y = steady_place(reference)
 
     def pick():
-        found, depth, loading = visitor.page.evaluate(PICK_AND_DEPTH, [x, y, WIDTH, HEIGHT, PIXEL_RATIO])
+        found, depth, loading = visitor.page.evaluate(
+            PICK_AND_DEPTH, [x, y, WIDTH, HEIGHT, PIXEL_RATIO]
+        )
         check_one_pick(found, dag)
-        assert math.isclose(found["distance"], depth, rel_tol=1e-4), f"picked at {found['distance']}, shown at {depth}"
+        assert math.isclose(found["distance"], depth, rel_tol=1e-4), (
+            f"picked at {found['distance']}, shown at {depth}"
+        )
         return found, loading
 
     coarse, _ = pick()
-    # Tiles that come one after the other, while all of them are waited for.
+    # Tiles that arrive one by one, while complete() waits.
     visitor.page.evaluate("""() => {
       window.whole = false;
       voxdagViewer.renderer.complete().then(() => whole = true);
@@ -55,12 +66,15 @@ def check_picks_while_loading(visitor, url, dag, camera, reference):
         levels.add(found["level"])
         busy += loading > 0
     fine, _ = pick()
-    assert fine["level"] > coarse["level"] and busy > 0, f"no pick while tiles came: {sorted(levels)}, {busy}"
+    assert fine["level"] > coarse["level"] and busy > 0, (
+        f"no pick while tiles came: {sorted(levels)}, {busy}"
+    )
 
 
-# All tiles but the root's leave between a pick's ray and its reading.
+# All tiles but the root are evicted between a pick's ray and its reading.
 PICK_WITHOUT_TILES = """async ([x, y]) => {
-  const {renderer} = voxdagViewer, {context: {passes}, stream: {store}} = renderer, itsPick = passes.pickOne;
+  const {renderer} = voxdagViewer, {context: {passes}, stream: {store}} = renderer,
+        itsPick = passes.pickOne;
   let left = 0, evicted = 0;
   passes.pickOne = function(values) {
     const reading = itsPick.call(passes, values);
@@ -78,7 +92,7 @@ PICK_WITHOUT_TILES = """async ([x, y]) => {
 }"""
 
 
-# Of the tiles that were first loaded for the view, those that the view is known to use now.
+# The tiles first loaded for the view, and how many of them the view is known to use.
 SEEN = """() => {
   const {store} = voxdagViewer.renderer.stream, tiles = [...store.tiles.values()].slice(0, 30);
   return [tiles.filter(({epoch}) => epoch === store.epoch).length, tiles.length];
@@ -86,34 +100,47 @@ SEEN = """() => {
 
 
 def check_tiles_that_left(visitor, url, dag, cameras, references):
-    """A tile that has left is fetched again when it is needed; a pick that it leaves under is that of the new picture."""
+    """An evicted tile is fetched again when needed. A pick during an eviction is repeated."""
     visitor.open(f"{url}/?budget=0.25{PLAIN}")
     visitor.page.evaluate("""() => {
-      const {source} = voxdagViewer, itsFetch = source.fetchTiles;
-      window.fetched = {};
-      source.fetchTiles = function(nodes) {
-        for (const {level, offset} of nodes) fetched[`${level}.${offset}`] = (fetched[`${level}.${offset}`] ?? 0) + 1;
-        return itsFetch.call(source, nodes);
-      };
-    }""")
+  const {source} = voxdagViewer, itsFetch = source.fetchTiles;
+  window.fetched = {};
+  source.fetchTiles = function(nodes) {
+    for (const {level, offset} of nodes)
+      fetched[`${level}.${offset}`] = (fetched[`${level}.${offset}`] ?? 0) + 1;
+    return itsFetch.call(source, nodes);
+  };
+}""")
     visitor.show(cameras["top"])
     visitor.show(cameras["wide"], complete=False)
     visitor.show(cameras["top"])
     seen, tiles = visitor.page.evaluate(SEEN)
-    assert seen > tiles / 4, f"only {seen} of {tiles} tiles are known to be seen: others would leave first"
-    visitor.page.evaluate("window.tilesOfTop = [...voxdagViewer.renderer.stream.store.tiles.keys()]")
+    assert seen > tiles / 4, (
+        f"only {seen} of {tiles} tiles are known to be seen: others would leave first"
+    )
+    visitor.page.evaluate(
+        "window.tilesOfTop = [...voxdagViewer.renderer.stream.store.tiles.keys()]"
+    )
     for _ in range(10):
         for name in ("near", "inside", "street"):
             visitor.show(cameras[name], complete=False)
             visitor.page.wait_for_timeout(100)
-        if visitor.page.evaluate("tilesOfTop.some((key) => !voxdagViewer.renderer.stream.store.tiles.has(key))"):
+        if visitor.page.evaluate(
+            "tilesOfTop.some((key) => !voxdagViewer.renderer.stream.store.tiles.has(key))"
+        ):
             break
-    assert visitor.page.evaluate("tilesOfTop.some((key) => !voxdagViewer.renderer.stream.store.tiles.has(key))"), "no tile of the first view has left"
+    assert visitor.page.evaluate(
+        "tilesOfTop.some((key) => !voxdagViewer.renderer.stream.store.tiles.has(key))"
+    ), "no tile of the first view has left"
     visitor.show(cameras["top"])
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert_equal(references["top"], depths, cameras["top"], "top, after its tiles have left")
-    assert visitor.page.evaluate("Object.values(fetched).some((times) => times > 1)"), "no tile was fetched twice"
-    pick, left, left_since = visitor.page.evaluate(PICK_WITHOUT_TILES, steady_place(references["top"]))
+    assert visitor.page.evaluate("Object.values(fetched).some((times) => times > 1)"), (
+        "no tile was fetched twice"
+    )
+    pick, left, left_since = visitor.page.evaluate(
+        PICK_WITHOUT_TILES, steady_place(references["top"])
+    )
     assert left > 0, "no tile has left: the check sees nothing"
     assert left_since == 0, f"{left_since} tiles have left since the ray of the pick"
     check_one_pick(pick, dag)
@@ -121,27 +148,35 @@ def check_tiles_that_left(visitor, url, dag, cameras, references):
 
 MAX_TILES, FEW_TILES = "const kMaxTiles = 1500;", 40
 FIRST_PIXELS, FINE_PIXELS = "const kPixels = 15;", 1
-MOST_UNDER_WAY = 5 * 48  # four requests, and the one that arrives
-# How many tiles were asked for until those of the first view were there.
+MOST_UNDER_WAY = 5 * 48  # four requests, and the arriving one
+# Counts the tiles requested until the first view had its tiles.
 COUNT_TILES = """
-window.asked = {tiles: 0, atMark: null};
+window.asked = {
+  tiles: 0,
+  atMark: null
+};
 const countedFetch = window.fetch, countedMark = performance.mark;
 performance.mark = function(name) {
   if (name === "voxdag: tiles of the first view") asked.atMark ??= asked.tiles;
   return countedMark.apply(this, arguments);
 };
 window.fetch = (url, options) => {
-  if (/\\/tiles\\/[0-9b]/.test(url)) asked.tiles += /nodes=/.test(url) ? url.split("nodes=")[1].split(",").length : 1;
+  if (/\\/tiles\\/[0-9b]/.test(url))
+    asked.tiles += /nodes=/.test(url) ? url.split("nodes=")[1].split(",").length : 1;
   return countedFetch(url, options);
 };
 """
 
 
 def check_end_of_first_view(visitor, url, camera, reference):
-    """The walk before the first frame ends after so many tiles; the picture then gets the others as ever."""
+    """The search before the first frame ends at its limit; later frames load the other tiles."""
+
     def make_small(route):
         script = route.fetch().text()
-        for old, new in ((MAX_TILES, f"const kMaxTiles = {FEW_TILES};"), (FIRST_PIXELS, f"const kPixels = {FINE_PIXELS};")):
+        for old, new in (
+            (MAX_TILES, f"const kMaxTiles = {FEW_TILES};"),
+            (FIRST_PIXELS, f"const kPixels = {FINE_PIXELS};"),
+        ):
             assert old in script, f"{old} is not there any more"
             script = script.replace(old, new)
         route.fulfill(body=script, content_type="text/javascript")
@@ -155,10 +190,12 @@ def check_end_of_first_view(visitor, url, camera, reference):
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert_equal(reference, depths, camera, f"after {at_mark} tiles of the first view")
     asked = visitor.page.evaluate("asked.tiles")
-    assert FEW_TILES < at_mark <= FEW_TILES + MOST_UNDER_WAY < asked, f"{at_mark} tiles in the first view, {asked} in all"
+    assert FEW_TILES < at_mark <= FEW_TILES + MOST_UNDER_WAY < asked, (
+        f"{at_mark} tiles in the first view, {asked} in all"
+    )
 
 
-# The places where the camera is seen on its way, and whether a drag has inertia.
+# The positions of the camera during a flight, and whether a drag has inertia.
 GLIDE = """async (camera) => {
   const {viewer} = voxdagViewer, places = new Set(), end = performance.now() + 120000;
   viewer.motion.startCoasting([1, 0], () => {});
@@ -167,14 +204,15 @@ GLIDE = """async (camera) => {
   viewer.flyToText(camera);
   for (;;) {
     places.add(viewer.camera.eye.join());
-    if (viewer.motion.flight === null || performance.now() > end) return [places.size, coasts, [...viewer.camera.eye]];
+    if (viewer.motion.flight === null || performance.now() > end)
+      return [places.size, coasts, [...viewer.camera.eye]];
     await new Promise((resolve) => requestAnimationFrame(resolve));
   }
 }"""
 
 
 def check_reduced_motion(visitor, cameras):
-    """The camera jumps where the system asks for less motion, and glides elsewhere."""
+    """The camera jumps if the system requests reduced motion, and glides otherwise."""
     for motion in ("no-preference", "reduce"):
         visitor.page.emulate_media(reduced_motion="reduce")
         visitor.show(cameras["top"], complete=False)
@@ -184,6 +222,8 @@ def check_reduced_motion(visitor, cameras):
         visitor.show(cameras["wide"], complete=False)
         assert math.dist(eye, visitor.camera()["eye"]) < 1, "the camera has not arrived"
         if motion == "reduce":
-            assert places == 1 and not coasts, f"the camera glides though motion is reduced: {places} places, {coasts}"
+            assert places == 1 and not coasts, (
+                f"the camera glides though motion is reduced: {places} places, {coasts}"
+            )
         else:
             assert places > 1 and coasts, "the camera never glides: the check sees nothing"

@@ -1,4 +1,4 @@
-"""Looks at jobs that run: what they have built so far, and how they end."""
+"""Running jobs: their partial result, and how they end."""
 
 import json
 import math
@@ -9,10 +9,11 @@ import urllib.error
 from pathlib import Path
 
 WAIT_S = 60
-MAX_PAUSE_S = 0.5  # a longer one could miss what is waited for, and even the end
+MAX_PAUSE_S = 0.5  # a longer one could miss the awaited state, and even the end
 SCENE = "running.glb"
 RESOLUTION, SUBVOLUME = 4096, 512
-CELL_LEVEL = int(math.log2(RESOLUTION / (SUBVOLUME // 4)))  # what is built is drawn in these cells
+# The partial result is drawn in cells of this level.
+CELL_LEVEL = int(math.log2(RESOLUTION / (SUBVOLUME // 4)))
 PICTURE = (96, 54)
 
 # Pixels of the wireframe over the picture, by the kinds of lines.
@@ -30,11 +31,13 @@ WIRES = """() => {
 
 
 class Job:
-    """A job of the service, which can be held at any time."""
+    """A job of the service that the test can hold at any time."""
 
     def __init__(self, server, resolution, **options):
         self.server = server
-        self.id = server.post("/api/v1/jobs", {"scene": SCENE, "resolution": resolution, "options": options})["id"]
+        self.id = server.post(
+            "/api/v1/jobs", {"scene": SCENE, "resolution": resolution, "options": options}
+        )["id"]
         self.path = f"/api/v1/jobs/{self.id}"
         self.page = f"{server.url}/viewer.html?job={self.id}"
 
@@ -45,7 +48,7 @@ class Job:
         return self.known("subvolumes")
 
     def known(self, what):
-        """{} before the subvolumes are planned."""
+        """Returns {} before the subvolumes are planned."""
         try:
             return json.loads(self.server.get(f"{self.path}/{what}"))
         except urllib.error.HTTPError as error:
@@ -56,11 +59,13 @@ class Job:
         deadline = time.monotonic() + WAIT_S
         while not condition():
             assert time.monotonic() < deadline, f"job {self.id}: not within {WAIT_S} s: {what}"
-            assert self.state() not in ("failed", "succeeded"), f"job {self.id} ended before: {what}"
+            assert self.state() not in ("failed", "succeeded"), (
+                f"job {self.id} ended before: {what}"
+            )
             time.sleep(0.02)
 
     def durable(self):
-        """How many built subvolumes can be seen, and how many there are."""
+        """Returns the numbers of visible and of all built subvolumes."""
         partial = self.known("partial")
         return partial.get("built", 0), partial.get("total", 0)
 
@@ -69,7 +74,7 @@ class Job:
         self.until(state, lambda: self.state() == state)
 
     def build_until(self, built):
-        """Builds until so many subvolumes are built, or more; then the job is suspended."""
+        """Builds at least `count` subvolumes, then suspends the job."""
         pause_s = 0.05
         while True:
             self.until("one is being built", lambda: self.subvolumes().get("working"))
@@ -82,12 +87,16 @@ class Job:
             pause_s = min(1.5 * pause_s, MAX_PAUSE_S)
 
     def processes(self):
-        """That of the job which runs."""
+        """Returns the process id of the running job."""
         threads = Path(f"/proc/{self.server.process.pid}/task").glob("*/children")
-        return [int(child) for children in threads for child in children.read_text(encoding="utf-8").split()]
+        return [
+            int(child)
+            for children in threads
+            for child in children.read_text(encoding="utf-8").split()
+        ]
 
     def hold_at_work(self):
-        """Stops its process while the list of the subvolumes has one that is being built."""
+        """Stops the process while the list has a subvolume being built."""
         while True:
             self.until("one is being built", lambda: self.subvolumes().get("working"))
             self.signal(signal.SIGSTOP)
@@ -110,12 +119,12 @@ def hits(depths):
 
 
 def uncovered(depths, others):
-    """How many rays of `depths` hit something that the rays of `others` do not hit or pass."""
+    """Returns how many rays of `depths` hit a surface that the rays of `others` miss or pass."""
     return sum(math.isfinite(d) and not other < d * 1.002 for d, other in zip(depths, others))
 
 
 def check_growing(visitor, server):
-    """What is built of a job grows under the camera; at its end its result is there, without a reload."""
+    """The partial result grows in view. At the end the result appears without a reload."""
     page = visitor.page
     job = Job(server, RESOLUTION, subvolume=SUBVOLUME, threads=1)
     job.build_until(4)
@@ -138,7 +147,9 @@ def check_growing(visitor, server):
     job.hold_at_work()
     try:
         visitor.wait_until("voxdagViewer.wires.counts.working === 1")
-        page.evaluate("new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)))")
+        page.evaluate(
+            "new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)))"
+        )
         assert page.evaluate(WIRES)["working"] > 50, "what is being built is not marked"
         visitor.picture("running")
     finally:
@@ -164,11 +175,13 @@ def check_growing(visitor, server):
     assert away < 0.01, f"the camera is {away} voxels away"
     page.evaluate("(level) => voxdagViewer.viewer.setOptions({level})", CELL_LEVEL)
     result = capture(visitor)
-    assert uncovered(late, result) <= 0.01 * hits(late), "something was shown that is not in the result"
+    assert uncovered(late, result) <= 0.01 * hits(late), (
+        "something was shown that is not in the result"
+    )
 
 
 def check_ends(visitor, server):
-    """Jobs that are canceled and deleted while they are viewed; one that waits."""
+    """Jobs that are canceled and deleted while they are viewed, and a waiting job."""
     page = visitor.page
     job = Job(server, RESOLUTION, subvolume=SUBVOLUME, threads=1)
     job.until("the subvolumes are planned", job.subvolumes)
@@ -195,7 +208,7 @@ def check_ends(visitor, server):
 
 def check_running_jobs(visitor, server, scene):
     server.send("PUT", f"/api/v1/scenes/{SCENE}", scene.read_bytes())
-    # What is not there before the plan, after the end and after a deletion.
+    # Elements that are absent before the plan, after the end and after a deletion.
     with visitor.expecting("status of 40[49]"):
         check_ends(visitor, server)
         check_growing(visitor, server)

@@ -1,4 +1,4 @@
-"""A browser window with the viewer in it, and what the test does there."""
+"""A browser window that shows the viewer, and the actions of the test."""
 
 import base64
 import contextlib
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from chromium import Window
 
-# Pixels of the canvas per pixel of the page: a CPU draws here.
+# Pixels of the canvas per pixel of the page. Low, because a CPU draws here.
 PIXEL_RATIO = 0.5
 
 # After two animation frames the picture has the new camera.
@@ -20,24 +20,26 @@ TWO_FRAMES = """async () => {
 SHOW = """async ([camera, complete]) => {
   const {viewer, renderer} = window.voxdagViewer;
   viewer.flyToText(camera);
-  await (%s)();
+  await (TWO_FRAMES)();
   if (!complete) return;
   await renderer.complete();
-  if (!renderer.progress.isFullSize || !renderer.isSunPlaced) throw new Error("complete() came before the final picture");
-}""" % TWO_FRAMES
+  if (!renderer.progress.isFullSize || !renderer.isSunPlaced)
+    throw new Error("complete() came before the final picture");
+}""".replace("TWO_FRAMES", TWO_FRAMES)
 
 CAPTURE = """async ([width, height]) => {
   const {depth, level} = await window.voxdagViewer.renderer.capture({width, height});
   const text = (bytes) => {
     let out = "";
-    for (let i = 0; i < bytes.length; i += 32768) out += String.fromCharCode(...bytes.subarray(i, i + 32768));
+    for (let i = 0; i < bytes.length; i += 32768)
+      out += String.fromCharCode(...bytes.subarray(i, i + 32768));
     return btoa(out);
   };
   return [text(new Uint8Array(depth.buffer, depth.byteOffset, depth.byteLength)), text(level)];
 }"""
 
 
-# What the canvas shows, rows from the top: red, green, blue, alpha.
+# The pixels of the canvas, rows from the top: red, green, blue, alpha.
 READ_CANVAS = """async () => {
   const {renderer, viewer} = window.voxdagViewer;
   while (renderer.statistics().samples < 16) {
@@ -51,7 +53,8 @@ READ_CANVAS = """async () => {
   context.drawImage(scene, 0, 0);
   const {data} = context.getImageData(0, 0, copy.width, copy.height);
   let out = "";
-  for (let i = 0; i < data.length; i += 32768) out += String.fromCharCode(...data.subarray(i, i + 32768));
+  for (let i = 0; i < data.length; i += 32768)
+    out += String.fromCharCode(...data.subarray(i, i + 32768));
   return [copy.width, copy.height, btoa(out)];
 }"""
 
@@ -59,7 +62,9 @@ READ_CANVAS = """async () => {
 class Visitor(Window):
     def __init__(self, browser, pictures, name, width=720, height=230, **options):
         options = {"reduced_motion": "reduce", "device_scale_factor": PIXEL_RATIO, **options}
-        super().__init__(browser, pictures, name, viewport={"width": width, "height": height}, **options)
+        super().__init__(
+            browser, pictures, name, viewport={"width": width, "height": height}, **options
+        )
 
     def open(self, url, wait=True):
         self.page.goto("about:blank")  # a new fragment alone would not reload the page
@@ -68,10 +73,12 @@ class Visitor(Window):
             self.wait_until("Boolean(window.voxdagViewer)")
 
     def wait_until(self, expression, argument=None):
-        """Playwright's wait_for_function evaluates in the page, which the policy forbids."""
+        """Polls an expression. The policy forbids Playwright's wait_for_function."""
         deadline = time.monotonic() + self.timeout_ms / 1000
         while not self.page.evaluate(expression, argument):
-            assert time.monotonic() < deadline, f"{self.name}: not within {self.timeout_ms} ms: {expression}"
+            assert time.monotonic() < deadline, (
+                f"{self.name}: not within {self.timeout_ms} ms: {expression}"
+            )
             self.page.wait_for_timeout(50)
 
     def show(self, camera, complete=True):
@@ -86,7 +93,7 @@ class Visitor(Window):
         return depths, levels
 
     def canvas(self):
-        """Width, height and bytes of the canvas once the picture is complete, four bytes a pixel."""
+        """Returns width, height and pixels of the complete canvas, four bytes per pixel."""
         width, height, text = self.page.evaluate(READ_CANVAS)
         pixels = base64.b64decode(text)
         assert len(pixels) == 4 * width * height
@@ -99,14 +106,14 @@ class Visitor(Window):
         return self.page.evaluate("window.voxdagViewer.camera.get()")
 
     def camera_text(self):
-        """The string in the panel, which follows the camera after a moment."""
+        """Returns the string in the panel, which follows the camera with a delay."""
         self.page.evaluate(TWO_FRAMES)
         self.wait_until("!voxdagViewer.viewer.bookmarkTimer")
         return self.page.locator("#camera-text").inner_text()
 
 
 def resident_bytes_of_descendants():
-    """Of all processes that this one has started, and those that they have: the browser, most of all."""
+    """Returns the resident memory of all child processes, direct or not: mostly the browser."""
     parents, pages = {}, {}
     for folder in Path("/proc").iterdir():
         if not folder.name.isdigit():

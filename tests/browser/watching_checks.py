@@ -1,4 +1,4 @@
-"""Looks at jobs that need somebody or something to continue: after a restart of the service, a failure, with another scene, among many."""
+"""Jobs that continue after a restart, after a failure, with another scene, among many."""
 
 import json
 import shutil
@@ -6,7 +6,7 @@ import signal
 
 from running_checks import RESOLUTION, SCENE, SUBVOLUME, Job, capture, hits
 
-MANY = 16  # running jobs that the service remembers for those who look at them
+MANY = 16  # running jobs whose partial results the service keeps for viewers
 BANNER = "document.querySelector('.banner-text')?.textContent ?? ''"
 RUNS = "Boolean(window.voxdagViewer?.running) && voxdagViewer.renderer.isReady"
 
@@ -16,7 +16,7 @@ def says(visitor, text):
 
 
 def hold(job):
-    """Stops its process as soon as there is one."""
+    """Stops the job's process as soon as it exists."""
     job.until("its process runs", job.processes)
     job.signal(signal.SIGSTOP)
 
@@ -28,7 +28,7 @@ def expect_same_view(visitor, camera):
 
 
 def check_restart(visitor, server, job):
-    """While the service is away the picture stays; afterwards the viewer continues with what was built."""
+    """The picture remains while the service is down. Afterwards the viewer continues."""
     visitor.open(job.page)
     visitor.wait_until("voxdagViewer.running && Boolean(voxdagViewer.renderer.info.root)")
     visitor.page.evaluate("window.isSamePage = true")
@@ -42,7 +42,11 @@ def check_restart(visitor, server, job):
     assert hits(capture(visitor)) >= before, "what was built is gone from the picture"
     server.start()
     hold(job)
-    visitor.wait_until(f"(digest) => {RUNS} && Boolean(voxdagViewer.renderer.info.root) && voxdagViewer.renderer.info.digest !== digest", digest)
+    visitor.wait_until(
+        f"(digest) => {RUNS} && Boolean(voxdagViewer.renderer.info.root) &&"
+        " voxdagViewer.renderer.info.digest !== digest",
+        digest,
+    )
     says(visitor, "are built")
     assert hits(capture(visitor)) >= before, "what was built before the restart is not shown"
     expect_same_view(visitor, camera)
@@ -50,7 +54,7 @@ def check_restart(visitor, server, job):
 
 
 def check_retries(visitor, server, job, camera, other_scene):
-    """A job that fails, is tried again, is canceled, and is tried again with another scene."""
+    """A job fails, is retried, is canceled, and is retried with another scene."""
     job.signal(signal.SIGKILL)
     says(visitor, "is failed and has no result. This is what was built of it.")
     assert hits(capture(visitor)) > 0, "what was built of a failed job is gone"
@@ -68,24 +72,28 @@ def check_retries(visitor, server, job, camera, other_scene):
     server.send("POST", f"{job.path}/retry")
     visitor.wait_until("Boolean(window.voxdagViewer) && !voxdagViewer.running")
     result = json.loads(server.get(job.path))["result"]
-    assert visitor.page.evaluate("voxdagViewer.renderer.info.voxels") == str(result["voxels"]), "it is not the last result"
+    assert visitor.page.evaluate("voxdagViewer.renderer.info.voxels") == str(result["voxels"]), (
+        "it is not the last result"
+    )
     assert visitor.page.evaluate("window.isSamePage === true"), "the page was loaded again"
 
 
 def check_many(visitor, server, data):
-    """With so many jobs looked at, one more is shown in words, and drawn as soon as another makes room."""
+    """Beyond the limit of viewed jobs, one more is described in text until another one closes."""
     job = Job(server, 4 * RESOLUTION, subvolume=SUBVOLUME, threads=1)
     job.until("the subvolumes are planned", job.subvolumes)
     job.signal(signal.SIGSTOP)
     try:
         others = [Job(server, 4 * RESOLUTION) for _ in range(MANY)]
         for other in others:
-            # As if it had run: it waits, since one job runs at a time.
+            # As if it had run: it waits, because only one job runs.
             shutil.copytree(data / "jobs" / job.id, data / "jobs" / other.id)
             assert other.durable()[1] > 0, "a job that waits has no subvolumes"
         visitor.open(job.page, wait=False)
         visitor.page.get_by_role("heading", name="This job is running.").wait_for()
-        assert not visitor.page.evaluate("Boolean(window.voxdagViewer)"), "more jobs are drawn than the service remembers"
+        assert not visitor.page.evaluate("Boolean(window.voxdagViewer)"), (
+            "more jobs are drawn than the service remembers"
+        )
         server.send("POST", f"{others[0].path}/cancel")
         server.send("DELETE", others[0].path)
         visitor.wait_until(RUNS)
@@ -99,7 +107,7 @@ def check_many(visitor, server, data):
 
 
 def check_watched_jobs(visitor, server, data, scene, other_scene):
-    """`data` is the folder of the service, which listens on the same port again."""
+    """`data` is the data folder of the service. It listens on the same port again."""
     server.send("PUT", f"/api/v1/scenes/{SCENE}", scene.read_bytes())
     job = Job(server, RESOLUTION, subvolume=SUBVOLUME, threads=1)
     job.build_until(4)

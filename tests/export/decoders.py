@@ -72,7 +72,9 @@ def expand(words, roots, depth, children_of):
 
 def voxels_of_bricks(bricks, corners):
     """The voxels of 64-bit masks with bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0."""
-    rows, bits = numpy.nonzero(bricks[:, None] >> numpy.arange(64, dtype=numpy.uint64) & numpy.uint64(1))
+    rows, bits = numpy.nonzero(
+        bricks[:, None] >> numpy.arange(64, dtype=numpy.uint64) & numpy.uint64(1)
+    )
     inner = [(bits >> 2 - axis & 1) | (bits >> 5 - axis & 1) << 1 for axis in range(3)]
     return 4 * corners[rows] + numpy.stack(inner, axis=1)
 
@@ -104,7 +106,7 @@ def hashdag(path, grid):
     bricks = (words[leaves] | words[leaves + 1] << 32).view(numpy.uint64)
     cells = voxels_of_bricks(bricks, corners)
     # The voxels that a node says it encloses are as many as are found below all of its occurrences.
-    for nodes, counts in visited:
+    for _, counts in visited:
         assert counts.sum() == len(cells)
     return cells
 
@@ -159,7 +161,9 @@ def voxel(path, grid):
         found = nodes[(found[rows] & 0xFFFFFF) + popcount_below(masks[rows], bits)]
     assert (found >> 24 == 0).all()
     bricks = (leaf_data[2 * found] | leaf_data[2 * found + 1] << 32).view(numpy.uint64)
-    rows, bits = numpy.nonzero(bricks[:, None] >> numpy.arange(64, dtype=numpy.uint64) & numpy.uint64(1))
+    rows, bits = numpy.nonzero(
+        bricks[:, None] >> numpy.arange(64, dtype=numpy.uint64) & numpy.uint64(1)
+    )
     inner = numpy.stack([bits & 3, bits >> 2 & 3, bits >> 4], axis=1)
     cells.append(4 * corners[rows] + inner)
     return numpy.concatenate(cells)

@@ -4,9 +4,9 @@
     export_test.py VOXDAG LIST_VOXELS FORMAT [TOOLS...]
 
 At three resolutions, at a coarser level, for one region, and for a region of a coarser level; and
-the colors of a scene, for formats whose libraries unit tests do not have. TOOLS are programs of this
-folder that the decoder of the format starts. Exits with 77, which ctest counts as skipped, where the
-library that decodes is missing, and with 1 if VOXDAG_SKIP_NOTHING is set.
+the colors of a scene, for formats whose libraries unit tests do not have. TOOLS are programs of
+this folder that the decoder of the format starts. Exits with 77, which ctest counts as skipped,
+where the library that decodes is missing, and with 1 if VOXDAG_SKIP_NOTHING is set.
 """
 
 import json
@@ -34,7 +34,7 @@ except ImportError:
         )
     skip("numpy here (python3-numpy)")
 
-import decoders
+import decoders  # noqa: E402
 
 SUFFIXES = {"hashdag": ".basic_dag.dag.bin", "voxel": ".voxel.json"}
 # Resolution, options of the export.
@@ -97,7 +97,9 @@ class Test:
         return self.files[resolution]
 
     def expected(self, path, shift, grid):
-        listed = subprocess.run([self.list_voxels, path, str(shift)], capture_output=True, check=True)
+        listed = subprocess.run(
+            [self.list_voxels, path, str(shift)], capture_output=True, check=True
+        )
         cells = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 3)
         cells = cells[((cells >= grid.low) & (cells < grid.high)).all(axis=1)]
         return numpy.unique(keys(cells))

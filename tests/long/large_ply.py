@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """A binary PLY of many times --memory.
 
-    tests/long/large_ply.py [--voxdag build/cpu/voxdag] [--folder DIR] [--edge 5000] [--resolution 2048]
+    tests/long/large_ply.py [--voxdag build/cpu/voxdag] [--folder DIR] [--edge 5000]
+                            [--resolution 2048]
 
-Writes a hilly sheet of EDGE x EDGE vertices, whose rows of faces are scattered over the file: 906 MiB by default.
-Builds it with --memory 64MiB and with the default. What must hold: the peak of resident memory is at most 64 MiB above what
-was given, by the build's report and by the system's own measurement, and the files are equal. Takes some minutes and several GB of
-disk; a scene that the folder has already is used again.
+Writes a hilly sheet of EDGE x EDGE vertices, whose rows of faces are scattered over the file: 906
+MiB by default. Builds it with --memory 64MiB and with the default. What must hold: the peak of
+resident memory is at most 64 MiB above what was given, by the build's report and by the system's
+own measurement, and the files are equal. Takes some minutes and several GB of disk; a scene that
+the folder has already is used again.
 """
 
 import argparse
@@ -61,10 +63,13 @@ def step_of(rows):
 
 def write_scene(path, edge):
     with open(f"{path}.partial", "wb") as file:
-        file.write(
+        header = (
             f"ply\nformat binary_little_endian 1.0\nelement vertex {edge * edge}\n"
             "property float x\nproperty float y\nproperty float z\n"
-            f"element face {2 * (edge - 1) ** 2}\nproperty list uchar uint vertex_indices\nend_header\n".encode())
+            f"element face {2 * (edge - 1) ** 2}\n"
+            "property list uchar uint vertex_indices\nend_header\n"
+        )
+        file.write(header.encode())
         write_vertices(file, edge)
         write_faces(file, edge)
     os.rename(f"{path}.partial", path)
@@ -84,10 +89,24 @@ def main():
         if not scene.exists():
             write_scene(scene, arguments.edge)
         size = scene.stat().st_size
-        print(f"{size / MIB:.0f} MiB of binary PLY, {2 * (arguments.edge - 1) ** 2 / 1e6:.1f} M triangles", flush=True)
+        print(
+            f"{size / MIB:.0f} MiB of binary PLY, "
+            f"{2 * (arguments.edge - 1) ** 2 / 1e6:.1f} M triangles",
+            flush=True,
+        )
         if size < 5 * BUDGET:
-            sys.exit(f"--edge {arguments.edge}: expected a scene of at least {5 * BUDGET / MIB:.0f} MiB")
-        command = [arguments.voxdag, "build", scene, "-r", str(arguments.resolution), "-o", folder / "sheet.vdag"]
+            sys.exit(
+                f"--edge {arguments.edge}: expected a scene of at least {5 * BUDGET / MIB:.0f} MiB"
+            )
+        command = [
+            arguments.voxdag,
+            "build",
+            scene,
+            "-r",
+            str(arguments.resolution),
+            "-o",
+            folder / "sheet.vdag",
+        ]
         return 0 if holds(command, (BUDGET, None)) else 1
 
 
