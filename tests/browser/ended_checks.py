@@ -47,7 +47,7 @@ def check_retry_of_canceled(visitor, server):
 
     visitor.open(job.page, wait=False)
     heading(visitor, "This job is canceled.")
-    page.get_by_text("It has no result to look at.").wait_for()
+    page.get_by_text("It has no result.").wait_for()
     page.evaluate("window.isSamePage = true")
     link = page.get_by_role("link", name="The job's page")
     link.focus()
@@ -59,7 +59,7 @@ def check_retry_of_canceled(visitor, server):
     )
     page.evaluate(f"asked.way = 'lose', {WAKE}")
     heading(visitor, "This job was canceled.")
-    page.get_by_text("The service does not answer. It is asked again.").wait_for()
+    page.get_by_text("The service does not answer. Trying again.").wait_for()
     server.send("POST", f"{job.path}/retry")
     # The plan of the first attempt is available throughout.
     job.hold_at_work()
@@ -116,7 +116,7 @@ def check_no_such_job(visitor, url):
 
 
 def expect_no_file(visitor):
-    heading(visitor, "The file is not there.")
+    heading(visitor, "The file does not exist.")
     visitor.page.get_by_text("not_found · HTTP 404").wait_for()
     for part in ("#scene", "#tools", "#panel"):
         assert visitor.page.locator(part).is_hidden(), f"{part} is shown next to the message"

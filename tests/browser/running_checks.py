@@ -191,13 +191,13 @@ def check_ends(visitor, server):
         visitor.open(queued.page, wait=False)
         page.get_by_role("heading", name="This job is queued.").wait_for()
         queued.change("cancel", "canceled")
-        page.get_by_text("It has no result to look at.").wait_for()
+        page.get_by_text("It has no result.").wait_for()
         visitor.open(job.page)
         visitor.wait_until("voxdagViewer.running && voxdagViewer.wires.counts.waiting > 0")
         server.send("POST", f"{job.path}/cancel")
     finally:
         job.signal(signal.SIGCONT)
-    page.get_by_text("This is what was built of it.").wait_for()
+    page.get_by_text("The picture shows its built part.").wait_for()
     assert page.evaluate(WIRES)["all"] > 200, "the wireframe of a canceled job is gone"
     job.until("it is canceled", lambda: job.state() == "canceled")
     server.send("DELETE", job.path)

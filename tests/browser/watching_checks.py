@@ -56,7 +56,7 @@ def check_restart(visitor, server, job):
 def check_retries(visitor, server, job, camera, other_scene):
     """A job fails, is retried, is canceled, and is retried with another scene."""
     job.signal(signal.SIGKILL)
-    says(visitor, "is failed and has no result. This is what was built of it.")
+    says(visitor, "is failed and has no result. The picture shows its built part.")
     assert hits(capture(visitor)) > 0, "what was built of a failed job is gone"
     server.send("POST", f"{job.path}/retry")
     hold(job)

@@ -1,4 +1,4 @@
-// Requests to /api/v1. Every failure is a Problem, including those of the network.
+// Requests to /api/v1. Every failure is a Problem, network failures included.
 
 const kTokenKey = "voxdag-token";
 
@@ -10,11 +10,11 @@ export class Problem extends Error {
     this.members = members;
     this.headers = headers;
   }
-  // Whether the same request may succeed later.
+  // True if the same request may succeed later.
   get isTransient() {
     return this.code === "unreachable" || [408, 429, 502, 503, 504].includes(this.status);
   }
-  // Seconds that the service asks to wait for.
+  // The pause in seconds that the service requests.
   get retryAfterS() {
     return Number(this.headers?.get("Retry-After")) || 0;
   }

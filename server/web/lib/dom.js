@@ -57,7 +57,7 @@ export function fact(name, ...value) {
   return h("div", {class: "fact"}, h("dt", {}, name), h("dd", {}, ...value));
 }
 
-// Asks in a modal dialog; resolves to true if the user confirms the action.
+// Opens a modal dialog. Resolves to true if the user confirms the action.
 export function confirmAction(title, text, action) {
   const dialog =
       h("dialog", {class: "ask", "aria-labelledby": "ask-title"},

@@ -69,7 +69,8 @@ async function putPart(path, file, offset, onProgress, signal) {
   const end = Math.min(file.size, offset + kPartBytes);
   const part = await file.slice(offset, end).arrayBuffer();
   const range =
-      end > offset ? `${offset}-${end - 1}` : "*";  // an empty part finishes what has all its bytes
+      // An empty part completes an upload that has all its bytes.
+      end > offset ? `${offset}-${end - 1}` : "*";
   const headers = {
     ...authorization(),
     "Content-Type": "application/octet-stream",

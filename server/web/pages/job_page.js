@@ -75,7 +75,7 @@ class JobPage {
     setText(this.link, "");
   }
 
-  // Waits before looking at an ended job again: for its preview, or in case it is retried.
+  // Waits before it fetches an ended job again, for its preview or in case it is retried.
   async waitWhileEnded() {
     const waking = new AbortController();
     this.wake = () => waking.abort();
@@ -170,7 +170,7 @@ class JobPage {
         fact("Finished", ...when(job.finished_at)));
   }
 
-  // The buttons change with the state; keyboard focus stays among them.
+  // The buttons depend on the state. The keyboard focus remains among them.
   showActions() {
     const hadFocus = this.places.actions.contains(document.activeElement);
     clear(this.places.actions, actions(this.job, () => this.reload()));

@@ -136,7 +136,7 @@ function jobRow(job) {
   return {element, update};
 }
 
-// What a job is doing, in one line.
+// Describes the activity of a job in one line.
 function activityText(job) {
   const p = job.progress;
   switch (job.state) {

@@ -1,4 +1,4 @@
-// Asks for the bearer token.
+// The form for the bearer token.
 
 import {request, token} from "../lib/api.js";
 import {field, h} from "../lib/dom.js";

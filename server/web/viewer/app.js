@@ -1,4 +1,4 @@
-// The viewer: the picture, what moves it, and the panel.
+// The viewer: picture, camera motion, and panel.
 
 import {announce, h} from "../lib/dom.js";
 
@@ -21,14 +21,14 @@ import {length, scale, subtract} from "./vector.js";
 const kDefaultFov = 35;
 const kPictureAspect = 16 / 9;  // of the views in the manifest
 const kSeenIntervalMs = 250;    // between two looks at how far away things are
-const kFirstSeenMs = 2000;      // until the first: it needs a program of its own
+const kFirstSeenMs = 2000;      // until the first pick, which needs its own program
 const kStatisticsIntervalMs = 500;
 const kNoPicture = "There is no picture yet.";
 const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
-  // `renderer` may start later; `places` are the elements {panel, tools, status}. With `bookmarks`
-  // the fragment of the address is that of the camera. Ends when `signal` aborts.
+  // `renderer` may start later. `places` are the elements {panel, tools, status}. With `bookmarks`
+  // the fragment of the address follows the camera. Ends when `signal` aborts.
   constructor({canvas, renderer, manifest, places, fileName, signal, bookmarks = true}) {
     Object.assign(this, {canvas, renderer, manifest, places, fileName, signal, bookmarks});
     this.space = new GridSpace(manifest);
@@ -205,7 +205,7 @@ export class Viewer {
     this.bookmark();
   }
 
-  // Speeds follow the distance of what is in the center; without anything there, they grow slowly.
+  // Speeds follow the distance of the surface in the center. Without a surface they grow slowly.
   async lookAhead(now) {
     if (this.seen.key === this.cameraKey) return;
     this.seen.time = now;
@@ -251,7 +251,7 @@ export class Viewer {
   async setPivot(x, y) {
     if (!this.renderer.isReady) return announce(kNoPicture);
     const hit = await this.renderer.pick(x, y);
-    if (!hit) return announce("Nothing there to orbit around.");
+    if (!hit) return announce("There is no surface to orbit around.");
     const {eye, fovDegrees} = this.camera.get();
     if (!(length(subtract(hit.position, eye)) > 0)) return;
     this.flyTo({eye, target: hit.position, fovDegrees});
@@ -326,7 +326,8 @@ export class Viewer {
     };
   }
 
-  // The drawing buffer is only valid until the browser has shown it: draws and reads at once.
+  // The drawing buffer is valid only until the browser has shown it, so this draws immediately
+  // before it reads.
   savePicture() {
     if (!this.renderer.hasDrawn) return announce(kNoPicture);
     this.renderer.frame();
@@ -377,6 +378,6 @@ export class Viewer {
 function problemText({code, message}) {
   if (code === "unauthorized") return "The service no longer accepts the token: reload the page.";
   return code === "unreachable" ?
-      `${message} What is missing is drawn coarse and asked for again.` :
+      `${message} Missing parts are drawn coarse and requested again.` :
       message;
 }

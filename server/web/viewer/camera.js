@@ -1,7 +1,7 @@
-// A pinhole camera in voxels, as doubles: the same picture as that of query/render/camera.h.
+// A pinhole camera in voxels, in doubles. It gives the same picture as query/render/camera.h.
 //
-// Invariants: the eye is not on the target; after a motion the view is at most kMaxPitch from the
-// horizontal, so that up stays up. Only a camera that was set may look straight up or down.
+// Invariants: the eye is not on the target. After a motion the view is at most kMaxPitch from the
+// horizontal, so the camera never turns over. Only set() can make it look straight up or down.
 
 import {
   add,
@@ -92,7 +92,7 @@ export class Camera {
     this.eye = eye;
   }
 
-  // Scales all distances from `point`, which stays where it is in the picture.
+  // Scales all distances from `point`, which keeps its place in the picture.
   zoomAbout(point, factor) {
     const least =
         kMinDistance / Math.min(this.distance, Math.max(distance(this.eye, point), kMinDistance));
@@ -104,7 +104,8 @@ export class Camera {
     if (distance(eye, target) > 0) Object.assign(this, {eye, target});
   }
 
-  // The same picture, with the target as far away as `point`: what is looked at is orbited.
+  // Moves the target to the depth of `point`, so that the camera orbits the visible surface. The
+  // picture does not change.
   moveTargetToDepthOf(point) {
     const {forward} = this.axes();
     const depth = dot(subtract(point, this.eye), forward);

@@ -31,7 +31,8 @@ export function cameraText(space, {eye, target, fovDegrees}) {
       `--fov ${numberText(fovDegrees)}`;
 }
 
-// Reads cameraText(), also from the middle of a command. Throws an Error that says what is missing.
+// Parses cameraText(), also from the middle of a command. Throws an Error that names a missing
+// option.
 export function parseCameraText(space, text, defaultFov) {
   const option = (name) => new RegExp(`(?:^|\\s)--${name}[\\s=]+["']?([^\\s"']+)`).exec(text)?.[1];
   return parseCamera(space, option("camera"), option("target"), option("fov"), defaultFov);

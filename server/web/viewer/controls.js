@@ -12,7 +12,7 @@ const kDoubleMovePx = 24;
 const kWheelZoom = 0.0016;  // per pixel of the wheel
 const kAnchorTimeMs = 400;  // one turn of the wheel zooms to one point
 const kLinePx = 20;
-const kRecentMs = 80;  // of a drag: its speed is that of the inertia
+const kRecentMs = 80;  // the last part of a drag, whose speed starts the inertia
 
 export class Controls {
   // handlers: pick(x, y) -> Promise of a position or null; onClick(x, y); onDoubleClick(x, y);
@@ -70,7 +70,7 @@ export class Controls {
     }
   }
 
-  // What was grabbed follows the pointer. Until it is known, that is the target.
+  // The grabbed point follows the pointer. Until it is known, the target is used.
   async findPanDepth(at) {
     const press = this.press;
     const point = await this.handlers.pick(...at);
@@ -162,7 +162,7 @@ export class Controls {
     else this.handlers.onClick(...at);
   }
 
-  // Zooms to what is under the cursor; in the sky to a point as far away as the target.
+  // Zooms to the surface under the cursor; in the sky, to a point as far away as the target.
   handleWheel(event) {
     event.preventDefault();
     const at = this.position(event);

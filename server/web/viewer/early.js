@@ -1,5 +1,5 @@
-// Begins what takes longest, the graphics context and its programs, while the other modules of the
-// page still load. A job may have nothing to look at yet, so its page does not.
+// Creates the graphics context and its programs, which takes longest, while the other modules of
+// the page still load. The page of a job does not, because a job may have nothing to draw yet.
 
 import {createContext} from "./gl/gl_objects.js";
 import {Passes} from "./gl/passes.js";
@@ -10,12 +10,12 @@ let begun = null;
 function begin(canvas) {
   const source = new TileSource({base: "/api/v1/view"}), manifest = source.manifest();
   const beginMs = performance.now(), gl = createContext(canvas);
-  manifest.catch(() => {});  // reported by whoever waits for it
+  manifest.catch(() => {});  // reported where it is awaited
   if (!gl) return;
   const passes = gl.isContextLost() ? null : new Passes(gl),
         mine = {source, manifest, beginMs, gl, passes};
   begun = mine;
-  // A context that is lost now already comes back, too; its programs do not.
+  // A context that is lost already is restored later, but without its programs.
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     mine.passes = null;
@@ -27,8 +27,8 @@ function begin(canvas) {
 
 if (!new URLSearchParams(location.search).has("job")) begin(document.getElementById("scene"));
 
-// {source, manifest, beginMs, gl, passes} for the canvas of the page, null if it was taken already,
-// or cannot be had. `passes` are null if the context was lost.
+// Returns {source, manifest, beginMs, gl, passes} for the canvas of the page, or null if they were
+// taken before or the context is unavailable. `passes` is null if the context was lost.
 export function takeBegun() {
   const taken = begun;
   begun = null;

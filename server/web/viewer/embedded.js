@@ -11,8 +11,8 @@ import {fillTools} from "./tools.js";
 
 const kBudgetBytes = 64 * 2 ** 20;
 
-// Fills `place`; throws an Error, with `place` as it was, if that is not possible. Ends with
-// `signal`.
+// Fills `place`. Throws an Error, and leaves `place` unchanged, if that is not possible. Ends when
+// `signal` aborts.
 export async function embedViewer(place, job, signal) {
   const canvas = h("canvas", {
     class: "scene",
@@ -29,7 +29,7 @@ export async function embedViewer(place, job, signal) {
   let viewer = null;
   const renderer =
       new Renderer(canvas, source, {budgetBytes: kBudgetBytes, onChange: () => viewer?.schedule()});
-  // A browser has few contexts: this one is released early, as the page that it was in lives on.
+  // A browser has few contexts, and the page remains open, so the context is released early.
   const release = () => {
     renderer.dispose();
     if (!renderer.context.gl.isContextLost())

@@ -1,5 +1,4 @@
-// The keys of the canvas. Held keys move the camera, the others are actions. The same list is the
-// help.
+// The keys of the canvas and their help. Held keys move the camera, the others are actions.
 
 import {h} from "../lib/dom.js";
 
@@ -15,7 +14,7 @@ const kHeld = {
   KeyE: "rise",
   KeyQ: "sink",
 };
-// By the character, since these keys are elsewhere on other keyboards.
+// By character, because other keyboards have these keys elsewhere.
 const kHeldCharacters = {
   "+": "zoomIn",
   "=": "zoomIn",
@@ -40,12 +39,12 @@ const kActions = {
 const kHelp = [
   ["Drag, one finger, arrow keys", "orbit; in flight look around"],
   ["Right button, Shift and drag, two fingers", "pan"],
-  ["Wheel, pinch, + and −", "zoom, by wheel and pinch to the place that is pointed at"],
+  ["Wheel, pinch, + and −", "zoom, by wheel and pinch to the place under the pointer"],
   ["W A S D, E and Q", "fly forward, left, back, right, up and down; Shift: faster"],
   ["F", "switch between orbit and flight"],
   [
     "Double click or tap; C",
-    "orbit around the place that is pointed at; around the center of the picture"
+    "orbit around the place under the pointer; around the center of the picture"
   ],
   ["Click or tap; Enter", "pick a voxel; the one in the center of the picture"],
   ["M", "measure from the picked voxel"],
@@ -56,8 +55,8 @@ const kHelp = [
   ["H", "this help"],
 ];
 
-// Calls actions by their names. `root` is the canvas, or the window: then the keys also act while
-// nothing has the focus.
+// Calls actions by name. `root` is the canvas, or the window, whose keys also act while nothing has
+// the focus.
 export function listenToKeys(root, canvas, motion, actions, onChange, signal) {
   const held = new Map();  // by event.code: a character may change while its key is down
   root.addEventListener("keydown", (event) => {

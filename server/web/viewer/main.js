@@ -14,7 +14,7 @@ import {fillTools} from "./tools.js";
 
 const kBudgetMiB = 256;
 const kPhoneBudgetMiB = 64;
-const kMinBudgetMiB = 0.25;  // that tiles and colors can do with
+const kMinBudgetMiB = 0.25;  // minimum for tiles and colors
 const kPauseMs = 3000, kMaxPauseMs = 15000;
 
 const place = (id) => document.getElementById(id);
@@ -33,7 +33,7 @@ function budgetBytes() {
       2 ** 20;
 }
 
-// Instead of the picture; nothing hides it again but a new message.
+// Shows a message instead of the picture until another message replaces it.
 function showMessage(...content) {
   place("scene").hidden = place("panel").hidden = place("tools").hidden = true;
   place("message").hidden = false;
@@ -49,8 +49,7 @@ function showTitle(title) {
   setText(place("title"), title);
 }
 
-// Waits until the job has a result, and returns it. One that has failed or was canceled may be
-// tried again.
+// Waits until the job has a result, and returns the job. A failed or canceled job may be retried.
 async function finishedJob() {
   let known = null, waits = null, draws = true, pauseMs = kPauseMs;
   for (;;) {
@@ -59,7 +58,7 @@ async function finishedJob() {
     if (job?.state === "succeeded") return job;
     const isLive = job !== null && !hasEnded(job.state);
     if (draws && isLive) {
-      // The same page as that of a result; what it shows grows.
+      // The page of a result, with a growing partial result.
       const {watchJob} = await import("./running/running_job.js");
       try {
         if (await watchJob({
@@ -86,7 +85,7 @@ async function finishedJob() {
   }
 }
 
-// null while the service does not answer, if that `mayBe` so.
+// Resolves to null if the service does not answer and `mayBe` allows that.
 async function jobNow(mayBe) {
   try {
     return await getJson(`/api/v1/jobs/${jobId}`, lifetime.signal);
@@ -96,7 +95,7 @@ async function jobNow(mayBe) {
   }
 }
 
-// What is said of a job that has nothing to draw.
+// The message about a job that has nothing to draw.
 class WaitingMessage {
   constructor({PartialView}) {
     this.heading = h("h1", {});
@@ -107,8 +106,7 @@ class WaitingMessage {
           h("a", {class: "button", href: `/#/jobs/${jobId}`}, "The job's page"));
   }
 
-  // `job` is null while the service does not answer; `before` is what was known of the job, if
-  // anything.
+  // `job` is null while the service does not answer. `before` is the last known job, or null.
   show(job, before) {
     const said = `${job ? "This job is" : "This job was"} ${stateText((job ?? before).state)}.`;
     if (before && said !== this.heading.textContent)
@@ -116,19 +114,18 @@ class WaitingMessage {
     setText(this.heading, said);
     setText(
         this.text,
-        !job ? "The service does not answer. It is asked again." :
+        !job ? "The service does not answer. Trying again." :
             hasEnded(job.state) ?
-               "It has no result to look at. If it is tried again, it is shown here." :
-               "Its result is shown here when it is done.");
-    // What has the focus keeps it.
+               "It has no result. If it is retried, its result appears here." :
+               "Its result appears here when the job is done.");
+    // The focus is kept.
     if (place("message").hidden || !this.heading.isConnected)
       showMessage(this.heading, this.text, this.cubes.element, this.buttons);
     if (job) this.cubes.update(job);
   }
 }
 
-// The address may be anybody's, and this is copied to a shell: only what consists of numbers is
-// taken.
+// The address is untrusted and the result is copied to a shell, so only numbers are used.
 function cameraOfAddress() {
   const members = new URLSearchParams(location.hash.slice(1));
   return ["camera", "target", "fov"]
@@ -179,7 +176,7 @@ async function start() {
     renderer = new Renderer(
         canvas, source, {budgetBytes: budgetBytes(), onChange: () => viewer?.schedule(), begun});
     const manifest = await arrives;
-    const started = renderer.start();  // the first tile need not wait for the panel
+    const started = renderer.start();  // loads the first tile while the panel is built
     started.catch(() => {});
     showTools();
     viewer = new Viewer({
@@ -201,7 +198,7 @@ async function start() {
   window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
 }
 
-// The panel stays open or closed when another picture of the job follows.
+// The panel keeps its state when the next picture of the job follows.
 function showTools() {
   const before =
       place("tools").querySelector('[data-tool="togglePanel"]')?.getAttribute("aria-expanded");
@@ -227,12 +224,12 @@ function showFailure(error) {
   }
   const code = error.code || (error.status ? `http_${error.status}` : "unreachable");
   const isMissing = code === "not_found" && askedJob === null;
-  // The id of a job that is not there is never given to another.
+  // The id of a deleted job is never used again.
   const isFinal = code === "not_found" && error instanceof Problem;
   showMessage(
       isMissing &&
           [
-            h("h1", {}, "The file is not there."),
+            h("h1", {}, "The file does not exist."),
             h("p", {}, "This page shows the file of ", h("code", {}, "voxdag view"),
               ". A job of a service is viewed from its page.")
           ],
@@ -243,7 +240,7 @@ function showFailure(error) {
             h("button", {type: "button", on: {click: () => location.reload()}}, "Try again")));
 }
 
-// The service asks for a token: the page of the dashboard that does so is loaded only then.
+// Shows the login page of the dashboard, which is loaded only when the service requires a token.
 async function signIn() {
   const rejected = Boolean(token.get());
   token.remove();
@@ -257,7 +254,7 @@ function run() {
   hideMessage();
   start().catch((error) => {
     if (error.status !== 401) showFailure(error);
-    else if (!(error instanceof Problem)) signIn();  // a Problem has asked for it already
+    else if (!(error instanceof Problem)) signIn();  // a Problem has already shown the login page
   });
 }
 

@@ -15,7 +15,7 @@ export class Markers {
     for (const mark of this.marks) mark.remove();
   }
 
-  // `positions` are those of the pick and of the start in voxels, or null.
+  // `positions`: the pick and the start of a measurement in voxels, or null.
   show(positions, camera, width, height) {
     const {forward, right, up} = camera.axes();
     const pixel = camera.pixelSpread(height);

@@ -1,5 +1,5 @@
-// What moves the camera over time: flights to another camera, inertia, keys that are down. With
-// reduced motion a flight arrives at once and nothing coasts.
+// Moves the camera over time: flights to another camera, inertia, held keys. With reduced motion a
+// flight arrives immediately and there is no inertia.
 
 import {between} from "./camera.js";
 
@@ -9,9 +9,9 @@ const kMinCoast = 0.02;  // radians per second
 const kMaxCoast = 3;
 const kTurnRate = 1.2;  // radians per second, by arrow keys
 const kZoomRate = 1.6;  // per second, by + and -
-const kFlyRate = 0.8;   // distances of what is seen, per second
+const kFlyRate = 0.8;   // distances to the visible surface, per second
 const kFast = 4;
-const kFirstStepS = 1 / 20;  // of a key, however short it is pressed
+const kFirstStepS = 1 / 20;  // minimum for a key press
 
 export class Motion {
   // seenDistance() is in voxels.
@@ -36,7 +36,7 @@ export class Motion {
     }
   }
 
-  // Inertia after a drag: `apply(yaw, pitch)` is called with what is left of the speed.
+  // Starts inertia after a drag: `apply(yaw, pitch)` is called with decreasing steps.
   startCoasting(speed, apply) {
     const rate = Math.hypot(...speed);
     const limited = speed.map((s) => s * Math.min(1, kMaxCoast / rate));

@@ -1,4 +1,4 @@
-// What was picked, and the distance between two picks.
+// The picked voxel, and the distance between two picks.
 
 import {announce, clear, fact, h} from "../lib/dom.js";
 import {countText} from "../lib/format.js";
@@ -6,7 +6,7 @@ import {countText} from "../lib/format.js";
 import {distance, subtract} from "./vector.js";
 
 export class PickView {
-  // onChange() is called when there is one more or one less to show.
+  // onChange() is called when the number of picks changes.
   constructor(space, onChange) {
     this.space = space;
     this.onChange = onChange;
@@ -18,13 +18,13 @@ export class PickView {
   set(pick) {
     this.pick = pick;
     this.show();
-    if (!pick) announce("No voxel there.");
+    if (!pick) announce("There is no voxel here.");
     else
       announce(`Picked voxel ${pick.voxel.join(", ")}.${
           this.start ? ` Distance ${this.measureText()}.` : ""}`);
   }
 
-  // Measures from the current pick, or no longer.
+  // Starts or ends a measurement from the current pick.
   toggleMeasure() {
     if (!this.start && !this.pick)
       return announce("Pick a voxel first: distances are measured from it.");
@@ -33,7 +33,7 @@ export class PickView {
     this.show();
   }
 
-  // {low, high} of the two picks in voxels, or null.
+  // Returns the box {low, high} of the two picks in voxels, or null.
   box() {
     if (!this.start || !this.pick) return null;
     const edge = (pick) => this.cellEdge(pick);
@@ -100,7 +100,7 @@ export class PickView {
     this.onChange();
   }
 
-  // The buttons are replaced: the focus stays on the new one.
+  // The buttons are replaced; the new one gets the focus.
   toggleMeasureAndFocus() {
     this.toggleMeasure();
     this.element.querySelector('[data-action="measure"]')?.focus();

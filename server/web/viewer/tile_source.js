@@ -1,10 +1,10 @@
 // Fetches the manifest, tiles and color pages of one file. They never change for a digest, so the
-// browser's cache has a tile that is asked for alone again, and what a page asks for first when it
-// is loaded again. Other batches follow the view and are seldom asked for twice.
+// browser's cache serves single tiles again, and the first batches when a page is reloaded. Other
+// batches depend on the view and are seldom requested twice.
 
-const kTimeoutMs = 30000;   // without a byte: all of an answer may take longer on a slow link
-const kMaxBytes = 2 ** 26;  // of an answer; the largest batch that there can be has 44 MB
-const kLookAgainMs = 5000;  // between two looks at whether the file is still there
+const kTimeoutMs = 30000;   // between two bytes; a complete answer may take longer
+const kMaxBytes = 2 ** 26;  // per answer; the largest possible batch has 44 MB
+const kLookAgainMs = 5000;  // between two checks that the file still exists
 const kMaxTileLevels = 5, kMaxBatch = 4096;
 
 const kReplaced = {
@@ -13,35 +13,35 @@ const kReplaced = {
 };
 const kRemoved = {
   code: "removed",
-  message: "The file is not there any more: what is missing of it does not come."
+  message: "The file was removed: its missing parts cannot be loaded."
 };
 
-// `status` is the HTTP status, 0 when there was no answer, 200 when it makes no sense; `code` is
-// that of the service.
+// `status` is the HTTP status, 0 without an answer, 200 if the answer makes no sense. `code` is the
+// code of the service.
 export class TileError extends Error {
   constructor(status, detail, {code = "", retryAfterMs = 0, timedOut = false} = {}) {
     super(detail);
     Object.assign(this, {status, code, retryAfterMs, timedOut});
   }
-  // Whether the same request may succeed later.
+  // True if the same request may succeed later.
   get isTransient() {
     if (this.code === "corrupt" || this.code === "unsupported_version") return false;
     return this.status === 0 || this.status === 408 || this.status === 429 || this.status >= 500;
   }
-  // Whether it is the token that is refused.
+  // True if the token was refused.
   get isDenied() {
     return this.status === 401 || this.status === 403;
   }
-  // Whether the service lives and has too much to do.
+  // True if the service is busy.
   get isBusy() {
     return (this.status === 503 || this.status === 429) &&
         (this.code === "busy" || this.retryAfterMs > 0);
   }
-  // Whether all of the file may be missing.
+  // True if the complete file may be missing.
   get isMissing() {
     return this.status === 404 || this.status === 409;
   }
-  // Whether what was asked for may be the reason, though nothing says so.
+  // True if the requested items may be the cause, although the answer does not say so.
   get isSuspicious() {
     return this.status === 200 || (this.status === 500 && this.isTransient);
   }
@@ -53,7 +53,7 @@ export class TileSource {
     this.base = base;
     this.headers = headers;
     this.info = null;
-    this.ended = null;  // {code, message} when there is nothing to be had any more
+    this.ended = null;  // {code, message} once the file was removed or replaced
     this.timeoutMs = kTimeoutMs;
     this.looking = null;
     this.lookedMs = -Infinity;
@@ -68,8 +68,8 @@ export class TileSource {
     return info;
   }
 
-  // The tiles of the nodes [{level, offset}], as words, in the same order. All or a TileError.
-  // `options`: {signal, cache}.
+  // Resolves to the words of the tiles of [{level, offset}], in the same order. Throws TileError
+  // unless all arrive. `options`: {signal, cache}.
   async fetchTiles(nodes, options) {
     const digest = encodeURIComponent(this.info.digest);
     if (nodes.length === 1) {
@@ -82,7 +82,7 @@ export class TileSource {
     return splitBatch(bytes, nodes.length);
   }
 
-  // Color pages [{level, position: [x, y, z]}], in the same way.
+  // The same for color pages [{level, position: [x, y, z]}].
   async fetchColors(pages, options) {
     const list = pages.map(({level, position}) => [level, ...position].join(".")).join(",");
     const bytes = await this.request(
@@ -94,7 +94,7 @@ export class TileSource {
     return this.info.batch_max;
   }
 
-  // After a tile was not found: whether all of the file is gone, which `ended` then says.
+  // Called after a tile was not found. Sets `ended` if the file was removed or replaced.
   async lookAgain(signal) {
     if (this.ended || performance.now() < this.lookedMs + kLookAgainMs) return;
     this.looking ??= this.look(signal).finally(() => this.looking = null);
@@ -107,7 +107,7 @@ export class TileSource {
       if (info.digest !== this.info.digest) this.ended = kReplaced;
       this.lookedMs = performance.now();
     } catch (error) {
-      // What only stands between here and the service has no such codes.
+      // A proxy does not send these codes.
       if (error.code === "not_found" || error.code === "conflict") this.ended = kRemoved;
     }
   }
@@ -122,7 +122,7 @@ export class TileSource {
     }
   }
 
-  // The bytes of an answer, or a TileError.
+  // Resolves to the bytes of an answer. Throws TileError.
   async request(path, {cache, signal} = {}) {
     this.requestCount++;
     const ending = new AbortController(), end = () => ending.abort();
@@ -142,7 +142,7 @@ export class TileSource {
           await fetch(this.base + path, {cache, headers: this.headers, signal: ending.signal});
       heard();
       const bytes = await bodyOf(response, heard);
-      // Of the body as sent, which may be compressed.
+      // The length of the body as sent, possibly compressed.
       this.fetchedBytes += Number(response.headers.get("Content-Length")) || bytes.byteLength;
       if (response.ok) return bytes;
       throw problemOf(response, bytes);
@@ -161,7 +161,7 @@ export class TileSource {
   }
 }
 
-// All bytes of an answer; `heard` is called as they come.
+// Resolves to all bytes of an answer. Calls `heard` for each piece.
 async function bodyOf(response, heard) {
   const reader = response.body?.getReader(), parts = [];
   let length = 0;
@@ -189,7 +189,7 @@ function problemOf({status, headers}, bytes) {
   try {
     problem = JSON.parse(new TextDecoder().decode(bytes));
   } catch {
-    // Not from the service: its status is all that it says.
+    // The answer is not from the service; only its status is known.
   }
   const retryAfterMs = 1000 * Math.max(0, Number(headers.get("Retry-After")) || 0);
   return new TileError(
@@ -197,7 +197,7 @@ function problemOf({status, headers}, bytes) {
       {code: String(problem?.code ?? ""), retryAfterMs});
 }
 
-// Sizes of the GPU's memory and ends of loops depend on these.
+// Checks the values that GPU memory sizes and loop bounds depend on.
 function checkManifest(info) {
   const expect = (isTrue, name) => {
     if (!isTrue)
@@ -212,7 +212,7 @@ function checkManifest(info) {
   expect(isCount(info.tile_levels, 1, kMaxTileLevels), "tile_levels");
   expect(isCount(info.batch_max, 1, kMaxBatch), "batch_max");
   expect(typeof info.digest === "string" && info.digest !== "", "digest");
-  // What a running job has built has no number yet, and no colors.
+  // A partial result has no voxel count and no colors.
   const isGrowing = info.voxels === undefined && !info.colors;
   expect(isGrowing || (typeof info.voxels === "string" && /^\d+$/.test(info.voxels)), "voxels");
   expect(
@@ -235,7 +235,7 @@ function wordsOf(bytes, begin, length) {
   return new Uint32Array(bytes, begin, length / 4);
 }
 
-// The parts of an answer that has `count` of them.
+// Splits an answer into its `count` parts.
 export function splitBatch(bytes, count) {
   const view = new DataView(bytes);
   const tiles = [];

@@ -1,4 +1,4 @@
-// The nodes of a cluster and what they do for a job.
+// The nodes of a cluster and their tasks for a job.
 
 import {clear, h, setText} from "../lib/dom.js";
 import {countText} from "../lib/format.js";
@@ -21,7 +21,7 @@ export class ClusterView {
     const cluster = job.progress?.cluster;
     this.element.hidden = !cluster;
     if (!cluster) return;
-    // What is known of tasks is of the last attempt.
+    // The task counts belong to the last attempt.
     const runs = job.state === "running";
     const running = cluster.nodes.reduce((sum, node) => sum + node.running, 0);
     setText(

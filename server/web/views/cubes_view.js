@@ -94,14 +94,14 @@ export class CubesView {
     this.canvas.hidden = this.turner.hidden = empty;
   }
 
-  // Cubes of a job that has ended come only if it is tried again. `known`: the service has said
-  // that there are none.
+  // An ended job gets cubes only if it is retried. `known`: the service has reported that it has
+  // none.
   sayWhyEmpty(ended, known) {
     if (this.resolution === undefined)
       setText(
           this.note,
           !ended    ? "Shown when the subvolumes are planned." :
-              known ? "There are none." :
+              known ? "There are no subvolumes." :
                       "");
   }
 
@@ -118,8 +118,8 @@ export class CubesView {
   }
 
   // Sorts the cubes from back to front. Octree cubes do not overlap, so the Morton order of their
-  // low corners is correct for any mixture of sizes: no cube precedes one that is lower on all
-  // axes.
+  // low corners is correct for any mixture of sizes: a cube never precedes a cube that is lower on
+  // all axes.
   order() {
     const minEdge = Math.min(...this.cubes.map((cube) => cube.edge));
     for (const cube of this.cubes) {

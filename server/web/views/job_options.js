@@ -88,7 +88,7 @@ export class JobOptions {
     this.sizeRow.hidden = this.cube.value !== "voxel_size";
   }
 
-  // Whether cells have colors or other attributes.
+  // True if cells have colors or other attributes.
   hasCells() {
     return [this.color, ...this.attributes].some((input) => input.checked);
   }
@@ -119,7 +119,7 @@ export class JobOptions {
     };
   }
 
-  // Copies those of a job.
+  // Copies the options of a job.
   set({resolution, priority, options = {}}) {
     this.resolution.value = String(resolution);
     if (priority) this.priority.value = String(priority);

@@ -2,7 +2,7 @@
 
 import {CubesView} from "./cubes_view.js";
 
-const kMaxDetailed = 1500;  // more subvolumes are drawn as the cubes they are
+const kMaxDetailed = 1500;  // more subvolumes are drawn as plain cubes
 
 export class PartialView extends CubesView {
   setEmpty(empty) {

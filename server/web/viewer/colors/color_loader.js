@@ -4,7 +4,7 @@ import {Loader} from "../tiles/loader.js";
 
 const kMaxRequests = 2, kMaxBatch = 128;
 
-// Its requests are {key, level, position, priority}.
+// Requests are {key, level, position, priority}.
 export class ColorLoader extends Loader {
   constructor(source, store, onArrival) {
     super(
@@ -12,7 +12,7 @@ export class ColorLoader extends Loader {
         {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, source.info.colors.batch_max)});
   }
 
-  // `wanted`: key -> request, of one reading of the feedback.
+  // Requests the pages of one reading; `wanted` maps key -> request.
   demand(wanted, nowMs) {
     const requests = [];
     let unmet = 0;

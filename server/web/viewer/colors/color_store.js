@@ -1,6 +1,6 @@
-// The color pages on the GPU: their words in a pool of blocks as that of the tiles, and a hash
-// table by which the shaders find a page by its place. Pages that the view does not use leave when
-// there is no room; the coarsest stay, so that there is always some color.
+// The color pages on the GPU: a pool of blocks, like the pool of the tiles, stores their words, and
+// a hash table maps the position of a page to its blocks. If the pool is full, pages that the view
+// does not use are evicted. The coarsest pages remain, so that every cell has some color.
 
 import {kRoundsToKnow} from "../tiles/loader.js";
 import {TilePool} from "../tiles/tile_pool.js";
@@ -8,20 +8,21 @@ import {TilePool} from "../tiles/tile_pool.js";
 import {decodePage, kBlockWords, kMoreAt} from "./page_format.js";
 
 const kRecentMs = 1500;
-const kFreeShare = 1 / 64;                   // of the pool, that leaves at once
-const kTableShare = 1 / 5;                   // of the budget
-const kEntryBytes = 16, kTableWidth = 1024;  // the shaders know the width
-const kMaxEntries = 2 ** 21;  // the pool has 2^20 blocks at most, and half of the entries stay free
-const kCoarseLevel = 5;       // pages of this level and coarser ones stay: they are 76 at most
+const kFreeShare = 1 / 64;                   // share of the pool that one eviction frees
+const kTableShare = 1 / 5;                   // share of the budget
+const kEntryBytes = 16, kTableWidth = 1024;  // the shaders contain the width
+// The pool has at most 2^20 blocks, and half of the entries remain free.
+const kMaxEntries = 2 ** 21;
+const kCoarseLevel = 5;  // pages of this level and coarser ones (at most 76) are never evicted
 
 // The number of the pages along an axis.
 function pagesOf(level) {
   return 2 ** Math.max(0, level - 3);
 }
-const kPagesBefore = [0];  // a level, of coarser ones
+const kPagesBefore = [0];  // number of pages on all coarser levels
 for (let level = 0; level < 20; ++level)
   kPagesBefore.push(kPagesBefore[level] + pagesOf(level) ** 3);
-// A number for a page: below 2^52.
+// A unique number of a page, below 2^52.
 export function pageKey(level, x, y, z) {
   const n = pagesOf(level);
   return kPagesBefore[level] + (x * n + y) * n + z;
@@ -36,7 +37,7 @@ export class ColorStore {
     this.pool = new TilePool(gl, budgetBytes - this.entries * kEntryBytes);
     this.maxPages = this.entries / 2;
     this.table = this.pool.createTexture(gl.RGBA32UI, kTableWidth, this.entries / kTableWidth);
-    this.words = new Uint32Array(4 * this.entries);  // what the table holds
+    this.words = new Uint32Array(4 * this.entries);  // the content of the table
     this.pages = new Map();                          // key -> page
     this.usedBlocks = 0;
     this.epoch = 0;
@@ -53,7 +54,7 @@ export class ColorStore {
     this.rounds = 0;
   }
 
-  // Stores a page as fetched. False if there is no room. Throws if the page is damaged.
+  // Stores a fetched page. Returns false if there is no room. Throws if the page is damaged.
   add({key, level, position}, pageWords, nowMs) {
     if (this.pages.has(key)) return true;
     const words = decodePage(pageWords), count = words.length / kBlockWords;
@@ -66,14 +67,14 @@ export class ColorStore {
     blocks.forEach(
         (block, i) => this.pool.write(
             block * kBlockWords / 4, words.subarray(i * kBlockWords, (i + 1) * kBlockWords)));
-    // A page without cells is known, but not found by the shaders.
+    // A page without cells is stored, but has no entry for the shaders.
     if (count > 0) this.insert(page.place, blocks[0] + 1);
     this.pages.set(key, page);
     this.usedBlocks += count;
     return true;
   }
 
-  // The page was seen in a picture of epoch `epoch`.
+  // Marks a page as used by a picture of epoch `epoch`.
   mark(key, epoch, nowMs) {
     const page = this.pages.get(key);
     if (!page) return;
@@ -103,16 +104,16 @@ export class ColorStore {
     return fits(count, 1);
   }
 
-  // The table is probed from an entry's hash to the next free entry, of which there always are
-  // some. An entry is x and the level, y, z, and the number of the page's first block plus 1; 0 is
-  // free.
+  // A probe starts at the hash of a page and ends at the next free entry; some entries are always
+  // free. An entry is x and the level, y, z, and the number of the page's first block plus 1. 0
+  // marks a free entry.
   insert(place, number) {
     let at = this.homeOf(place);
     while (this.words[4 * at + 3] !== 0) at = this.next(at);
     this.write(at, [...place, number]);
   }
 
-  // Moves what follows back, so that no probe ends at the entry that becomes free.
+  // Moves later entries back, so that no probe ends too early at the freed entry.
   remove(place) {
     const {words} = this;
     let free = this.homeOf(place);
@@ -120,7 +121,8 @@ export class ColorStore {
     for (let at = this.next(free); words[4 * at + 3] !== 0; at = this.next(at)) {
       const home = this.homeOf(words.subarray(4 * at, 4 * at + 3));
       const mask = this.entries - 1;
-      if ((at - home & mask) < (at - free & mask)) continue;  // its home lies behind the free one
+      // Its probe starts after the free entry.
+      if ((at - home & mask) < (at - free & mask)) continue;
       this.write(free, words.slice(4 * at, 4 * at + 4));
       free = at;
     }

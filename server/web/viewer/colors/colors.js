@@ -1,18 +1,16 @@
-// The colors of a file: what the shaders need to draw them, and what a reading of the feedback says
-// of them.
+// The colors of a file: the uniforms for drawing them, and the pages that the feedback requests.
 
 import {ColorLoader} from "./color_loader.js";
 import {ColorStore, pageKey} from "./color_store.js";
 
 const kMebibyte = 1 << 20;
-const kBudgetShare = 1 / 4;   // of that of tiles and colors
-const kMinBytes = 96 * 1024;  // a pool and a hash table take no less
-const kBytesPerVoxel = 1024;  // at worst: a page for each voxel, as many again on coarser levels
-const kBaseBelow =
-    2;  // levels: of a wanted page a coarser one comes first, unless one as fine is there
-const kWanted = 2;  // of the feedback's last word, the least: so many pixels want the page
+const kBudgetShare = 1 / 4;   // share of the budget of tiles and colors
+const kMinBytes = 96 * 1024;  // minimum for a pool and a hash table
+const kBytesPerVoxel = 1024;  // at worst a page for each voxel, and as many on coarser levels
+const kBaseBelow = 2;  // levels from a wanted page to the coarser page that is requested first
+const kWanted = 2;     // minimum of the feedback's last word for a wanted page: 1 + its pixels
 
-// How much of the budget the colors of a file take.
+// Returns the part of the budget for the colors of a file.
 export function colorBudget(info, budgetBytes) {
   if (!info.colors) return 0;
   return Math.min(
@@ -42,14 +40,14 @@ export class Colors {
     };
   }
 
-  // Takes the words that kColorFeedback wrote for a picture of an epoch.
+  // Requests and marks the pages that kColorFeedback wrote for a picture of an epoch.
   takeReading(words, epoch, nowMs) {
     const wanted = new Map();
     for (let at = 0; at < words.length; at += 4) {
       const head = words[at], y = words[at + 1], z = words[at + 2], state = words[at + 3];
       if (state === 0) continue;
       if (state < kWanted) {
-        // Neighbors mostly use one page.
+        // Neighboring texels mostly use the same page.
         if (at > 0 && head === words[at - 4] && y === words[at - 3] && z === words[at - 2] &&
             words[at - 1] === state)
           continue;
@@ -66,16 +64,16 @@ export class Colors {
     this.loader.demand(wanted, nowMs);
   }
 
-  // Pages for more pixels come first: so coarser ones, and where memory ends, no part of the
-  // picture is without them.
+  // Pages for more pixels come first. So coarse pages precede fine ones, and if memory is short,
+  // every part of the picture still has colors.
   want(wanted, level, position, pixels) {
     const key = pageKey(level, ...position), request = wanted.get(key);
     if (request) request.priority += pixels;
     else wanted.set(key, {key, level, position, priority: pixels});
   }
 
-  // The page whose color is on the screen while this one is missing is in use. Returns its level,
-  // -1 if there is none.
+  // Marks the coarser page that is drawn in place of a missing one. Returns its level, or -1 if no
+  // coarser page is loaded.
   markCoarser(level, position, epoch, nowMs) {
     for (let coarser = level - 1; coarser >= 0; --coarser) {
       position = position.map((at) => at >>> 1);

@@ -1,12 +1,13 @@
-// Checks a color page (docs/format.md) and lays its words out for the GPU. Pages come from the
-// network: a damaged one is an error and never a wrong address.
+// Checks a color page (docs/format.md) and lays out its words for the GPU. Pages come from the
+// network: a damaged page is an error, never a wrong address.
 
 export const kBlockWords = 64;  // of the pool: 16 texels of four words
 const kMaskAt = 1, kMaskWords = 16;
-const kSingle = 1 << 24;       // of a page's first word: colors follow one by one, not in blocks
-const kUsedBits = 0x011f03ff;  // of the same
-const kFirstColors = 8;        // texels of colors in the first block
-export const kMoreAt = 20;     // word of the first block where the addresses of the others begin
+const kSingle = 1 << 24;       // flag of a page's first word: single colors follow, not blocks
+const kUsedBits = 0x011f03ff;  // all valid bits of the first word
+const kFirstColors = 8;        // color texels in the first block
+// Word of the first block at which the addresses of the other blocks begin.
+export const kMoreAt = 20;
 
 function countBits(word) {
   let bits = 0;
@@ -14,10 +15,10 @@ function countBits(word) {
   return bits;
 }
 
-// The first block of the pool has the page's first word, how many cells come before the second,
-// third and fourth 128 of them (10 bits each), two words of 0, the mask, the addresses of up to 12
-// more blocks, and 8 texels of colors; the others have 16. Returns the words of whole blocks,
-// without these addresses; none for a page without cells.
+// Returns the words of complete blocks; none for a page without cells. The first block has the
+// page's first word, the numbers of cells before the second, third and fourth 128 of them (10 bits
+// each), two words of 0, the mask, the addresses of up to 12 more blocks (filled in later), and 8
+// texels of colors. The other blocks have 16 texels of colors.
 export function decodePage(page) {
   const count = page[0] & 1023, skip = page[0] >>> 16 & 31, single = (page[0] & kSingle) !== 0;
   if (page.length === 1 && page[0] === 0) return new Uint32Array(0);

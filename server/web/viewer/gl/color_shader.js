@@ -1,12 +1,12 @@
-// GLSL: colors of cells from the pages on the GPU (colors/page_format.js says how they lie there),
-// and the feedback of which pages are missing and which are used.
+// GLSL: colors of cells from the pages on the GPU (layout: colors/page_format.js), and the feedback
+// about missing and used pages.
 
 import {kCameraSource, kPrecision} from "./ray_shader.js";
 
-// What a pass writes of a pixel's color, and how it is read.
+// The color state of a pixel, as the passes write and read it.
 export const kColorState = `
 const uint kColored = 1u << 24;      // the low bits are red, green and blue, as sRGB
-const uint kPageMissing = 1u << 25;  // the color is coarse, or none, for want of a page
+const uint kPageMissing = 1u << 25;  // the color is coarse or absent because a page is missing
 vec3 linear_of(uint color) {
   vec3 s = vec3(color & 255u, color >> 8 & 255u, color >> 16 & 255u) / 255.0;
   return mix(pow((s + 0.055) / 1.055, vec3(2.4)), s / 12.92, lessThanEqual(s, vec3(0.04045)));
@@ -31,7 +31,7 @@ uint popcount32(uint x) {
   return ((x + (x >> 4)) & 0x0f0f0f0fu) * 0x01010101u >> 24;
 }
 
-// The number of the page's first block plus 1; 0 if it is not there.
+// Returns the number of the page's first block plus 1, or 0 if the page is not loaded.
 uint page_at(int level, ivec3 place) {
   uvec3 key = uvec3(place);
   key.x |= uint(level) << 20;
@@ -115,9 +115,8 @@ uint color_of_cell(ivec3 cell, int scale, bool is_final) {
 }
 `;
 
-// One texel for each block of u_block x u_block pixels: x and level, y, z of a page, and a number:
-// 0 if there is none, 1 if the page is used, one more than the pixels that it is missing from
-// otherwise.
+// One texel per block of u_block x u_block pixels: x and level, y, z of a page, and a number. It is
+// 0 without a page, 1 if the page is used, and otherwise 1 plus the number of pixels that miss it.
 export const kColorFeedback = `#version 300 es
 ${kPrecision}${kCameraSource}${kColorState}
 uniform usampler2D u_hits, u_colors;
@@ -126,7 +125,7 @@ uniform int u_levels, u_color_levels, u_block;
 uniform ivec2 u_size, u_sample;
 layout(location = 0) out uvec4 o_page;
 
-// The page that the color of a pixel is in. The hit is computed again: at worst it is a neighbor's.
+// The page of a pixel's color. The hit is computed again and may be in a neighboring page.
 uvec3 page_of(ivec2 pixel, uvec4 g) {
   vec3 direction = direction_of(vec2(pixel) + 0.5 + u_jitter), p = direction * t_in(g);
   if (axis_in(g) < 3)

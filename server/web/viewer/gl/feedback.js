@@ -1,7 +1,6 @@
-// What a reading of the feedback says: the tiles that are missing, those that were used, and
-// statistics of what is seen.
+// Decodes a reading of the feedback: missing tiles, used tiles, and statistics of the picture.
 
-const kMaxSamples = 4096;  // that the statistics are of
+const kMaxSamples = 4096;  // for the statistics
 const kHalf = new DataView(new ArrayBuffer(4));
 
 function halfToNumber(bits) {
@@ -59,8 +58,8 @@ export function readFeedback(words) {
   };
 }
 
-// {depth, level, steps} of each pixel, rows from the top, of a picture's words as pack_hit() packs
-// them, rows from the bottom. The depth of the sky is infinite.
+// Returns {depth, level, steps} of each pixel, rows from the top. `words` are the results of
+// pack_hit(), rows from the bottom. The depth of the sky is infinite.
 export function readHits(words, width, height, levels) {
   const depth = new Float32Array(width * height).fill(Infinity),
         level = new Uint8Array(width * height);

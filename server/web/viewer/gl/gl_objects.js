@@ -4,7 +4,7 @@ import {kQuad} from "./picture_shaders.js";
 
 export class WebGLUnavailable extends Error {}
 
-// The context of a canvas; null if there is none to be had.
+// Returns the context of a canvas, or null if the browser offers none.
 export function createContext(canvas) {
   return canvas.getContext("webgl2", {
     alpha: false,
@@ -16,7 +16,7 @@ export function createContext(canvas) {
 }
 
 export class Program {
-  // Compilation runs in the background until ready() or use().
+  // Compilation runs in the background until finish().
   constructor(gl, name, fragment) {
     this.gl = gl;
     this.name = name;
@@ -33,7 +33,8 @@ export class Program {
     this.uniforms = null;
   }
 
-  // Whether the compiler is done, if `parallel` (KHR_parallel_shader_compile) can say so.
+  // True if the compiler has finished, or if the browser cannot report it. `parallel` is the
+  // extension KHR_parallel_shader_compile, or null.
   done(parallel) {
     return !parallel || this.gl.getProgramParameter(this.program, parallel.COMPLETION_STATUS_KHR);
   }
@@ -60,8 +61,8 @@ export class Program {
     }
   }
 
-  // Runs it for one pixel of a target of these formats: most drivers compile the rest only then. Of
-  // `words` and `floats`, textures, it reads nothing that matters.
+  // Draws one pixel to a target of these formats, because most drivers finish compilation only
+  // then. The textures `words` and `floats` are placeholders.
   warmUp(formats, words, floats) {
     const {gl} = this, target = new Target(gl, 1, 1, formats);
     gl.useProgram(this.program);
@@ -80,8 +81,8 @@ export class Program {
     this.gl.deleteProgram(this.program);
   }
 
-  // Sets the uniforms that the program has, and runs it over the viewport, or some rows of it.
-  // `target`: null for the canvas.
+  // Sets the uniforms of the program and draws the viewport, or some rows of it. `target`: null for
+  // the canvas.
   draw(target, values, width, height, {row = 0, rows = height} = {}) {
     const {gl} = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
@@ -166,7 +167,7 @@ export class Target {
   }
 }
 
-// Resolves when the GPU is done with all that it was given; to false if `isOver()` before that.
+// Resolves when the GPU has finished all commands; to false if `isOver()` before that.
 export async function gpuDone(gl, isOver) {
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();

@@ -16,16 +16,16 @@ import {
   kTrace
 } from "./picture_shaders.js";
 
-const kHalfRange = 1;      // brightest light of a target with half floats
-const kByteRange = 8;      // and of one with bytes
-const kFeedbackBlock = 4;  // pixels of the canvas that a texel of the feedback is of
+const kHalfRange = 1;      // brightest light in a target with half floats
+const kByteRange = 8;      // brightest light in a target with bytes
+const kFeedbackBlock = 4;  // edge in canvas pixels of a feedback texel
 const kHitFormats = ["RGBA32UI"], kColoredHitFormats = ["RGBA32UI", "R32UI"],
       kLightFormats = ["R8", "R32UI", "R32UI"];
 const kSkyFormats = ["RGBA8"], kFeedbackFormats = ["RGBA32UI"];
 const kColorTexels =
-    1 << 17;  // of the feedback of colors, about: each page that is seen needs one of its own
+    1 << 17;  // texels of the color feedback, about; every visible page needs its own
 
-// The pixels that a texel of a feedback is of, and which of them it says more about.
+// The block of pixels of a feedback texel, and the pixel in it that is sampled.
 function blocksOf(edge, seed) {
   return {u_block: edge, u_sample: [seed % edge, Math.floor(seed / edge) % edge]};
 }
@@ -42,16 +42,16 @@ export class Passes {
     this.combine = new Program(gl, "combine", kCombine);
     this.present = new Program(gl, "present", kPresent);
     this.feedback = new Program(gl, "feedback", kFeedback);
-    this.trace = null;  // these two depend on the file
+    this.trace = null;  // trace and colorFeedback depend on the file
     this.colorFeedback = null;
     this.pick = null;
     this.sun = null;
-    this.later = null;  // promise of these two
+    this.later = null;  // promise of pick and sun
     this.disposed = false;
     this.targets = null;
     this.vertexArray = gl.createVertexArray();
-    // What does not depend on the file. A compiler that cannot say when it is done is not waited
-    // for before it has all.
+    // Compiles the programs that do not depend on the file. If the browser cannot report the end of
+    // a compilation, all programs are linked before the first result is queried.
     this.begun = this.parallel ? this.begin() : null;
     this.begun?.catch(() => {});  // compile() reports it
     this.compiled = null;         // promise of compile()
@@ -71,8 +71,8 @@ export class Passes {
     ]);
   }
 
-  // Resolves when all programs for a file are compiled; the page stays responsive where the browser
-  // can compile in the background. Throws WebGLUnavailable if one cannot be; does nothing if the
+  // Resolves when all programs for a file are compiled. The page remains responsive if the browser
+  // compiles in the background. Throws WebGLUnavailable if a program fails. Does nothing if the
   // context is lost.
   compile(colored) {
     return this.compiled ??= this.compileAll(colored);
@@ -105,7 +105,7 @@ export class Passes {
     return this.floats ? "RGBA16F" : "RGBA8";
   }
 
-  // The same for the programs that a first picture does not need. Resolves to whether they can be
+  // Compiles the programs that the first picture does not need. Resolves to whether they can be
   // used.
   compileLater() {
     if (!this.later) {
@@ -124,17 +124,16 @@ export class Passes {
     return true;
   }
 
-  // Targets for a picture of this size, of the `full` one {width, height}, or of fewer pixels while
-  // the camera moves. They are as large as they have to be, which is as large as the full one from
-  // the second size on: so nothing is allocated when a camera begins to move or stops. `colored`:
-  // of a file with colors.
+  // Provides targets for a picture of this size: the `full` size {width, height}, or a smaller one
+  // while the camera moves. From the second size on the targets have the full size, so nothing is
+  // allocated when the camera starts or stops. `colored`: the file has colors.
   resize(width, height, full, colored) {
     const {targets} = this,
           isForCanvas = targets?.full.width === full.width && targets.full.height === full.height;
     if (!isForCanvas) this.allocate(width, height, full, colored);
     else if (width > targets.hits.width || height > targets.hits.height)
       this.allocate(full.width, full.height, full, colored);
-    // A small picture says as much as a large one of what is missing: then a texel is of fewer
+    // A small picture reports as many missing tiles as a large one: its feedback texels cover fewer
     // pixels.
     const share = Math.max(width / full.width, height / full.height);
     Object.assign(this.targets, {
@@ -166,7 +165,7 @@ export class Passes {
       feedback: new Target(
           gl, Math.ceil(full.width / kFeedbackBlock), Math.ceil(full.height / kFeedbackBlock),
           kFeedbackFormats),
-      // For any size, with the block of that.
+      // Large enough for any size with the matching colorBlock.
       colorFeedback: colored ?
           new Target(
               gl, Math.ceil(Math.min(width, across + 4)),
@@ -188,9 +187,9 @@ export class Passes {
         (target) => target !== null);
   }
 
-  // One sample per pixel, accumulated as number `values.u_frame` (from 0 on). Yields between parts
-  // of at most `partPixels()` pixels. Returns the reading of the feedback; its `colors` is that of
-  // the colors, ready as soon as the reading is, or null if none are shown.
+  // Draws one sample per pixel, accumulated as number `values.u_frame` (from 0). Yields between
+  // parts of at most `partPixels()` pixels. Returns the reading of the feedback. Its `colors` is
+  // the reading of the color feedback, ready at the same time, or null if no colors are shown.
   * draw(values, partPixels) {
     const {
       targets,
@@ -256,7 +255,7 @@ export class Passes {
         width, height);
   }
 
-  // The hits of a picture of any size, as words of pack_hit(), rows from the bottom.
+  // Returns the hits of a picture of any size, as words of pack_hit(), rows from the bottom.
   capture(values, width, height) {
     const {gl} = this, target = new Target(gl, width, height, ["RGBA32UI"]);
     this.trace.draw(target, {...values, u_color_levels: -1}, width, height);
@@ -266,9 +265,8 @@ export class Passes {
     return words;
   }
 
-  // The hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of the tile it is in.
-  // Null if the context is lost. The page does not wait for the GPU. After compileLater(): by then
-  // `values` may be out of date.
+  // Resolves to the hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of its
+  // tile; or to null if the context is lost. Does not block on the GPU. Call compileLater() first.
   async pickOne(values) {
     const {gl} = this, target = new Target(gl, 2, 1, ["RGBA32UI"]);
     this.pick.draw(target, values, 2, 1);
@@ -281,9 +279,9 @@ export class Passes {
     return reading.take();
   }
 
-  // {place: of the 48 of the sun, the one that lights nearest to `share` of what the last picture
-  // shows,
-  //  wanted: leaf address -> 1, tiles that would make the choice better}. After compileLater().
+  // Returns {place, wanted}. `place` is the one of the 48 places of the sun that lights a share of
+  // the last picture nearest to `share`. `wanted` maps the leaf addresses of tiles that would
+  // improve the choice to 1. Call compileLater() first.
   chooseSun(values, share) {
     const {gl, targets} = this, wanted = new Map();
     const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]),

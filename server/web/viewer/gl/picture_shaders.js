@@ -1,6 +1,6 @@
 // GLSL of the passes of a picture: trace (G-buffer), light (normals and sun), occlusion (sky),
-// combine (filter, accumulate), present (tones), feedback (what is missing, what was used).
-// Lighting as in query/render.
+// combine (filter, accumulate), present (tones), feedback (missing and used tiles). Lighting as in
+// query/render.
 
 import {kColorSource, kColorState} from "./color_shader.js";
 import {kCameraSource, kPrecision, kRaySource} from "./ray_shader.js";
@@ -14,7 +14,7 @@ void main() {
 }`;
 
 const kTraceMain = `
-uniform vec2 u_jitter;       // the ray's place in its pixel, from the pixel's center
+uniform vec2 u_jitter;  // offset of the ray from the center of its pixel
 uniform float u_cone;        // width of the cone at distance 1
 uniform uint u_seed;
 layout(location = 0) out uvec4 o_hit;
@@ -36,7 +36,7 @@ void main() {
   for (int s = 0; s < 21; ++s) picked_slots[s] = 0u;
 #endif
 #ifdef PICK
-  vec2 point = vec2(0.5);  // of both pixels: the second says more about the hit
+  vec2 point = vec2(0.5);  // center of both pixels; the second has more words of the hit
 #else
   vec2 point = gl_FragCoord.xy + u_jitter;
 #endif
@@ -61,7 +61,7 @@ void main() {
 
 export const kTrace = `${kVersion}
 #define WIRE\n${kRaySource}${kCameraSource}${kTraceMain}`;
-// Of files with colors.
+// Variant for files with colors.
 export const kColoredTrace = `${kVersion}
 #define WIRE\n#define CELL\n#define COLOR\n${kRaySource}${kCameraSource}${kColorSource}${
     kTraceMain}`;
@@ -69,7 +69,7 @@ export const kPick = `${kVersion}
 #define PICK\n#define CELL\n${kRaySource}${kCameraSource}${kTraceMain}`;
 
 const kSky = `
-const float kPi = 3.14159265, kOpenFloor = 0.82;  // green light of an open sky on a floor
+const float kPi = 3.14159265, kOpenFloor = 0.82;  // green light of an unoccluded sky on a floor
 const vec3 kZenith = vec3(0.62, 0.78, 1.00), kHorizon = vec3(0.95, 0.98, 1.02);
 const vec3 kGround = vec3(0.40, 0.36, 0.31);
 vec3 sky_color(vec3 direction) {
@@ -82,7 +82,7 @@ uint pack_normal(vec3 n) {
   vec2 p = n.z >= 0.0 ? n.xy : folded;
   return packSnorm2x16(p);
 }
-// Which of 2 x 2 pixels a sample of the sky's light is for.
+// The pixel among 2 x 2 that a sample of the sky's light is for.
 ivec2 chosen_of_four(int frame) {
   return ivec2(frame & 1, (frame & 1) ^ (frame >> 1 & 1));
 }
@@ -96,7 +96,7 @@ vec3 unpack_normal(uint packed_normal) {
 }
 `;
 
-// What the passes of light share: rays that begin at the surface of a pixel.
+// Shared by the passes of light: rays that begin at the surface of a pixel.
 const kSurface = `
 uniform usampler2D u_hits;
 uniform ivec2 u_size;        // of the picture, a corner of the targets
@@ -122,8 +122,8 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
 }
-// Where a ray meets the floor that the scene stands on, if its shadow is seen there, from 0 to 1.
-uniform vec2 u_floor;        // how far it is below the eye, 0: there is none; the scene's diagonal
+// Weight, 0 to 1, of the floor's shadow where a ray meets the floor below the scene.
+uniform vec2 u_floor;  // distance below the eye, or 0 without a floor; the scene's diagonal
 uniform vec3 u_floor_center; // of the scene, from the eye
 float floor_at(ivec2 pixel, out Surface s) {
   s.direction = direction_of(vec2(pixel) + 0.5 + u_jitter);
@@ -147,7 +147,7 @@ void set_ray_from(vec3 offset, vec3 direction) {
   set_ray(u_eye_cell + ivec3(whole), p - whole, direction);
 }
 
-// The R2 sequence, begun for each pixel at one of 16 places, that differ within every 4 x 4 pixels.
+// The R2 sequence. Each pixel starts at one of 16 offsets, which differ within every 4 x 4 pixels.
 vec2 sample_pair(ivec2 pixel, int dimension) {
   int place = (pixel.x & 3) * 4 + (pixel.y & 3);
   float n = float(u_frame * 16 + place * 7 % 16);
@@ -157,7 +157,7 @@ vec2 sample_pair(ivec2 pixel, int dimension) {
 `;
 
 const kBlocked = `
-// Whether something lies within that distance between the surface and a light.
+// True if something within ` reach` blocks the light.
 bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out Hit hit) {
   // In a narrow place the start may be occupied. The path of the camera ray is free, unless the eye
   // is in an occupied cell.
@@ -256,7 +256,7 @@ void main() {
   vec3 a, b;
   basis_around(u_sun, a, b);
   vec2 p = sample_pair(pixel, 1);
-  // A single sample has sharp shadows; noise disappears only where there are more.
+  // A single sample has sharp shadows, because noise disappears only with more samples.
   float r = u_frame == 0 ? 0.0 : kSunRadius * sqrt(p.x), angle = 2.0 * kPi * p.y;
   vec3 toward = normalize(u_sun + a * (r * cos(angle)) + b * (r * sin(angle)));
   if (is_blocked(s, normal, toward, 1e30, vec2(s.size, kSunWidening), hit)) {
@@ -305,9 +305,8 @@ void main() {
   o_sky = vec4(sky / 1.1, 1.0);
 }`;
 
-// For each of 48 places of the sun (columns) and the pixels that render probes, 40 x 24 (rows): 0
-// if the pixel sees no surface, 1 if that is in shadow, 2 if it is lit; and the cut-off node whose
-// tile would say more.
+// For each of 48 places of the sun (columns) and each of 40 x 24 probed pixels (rows): 0 without a
+// surface, 1 in shadow, 2 lit; and the cut-off node whose missing tile makes the result uncertain.
 export const kSunPlaces = 48, kSunRows = 960;
 export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
@@ -330,7 +329,7 @@ void main() {
     o_lit = uvec4(1, 0, 0, 0);
     return;
   }
-  // As detailed as the rays of render, which chooses among the same places.
+  // The same detail as in render, which chooses among the same places.
   bool blocked = is_blocked(s, normal, sun, 1e30, vec2(s.size, 0.004), hit);
   o_lit = uvec4(blocked ? 1u : 2u, blocked ? hit.missing : 0u, 0, 0);
 }`;
@@ -342,8 +341,8 @@ vec3 reflected(vec3 albedo, vec3 normal, vec3 sky, float sun) {
 }
 `;
 
-// Light from the sky is averaged over 4 x 4 samples on the same plane; that on the floor over those
-// of the floor.
+// Light from the sky is averaged over 4 x 4 samples on the same plane, on the floor over samples of
+// the floor.
 const kSkyFilter = `
 uniform usampler2D u_hits, u_normals;
 uniform sampler2D u_light, u_sky;
@@ -379,14 +378,14 @@ vec3 sky_around(ivec2 pixel, uvec4 g, vec3 normal) {
 }
 `;
 
-// The result is multiplied by its coverage, from which haze takes a share. A shadow on the floor is
-// black that covers a part of the background.
+// The result is multiplied by its coverage, which haze reduces. A shadow on the floor is black that
+// partly covers the background.
 export const kCombine = `${kVersion}${kCameraSource}${kSky}${kColorState}${kSkyFilter}
 uniform usampler2D u_colors;
 uniform bool u_colored;      // u_colors has colors
 uniform sampler2D u_before;
-uniform vec2 u_haze;         // where it begins, and 1 / the scene's diagonal
-uniform float u_share;       // of this sample among those so far
+uniform vec2 u_haze;  // begin, and 1 / the scene's diagonal
+uniform float u_share;  // share of this sample among all so far
 uniform float u_range;       // the brightest light that the target can hold
 uniform vec2 u_floor;
 uniform vec3 u_floor_center;
@@ -451,10 +450,9 @@ void main() {
   o_color = vec4(srgb(mix(background, lit, color.a)) + (float(order) / 16.0 - 0.47) / 255.0, 1.0);
 }`;
 
-// One texel for each block of u_block x u_block pixels: a cut-off node whose tile is missing (that
-// of the largest cell), how many pixels wide that cell is and how bright a sample, a tile that was
-// used and the steps of a sample, the sample's t. A sample is a pixel of the block that changes
-// with each frame.
+// One texel per block of u_block x u_block pixels: the cut-off node of the largest cell whose tile
+// is missing; the width of that cell in pixels and the brightness of a sample; a used tile and the
+// steps of the sample; the sample's t. The sampled pixel of the block changes with each frame.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;
@@ -490,7 +488,7 @@ void main() {
   if (found_in(g)) {
     vec3 normal = unpack_normal(texelFetch(u_normals, at, 0).x);
     vec3 sky = sky_around(at, g, normal);
-    // The exposure is that of plaster, as in render: dark colors stay dark.
+    // The exposure is measured for plaster, as in render, so dark colors remain dark.
     vec3 light = reflected(kPlaster, normal, sky, texelFetch(u_light, at, 0).x);
     luminance = dot(light, vec3(0.2126, 0.7152, 0.0722));
   }

@@ -1,9 +1,9 @@
 // The uniforms of all rays of a picture.
 
-const kConeShare = 0.75;  // of a pixel: the width at which a cell is hit as a whole
+const kConeShare = 0.75;  // of a pixel: cells of this width are hit as one cell
 
-// Of a Renderer whose tiles are there, for a picture of width x height pixels with the detail of
-// one that is lodHeight pixels high.
+// Returns the uniforms of a Renderer with loaded tiles, for a picture of width x height pixels with
+// the level of detail of lodHeight rows.
 export function pictureValues(renderer, width, height, lodHeight) {
   const {info, options, view, light, stream: {store, colors, rootPointer}} = renderer,
                                                              levels = info.levels,
@@ -47,7 +47,7 @@ export function pictureValues(renderer, width, height, lodHeight) {
   };
 }
 
-// Where in its pixel a sample lies; sample 0 is at the pixel's center.
+// Returns the offset of a sample from the center of its pixel; sample 0 is at the center.
 export function jitterOf(sample) {
   const wrap = (x) => x - Math.floor(x);
   return [

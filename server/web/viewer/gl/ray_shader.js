@@ -19,17 +19,17 @@ const kMaxSteps = 4096;
 // Uniforms of the pool, and of all rays of a picture.
 const kPoolSource = `
 uniform usampler2D u_pool, u_table;
-uniform uint u_root;         // pointer to the root (tiles/tile_format.js says what a pointer is)
+uniform uint u_root;  // pointer to the root (see tiles/tile_format.js)
 uniform int u_levels;        // the grid has 2^u_levels voxels per edge
 uniform uint u_boundaries;   // bit s: nodes with 2^s voxels per edge are the roots of tiles
 uniform ivec3 u_clip_low, u_clip_high;
-uniform vec2 u_cell_sizes;   // smallest and largest cell that is hit as a whole, in voxels
+uniform vec2 u_cell_sizes;  // smallest and largest cell that is hit as one cell, in voxels
 
 uvec4 texel(uint address) {
   return texelFetch(u_pool, ivec2(address & 4095u, address >> 12), 0);
 }
 
-// The pointer to the root of the slot's tile, 0 if it is not loaded.
+// Returns the pointer to the root of the slot's tile, or 0 if the tile is not loaded.
 uint tile_of(uint slot) {
   return slot == 0u ? 0u : texelFetch(u_table, ivec2(slot & 1023u, slot >> 10), 0).x;
 }
@@ -53,7 +53,7 @@ struct Hit {
   float t;
   int scale;       // the cell has 2^scale voxels per edge
   int axis;        // of the face that the ray entered by; -1 if it began in the cell
-  uint missing;    // texel of the cut-off node whose tile would have been needed; 0: none
+  uint missing;  // texel of the cut-off node whose tile is missing; 0: none
 };
 
 ivec3 ray_base;
@@ -61,9 +61,9 @@ vec3 ray_shift, ray_inverse;
 uint ray_mirror;
 int step_count = 0;
 uint random_state = 1u;
-uint entered_count = 0u, entered_slot = 0u;  // one of the tiles that were entered, chosen at random
+uint entered_count = 0u, entered_slot = 0u;  // a random one of the entered tiles
 #ifdef WIRE
-uniform int u_wire_scale;    // of the cubes that are drawn; -1: none
+uniform int u_wire_scale;  // of the drawn cubes; -1: none
 uniform float u_wire_width;  // half of a line's, at distance 1
 bool wire = false;
 #endif
@@ -103,7 +103,7 @@ void note_tile(uint slot) {
 }
 
 #ifdef WIRE
-// Whether the ray enters the cell near an edge of the face.
+// True if the ray enters the cell near an edge of the face.
 void note_wire(ivec3 position, int scale, int axis, float t) {
   if (scale != u_wire_scale || axis < 0) return;
   vec3 inward = (t - time_of(position)) / ray_inverse;
@@ -135,7 +135,7 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
   uint stack[21];            // at s: the node whose children have 2^s voxels per edge
   uint node = u_root, leaf = 0u, octant = 0u;
   uvec2 brick = uvec2(0);
-  int brick_scale = -1;      // of the brick that the ray is in; -1: none
+  int brick_scale = -1;  // of the brick around the ray; -1: none
   ivec3 position = ivec3(0);
   int scale = u_levels - 1;
   if (u_levels == 2) {

@@ -1,9 +1,9 @@
-// The camera as the shaders need it: as query/render/camera.h, with the eye as an integer voxel
-// plus a fraction, so that float32 holds all that is relative to it.
+// The camera of the shaders, as in query/render/camera.h. The eye is an integer voxel plus a
+// fraction, so that float32 suffices for all relative positions.
 
 import {length, pictureAxes, pictureDirection, subtract} from "../vector.js";
 
-const kFar = 2 ** 30;  // voxels; an eye beyond is drawn from there
+const kFar = 2 ** 30;  // voxels; a farther eye is moved to this distance
 
 export class View {
   // In voxels; the vertical field of view in degrees.

@@ -1,10 +1,10 @@
-// The light of a picture: where the sun stands, how bright the picture is, how far occluders reach,
-// and where the floor is. Exposure and reach follow what is seen. All in voxels.
+// The light of a picture: position of the sun, exposure, reach of occluders, and position of the
+// floor, in voxels. Exposure and reach follow the visible surfaces.
 
 import {length, scale, subtract} from "../vector.js";
 
 export class Light {
-  // Of a file with this manifest.
+  // Light for a file with this manifest.
   constructor({box, resolution}) {
     this.exposure = 1;
     this.skyReach = 1;
@@ -13,17 +13,17 @@ export class Light {
     this.low = box?.low ?? [0, 0, 0];
     this.high = box?.high ?? [resolution, resolution, resolution];
     this.outside = true;  // the first camera sees the floor
-    this.turn = null;     // until there is a camera
+    this.turn = null;     // set by the first camera
     this.setSun(0);
   }
 
-  // Whether a camera there sees the floor that the scene stands on, and its shadow.
+  // True if a camera at `eye` sees the floor below the scene, and its shadow.
   seesFloor(eye) {
     return eye[1] > this.low[1] && eye.some((x, i) => x < this.low[i] || x > this.high[i]);
   }
 
-  // What the shaders know of the floor for a camera there: how far it is below, or 0, and over
-  // which distance its shadow fades, from where.
+  // Returns the uniforms of the floor for a camera at `eye`: its distance below, or 0; the distance
+  // over which its shadow fades; and the center of the shadow.
   floor(eye) {
     const center = this.low.map((x, i) => (x + this.high[i]) / 2);
     return {
@@ -35,12 +35,12 @@ export class Light {
     return length(subtract(this.high, this.low));
   }
 
-  // The next reading sets brightness and reach at once instead of approaching them.
+  // The next reading sets exposure and reach directly instead of approaching them.
   forgetReadings() {
     this.readings = 0;
   }
 
-  // Over the left shoulder of a camera, the first one, that looks `forward`.
+  // Places the sun over the left shoulder of the first camera, which looks `forward`.
   placeSun(eye, forward) {
     const back = scale(forward, -1);
     this.outside = this.seesFloor(eye);
@@ -56,7 +56,7 @@ export class Light {
         [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
   }
 
-  // By what a camera at `eye` sees: smoothly while it moves, fast when it stands.
+  // Adapts exposure and reach to a reading: slowly while the camera moves, quickly when it stands.
   adjust(read, eye, moving) {
     const share = moving ? 0.15 : 0.5;
     const toward = (from, to, known) => known ? from * (to / from) ** share : to;
@@ -64,7 +64,7 @@ export class Light {
         this.skyReach, Math.max(1, (this.seesFloor(eye) ? 0.35 : 1) * read.medianT),
         this.readings > 0);
     this.hazeStart = toward(this.hazeStart, Math.max(1, read.nearestT), this.readings > 0);
-    // The exposure that the first reading measures is that of light without a reach.
+    // The first reading measures its exposure before the reach is known.
     this.exposure = toward(this.exposure, read.exposure, this.readings > 1);
     this.readings++;
   }

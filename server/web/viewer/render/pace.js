@@ -1,13 +1,13 @@
-// How fast the GPU is, and how much it is given at once: pixels of a part, and of a picture while
-// the camera moves.
+// Measures the speed of the GPU, and chooses the pixels per part and the resolution while the
+// camera moves.
 
 const kTargetMs = 40;  // of a frame while the camera moves
-const kPartMs = 120;   // of what the GPU is given at once
+const kPartMs = 120;   // per part of a sample
 const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // of the internal resolution
 const kFewTiles = 64,
-      kCoarsePixels = 16;  // that a picture lacks, and the width of its cells for want of them
+      kCoarsePixels = 16;  // missing tiles, and width of the widest missing cell
 const kMinPart = 1 << 12,
-      kFirstPart = 1 << 17;  // pixels of one part, until it is known how long one takes
+      kFirstPart = 1 << 17;  // pixels per part, until the speed is known
 
 export class Pace {
   constructor() {
@@ -22,9 +22,9 @@ export class Pace {
   get scale() {
     return kScales[this.scaleIndex];
   }
-  // The same while tiles arrive. Small pictures find soonest what most of a view needs, but upon
-  // the rest their rays hit by chance: when one lacks few tiles, the pixels of the final picture
-  // say what is still missing.
+  // The scale while tiles arrive. Small pictures quickly find most of the tiles that a view needs.
+  // Their few rays find the last tiles only by chance, so if few are missing, a full-size picture
+  // searches.
   get seekingScale() {
     return this.lacksFew ? 1 : this.scale;
   }
@@ -35,19 +35,19 @@ export class Pace {
     this.lacksFew ||= tiles < kFewTiles && coarsePixels < kCoarsePixels;
   }
 
-  // The browser offers to draw a frame.
+  // The browser requests a frame.
   tick(nowMs) {
     const interval = nowMs - this.callMs;
     this.callMs = nowMs;
     if (interval > 4) this.intervalMs = Math.min(interval, 1.05 * this.intervalMs, kTargetMs);
   }
 
-  // What is seen as done at a frame may have been done since the one before.
+  // The GPU may have finished at any time since the previous frame.
   gpuMs(seenMs) {
     return Math.max(1, seenMs - this.intervalMs / 2);
   }
 
-  // One of several parts was seen as done after so long. Returns how long it took.
+  // Takes the observed time of one of several parts. Returns the estimated time on the GPU.
   partDone(seenMs) {
     const partMs = this.gpuMs(seenMs);
     this.partPixels =
@@ -55,9 +55,8 @@ export class Pace {
     return partMs;
   }
 
-  // The same of the last part, or the only one, of a picture with so many pixels; its other parts
-  // took `busyMs`. Chooses the internal resolution, if it `counts` for that, by the time that a
-  // frame of the last one took.
+  // Takes the observed time of the last or only part of a picture; the other parts took `busyMs`.
+  // If the frame `counts`, chooses the internal resolution by its time.
   frameDone(seenMs, busyMs, pixels, counts) {
     const frameMs = busyMs + this.gpuMs(seenMs);
     if (busyMs === 0)

@@ -1,4 +1,4 @@
-// What the picture of a running job shows, in words, over the picture.
+// The text over the picture of a running job.
 
 import {h, setText, svg} from "../../lib/dom.js";
 import {countText, hasEnded, stateText, titleText} from "../../lib/format.js";
@@ -29,15 +29,15 @@ export class Banner {
     this.element = h("div", {class: "banner"}, this.text, toggle, legend);
   }
 
-  // `job` is null while the service does not answer; the counts are the last that are known.
+  // `job` is null while the service does not answer. The counts are the last known ones.
   show(job, {built = 0, total = 0}) {
     const what = `${countText(built)} of ${countText(total)} occupied subvolumes are built`;
     setText(
         this.text,
-        !job ? "The service does not answer. This is what was built when it did." :
+        !job ? "The service does not answer. The picture shows the last known state." :
             hasEnded(job.state) ?
                `${titleText(job)} is ${
-                   stateText(job.state)} and has no result. This is what was built of it.` :
+                   stateText(job.state)} and has no result. The picture shows its built part.` :
                `${stateText(job.state)}: ${what}, drawn coarsely.`);
     this.kinds.waiting.hidden = this.kinds.built.hidden = !this.wires.drawsAll;
     this.element.classList.toggle("bad", !job || hasEnded(job.state));

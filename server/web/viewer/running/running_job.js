@@ -1,6 +1,6 @@
-// The viewer of a job that runs: what is built so far, from the coarse bricks of its subvolumes,
-// and the wireframe of all of them. What is built grows under the camera; the tiles that were
-// fetched stay.
+// The viewer of a running job: its partial result, drawn from the coarse bricks of the built
+// subvolumes, and the wireframe of all subvolumes. The partial result grows while it is viewed;
+// fetched tiles remain valid.
 
 import {authorization, getJson, sleep} from "../../lib/api.js";
 import {announce} from "../../lib/dom.js";
@@ -14,16 +14,16 @@ import {Banner} from "./banner.js";
 import {SubvolumeWires} from "./subvolume_wires.js";
 
 const kPauseMs = 1500, kMaxPauseMs = 15000;
-const kGone = [404, 409, 410];  // what is built has another digest, or the job another state
-// A list of subvolumes is fetched again after this many times what it took, and after this time for
-// each of them; what has changed is reported a moment before the list has it, and what is begun is
-// only in the list.
+const kGone = [404, 409, 410];  // the partial result has a new digest, or the job a new state
+// The pause between two requests for the list of subvolumes is this multiple of the last request's
+// duration, and at least this time per subvolume. The list contains a change slightly later than
+// the progress report, so it is fetched twice; started subvolumes are only in the list.
 const kListShare = 10, kListPausePerCubeMs = 0.1;
 const kListLooks = 2, kMaxListPauseMs = 15000;
 
-// Shows the job until it has its result. Resolves to whether there was anything to show: not before
-// the subvolumes are planned. Throws WebGLUnavailable, and Problem when the job is gone. The camera
-// is left in the address, where the next viewer finds it. `showTools` fills the tools of the page.
+// Shows the job until it has a result. Resolves to false if there was nothing to show, because the
+// subvolumes are not planned yet. Throws WebGLUnavailable, or Problem if the job was deleted. The
+// address keeps the camera for the next viewer. `showTools` fills the tools of the page.
 export async function watchJob({job, place, budgetBytes, showPicture, showTools, signal}) {
   const path = `/api/v1/jobs/${job.id}`;
   const source = new TileSource({base: `${path}/partial`, headers: authorization()});
@@ -69,12 +69,13 @@ export async function watchJob({job, place, budgetBytes, showPicture, showTools,
     wires?.dispose();
     banner?.element.remove();
     delete window.voxdagViewer;
-    if (rests) await sleep(kPauseMs, signal, true);  // without tiles: theirs is another digest now
+    // Without tiles, because their digest has changed.
+    if (rests) await sleep(kPauseMs, signal, true);
   }
 }
 
-// null while there is none: before the plan, when the files of the job are gone, and while the
-// service is away.
+// Resolves to null before the plan, after the files of the job were deleted, and while the service
+// does not answer.
 async function manifestOf(source) {
   try {
     return await source.manifest();
@@ -84,7 +85,7 @@ async function manifestOf(source) {
   }
 }
 
-// null while the service is away.
+// Resolves to null while the service does not answer.
 async function jobOf(path, signal) {
   try {
     return await getJson(path, signal);
@@ -94,18 +95,18 @@ async function jobOf(path, signal) {
   }
 }
 
-// Fetches the list of the subvolumes while there is something new in it.
+// The list of subvolumes, fetched again whenever it may have changed.
 class SubvolumeList {
   constructor(path) {
     this.path = path;
     this.list = null;
     this.key = null;
-    this.looks = 0;  // that are left
+    this.looks = 0;  // requests until the list is up to date
     this.nextMs = -Infinity;
     this.latestMs = -Infinity;
   }
 
-  // Whether it was fetched.
+  // Resolves to true if the list was fetched.
   async update(job, signal) {
     const {stage, subvolumes} = job.progress ?? {},
                   key = JSON.stringify([job.state, job.attempts, stage, subvolumes]);
@@ -125,9 +126,9 @@ class SubvolumeList {
   }
 }
 
-// Until the job has its result, or begins again, or what is built is another DAG, after a restart
-// of the service. Resolves to whether to wait before one looks again, since that could be so each
-// time.
+// Updates the picture until the job has a result, is retried, or its partial result is a different
+// DAG, as after a restart of the service. Resolves to true if the caller has to pause before it
+// follows the job again, because the cause may recur.
 async function follow({path, source, renderer, banner, wires, signal}) {
   const {digest} = renderer.info, wasEmpty = !renderer.info.root;
   const subvolumes = new SubvolumeList(path);
@@ -149,16 +150,16 @@ async function follow({path, source, renderer, banner, wires, signal}) {
     if (manifest?.root && manifest.root.offset === renderer.info.root.offset) {
       Object.assign(renderer.info, {built: manifest.built, total: manifest.total});
     } else if (manifest?.root && !isArriving) {
-      // Its tile may take long: what the job does is shown all the same.
+      // Loading the tile may take long; banner and wireframe are updated nevertheless.
       isArriving = true;
       renderer.showRoot(manifest)
-          .catch((error) => console.warn(`voxdag: what was built is not shown: ${error.message}`))
+          .catch((error) => console.warn(`voxdag: the partial result is not updated: ${error.message}`))
           .finally(() => isArriving = false);
     }
     if (job && await subvolumes.update(job, signal))
       wires.show(subvolumes.list, state === "running");
     banner.show(job, subvolumes.list ?? source.info);
-    // What has ended, or gives no answer, may continue some day.
+    // An ended job may be retried, and a service may come back.
     pauseMs = manifest ? kPauseMs : Math.min(kMaxPauseMs, 1.5 * pauseMs);
     await sleep(pauseMs, signal, true);
   }

@@ -1,14 +1,14 @@
-// The wireframe of a job's subvolumes over the picture. What is built, in work and waiting differs
-// by the kind of line, not by its color alone. Drawn without the GPU's depth: what is behind the
-// voxels shows through.
+// The wireframe of a job's subvolumes over the picture. Built, active and waiting subvolumes differ
+// by line style, not by color alone. Hidden lines are visible, because the depth on the GPU is not
+// used.
 
 import {dot, subtract} from "../vector.js";
 
-const kMaxEdges = 24000;  // of more, only those of what is in work are drawn
-const kOpaque = 10;       // the square root of how many cubes of a kind are drawn opaque
-const kNear = 1e-3;       // of the grid: nearer than this nothing is drawn
+const kMaxEdges = 24000;  // beyond this count only the edges of active subvolumes are drawn
+const kOpaque = 10;       // square root of the number of cubes of one kind that are drawn opaque
+const kNear = 1e-3;       // share of the grid's edge; nearer lines are clipped
 
-// Later ones are drawn over earlier ones.
+// Later styles are drawn over earlier ones.
 export const kStyles = {
   waiting: {name: "waiting", color: "#5d6873", width: 1, dash: [3, 5]},
   built: {name: "built", color: "#15609b", width: 1, dash: []},
@@ -26,12 +26,12 @@ export class SubvolumeWires {
     this.edges = Object.fromEntries(kOrder.map((state) => [state, new Float64Array(0)]));
     this.counts = Object.fromEntries(kOrder.map((state) => [state, 0]));
     this.visible = true;
-    this.drawsAll = true;  // not only what is in work
-    this.drawn = null;     // for which camera and size
+    this.drawsAll = true;  // false: only active subvolumes
+    this.drawn = null;     // camera and size of the drawn picture
   }
 
-  // {resolution, cubes: [[x, y, z, edge, built]...], working: [[x, y, z, edge]...]} in voxels;
-  // nothing is in work unless the job `runs`.
+  // Shows {resolution, cubes: [[x, y, z, edge, built]...], working: [[x, y, z, edge]...]} in
+  // voxels. `working` counts only while the job `runs`.
   show({resolution, cubes, working = []}, runs) {
     this.resolution = resolution;
     const atWork = new Set(runs ? working.map((cube) => cube.join()) : []);
@@ -66,8 +66,8 @@ export class SubvolumeWires {
     const {canvas} = this, width = canvas.clientWidth, height = canvas.clientHeight,
           ratio = window.devicePixelRatio || 1;
     if (!width || !height) return;
-    // Thousands of lines take longer than a part of a sample: they are drawn when they change, and
-    // not with each frame.
+    // Thousands of lines take longer than a part of a sample, so they are drawn only when they
+    // change.
     const {forward, up} = camera.axes(), drawn = [
       ...camera.eye, ...forward, ...up, camera.fovDegrees, width, height, ratio
     ].join();
@@ -126,7 +126,7 @@ export class SubvolumeWires {
   }
 }
 
-// The twelve edges of a cube; one that several cubes of the same size share is drawn once.
+// Adds the twelve edges of a cube. An edge shared by cubes of the same size is drawn once.
 function addEdges(x, y, z, edge, rank, found) {
   for (let axis = 0; axis < 3; ++axis)
     for (let corner = 0; corner < 4; ++corner) {

@@ -1,30 +1,32 @@
-// Finds the tiles of the first view while the shaders are compiled: by walking through the tiles
-// that are there, as a reading of the feedback would say them a level at a time. What surfaces hide
-// is not known here, so a few tiles too many are fetched; therefore this stops at cells that are
-// still wide, after so many tiles, and when none come.
+// Finds the tiles of the first view while the shaders compile, by descending through the loaded
+// tiles. Readings of the feedback would find them level by level. Hidden surfaces are not detected
+// here, so some unneeded tiles are fetched. Therefore the search stops at rather wide cells, after
+// a maximum number of tiles, and if no tile arrives.
 
-const kPixels = 15;  // wider cells are refined: of the canvas
+const kPixels = 15;  // pixels of the canvas; wider cells are refined
 const kMaxTiles = 1500;
 const kStallMs = 1500;
-const kHeadWords = 4, kCutWords = 4;  // of a tile (docs/format.md)
+const kHeadWords = 4, kCutWords = 4;  // in a tile (docs/format.md)
 
 export class FirstView {
-  // Of the `view` (gl/view.js) in a picture of this size; cells of `finest` voxels are not refined.
+  // Searches for the `view` (gl/view.js) in a picture of this size. Cells of `finest` voxels are
+  // not refined.
   constructor({levels}, view, {width, height}, finest) {
     Object.assign(this, {levels, view, finest});
     this.pixel = view.pixel(height);
-    this.slopes = [view.tangent * width / height, view.tangent];  // of the sides of the picture
-    this.known = new Map();                                       // key -> words of a tile
-    this.places = new Map();  // key -> where the tile is needed, low corners
+    // Slopes of the sides of the picture.
+    this.slopes = [view.tangent * width / height, view.tangent];
+    this.known = new Map();   // key -> words of a tile
+    this.places = new Map();  // key -> low corners of the places that need the tile
     this.wanted = new Map();  // texel of a cut-off node -> pixels of its widest coarse cell
-    this.takenMs = 0;         // when the last tile came
+    this.takenMs = 0;         // time of the last tile
   }
 
   get isOver() {
     return this.wanted.size === 0 || this.known.size > kMaxTiles;
   }
 
-  // Whether a request that is not answered holds up what others could say.
+  // True if a request without an answer delays the search.
   stalls(nowMs) {
     return nowMs - this.takenMs > kStallMs;
   }
@@ -34,7 +36,7 @@ export class FirstView {
     this.take(store, tile, words);
   }
 
-  // A tile of the store has these words.
+  // Takes the words of a tile in the store.
   take(store, tile, words) {
     this.takenMs = performance.now();
     if (this.known.has(tile.key)) return;
@@ -42,7 +44,7 @@ export class FirstView {
     for (const corner of this.places.get(tile.key) ?? []) this.walk(store, tile, words, corner);
   }
 
-  // Adds what is missing below a tile at a place.
+  // Adds the missing tiles below a tile at a place.
   walk(store, tile, words, corner) {
     if ((words[1] >>> 16 & 1) === 1) return;  // bricks
     const leafEdge = 2 ** (this.levels - tile.level - tile.levels), cell = leafEdge / 4;
@@ -73,16 +75,16 @@ export class FirstView {
     if (places) places.push(corner);
     else this.places.set(node.key, [corner]);
     const words = this.known.get(node.key), tile = store.get(node.level, node.offset);
-    if (words && tile) this.walk(store, tile, words, corner);  // it may have left again
+    if (words && tile) this.walk(store, tile, words, corner);  // it may have been evicted
   }
 
-  // Whether a cube is in the picture, with cells that are too wide.
+  // True if a cube is in the picture and its cells are too wide.
   needs(x, y, z, edge, cell) {
     return this.pixelsOf(x, y, z, edge, cell) > kPixels &&
         this.isSeen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);
   }
 
-  // How many pixels wide a cell at the nearest point of a cube is.
+  // Returns the width in pixels of a cell at the nearest point of a cube.
   pixelsOf(x, y, z, edge, cell) {
     const [ex, ey, ez] = this.view.eye;
     const far = Math.hypot(
@@ -91,7 +93,7 @@ export class FirstView {
     return cell / Math.max(far * this.pixel, 1e-9);
   }
 
-  // Whether a part of a ball may be in the picture.
+  // True if a part of a ball may be in the picture.
   isSeen(x, y, z, radius) {
     const {eye, forward, right, up} = this.view, dx = x - eye[0], dy = y - eye[1], dz = z - eye[2];
     const along = (axis) => axis[0] * dx + axis[1] * dy + axis[2] * dz;
@@ -101,7 +103,7 @@ export class FirstView {
             depth * this.slopes[i] + radius * Math.hypot(1, this.slopes[i]));
   }
 
-  // Of the widest cell of a coarse brick that is in the picture.
+  // Returns the width in pixels of the widest visible cell of a coarse brick.
   coarsePixels(low, high, x, y, z, cell) {
     let most = 0;
     for (let bit = 0; bit < 64; ++bit) {

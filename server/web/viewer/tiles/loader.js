@@ -1,15 +1,13 @@
-// What decides what is fetched next, and survives what fails: for tiles and for color pages. Each
-// reading of the feedback replaces the queue, so that what has left the picture is not fetched any
-// more.
+// Schedules the requests for tiles or color pages, and retries failed ones. Each reading of the
+// feedback replaces the queue, so items that are no longer in the picture are not fetched.
 
 import {TileError} from "../tile_source.js";
 
-export const kRoundsToKnow =
-    4;  // readings of the feedback after which what was not seen is known to be so
+export const kRoundsToKnow = 4;  // after this many readings an unmarked item is known to be unused
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
-const kMaxTries = 3;         // of one item whose answers are of no use
-const kRefusedMs = 300000;   // until an item that was refused is asked for again
-const kMaxFailures = 65536;  // that are remembered
+const kMaxTries = 3;         // per item with unusable answers
+const kRefusedMs = 300000;   // until a refused item is requested again
+const kMaxFailures = 65536;  // remembered items
 const kMaxWarnings = 20;
 const kFullPauseMs = 250;
 
@@ -22,7 +20,7 @@ const kRefused = {
   message: "Part of the file is drawn coarse: the service fails to send it."
 };
 
-// Random, so that those who lost the same service do not come back at the same time.
+// Random, so that clients of a restarted service do not return simultaneously.
 export function pauseAfter(failures) {
   return Math.min(kMaxPauseMs, kFirstPauseMs * 2 ** (failures - 1)) * (0.5 + 0.5 * Math.random());
 }
@@ -33,15 +31,16 @@ export function pauseAfter(failures) {
 //     nameOf(request)              for messages
 // and `store.rounds`, the readings since the view changed.
 export class Loader {
-  // onArrival(failed): something arrived, or, if `failed`, what fails changed.
+  // onArrival(failed): an item arrived, or, if `failed`, a request failed or the retry state
+  // changed.
   constructor(source, store, onArrival, {maxRequests, maxBatch}) {
     this.source = source;
     this.store = store;
     this.onArrival = onArrival;
-    this.maxRequests = maxRequests;  // at the same time
+    this.maxRequests = maxRequests;  // concurrent requests
     this.maxBatch = maxBatch;
     this.allowed = maxRequests;  // fewer while the service is busy
-    this.batchSize = maxBatch;   // smaller where it is silent for long
+    this.batchSize = maxBatch;   // smaller after timeouts
     this.queue = [];
     this.loading = new Map();   // key -> request
     this.failures = new Map();  // key -> {count, retryMs, batch: the largest that it may be in,
@@ -52,30 +51,30 @@ export class Loader {
     this.requestedTotal = 0;
     this.outage = {count: 0, retryMs: 0};
     this.busy = {count: 0, retryMs: 0};
-    this.fullUntilMs = 0;  // Infinity: until the next epoch
-    this.trouble = null;   // {code, message}: as long as the outage
-    this.failure = null;   // the same, for good
-    this.refusal = null;   // the same: of some items only
+    this.fullUntilMs = 0;  // no room until then; Infinity: until the next epoch
+    this.trouble = null;   // {code, message} of the current outage
+    this.failure = null;   // {code, message} of the error that ended loading
+    this.refusal = null;   // {code, message} if some items were refused
     this.warnings = 0;
     this.timer = 0;
-    this.wakes = new Set();  // times
-    this.unmet = 0;          // what the last reading wanted and may still come
+    this.wakes = new Set();  // times of scheduled wake-ups
+    this.unmet = 0;          // items missing in the last reading that may still arrive
     this.ending = new AbortController();
   }
 
-  // null, or {code, message} of what is to be said.
+  // null, or {code, message} for the user.
   get problem() {
     return this.failure ?? this.source.ended ?? this.trouble ?? this.refusal;
   }
   get disposed() {
     return this.ending.signal.aborted;
   }
-  // Whether nothing is asked for any more.
+  // True once the loader has stopped requesting items.
   get hasEnded() {
     return this.disposed || this.source.ended !== null || this.failure !== null;
   }
 
-  // True if nothing more will arrive for the view, unless it changes.
+  // True if no request is queued or in flight.
   get isIdle() {
     return this.requests === 0 && this.queue.length === 0;
   }
@@ -87,7 +86,7 @@ export class Loader {
     if (this.fullUntilMs === Infinity) this.fullUntilMs = 0;
   }
 
-  // Whether it is not asked for any more, for minutes.
+  // True if an item was refused and is not requested for minutes.
   isRefused(key, nowMs) {
     const failure = this.failures.get(key);
     return failure !== undefined && failure.count >= kMaxTries && nowMs < failure.retryMs;
@@ -97,19 +96,19 @@ export class Loader {
     return !(nowMs < this.failures.get(key)?.retryMs) && nowMs >= this.fullUntilMs;
   }
 
-  // `requests` are those of one reading, of which `unmet` may still come.
+  // Replaces the queue by the `requests` of one reading. `unmet`: its items that may still arrive.
   replaceQueue(requests, unmet, nowMs) {
     this.unmet = unmet;
     if (unmet === 0) this.endOutage();
-    // What the service may fail at comes last, and of that what is more likely so: others are not
-    // to wait for it.
+    // Suspicious items come last, the most suspicious ones at the very end, so that they do not
+    // delay others.
     const trust = ({key}) =>
         this.failures.get(key)?.last ? this.failures.get(key).batch : this.maxBatch;
     this.queue = requests.sort((a, b) => trust(a) - trust(b) || a.priority - b.priority);
     this.send(nowMs);
   }
 
-  // Until when nothing is asked for.
+  // No request is sent before this time.
   get retryMs() {
     return Math.max(this.outage.retryMs, this.busy.retryMs);
   }
@@ -123,7 +122,7 @@ export class Loader {
       this.wakeAt(this.retryMs, nowMs);
       return;
     }
-    // After an outage one request tries whether it is over.
+    // During an outage a single request probes the service.
     const maxRequests = this.outage.count > 0 ? 1 : Math.floor(this.allowed);
     while (this.requests < maxRequests && this.queue.length > 0 && !this.isFull)
       this.fetch(this.takeBatch());
@@ -144,7 +143,7 @@ export class Loader {
     for (const request of batch) this.loading.set(request.key, request);
     let answer = null, error = null;
     try {
-      // What was of no use is not to come from the browser's cache again.
+      // An unusable answer must not come from the browser's cache again.
       const again = batch.some(({key}) => this.failures.has(key));
       answer = await this.fetchAll(batch, {signal, cache: again ? "reload" : undefined});
     } catch (caught) {
@@ -180,7 +179,7 @@ export class Loader {
           this.failures.delete(request.key);
         } else {
           hasRoom = false;
-          // When the store knows what the view does not need, all that is left is needed.
+          // Once the store knows the unused items, all remaining items are needed.
           this.fullUntilMs = this.store.rounds >= kRoundsToKnow ? Infinity : nowMs + kFullPauseMs;
           this.queue = [];
           this.wakeAt(nowMs + kFullPauseMs, nowMs);
@@ -205,7 +204,7 @@ export class Loader {
     else this.split(batch, error, nowMs);
   }
 
-  // One of them is at fault, which halving finds.
+  // One item of the batch is at fault. Halving the batch finds it.
   split(batch, error, nowMs) {
     if (batch.length === 1) return this.noteFailure(batch[0], error, nowMs);
     const half = Math.ceil(batch.length / 2);
@@ -216,12 +215,12 @@ export class Loader {
     else this.askAgain(batch);
   }
 
-  // Before all others, in the same order.
+  // Requeues a batch before all others, in the same order.
   askAgain(batch) {
     this.queue.push(...batch.reverse());
   }
 
-  // What failed longest ago is forgotten, and asked for like anything else if it is wanted again.
+  // The oldest failures are forgotten; their items are then requested like any other.
   remember(key, failure) {
     this.failures.delete(key);
     this.failures.set(key, failure);
@@ -232,7 +231,7 @@ export class Loader {
   noteFailure(request, error, nowMs) {
     const {key} = request, isAnswer = error instanceof TileError && error.status !== 200;
     const tries = 1 + (this.failures.get(key)?.count ?? 0);
-    // An answer that says that there is nothing needs no second try.
+    // A definite refusal needs no second try.
     const count = isAnswer && !error.isTransient ? Math.max(kMaxTries, tries) : tries;
     const retryMs = nowMs + (count < kMaxTries ? kFirstPauseMs * 2 ** count : kRefusedMs);
     this.remember(key, {count, retryMs, batch: 1, last: true});
@@ -243,12 +242,11 @@ export class Loader {
           this.refusal ?? kRefused :
           kDamaged;
     if (this.warnings++ < kMaxWarnings)
-      console.warn(`voxdag: ${this.nameOf(request)} cannot be used${
-          count < kMaxTries ? " and is asked for again" : ""}: ${error.message}`);
+      console.warn(`voxdag: ${this.nameOf(request)} is unusable${
+          count < kMaxTries ? " and is requested again" : ""}: ${error.message}`);
   }
 
-  // The service is away, or answers nothing that makes sense. Requests that fail together count
-  // once.
+  // The service does not answer, or its answers make no sense. Concurrent failures count once.
   pause(trouble, nowMs) {
     this.failedTotal++;
     this.trouble = trouble;
@@ -258,7 +256,7 @@ export class Loader {
     this.wakeAt(this.outage.retryMs, nowMs);
   }
 
-  // The service has too much to do: no outage, and nothing to be said.
+  // The service is busy. This is not an outage, and the user need not know.
   rest(retryAfterMs, nowMs) {
     this.endOutage();
     if (nowMs < this.busy.retryMs) return;
@@ -268,14 +266,15 @@ export class Loader {
     this.wakeAt(this.busy.retryMs, nowMs);
   }
 
-  // Nothing will come any more, as the error says. What is known of the file says more.
+  // Stops loading after a fatal error. A known change of the file explains it better than the
+  // error.
   fail(error) {
     this.failure = this.source.ended ??
         {code: error.isDenied ? "unauthorized" : "failed", message: error.message};
     this.queue = [];
   }
 
-  // Whether something wanted may still arrive though no request is under way.
+  // True if wanted items may still arrive although no request is in flight.
   get awaitsRetry() {
     const nowMs = performance.now();
     if (this.hasEnded || this.unmet === 0) return false;
@@ -285,7 +284,7 @@ export class Loader {
             (f) => f.count > 0 && f.count < kMaxTries && nowMs < f.retryMs);
   }
 
-  // Whether nothing is asked for until a time that wakes the renderer.
+  // True if the next request is sent only after a scheduled wake-up.
   pauses(nowMs) {
     return this.requests === 0 && nowMs < this.retryMs;
   }
@@ -310,7 +309,7 @@ export class Loader {
     this.onArrival(true);
   }
 
-  // Ends what is under way, too.
+  // Aborts all requests.
   dispose() {
     this.ending.abort();
     clearTimeout(this.timer);

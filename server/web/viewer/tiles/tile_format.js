@@ -1,8 +1,8 @@
-// Decodes a tile (docs/format.md) and lays its words out for the pool. Tiles come from the network:
-// every index is checked, so that a damaged tile is an error and never a wrong address on the GPU.
+// Decodes a tile (docs/format.md) and lays out its words for the pool. Tiles come from the network:
+// every index is checked, so a damaged tile is an error, never a wrong address on the GPU.
 
 export const kTexelWords = 4;
-export const kBlockTexels = 16;  // of the pool; a node or leaf never crosses the end of a block
+export const kBlockTexels = 16;  // in the pool; no node or leaf crosses the end of a block
 const kMagic = 0x31544456;
 const kHeadWords = 4;
 const kCutWords = 4;  // of a cut-off node in a tile
@@ -15,17 +15,17 @@ const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
 });
 
 // The pool has texels of four words, addressed by 24 bits. A *pointer* is the address of a texel
-// times 256, plus the child mask of the node there; so a ray knows a node's mask without reading
-// the node. A node is one pointer per child, in one or two texels. A cut-off node is one texel: the
-// slot of its tile (0: none), its coarse brick's two words, 0. Two bricks share a texel; the
-// pointer's lowest bit says which.
+// times 256, plus the child mask of the node there, so a ray knows the mask of a node before it
+// reads the node. A node is one pointer per child, in one or two texels. A cut-off node is one
+// texel: the slot of its tile (0: none), its coarse brick's two words, 0. Two bricks share a texel;
+// the lowest bit of the pointer selects one.
 //
-// `shape` is that of tiles of this level (tileShape).
-// Returns {level, levels, words, pointers, root, leafBegin, addresses, coarse}: `words` are the
-// pool's words at virtual addresses from 0 on, whole blocks; `pointers` are the positions in
-// `words` of pointers with virtual addresses, which the pool makes absolute; `root` is such a
-// pointer; `leafBegin` is the first leaf's texel. `addresses` are the word offsets of the cut-off
-// nodes in the file, and `coarse` their coarse bricks; both are null for a tile with bricks.
+// `shape` is the tileShape() of the level. Returns {level, levels, words, pointers, root,
+// leafBegin, addresses, coarse}. `words` are the words of complete blocks for the pool, at virtual
+// addresses from 0. `pointers` are the positions in `words` of pointers with virtual addresses,
+// which the pool makes absolute; `root` is such a pointer. `leafBegin` is the texel of the first
+// leaf. `addresses` are the word offsets of the cut-off nodes in the file, and `coarse` their
+// coarse bricks; both are null for a tile with bricks.
 export function decodeTile(tile, level, shape) {
   checkHead(tile, level, shape);
   const {levels, bricks} = shape, nodeWords = tile[2], leafCount = tile[3];
@@ -63,8 +63,8 @@ export function decodeTile(tile, level, shape) {
   };
 }
 
-// How many levels the tiles of a level have in a file with this manifest, and whether bricks are
-// below them.
+// Returns the number of levels in a tile of `level`, and whether its leaves are bricks, for a file
+// with this manifest.
 export function tileShape({levels, tile_levels}, level) {
   const below = levels - 2 - level, own = (below - 1) % tile_levels + 1;
   return {levels: own, bricks: own === below};
@@ -84,7 +84,7 @@ function checkHead(tile, level, {levels, bricks}) {
     throw new Error(`A tile has ${tile[3]} leaves; expected ${8 ** levels} at most.`);
 }
 
-// Packs the nodes in their order, none across the end of a block. Returns the texel after the last.
+// Packs the nodes in order; no node crosses the end of a block. Returns the texel after the last.
 function placeNodes(nodes, levels, place, depth) {
   let address = 0;
   for (let at = 0; at < nodes.length;) {

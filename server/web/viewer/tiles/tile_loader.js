@@ -5,20 +5,20 @@ import {TileError} from "../tile_source.js";
 import {Loader, pauseAfter} from "./loader.js";
 
 const kMaxRequests = 4, kMaxBatch = 48;
-const kMaxRootTries = 3;  // while the root's answers make no sense
+const kMaxRootTries = 3;  // with unusable answers
 
-// Its requests are {key, level, offset, priority, leaves}: leaves are the texels of cut-off nodes
-// to be linked.
+// Requests are {key, level, offset, priority, leaves}; `leaves` are the texels of the cut-off nodes
+// to link.
 export class TileLoader extends Loader {
   constructor(source, store, onArrival) {
     super(
         source, store, onArrival,
         {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, source.batchMax)});
-    this.firstView = null;  // the FirstView that the next tiles are shown to
+    this.firstView = null;  // the FirstView that receives the next tiles
   }
 
-  // `wanted`: leaf address -> priority, of one reading of the feedback. Returns how many of the
-  // nodes were linked to tiles that are there already.
+  // Requests the tiles of one reading; `wanted` maps leaf address -> priority. Returns the number
+  // of nodes that were linked to loaded tiles.
   demand(wanted, nowMs) {
     const byKey = new Map();
     let linked = 0, unmet = 0;
@@ -53,7 +53,8 @@ export class TileLoader extends Loader {
     return linked;
   }
 
-  // Loads one tile that no other refers to. Resolves to its words, undefined after dispose().
+  // Loads the root, a tile that no other tile refers to. Resolves to its words, or to undefined
+  // after dispose().
   async loadRoot(level, offset) {
     const {signal} = this.ending;
     for (let tries = 1;; ++tries) {
@@ -82,7 +83,7 @@ export class TileLoader extends Loader {
     }
   }
 
-  // What lies below another root already is seen at once, not only when a reading has asked for it.
+  // Links loaded tiles below a new root immediately, without waiting for a reading.
   linkRoot() {
     const {store} = this, {root} = store;
     for (let i = 0; i < (root.addresses?.length ?? 0); ++i) {

@@ -1,23 +1,23 @@
-// The GPU's memory for tiles: texels of four words in one unsigned integer texture, divided into
-// blocks, and the table that says for each slot where its tile begins. A tile takes any free
-// blocks, so memory does not fragment. Few views need much: a large pool begins small, and takes
-// its final size at once when it is full. Both textures, and while it grows the third, are together
-// at most the budget. Where there is no memory for more, a pool stays as small as it is.
+// The GPU's memory for tiles: a texture of four-word texels, divided into blocks, and a table with
+// the pointer to the tile of each slot. A tile uses any free blocks, so memory does not fragment.
+// Few views need much memory: a large pool starts small and grows to its final size in one step.
+// Both textures, and the third one while the pool grows, together never exceed the budget. If the
+// GPU has no memory for the larger texture, the pool keeps its size.
 
 import {kBlockTexels, kTexelWords} from "./tile_format.js";
 
-const kRowTexels = 4096, kTableWidth = 1024;  // texture widths; the shaders know them
+const kRowTexels = 4096, kTableWidth = 1024;  // texture widths, also in the shaders
 const kMaxRows = 4096;                        // addresses have 24 bits
 const kBlocksPerRow = kRowTexels / kBlockTexels;
 const kTexelBytes = kTexelWords * 4;
-const kFirstRows = 256;  // of a pool that grows: 16 MiB
+const kFirstRows = 256;  // initial size of a growing pool: 16 MiB
 const kErrorFlags = 8;   // more than WebGL has
 
 export class TilePool {
   constructor(gl, budgetBytes) {
     this.gl = gl;
-    // A tile has one block or more, so there are at most as many slots; and an entry of the table
-    // for each.
+    // A tile has at least one block, so there are at most as many slots as blocks. Each slot has an
+    // entry in the table.
     const rowBytes = kRowTexels * kTexelBytes + kBlocksPerRow * 4;
     const rows = Math.floor((budgetBytes - kTableWidth * 4) / rowBytes);
     if (rows < 1) throw new Error(`A budget of ${budgetBytes} bytes is too small for the viewer.`);
@@ -25,7 +25,7 @@ export class TilePool {
     this.maxRows =
         Math.min(grows ? rows - kFirstRows : rows, kMaxRows, gl.getParameter(gl.MAX_TEXTURE_SIZE));
     this.rows = grows ? kFirstRows : this.maxRows;
-    this.blockCount = this.maxRows * kBlocksPerRow;  // in the end
+    this.blockCount = this.maxRows * kBlocksPerRow;  // of the final size
     this.tableRows = Math.ceil(this.blockCount / kTableWidth);
     this.slotCount = this.tableRows * kTableWidth;
     this.texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.rows);
@@ -43,8 +43,7 @@ export class TilePool {
     return this.free.length + this.blockCount - this.nextBlock;
   }
 
-  // Block numbers, or null if there are not so many free ones: also if there seemed to be, but the
-  // pool cannot grow.
+  // Returns block numbers, or null if too few blocks are free or the pool cannot grow.
   allocate(count) {
     if (this.freeBlocks < count) return null;
     const end = this.nextBlock + Math.max(0, count - this.free.length);
@@ -55,8 +54,8 @@ export class TilePool {
     return blocks.sort();
   }
 
-  // The texture is another one afterwards. False if there is no memory for it: the pool then keeps
-  // its size.
+  // Replaces the texture by a larger one. Returns false, and keeps the size, if the GPU has no
+  // memory.
   grow() {
     const {gl} = this, before = this.texels;
     for (let flags = 0; flags < kErrorFlags && gl.getError() !== gl.NO_ERROR; ++flags)
@@ -117,7 +116,7 @@ export class TilePool {
     return absolute(root);
   }
 
-  // Texels within one row.
+  // Writes texels within one row.
   write(texel, words) {
     const {gl} = this;
     gl.bindTexture(gl.TEXTURE_2D, this.texels);
@@ -126,7 +125,7 @@ export class TilePool {
         words.length / kTexelWords, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
   }
 
-  // `pointer` to the root of the slot's tile, 0 if it is not there.
+  // Sets the pointer to the root of the slot's tile, 0 if the tile is not loaded.
   setSlot(slot, pointer) {
     const {gl} = this;
     gl.bindTexture(gl.TEXTURE_2D, this.table);

@@ -1,22 +1,21 @@
-// The tiles in the pool, by node, and which of them leave when it is full.
+// The loaded tiles by node, and their eviction when the pool is full.
 //
-// Tiles refer to each other by slots: a cut-off node in the pool names the slot of its tile, and
-// the pool's table says where that is, or that it is not there. So equal subtrees share one tile,
-// and a tile that leaves costs one write. A slot lives while its tile is loaded or a loaded tile
-// refers to it.
+// Tiles refer to each other by slots: a cut-off node in the pool contains the slot of its tile, and
+// the table of the pool contains the tile's pointer, or 0. So equal subtrees share one tile, and an
+// eviction costs one write. A slot exists while its tile is loaded or a loaded tile refers to it.
 //
-// A tile leaves only if it was not seen in the current view ("epoch"), and not at all recently
-// while the camera moves. What was loaded for a view stays until the next one. Therefore the number
-// of tiles that are fetched for one view is bounded, however small the pool is.
+// A tile is evicted only if the current view ("epoch") does not use it, and, while the camera
+// moves, if it was not used recently. Tiles loaded for a view remain until the next view. Therefore
+// the number of tiles fetched for one view is bounded, however small the pool is.
 
 import {kRoundsToKnow} from "./loader.js";
 import {decodeTile, kBlockTexels, kTexelWords, tileShape} from "./tile_format.js";
 
 const kRecentMs = 1500;
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
-const kFreeShare = 1 / 64;  // of the pool, that leaves at once
+const kFreeShare = 1 / 64;  // share of the pool that one eviction frees
 
-// A number for a node: offsets are below 2^40.
+// A unique number of a node; offsets are below 2^40.
 export function keyOf(level, offset) {
   return offset * 32 + level;
 }
@@ -47,8 +46,7 @@ export class TileStore {
     return this.tiles.get(keyOf(level, offset));
   }
 
-  // The cut-off node in a texel of the pool, {tile, index, level, offset, key}; null if there is
-  // none (any more).
+  // Returns the cut-off node in a texel of the pool, {tile, index, level, offset, key}, or null.
   cutOffNode(texel) {
     const block = Math.floor(texel / kBlockTexels), tile = this.owner[block];
     if (!tile || !tile.addresses) return null;
@@ -58,7 +56,7 @@ export class TileStore {
     return {tile, index, level, offset, key: keyOf(level, offset), texel};
   }
 
-  // The same by the node's place in its tile.
+  // Returns the same by the index of the node in its tile.
   leaf(tile, index) {
     const at = tile.leafBegin + index;
     return this.cutOffNode(
@@ -77,8 +75,8 @@ export class TileStore {
     return true;
   }
 
-  // Stores a tile as fetched. False if the pool is full of what the view needs. Throws if the tile
-  // is damaged.
+  // Stores a fetched tile. Returns false if the view needs everything in the full pool. Throws if
+  // the tile is damaged.
   add(level, offset, words, nowMs) {
     const key = keyOf(level, offset);
     if (this.tiles.has(key)) return true;
@@ -121,7 +119,7 @@ export class TileStore {
     this.root = this.get(level, offset);
   }
 
-  // The only brick of a grid of 4^3 voxels, as two words. Returns the pointer to it.
+  // Stores the only brick of a grid of 4^3 voxels, two words. Returns its pointer.
   addBrick(brick) {
     const words = new Uint32Array(kBlockTexels * kTexelWords);
     words.set(brick);
@@ -130,7 +128,7 @@ export class TileStore {
     return this.pool.upload(blocks, {words, pointers: [], root: 0});
   }
 
-  // The tile in a slot was seen in a picture of epoch `epoch`.
+  // Marks the tile in a slot as used by a picture of epoch `epoch`.
   mark(slot, epoch, nowMs) {
     const tile = this.bySlot[slot]?.tile;
     if (!tile) return;
@@ -138,8 +136,8 @@ export class TileStore {
     if (epoch > tile.epoch) tile.epoch = epoch;
   }
 
-  // Makes room for a tile of `count` blocks. A slot may be taken by a tile that has left, as long
-  // as others refer to it; so these leave until one is free.
+  // Evicts tiles until `count` blocks, and a slot if needed, are free. An evicted tile keeps its
+  // slot while others refer to it, so evictions continue until a slot is free.
   evictFor(count, needsSlot, nowMs) {
     const fits = (blocks) =>
         this.pool.freeBlocks >= blocks && (!needsSlot || this.pool.hasFreeSlot);
