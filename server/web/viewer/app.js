@@ -347,37 +347,29 @@ export class Viewer {
     if (this.signal.aborted) return;
     const statistics = this.renderer.statistics();
     this.panel.showStatistics(statistics);
-    const {problem} = this.renderer, {refusal} = this;
-    const {loading} = statistics;
-    this.showStatus(
-        this.renderer.context.isLost ? "The graphics card is not available: waiting for it." :
-            problem                  ? problemText(problem) :
-            refusal                  ? refusal :
-            loading > 0              ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"             }…` :
-                                       "",
-        problem?.code === "replaced");
-    this.places.status.classList.toggle("bad", Boolean(problem || refusal));
+    const {problem} = this.renderer;
+    this.showStatus(this.currentStatus(problem, statistics.loading), problem?.code === "replaced");
+    this.places.status.classList.toggle("bad", Boolean(problem || this.refusal));
+  }
+
+  currentStatus(problem, loading) {
+    if (this.renderer.context.isLost) return "The graphics card is not available: waiting for it.";
+    if (problem) return problemText(problem);
+    if (this.refusal) return this.refusal;
+    return loading > 0 ? `Loading ${loading} ${loading === 1 ? "tile" : "tiles"}…` : "";
   }
 
   showStatus(text, canReload) {
     if (text === this.statusText) return;
     this.statusText = text;
-    this.places.status.replaceChildren(
-        text,
-        ...(canReload ?
-                [
-                  " ",
-                  h("button",
-                    {type: "button", class: "small", on: {click: () => location.reload()}},
-                    "Reload")
-                ] :
-                []));
+    const {status} = this.places, on = {click: () => location.reload()};
+    status.replaceChildren(text);
+    if (canReload) status.append(" ", h("button", {type: "button", class: "small", on}, "Reload"));
   }
 }
 
 function problemText({code, message}) {
   if (code === "unauthorized") return "The service no longer accepts the token: reload the page.";
-  return code === "unreachable" ?
-      `${message} Missing parts are drawn coarse and requested again.` :
-      message;
+  return code === "unreachable" ? `${message} Missing parts are drawn coarse and requested again.` :
+                                  message;
 }

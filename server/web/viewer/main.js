@@ -95,6 +95,12 @@ async function jobNow(mayBe) {
   }
 }
 
+function waitingText(job) {
+  if (!job) return "The service does not answer. Trying again.";
+  return hasEnded(job.state) ? "It has no result. If it is retried, its result appears here." :
+                               "Its result appears here when the job is done.";
+}
+
 // The message about a job that has nothing to draw.
 class WaitingMessage {
   constructor({PartialView}) {
@@ -112,12 +118,7 @@ class WaitingMessage {
     if (before && said !== this.heading.textContent)
       announce(job ? said : "The service does not answer.");
     setText(this.heading, said);
-    setText(
-        this.text,
-        !job ? "The service does not answer. Trying again." :
-            hasEnded(job.state) ?
-               "It has no result. If it is retried, its result appears here." :
-               "Its result appears here when the job is done.");
+    setText(this.text, waitingText(job));
     // The focus is kept.
     if (place("message").hidden || !this.heading.isConnected)
       showMessage(this.heading, this.text, this.cubes.element, this.buttons);

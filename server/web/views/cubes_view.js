@@ -97,12 +97,9 @@ export class CubesView {
   // An ended job gets cubes only if it is retried. `known`: the service has reported that it has
   // none.
   sayWhyEmpty(ended, known) {
-    if (this.resolution === undefined)
-      setText(
-          this.note,
-          !ended    ? "Shown when the subvolumes are planned." :
-              known ? "There are no subvolumes." :
-                      "");
+    if (this.resolution !== undefined) return;
+    const end = known ? "There are no subvolumes." : "";
+    setText(this.note, ended ? end : "Shown when the subvolumes are planned.");
   }
 
   turnBy(by) {

@@ -8,65 +8,68 @@ import {copyButton, problemBox} from "./parts.js";
 
 const kMaxInMemoryBytes = 2 ** 30;
 
-// `reload` is called after each action.
+// Elements for the actions; `reload` is called after each action.
 export function actions(job, reload) {
   const error = h("div", {role: "alert"});
+  const button = (text, action, kind = "") => actionButton(text, action, kind, error);
   const post = (name) => async () => {
     await sendJson("POST", `${job.links.self}/${name}`);
     await reload();
   };
-  const button = (text, action, kind = "") => {
-    const element =
-        h("button", {type: "button", class: kind, "data-action": text.toLowerCase()}, text);
-    element.addEventListener("click", async () => {
-      if (element.hasAttribute("aria-busy")) return;
-      element.setAttribute("aria-busy", "true");  // a disabled button would lose the focus
-      clear(error);
-      try {
-        await action();
-      } catch (problem) {
-        if (problem.code === undefined) throw problem;
-        clear(error, problemBox(problem));
-      } finally {
-        element.removeAttribute("aria-busy");
-      }
-    });
-    return element;
+  const cancel = async () => {
+    if (await confirmAction(
+            "Cancel this job?", "Its partial result will be deleted.", "Cancel the job"))
+      await post("cancel")();
   };
   const may = (...states) => states.includes(job.state);
-  const view = () => h("a", {class: "button", href: `/viewer.html?job=${job.id}`}, "View");
   const buttons = [
     may("succeeded") && button("Download", () => download(job), "primary"),
-    may("succeeded") && view(),
+    may("succeeded") && viewLink(job),
     may("suspended") && button("Resume", post("resume"), "primary"),
     may("failed", "canceled") && button("Retry", post("retry"), "primary"),
     may("queued", "running") && button("Suspend", post("suspend")),
-    may("running", "suspended") && view(),
-    may("queued", "running", "suspended") &&
-        button(
-            "Cancel",
-            async () => {
-              if (await confirmAction(
-                      "Cancel this job?", "Its partial result will be deleted.", "Cancel the job"))
-                await post("cancel")();
-            },
-            "danger"),
-    hasEnded(job.state) &&
-        button(
-            "Delete",
-            async () => {
-              const what = job.state === "succeeded" ?
-                  "Its result, report and log will be deleted." :
-                  "Its log will be deleted.";
-              if (!await confirmAction("Delete this job?", what, "Delete the job")) return;
-              await sendJson("DELETE", job.links.self);
-              location.hash = "#/";
-            },
-            "danger"),
-    may("succeeded") &&
-        h("a", {class: "button quiet", href: `#/new?like=${job.id}`}, "Copy to new job"),
+    may("running", "suspended") && viewLink(job),
+    may("queued", "running", "suspended") && button("Cancel", cancel, "danger"),
+    hasEnded(job.state) && button("Delete", () => deleteJob(job), "danger"),
+    may("succeeded") && copyLink(job),
   ];
   return [h("div", {class: "buttons"}, buttons), error];
+}
+
+// A button that is busy during its action, and shows a Problem in the element `error`.
+function actionButton(text, action, kind, error) {
+  const element =
+      h("button", {type: "button", class: kind, "data-action": text.toLowerCase()}, text);
+  element.addEventListener("click", async () => {
+    if (element.hasAttribute("aria-busy")) return;
+    element.setAttribute("aria-busy", "true");  // a disabled button would lose the focus
+    clear(error);
+    try {
+      await action();
+    } catch (problem) {
+      if (problem.code === undefined) throw problem;
+      clear(error, problemBox(problem));
+    } finally {
+      element.removeAttribute("aria-busy");
+    }
+  });
+  return element;
+}
+
+function viewLink(job) {
+  return h("a", {class: "button", href: `/viewer.html?job=${job.id}`}, "View");
+}
+
+function copyLink(job) {
+  return h("a", {class: "button quiet", href: `#/new?like=${job.id}`}, "Copy to new job");
+}
+
+async function deleteJob(job) {
+  const text = job.state === "succeeded" ? "Its result, report and log will be deleted." :
+                                           "Its log will be deleted.";
+  if (!await confirmAction("Delete this job?", text, "Delete the job")) return;
+  await sendJson("DELETE", job.links.self);
+  location.hash = "#/";
 }
 
 function fileName(job) {

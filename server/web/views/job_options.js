@@ -6,138 +6,169 @@ import {gridText} from "../lib/format.js";
 
 const kMinLevel = 2, kMaxLevel = 20;
 const kDefaultLevel = 11;
+const kAutomatic = ["", "Automatic"];
+const kAttributes = {
+  alpha: "Alpha",
+  normal: "Normals",
+  material: "Materials"
+};
+
+// The form fields of all options; `on` are their listeners. The keys of `options` are the names in
+// a request. An option is sent if its field is not empty.
+class Fields {
+  constructor(on) {
+    this.on = on;
+    this.resolution = this.choice(gridChoices(kMinLevel, kMaxLevel));
+    this.resolution.value = String(2 ** kDefaultLevel);
+    this.priority = this.number({min: "-100", max: "100", step: "1", placeholder: "0"});
+    this.cube = this.choice(
+        [["", "Bounds of the scene"], ["bounds", "Corner and edge"], ["voxel_size", "Voxel size"]]);
+    this.bounds = ["X", "Y", "Z", "Edge"].map(
+        (name) => this.number({step: "any", "aria-label": `Bounds: ${name}`, placeholder: name}));
+    this.skipInvalid = this.checkBox("skip-invalid");
+    this.color = this.checkBox("color");
+    this.attributes =
+        Object.keys(kAttributes).map((name) => this.checkBox(`attribute-${name}`, name));
+    this.options = {
+      voxel_size: this.number({step: "any", min: "0"}),
+      color_resolution: this.choice([kAutomatic, ...gridChoices(kMinLevel, kMaxLevel)]),
+      hash_bits: this.number({min: "4", max: "64", step: "1", placeholder: "64"}),
+      memory: h("input", {placeholder: "2GiB", autocomplete: "off", on}),
+      threads: this.number({min: "1", step: "1", placeholder: "default"}),
+      subvolume: this.choice([kAutomatic, ...gridChoices(6, 14)]),
+      backend: this.choice([
+        kAutomatic, ["cpu", "CPU"], ["cuda", "CUDA"], ["parallel-host", "GPU pipeline on the CPU"]
+      ]),
+      method: this.choice(
+          [kAutomatic, ["consing", "Consing"], ["pointers", "Pointers"], ["hashes", "Hashes"]]),
+    };
+  }
+
+  number(attributes) {
+    return h("input", {type: "number", ...attributes, on: this.on});
+  }
+  checkBox(id, value = null) {
+    return h("input", {type: "checkbox", id, value, on: this.on});
+  }
+  choice(entries) {
+    return h("select", {on: this.on}, entries.map(([value, text]) => h("option", {value}, text)));
+  }
+}
 
 export class JobOptions {
   constructor(changed) {
-    const watch = {on: {change: changed}};
-    const number = (attributes) => h("input", {type: "number", ...attributes, ...watch});
-    const choice = (...options) =>
-        h("select", watch, options.map(([value, text]) => h("option", {value}, text)));
-    const powers = (from, to) => Array.from({length: to - from + 1}, (_, i) => 2 ** (from + i));
-    this.resolution = choice(...powers(kMinLevel, kMaxLevel).map((r) => [r, gridText(r)]));
-    this.resolution.value = String(2 ** kDefaultLevel);
+    const fields = this.fields = new Fields({
+      change: () => {
+        this.showRows();
+        changed();
+      }
+    });
     this.resolutionField =
-        field("Resolution", this.resolution, "Voxels along each edge of the cube.");
-
-    this.cube = choice(
-        ["", "Bounds of the scene"], ["bounds", "Corner and edge"], ["voxel_size", "Voxel size"]);
-    this.bounds = ["X", "Y", "Z", "Edge"].map(
-        (name) => number({step: "any", "aria-label": `Bounds: ${name}`, placeholder: name}));
-    this.voxel_size = number({step: "any", min: "0"});
-    this.boundsRow = h(
-        "div", {class: "field", role: "group", "aria-label": "Bounds"},
-        h("span", {class: "label"}, "Low corner and edge"), h("div", {class: "four"}, this.bounds));
-    this.sizeRow = field("Edge of a voxel", this.voxel_size, "In the scene's units.");
-    this.skip_invalid = h("input", {type: "checkbox", id: "skip-invalid", ...watch});
-    this.color = h("input", {type: "checkbox", id: "color", ...watch});
-    this.attributes = ["alpha", "normal", "material"].map(
-        (name) => h("input", {type: "checkbox", id: `attribute-${name}`, value: name, ...watch}));
-    this.color_resolution =
-        choice(["", "Automatic"], ...powers(kMinLevel, kMaxLevel).map((k) => [k, gridText(k)]));
-    this.colorRow = field(
-        "Color grid", this.color_resolution,
-        "At most the resolution; finer voxels have the color of their cell.");
-    this.hash_bits = number({min: "4", max: "64", step: "1", placeholder: "64"});
-    this.memory = h("input", {placeholder: "2GiB", autocomplete: "off", ...watch});
-    this.threads = number({min: "1", step: "1", placeholder: "default"});
-    this.subvolume =
-        choice(["", "Automatic"], ...powers(6, 14).map((edge) => [edge, gridText(edge)]));
-    this.backend = choice(
-        ["", "Automatic"], ["cpu", "CPU"], ["cuda", "CUDA"],
-        ["parallel-host", "GPU pipeline on the CPU"]);
-    this.method = choice(
-        ["", "Automatic"], ["consing", "Consing"], ["pointers", "Pointers"], ["hashes", "Hashes"]);
-    this.priority = number({min: "-100", max: "100", step: "1", placeholder: "0"});
-    this.cube.addEventListener("change", () => this.showRows());
-    for (const input of [this.color, ...this.attributes])
-      input.addEventListener("change", () => this.showRows());
+        field("Resolution", fields.resolution, "Voxels along each edge of the cube.");
     this.element =
         h("details", {class: "card"}, h("summary", {}, h("h2", {}, "Options")),
-          h("div", {class: "options"},
-            h("fieldset", {}, h("legend", {}, "Geometry: determines the result"),
-              field("Cube", this.cube), this.boundsRow, this.sizeRow,
-              h("div", {class: "check"}, this.skip_invalid,
-                h("label",
-                  {for: "skip-invalid"
-                  },
-                  "Skip invalid triangles")),
-              h("div", {class: "check"}, this.color,
-                h("label",
-                  {for: "color"
-                  },
-                  "Colors of the scene")),
-              this.attributes.map(
-                  (input, i) =>
-                      h("div", {class: "check"}, input,
-                        h("label",
-                          {for: input.id
-                          },
-                          ["Alpha", "Normals", "Materials"][i]))),
-              this.colorRow, field("Hash bits", this.hash_bits)),
-            h("fieldset", {}, h("legend", {}, "Run: does not affect the result"),
-              field("Memory", this.memory, "For example 512MiB or 8GiB."),
-              field("Threads", this.threads), field("Subvolumes", this.subvolume),
-              field("Backend", this.backend), field("Method", this.method),
-              field("Priority", this.priority, "Higher runs earlier; -100 to 100."))));
+          h("div", {class: "options"}, this.geometryPart(), this.runPart()));
     this.showRows();
   }
 
+  geometryPart() {
+    const {cube, bounds, skipInvalid, color, attributes, options} = this.fields;
+    const boundsAttributes = {class: "field", role: "group", "aria-label": "Bounds"};
+    this.boundsRow =
+        h("div", boundsAttributes, h("span", {class: "label"}, "Low corner and edge"),
+          h("div", {class: "four"}, bounds));
+    this.sizeRow = field("Edge of a voxel", options.voxel_size, "In the scene's units.");
+    this.colorRow = field(
+        "Color grid", options.color_resolution,
+        "At most the resolution; finer voxels have the color of their cell.");
+    return h(
+        "fieldset", {}, h("legend", {}, "Geometry: determines the result"), field("Cube", cube),
+        this.boundsRow, this.sizeRow, checkRow(skipInvalid, "Skip invalid triangles"),
+        checkRow(color, "Colors of the scene"),
+        attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,
+        field("Hash bits", options.hash_bits));
+  }
+
+  runPart() {
+    const {priority, options: {memory, threads, subvolume, backend, method}} = this.fields;
+    return h(
+        "fieldset", {}, h("legend", {}, "Run: does not affect the result"),
+        field("Memory", memory, "For example 512MiB or 8GiB."), field("Threads", threads),
+        field("Subvolumes", subvolume), field("Backend", backend), field("Method", method),
+        field("Priority", priority, "Higher runs earlier; -100 to 100."));
+  }
+
   showRows() {
+    const cube = this.fields.cube.value;
     this.colorRow.hidden = !this.hasCells();
-    this.boundsRow.hidden = this.cube.value !== "bounds";
-    this.sizeRow.hidden = this.cube.value !== "voxel_size";
+    this.boundsRow.hidden = cube !== "bounds";
+    this.sizeRow.hidden = cube !== "voxel_size";
   }
 
   // True if cells have colors or other attributes.
   hasCells() {
-    return [this.color, ...this.attributes].some((input) => input.checked);
+    return [this.fields.color, ...this.fields.attributes].some((input) => input.checked);
   }
 
-  // {resolution, priority?, options?}
+  // {resolution, priority?, options?}. Throws Problem for an invalid field.
   values() {
-    const options = {};
-    if (this.cube.value === "bounds")
-      options.bounds = this.bounds.map((input) => numberOf(input, "The bounds"));
-    if (this.cube.value === "voxel_size")
-      options.voxel_size = numberOf(this.voxel_size, "The voxel size");
-    if (this.skip_invalid.checked) options.skip_invalid = true;
-    if (this.color.checked) options.color = true;
-    const attributes = this.attributes.filter((input) => input.checked).map((input) => input.value);
-    if (attributes.length) options.attributes = attributes;
-    if (this.hasCells() && this.color_resolution.value)
-      options.color_resolution = Number(this.color_resolution.value);
-    if (this.hash_bits.value) options.hash_bits = numberOf(this.hash_bits, "The hash bits");
-    if (this.memory.value.trim()) options.memory = this.memory.value.trim();
-    if (this.threads.value) options.threads = numberOf(this.threads, "The threads");
-    if (this.subvolume.value) options.subvolume = Number(this.subvolume.value);
-    if (this.backend.value) options.backend = this.backend.value;
-    if (this.method.value) options.method = this.method.value;
+    const {resolution, priority} = this.fields, options = this.optionValues();
     return {
-      resolution: Number(this.resolution.value),
-      ...(this.priority.value && {priority: numberOf(this.priority, "The priority")}),
+      resolution: Number(resolution.value),
+      ...(priority.value && {priority: numberOf(priority, "The priority")}),
       ...(Object.keys(options).length && {options})
     };
   }
 
+  optionValues() {
+    const {cube, bounds, skipInvalid, color, attributes, options: inputs} = this.fields;
+    const hidden = {voxel_size: cube.value !== "voxel_size", color_resolution: !this.hasCells()};
+    const chosen = attributes.filter((input) => input.checked).map((input) => input.value);
+    const values = {
+      ...(cube.value === "bounds" &&
+          {bounds: bounds.map((input) => numberOf(input, "The bounds"))}),
+      ...(skipInvalid.checked && {skip_invalid: true}),
+      ...(color.checked && {color: true}),
+      ...(chosen.length && {attributes: chosen}),
+    };
+    for (const [name, input] of Object.entries(inputs)) {
+      const isRequired = name === "voxel_size";
+      if (!hidden[name] && (isRequired || input.value.trim())) values[name] = valueOf(name, input);
+    }
+    return values;
+  }
+
   // Copies the options of a job.
   set({resolution, priority, options = {}}) {
-    this.resolution.value = String(resolution);
-    if (priority) this.priority.value = String(priority);
-    this.cube.value = options.bounds ? "bounds" : options.voxel_size ? "voxel_size" : "";
-    options.bounds?.forEach((value, i) => {
-      this.bounds[i].value = String(value);
-    });
-    this.skip_invalid.checked = Boolean(options.skip_invalid);
-    const given = [options.attributes ?? []].flat();
-    this.color.checked = Boolean(options.color) || given.includes("color");
-    for (const input of this.attributes) input.checked = given.includes(input.value);
-    for (const name
-             of ["voxel_size", "color_resolution", "hash_bits", "memory", "threads", "subvolume",
-                 "backend", "method"])
-      if (options[name] !== undefined) this[name].value = String(options[name]);
+    const {fields} = this, attributes = [options.attributes ?? []].flat();
+    fields.resolution.value = String(resolution);
+    if (priority) fields.priority.value = String(priority);
+    fields.cube.value = options.bounds ? "bounds" : options.voxel_size ? "voxel_size" : "";
+    options.bounds?.forEach((value, i) => fields.bounds[i].value = String(value));
+    fields.skipInvalid.checked = Boolean(options.skip_invalid);
+    fields.color.checked = Boolean(options.color) || attributes.includes("color");
+    for (const input of fields.attributes) input.checked = attributes.includes(input.value);
+    for (const [name, input] of Object.entries(fields.options))
+      if (options[name] !== undefined) input.value = String(options[name]);
     this.showRows();
     this.element.open = Object.keys(options).length > 0;
   }
+}
+
+function gridChoices(minLevel, maxLevel) {
+  const edges = Array.from({length: maxLevel - minLevel + 1}, (_, i) => 2 ** (minLevel + i));
+  return edges.map((edge) => [edge, gridText(edge)]);
+}
+
+function checkRow(input, label) {
+  return h("div", {class: "check"}, input, h("label", {for: input.id
+           }, label));
+}
+
+// The value of an option in a request.
+function valueOf(name, input) {
+  if (["memory", "backend", "method"].includes(name)) return input.value.trim();
+  return numberOf(input, `The ${name.replace("_", " ")}`);
 }
 
 function numberOf(input, what) {

@@ -96,9 +96,9 @@ uint spread_bits(int x) {
   return uint((x & 1) | (x & 2) << 2 | (x & 4) << 4);
 }
 
-// The color of the cell of 2^scale voxels with this low corner, or of the nearest coarser cell whose
-// page is loaded. For a cell that finer ones will replace, a page counts as missing only if the
-// color is much coarser.
+// The color of the cell of 2^scale voxels with this low corner, or of the nearest coarser cell
+// whose page is loaded. For a cell that finer ones will replace, a page counts as missing only if
+// the color is much coarser.
 uint color_of_cell(ivec3 cell, int scale, bool is_final) {
   int wanted = min(u_levels - scale, u_color_levels);
   ivec3 at = cell >> (u_levels - wanted);

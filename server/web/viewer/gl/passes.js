@@ -191,35 +191,14 @@ export class Passes {
   // parts of at most `partPixels()` pixels. Returns the reading of the feedback. Its `colors` is
   // the reading of the color feedback, ready at the same time, or null if no colors are shown.
   * draw(values, partPixels) {
-    const {
-      targets,
-      gl
-    } = this,
-  {width, height, hits, light, sky, colors, feedback, colorFeedback, feedbackBlock, colorBlock} =
-        targets;
-    const share = this.floats ? 1 / (values.u_frame + 1) : 1;
-    const [before, after] = [colors[targets.current], colors[1 - targets.current]];
-    const all = {
-      ...values,
-      u_size: [width, height],
-      u_hits: hits.textures[0],
-      u_light: light.textures[0],
-      u_sky: sky.textures[0],
-      u_normals: light.textures[1],
-      u_colors: hits.textures[1] || hits.textures[0],
-      u_colored: hits.textures.length > 1,
-      u_shadow_missing: light.textures[2],
-      u_before: before.textures[0],
-      u_share: share,
-      u_range: this.colorRange,
-      ...blocksOf(feedbackBlock, values.u_seed)
-    };
-    const partsOf = (edge) => [Math.ceil(width / edge), Math.ceil(height / edge)];
+    const {targets} = this, {width, height, hits, light, sky, colors} = targets;
+    const all = this.passValues(values);
+    const steps = [
+      [this.trace, hits, width, height], [this.light, light, width, height],
+      [this.occlusion, sky, Math.ceil(width / 2), Math.ceil(height / 2)]
+    ];
     let left = partPixels();
-    const [skyWidth, skyHeight] = partsOf(2);
-    for (const [program, target, columns, allRows] of [
-             [this.trace, hits, width, height], [this.light, light, width, height],
-             [this.occlusion, sky, skyWidth, skyHeight]])
+    for (const [program, target, columns, allRows] of steps)
       for (let row = 0, rows; row < allRows; row += rows) {
         if (left < columns) {
           yield null;
@@ -229,17 +208,43 @@ export class Passes {
         program.draw(target, all, columns, allRows, {row, rows});
         left -= rows * columns;
       }
-    this.combine.draw(after, all, width, height);
+    this.combine.draw(colors[1 - targets.current], all, width, height);
     targets.current = 1 - targets.current;
-    this.feedback.draw(feedback, all, ...partsOf(feedbackBlock));
-    let ofColors = null;
-    if (colorFeedback && values.u_color_levels >= 0) {
-      this.colorFeedback.draw(
-          colorFeedback, {...all, ...blocksOf(colorBlock, values.u_seed)}, ...partsOf(colorBlock));
-      ofColors = new AsyncReading(gl, colorFeedback, ...partsOf(colorBlock));
-    }
-    return Object.assign(
-        new AsyncReading(gl, feedback, ...partsOf(feedbackBlock)), {colors: ofColors});
+    return this.drawFeedback(all);
+  }
+
+  // The uniforms of all passes of a sample.
+  passValues(values) {
+    const {width, height, hits, light, sky, colors, current} = this.targets;
+    return {
+      ...values,
+      u_size: [width, height],
+      u_hits: hits.textures[0],
+      u_light: light.textures[0],
+      u_sky: sky.textures[0],
+      u_normals: light.textures[1],
+      u_colors: hits.textures[1] || hits.textures[0],
+      u_colored: hits.textures.length > 1,
+      u_shadow_missing: light.textures[2],
+      u_before: colors[current].textures[0],
+      u_share: this.floats ? 1 / (values.u_frame + 1) : 1,
+      u_range: this.colorRange
+    };
+  }
+
+  drawFeedback(values) {
+    const {feedback, colorFeedback, feedbackBlock, colorBlock} = this.targets;
+    const colors = colorFeedback && values.u_color_levels >= 0 ?
+        this.read(this.colorFeedback, colorFeedback, colorBlock, values) :
+        null;
+    return Object.assign(this.read(this.feedback, feedback, feedbackBlock, values), {colors});
+  }
+
+  // Draws a feedback with one texel per block of pixels, and starts to read it.
+  read(program, target, block, values) {
+    const size = [this.targets.width, this.targets.height].map((edge) => Math.ceil(edge / block));
+    program.draw(target, {...values, ...blocksOf(block, values.u_seed)}, ...size);
+    return new AsyncReading(this.gl, target, ...size);
   }
 
   // Draws the accumulated picture to the canvas.

@@ -157,7 +157,7 @@ vec2 sample_pair(ivec2 pixel, int dimension) {
 `;
 
 const kBlocked = `
-// True if something within ` reach` blocks the light.
+// True if something blocks the light within the reach.
 bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out Hit hit) {
   // In a narrow place the start may be occupied. The path of the camera ray is free, unless the eye
   // is in an occupied cell.

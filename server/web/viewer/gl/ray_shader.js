@@ -115,8 +115,8 @@ void note_wire(ivec3 position, int scale, int axis, float t) {
 #endif
 
 // The first occupied cell between t_min and t_max. An occupied cell that is no wider than the cone,
-// which is cone.x + cone.y * t wide, is hit as one cell. So is the finest cell in the coarse brick of
-// a tile that is not loaded.
+// which is cone.x + cone.y * t wide, is hit as one cell. So is the finest cell in the coarse brick
+// of a tile that is not loaded.
 bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
   int edge = 1 << u_levels;
   ivec3 mirrored = ivec3(ray_mirror >> 2 & 1u, ray_mirror >> 1 & 1u, ray_mirror & 1u);

@@ -5,6 +5,8 @@ import {countText, hasEnded, stateText, titleText} from "../../lib/format.js";
 
 import {kStyles} from "./subvolume_wires.js";
 
+const kNoAnswer = "The service does not answer. The picture shows the last known state.";
+
 export class Banner {
   constructor(wires) {
     this.wires = wires;
@@ -31,17 +33,18 @@ export class Banner {
 
   // `job` is null while the service does not answer. The counts are the last known ones.
   show(job, {built = 0, total = 0}) {
-    const what = `${countText(built)} of ${countText(total)} occupied subvolumes are built`;
-    setText(
-        this.text,
-        !job ? "The service does not answer. The picture shows the last known state." :
-            hasEnded(job.state) ?
-               `${titleText(job)} is ${
-                   stateText(job.state)} and has no result. The picture shows its built part.` :
-               `${stateText(job.state)}: ${what}, drawn coarsely.`);
+    setText(this.text, job ? describe(job, built, total) : kNoAnswer);
     this.kinds.waiting.hidden = this.kinds.built.hidden = !this.wires.drawsAll;
     this.element.classList.toggle("bad", !job || hasEnded(job.state));
   }
+}
+
+function describe(job, built, total) {
+  const state = stateText(job.state);
+  if (hasEnded(job.state))
+    return `${titleText(job)} is ${state} and has no result. The picture shows its built part.`;
+  const count = `${countText(built)} of ${countText(total)} occupied subvolumes are built`;
+  return `${state}: ${count}, drawn coarsely.`;
 }
 
 function sample({color, width, dash}) {

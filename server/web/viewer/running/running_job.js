@@ -153,7 +153,9 @@ async function follow({path, source, renderer, banner, wires, signal}) {
       // Loading the tile may take long; banner and wireframe are updated nevertheless.
       isArriving = true;
       renderer.showRoot(manifest)
-          .catch((error) => console.warn(`voxdag: the partial result is not updated: ${error.message}`))
+          .catch(
+              (error) =>
+                  console.warn(`voxdag: the partial result is not updated: ${error.message}`))
           .finally(() => isArriving = false);
     }
     if (job && await subvolumes.update(job, signal))
