@@ -2,17 +2,19 @@
 """Whole files exported to every format, decoded by other code and compared voxel by voxel.
 
     tests/long/exports_whole.py [--voxdag build/cpu/voxdag] [--digest build/cpu/tests/digest_voxels]
-                                [--folder DIR] [--memory 4GiB] [--formats bt,vdb,...] [--resolution 2048]
+                                [--folder DIR] [--memory 4GiB] [--formats bt,vdb,...]
+                                 [--resolution 2048]
                                 [--may-refuse bt,glb,...]
                                 [FILE.vdag[:X0,Y0,Z0,X1,Y1,Z1] ...]
 
-Without files a generated city is built at --resolution. Each file, or region of it, is exported to each format. The
-formats of --may-refuse, by default none for the city and all for files, may be refused: then the export must name a selection
-that fits, and leave no file. Files have no colors, or the decoders of ply and npz fail. A written file is decoded completely by
-tests/export/whole, which shares nothing with the exporter, and must have the count and the 128 bits of
-order-independent hashes of positions that the reader header finds in the .vdag file; a glb file, the faces between
-voxels and empty cells. Prints a row of a table for each; exit status 1 if anything differs. Takes 12 GB of disk for
-Sponza at 4096^3.
+Without files a generated city is built at --resolution. Each file, or region of it, is exported to
+each format. The formats of --may-refuse, by default none for the city and all for files, may be
+refused: then the export must name a selection that fits, and leave no file. Files have no colors,
+or the decoders of ply and npz fail. A written file is decoded completely by tests/export/whole,
+which shares nothing with the exporter, and must have the count and the 128 bits of
+order-independent hashes of positions that the reader header finds in the .vdag file; a glb file,
+the faces between voxels and empty cells. Prints a row of a table for each; exit status 1 if
+anything differs. Takes 12 GB of disk for Sponza at 4096^3.
 """
 
 import argparse
@@ -83,8 +85,21 @@ def check(options, selection, name, folder):
     output = folder / ("whole" + SUFFIXES.get(name, "." + name))
     region = ["--region", ",".join(selection.region)] if selection.region else []
     started = time.monotonic()
-    status, out, err, seconds, peak = run([options.voxdag, "export", selection.path, "--to", name, "-o", output,
-                                           "--memory", options.memory, "--json", *region])
+    status, out, err, seconds, peak = run(
+        [
+            options.voxdag,
+            "export",
+            selection.path,
+            "--to",
+            name,
+            "-o",
+            output,
+            "--memory",
+            options.memory,
+            "--json",
+            *region,
+        ]
+    )
     wall = time.monotonic() - started
     if status != 0:
         message = err.strip().splitlines()[-1]
@@ -104,17 +119,28 @@ def check(options, selection, name, folder):
     assert peak <= most, f"peak memory {peak:.0f} MiB, expected {most:.0f} MiB at most"
     for path in folder.iterdir():
         path.unlink()
-    return [f"{size / 2**20:.1f} MiB", f"{wall:.1f} s", f"{seconds:.1f} s", f"{peak:.0f} MiB",
-            f"{DECODERS.get(name, 'own')}, {decoding:.0f} s", f"{found[0]:,}".replace(",", " ") +
-            (" faces" if kind == "faces" else " voxels")]
+    return [
+        f"{size / 2**20:.1f} MiB",
+        f"{wall:.1f} s",
+        f"{seconds:.1f} s",
+        f"{peak:.0f} MiB",
+        f"{DECODERS.get(name, 'own')}, {decoding:.0f} s",
+        f"{found[0]:,}".replace(",", " ") + (" faces" if kind == "faces" else " voxels"),
+    ]
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--voxdag", default="build/cpu/voxdag")
     parser.add_argument("--digest", default="build/cpu/tests/digest_voxels")
-    parser.add_argument("--folder", help="where files are written; a temporary folder of the system")
-    parser.add_argument("--memory", default="4GiB", help="of each export, in MiB or GiB; its peak is checked")
+    parser.add_argument(
+        "--folder", help="where files are written; a temporary folder of the system"
+    )
+    parser.add_argument(
+        "--memory", default="4GiB", help="of each export, in MiB or GiB; its peak is checked"
+    )
     parser.add_argument("--formats", help="all that this voxdag has")
     parser.add_argument("--resolution", type=int, default=2048)
     parser.add_argument("--may-refuse", help="formats")
@@ -125,21 +151,29 @@ def main():
     else:
         options.may_refuse = FORMATS if options.files else []
     if not options.formats:
-        known = re.findall(r"^\s*(\w+): ", run([options.voxdag, "export", "--help"])[1], re.MULTILINE)
+        known = re.findall(
+            r"^\s*(\w+): ", run([options.voxdag, "export", "--help"])[1], re.MULTILINE
+        )
         options.formats = ",".join(name for name in FORMATS if name in known)
     failed = 0
     with tempfile.TemporaryDirectory(dir=options.folder) as scratch:
         scratch = Path(scratch)
         if not options.files:
             scene, built = scratch / "city.glb", scratch / "city.vdag"
-            for args in (["generate", "city", scene, "--triangles", str(options.resolution * 100)],
-                         ["build", scene, "-r", str(options.resolution), "-o", built]):
+            for args in (
+                ["generate", "city", scene, "--triangles", str(options.resolution * 100)],
+                ["build", scene, "-r", str(options.resolution), "-o", built],
+            ):
                 status, _, err, *_ = run([options.voxdag, *args])
                 assert status == 0, err
             options.files = [str(built)]
         folder = scratch / "out"
         folder.mkdir()
-        print("| file | format | size | wall | CPU | peak memory | decoder, CPU | equal, one to one |", flush=True)
+        print(
+            "| file | format | size | wall | CPU | peak memory "
+            "| decoder, CPU | equal, one to one |",
+            flush=True,
+        )
         print("|---|---|---|---|---|---|---|---|")
         for text in options.files:
             selection = Selection(options, text)

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Kills builds at random moments, and immediately runs the same command again.
 
-    tests/long/kill_builds.py [--voxdag build/cpu/voxdag] [--kills 300] [--scene FILE] [-r 2048] [--color]
+    tests/long/kill_builds.py [--voxdag build/cpu/voxdag] [--kills 300] [--scene FILE]
+                              [-r 2048] [--color]
 
-Without --scene a terrain is generated. With --color the file has colors. The build is killed (SIGKILL) one to six times, each time at a
-random moment of the remaining time, and started again without a pause; then it runs to its end. What
-must hold:
+Without --scene a terrain is generated. With --color the file has colors. The build is killed
+(SIGKILL) one to six times, each time at a random moment of the remaining time, and started again
+without a pause; then it runs to its end. What must hold:
 
   - no command is refused or fails, whatever the killed one has left or still holds;
   - the file has the SHA-256 of a build that nobody disturbed, and nothing else is left.
@@ -30,16 +31,32 @@ class Builds:
         scene = options.scene
         if not scene:
             scene = folder / "scene.glb"
-            subprocess.run([options.voxdag, "generate", "terrain", scene, "--triangles", "400000"],
-                           check=True, stdout=subprocess.DEVNULL)
-        self.command = [options.voxdag, "build", scene, "-r", str(options.resolution), "-o",
-                        self.output, "--json"] + options.build_options.split() + ["--color"] * options.color
+            subprocess.run(
+                [options.voxdag, "generate", "terrain", scene, "--triangles", "400000"],
+                check=True,
+                stdout=subprocess.DEVNULL,
+            )
+        self.command = (
+            [
+                options.voxdag,
+                "build",
+                scene,
+                "-r",
+                str(options.resolution),
+                "-o",
+                self.output,
+                "--json",
+            ]
+            + options.build_options.split()
+            + ["--color"] * options.color
+        )
         self.kills = self.waits = self.finished_early = 0
         self.failures = []
 
     def start(self):
-        return subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                text=True)
+        return subprocess.Popen(
+            self.command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
 
     def end(self, process):
         """The SHA-256 that a build reports; None if it failed."""
@@ -102,10 +119,15 @@ class Builds:
             self.round(min(self.random.randint(1, 6), kills - self.kills))
             if self.kills // 25 > shown:
                 shown = self.kills // 25
-                print(f"{self.kills} kills, {self.waits} waited for a lock, "
-                      f"{len(self.failures)} failures", flush=True)
-        print(f"{self.kills} kills, {self.finished_early} builds ended before their kill, "
-              f"{self.waits} commands waited for a lock, {len(self.failures)} failures")
+                print(
+                    f"{self.kills} kills, {self.waits} waited for a lock, "
+                    f"{len(self.failures)} failures",
+                    flush=True,
+                )
+        print(
+            f"{self.kills} kills, {self.finished_early} builds ended before their kill, "
+            f"{self.waits} commands waited for a lock, {len(self.failures)} failures"
+        )
         for failure in self.failures:
             print(failure)
         return not self.failures

@@ -11,9 +11,9 @@ ALLOWANCE = 64 * MIB  # of the promise of --memory
 
 
 def holds(build_command, budgets):
-    """Runs `voxdag build` with each budget, in bytes, None for the default, and prints its costs. Returns True if the
-    peak of resident memory, by the report and by the system's own measurement, was at most ALLOWANCE above each
-    budget, and the files were equal."""
+    """Runs `voxdag build` with each budget, in bytes, None for the default, and prints its costs.
+    Returns True if the peak of resident memory, by the report and by the system's own measurement,
+    was at most ALLOWANCE above each budget, and the files were equal."""
     digests, within = set(), True
     for memory in budgets:
         report, measured = _build(build_command, memory)
@@ -22,8 +22,12 @@ def holds(build_command, budgets):
         broken = memory is not None and peak > memory + ALLOWANCE
         within &= not broken
         given = f"{memory // MIB} MiB" if memory else "default"
-        print(f"--memory {given:8} peak {peak / MIB:6.0f} MiB  wall {report['wall_s']:6.1f} s  "
-              f"CPU {report['cpu_s']:6.1f} s  {report['voxels']} voxels{'  TOO MUCH' if broken else ''}", flush=True)
+        print(
+            f"--memory {given:8} peak {peak / MIB:6.0f} MiB  wall {report['wall_s']:6.1f} s  "
+            f"CPU {report['cpu_s']:6.1f} s  {report['voxels']} voxels"
+            f"{'  TOO MUCH' if broken else ''}",
+            flush=True,
+        )
     if len(digests) != 1:
         print("the files differ")
     return within and len(digests) == 1

@@ -3,9 +3,9 @@
 
     tests/long/soak.py [--voxdag build/cpu/voxdag] [--minutes 60] [--clients 20] [--kill-every 5]
 
-Each client repeats, chosen by its seed: upload a scene, submit a job, follow its events, download and
-compare the result, cancel, suspend and resume, retry, delete. Every KILL-EVERY minutes the service is
-killed (SIGKILL) and immediately started again on the same data. What must hold:
+Each client repeats, chosen by its seed: upload a scene, submit a job, follow its events, download
+and compare the result, cancel, suspend and resume, retry, delete. Every KILL-EVERY minutes the
+service is killed (SIGKILL) and immediately started again on the same data. What must hold:
 
   - a result has the SHA-256 that a build without a service gives, and so have its bytes;
   - a job that was acknowledged is never lost, and none fails;
@@ -36,7 +36,7 @@ RESOLUTIONS = [256, 512, 1024]
 ENDED = ("succeeded", "failed", "canceled")
 
 
-class Failure(Exception):
+class SoakError(Exception):
     """Something that must hold does not."""
 
 
@@ -55,7 +55,8 @@ class Service:
         with open(self.log_path, "a", encoding="utf-8") as log:
             self.process = subprocess.Popen(
                 [self.voxdag, "serve", "--port", str(self.port), "--data", self.folder / "data"],
-                stderr=log)
+                stderr=log,
+            )
         deadline = time.monotonic() + 60
         while time.monotonic() < deadline:
             text = self.log_path.read_text(encoding="utf-8")[begin:]
@@ -63,9 +64,9 @@ class Service:
                 self.port = int(found[1])
                 return
             if self.process.poll() is not None:
-                raise Failure(f"the service ended with {self.process.returncode}: {text[-500:]}")
+                raise SoakError(f"the service ended with {self.process.returncode}: {text[-500:]}")
             time.sleep(0.02)
-        raise Failure("the service does not start within 60 s")
+        raise SoakError("the service does not start within 60 s")
 
     def kill(self):
         self.process.kill()
@@ -75,8 +76,10 @@ class Service:
     def usage(self):
         """Resident KiB and open file descriptors."""
         status = Path(f"/proc/{self.process.pid}/status").read_text()
-        return (int(re.search(r"VmRSS:\s+(\d+)", status)[1]),
-                len(os.listdir(f"/proc/{self.process.pid}/fd")))
+        return (
+            int(re.search(r"VmRSS:\s+(\d+)", status)[1]),
+            len(os.listdir(f"/proc/{self.process.pid}/fd")),
+        )
 
 
 class Client(threading.Thread):
@@ -101,12 +104,13 @@ class Client(threading.Thread):
             self.counts[what] = self.counts.get(what, 0) + 1
 
     def request(self, method, path, body=None, headers=None):
-        """The status and bytes of the answer; repeats requests without an answer, and requests refused as busy."""
+        """Returns status and bytes. Repeats requests without an answer or refused as busy."""
         deadline = time.monotonic() + JOB_TIMEOUT_S
         while True:
             try:
-                connection = http.client.HTTPConnection("127.0.0.1", self.service.port,
-                                                        timeout=REQUEST_TIMEOUT_S)
+                connection = http.client.HTTPConnection(
+                    "127.0.0.1", self.service.port, timeout=REQUEST_TIMEOUT_S
+                )
                 try:
                     connection.request(method, path, body, headers or {})
                     answer = connection.getresponse()
@@ -118,13 +122,13 @@ class Client(threading.Thread):
             except (OSError, http.client.HTTPException):
                 self.count("repeated requests")
             if time.monotonic() > deadline:
-                raise Failure(f"{method} {path}: no answer for {JOB_TIMEOUT_S} s")
+                raise SoakError(f"{method} {path}: no answer for {JOB_TIMEOUT_S} s")
             time.sleep(0.2)
 
     def job(self, job_id):
         status, data = self.request("GET", f"/api/v1/jobs/{job_id}")
         if status != 200:
-            raise Failure(f"job {job_id} is lost: {status} {data[:200]}")
+            raise SoakError(f"job {job_id} is lost: {status} {data[:200]}")
         return json.loads(data)
 
     def wait(self, job_id, states):
@@ -134,14 +138,15 @@ class Client(threading.Thread):
             if job["state"] in states:
                 return job
             if job["state"] == "failed":
-                raise Failure(f"job {job_id} failed: {job['error']}")
+                raise SoakError(f"job {job_id} failed: {job['error']}")
             time.sleep(0.1)
-        raise Failure(f"job {job_id} is {job['state']} after {JOB_TIMEOUT_S} s")
+        raise SoakError(f"job {job_id} is {job['state']} after {JOB_TIMEOUT_S} s")
 
     def follow(self, job_id):
         """Reads the event stream until it ends or breaks."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.service.port,
-                                                timeout=REQUEST_TIMEOUT_S)
+        connection = http.client.HTTPConnection(
+            "127.0.0.1", self.service.port, timeout=REQUEST_TIMEOUT_S
+        )
         try:
             connection.request("GET", f"/api/v1/jobs/{job_id}/events")
             answer = connection.getresponse()
@@ -157,17 +162,21 @@ class Client(threading.Thread):
         scene = f"{name}-{self.random.randrange(4)}.glb"
         status, data = self.request("PUT", f"/api/v1/scenes/{scene}", self.scenes[name])
         if status not in (200, 201, 409):
-            raise Failure(f"upload: {status} {data[:200]}")
+            raise SoakError(f"upload: {status} {data[:200]}")
         if self.request("HEAD", f"/api/v1/scenes/{scene}")[0] == 404:
-            return
+            return None
         key = f"{self.number}-{self.random.getrandbits(64):x}"
         body = json.dumps({"scene": scene, "resolution": resolution, "name": key})
-        status, data = self.request("POST", "/api/v1/jobs", body, {
-            "Content-Type": "application/json", "Idempotency-Key": key})
+        status, data = self.request(
+            "POST",
+            "/api/v1/jobs",
+            body,
+            {"Content-Type": "application/json", "Idempotency-Key": key},
+        )
         if status == 404 or status == 409:
-            return
+            return None
         if status != 202:
-            raise Failure(f"submit: {status} {data[:200]}")
+            raise SoakError(f"submit: {status} {data[:200]}")
         job_id = json.loads(data)["id"]
         self.count("jobs")
         plan = self.random.random()
@@ -189,17 +198,17 @@ class Client(threading.Thread):
         status, dag = self.request("GET", f"/api/v1/jobs/{job_id}/dag")
         expected = self.expected[name, resolution]
         if status != 200 or hashlib.sha256(dag).hexdigest() != expected:
-            raise Failure(f"job {job_id}: the downloaded bytes are not those of a local build")
+            raise SoakError(f"job {job_id}: the downloaded bytes are not those of a local build")
         if job["result"]["sha256"] != expected:
-            raise Failure(f"job {job_id}: another SHA-256 than that of a local build")
+            raise SoakError(f"job {job_id}: another SHA-256 than that of a local build")
         self.count("verified")
         return self.remove(job_id)
 
     def remove(self, job_id):
         status, data = self.request("DELETE", f"/api/v1/jobs/{job_id}")
         if status not in (204, 404):
-            raise Failure(f"delete {job_id}: {status} {data[:200]}")
-        return None
+            raise SoakError(f"delete {job_id}: {status} {data[:200]}")
+        return
 
 
 def prepare(voxdag, folder):
@@ -210,9 +219,12 @@ def prepare(voxdag, folder):
         subprocess.run([voxdag, "generate", *arguments, path], check=True, capture_output=True)
         scenes[name] = path.read_bytes()
         for resolution in RESOLUTIONS:
-            built = subprocess.run([voxdag, "build", path, "-r", str(resolution), "-o",
-                                    folder / "out.vdag", "--json"],
-                                   check=True, capture_output=True, text=True)
+            built = subprocess.run(
+                [voxdag, "build", path, "-r", str(resolution), "-o", folder / "out.vdag", "--json"],
+                check=True,
+                capture_output=True,
+                text=True,
+            )
             expected[name, resolution] = json.loads(built.stdout)["sha256"]
     return scenes, expected
 
@@ -241,8 +253,10 @@ def soak(voxdag, folder, arguments):
     service = Service(voxdag, folder)
     begin = time.monotonic()
     counts = {"lock": threading.Lock()}
-    clients = [Client(service, number, expected, scenes, begin + 60 * arguments.minutes, counts)
-               for number in range(arguments.clients)]
+    clients = [
+        Client(service, number, expected, scenes, begin + 60 * arguments.minutes, counts)
+        for number in range(arguments.clients)
+    ]
     for client in clients:
         client.start()
     memory, files, kills = [], [], 0
@@ -250,7 +264,7 @@ def soak(voxdag, folder, arguments):
     while any(client.is_alive() for client in clients):
         now = time.monotonic()
         if service.process.poll() is not None:
-            raise Failure(f"the service ended by itself with {service.process.returncode}")
+            raise SoakError(f"the service ended by itself with {service.process.returncode}")
         if now >= next_line:
             next_line += 60
             rss_kib, descriptors = service.usage()
@@ -258,8 +272,11 @@ def soak(voxdag, folder, arguments):
                 memory.append(rss_kib)
                 files.append(descriptors)
             shown = {k: v for k, v in sorted(counts.items()) if k != "lock"}
-            print(f"{(now - begin) / 60:5.0f} min  {rss_kib / 1024:6.1f} MiB  {descriptors:4} files  "
-                  f"{kills} kills  {shown}", flush=True)
+            print(
+                f"{(now - begin) / 60:5.0f} min  {rss_kib / 1024:6.1f} MiB  {descriptors:4} files  "
+                f"{kills} kills  {shown}",
+                flush=True,
+            )
         if now >= next_kill:
             next_kill += 60 * arguments.kill_every
             service.kill()

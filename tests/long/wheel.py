@@ -3,10 +3,11 @@
 
     tests/long/wheel.py [--folder DIR]
 
-Builds the wheel of this checkout with `pip wheel`, which compiles the complete library, in a separate build folder.
-What must hold: the wheel has the name and the tags that this Python needs (cp312-abi3 from 3.12 on, before that one for
-each version), the package with its types and the license, and no other file. Installed, it runs the program at the top of
-docs/python.md in an empty folder, which makes a picture of something, and mypy knows its types. Needs PyPI.
+Builds the wheel of this checkout with `pip wheel`, which compiles the complete library, in a
+separate build folder. What must hold: the wheel has the name and the tags that this Python needs
+(cp312-abi3 from 3.12 on, before that one for each version), the package with its types and the
+license, and no other file. Installed, it runs the program at the top of docs/python.md in an empty
+folder, which makes a picture of something, and mypy knows its types. Needs PyPI.
 """
 
 import argparse
@@ -24,20 +25,33 @@ from pathlib import Path
 
 REPO = Path(__file__).resolve().parents[2]
 # What is only in the repository must not be found.
-ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")} | {"MPLBACKEND": "Agg"}
+ENVIRONMENT = {
+    name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
+} | {"MPLBACKEND": "Agg"}
 
 
 def run(command, folder, status=0):
     """The output of a command, which must end with this status."""
-    done = subprocess.run([str(part) for part in command], cwd=folder, env=ENVIRONMENT, text=True,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    done = subprocess.run(
+        [str(part) for part in command],
+        cwd=folder,
+        env=ENVIRONMENT,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
     if done.returncode != status:
-        sys.exit(f"{' '.join(map(str, command))}\nstatus {done.returncode}, expected {status}: {done.stdout}")
+        sys.exit(
+            f"{' '.join(map(str, command))}\n"
+            f"status {done.returncode}, expected {status}: {done.stdout}"
+        )
     return done.stdout
 
 
 def field(name):
-    return re.search(rf'^{name} = "(.+)"$', (REPO / "pyproject.toml").read_text(), re.MULTILINE).group(1)
+    return re.search(
+        rf'^{name} = "(.+)"$', (REPO / "pyproject.toml").read_text(), re.MULTILINE
+    ).group(1)
 
 
 def expected_tags():
@@ -54,7 +68,9 @@ def check_wheel(wheel):
     tags, suffix = expected_tags()
     assert wheel.name == f"{name}-{tags}.whl", f"{wheel.name}, expected {name}-{tags}.whl"
     modules = {path.name for path in (REPO / "python" / "voxdag").iterdir() if path.suffix == ".py"}
-    package = {f"voxdag/{file}" for file in modules | {"py.typed", "_native.pyi", "_native" + suffix}}
+    package = {
+        f"voxdag/{file}" for file in modules | {"py.typed", "_native.pyi", "_native" + suffix}
+    }
     with zipfile.ZipFile(wheel) as archive:
         files = {file for file in archive.namelist() if not file.endswith("/")}
         information = {file for file in files if file.startswith(f"{name}.dist-info/")}
@@ -67,8 +83,12 @@ def check_wheel(wheel):
         facts = archive.read(f"{name}.dist-info/WHEEL").decode().splitlines()
         assert f"Tag: {tags}" in facts and "Root-Is-Purelib: false" in facts, facts
         metadata = archive.read(f"{name}.dist-info/METADATA").decode().splitlines()
-        for line in ("Name: voxdag", f"Version: {field('version')}", f"Requires-Python: {field('requires-python')}",
-                     "Requires-Dist: numpy"):
+        for line in (
+            "Name: voxdag",
+            f"Version: {field('version')}",
+            f"Requires-Python: {field('requires-python')}",
+            "Requires-Dist: numpy",
+        ):
             assert line in metadata, f"METADATA has no '{line}'"
         stub = archive.read("voxdag/_native.pyi").decode()
         assert "def build(" in stub and "class" in stub, "the stub says nothing"
@@ -77,18 +97,28 @@ def check_wheel(wheel):
 
 def check_program(python, folder):
     """The first program of the guide, and what its picture shows."""
-    program = re.search(r"^```python\n(.*?)^```", (REPO / "docs" / "python.md").read_text(),
-                        re.MULTILINE | re.DOTALL).group(1)
+    program = re.search(
+        r"^```python\n(.*?)^```",
+        (REPO / "docs" / "python.md").read_text(),
+        re.MULTILINE | re.DOTALL,
+    ).group(1)
     folder.mkdir()
     run([python, "-c", program], folder)
     made = sorted(file.name for file in folder.iterdir())
     assert made == ["scene.png", "scene.vdag", "scene.vdag.report.json"], made
-    shown = run([python, "-c", textwrap.dedent("""
+    shown = run(
+        [
+            python,
+            "-c",
+            textwrap.dedent("""
         import matplotlib.pyplot as plt, numpy as np
         picture = plt.imread("scene.png")[:, :, :3]
         colors, counts = np.unique(picture.reshape(-1, 3), axis=0, return_counts=True)
         print(*picture.shape[:2], len(colors), counts.max() / counts.sum())
-    """)], folder).split()
+    """),
+        ],
+        folder,
+    ).split()
     assert shown[:2] == ["300", "400"], shown
     # The tetrahedron takes a part of the picture, and light makes its sides different.
     assert int(shown[2]) > 20 and float(shown[3]) < 0.95, f"a blank picture: {shown}"
@@ -97,7 +127,8 @@ def check_program(python, folder):
 
 def check_types(python, folder):
     folder.mkdir()
-    (folder / "good.py").write_text(textwrap.dedent("""
+    (folder / "good.py").write_text(
+        textwrap.dedent("""
         import numpy as np
         import numpy.typing as npt
         import voxdag
@@ -106,12 +137,15 @@ def check_types(python, folder):
             dag = voxdag.open(path)
             set_voxels: npt.NDArray[np.bool_] = dag.lookup(np.zeros((1, 3), np.int64))
             return dag.count() + len(set_voxels)
-    """))
-    (folder / "bad.py").write_text(textwrap.dedent("""
+    """)
+    )
+    (folder / "bad.py").write_text(
+        textwrap.dedent("""
         import voxdag
         voxdag.open(7)
         voxdag.build("scene.glb", resolution="64", output="scene.vdag")
-    """))
+    """)
+    )
     run([python, "-m", "mypy", "--strict", "good.py"], folder)
     found = run([python, "-m", "mypy", "--strict", "bad.py"], folder, status=1)
     assert "bad.py:3: error: Argument 1" in found and "bad.py:4: error: Argument" in found, found
@@ -131,8 +165,22 @@ def main():
         run([sys.executable, "-m", "venv", "--clear", folder / "venv"], folder)
         python = folder / "venv" / "bin" / "python"
         start = time.monotonic()
-        run([python, "-m", "pip", "wheel", ".", "--no-deps", "--no-cache-dir", "-w", folder / "wheels",
-             "--config-settings", f"build-dir={folder / 'build'}"], REPO)
+        run(
+            [
+                python,
+                "-m",
+                "pip",
+                "wheel",
+                ".",
+                "--no-deps",
+                "--no-cache-dir",
+                "-w",
+                folder / "wheels",
+                "--config-settings",
+                f"build-dir={folder / 'build'}",
+            ],
+            REPO,
+        )
         print(f"pip wheel: {(time.monotonic() - start) / 60:.1f} minutes", flush=True)
         wheels = list((folder / "wheels").iterdir())
         assert len(wheels) == 1, wheels
