@@ -105,10 +105,11 @@ INCLUDED_BY = {
         "server/http/",
         "server/service.",
         "server/view_service.",
-    ),
+    )
 }
 
-# Below these folders a folder and its parent may still include each other. The list may only shrink.
+# Below these folders a folder and its parent may still include each other. The list may only
+# shrink.
 NESTED_CYCLES_LEFT = ("merge/", "query/export/", "scene/")
 
 # Third-party headers, and the folders where each may be included.
@@ -226,10 +227,10 @@ def check_file(path, edges):
 
 
 def is_exempt(a, b):
-    """Whether two folders are the same, or one is in the other, below a folder of NESTED_CYCLES_LEFT."""
+    """True if one folder contains the other, or is it, below a folder of NESTED_CYCLES_LEFT."""
     inner, outer = max(a, b, key=len), min(a, b, key=len)
     is_nested = inner.startswith(outer + "/")
-    return a == b or is_nested and (outer + "/").startswith(NESTED_CYCLES_LEFT)
+    return a == b or (is_nested and (outer + "/").startswith(NESTED_CYCLES_LEFT))
 
 
 def find_cycles(edges):
@@ -251,7 +252,10 @@ def find_cycles(edges):
     reach = {folder: reachable(folder) for folder in list(graph)}
     for source, target in sorted(edges):
         if not is_exempt(source, target) and source in reach.get(target, ()):
-            yield edges[source, target], f"{source} and {target} include each other (a folder cycle)"
+            yield (
+                edges[source, target],
+                f"{source} and {target} include each other (a folder cycle)",
+            )
 
 
 def check_folder_sizes(paths):
@@ -267,7 +271,9 @@ def main():
     findings, edges = [], {}
     for path in paths:
         if SOURCE.search(path) or COUNTED.search(path):
-            findings += [f"{path}:{number}: {problem}" for number, problem in check_file(path, edges)]
+            findings += [
+                f"{path}:{number}: {problem}" for number, problem in check_file(path, edges)
+            ]
     findings += [f"{place}: {problem}" for place, problem in find_cycles(edges)]
     findings += check_folder_sizes(paths)
     print("\n".join(findings), end="\n" if findings else "")

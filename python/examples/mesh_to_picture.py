@@ -9,20 +9,23 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-
 import voxdag
 
 # A knotted tube: vertices (N, 3), triangles (M, 3).
 around, across = 400, 24
 t = np.linspace(0, 2 * np.pi, around, endpoint=False)
-center = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1)
+center = np.stack(
+    [np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1
+)
 along = np.roll(center, -1, axis=0) - np.roll(center, 1, axis=0)
 along /= np.linalg.norm(along, axis=1, keepdims=True)
 side = np.cross(along, [0, 0, 1.0])
 side /= np.linalg.norm(side, axis=1, keepdims=True)
 up = np.cross(side, along)
 s = np.linspace(0, 2 * np.pi, across, endpoint=False)
-vertices = (center[:, None] + 0.45 * (np.cos(s)[:, None] * side[:, None] + np.sin(s)[:, None] * up[:, None]))
+vertices = center[:, None] + 0.45 * (
+    np.cos(s)[:, None] * side[:, None] + np.sin(s)[:, None] * up[:, None]
+)
 a = np.arange(around)[:, None] * across + np.arange(across)
 b, d = np.roll(a, -1, axis=0), np.roll(a, -1, axis=1)
 c = np.roll(b, -1, axis=1)
@@ -39,6 +42,9 @@ with tempfile.TemporaryDirectory() as folder:
         hits = dag.rays(origins, [[0, 0, -1.0]], world=True)
         depth = np.where(hits.hit, hits.distance, np.nan).reshape(x.shape)
 
-plt.imsave(sys.argv[1] if len(sys.argv) > 1 else "knot.png", np.nan_to_num(-depth, nan=-np.nanmax(depth)),
-           cmap="magma")
+plt.imsave(
+    sys.argv[1] if len(sys.argv) > 1 else "knot.png",
+    np.nan_to_num(-depth, nan=-np.nanmax(depth)),
+    cmap="magma",
+)
 print(f"{report['voxels']} voxels, {report['dag_nodes']} nodes, {int(hits.hit.sum())} rays hit")

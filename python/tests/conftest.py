@@ -7,14 +7,16 @@ import textwrap
 
 import numpy as np
 import pytest
-
 import voxdag
 
 
 def torus(around=48, across=24, big=3.0, small=1.25):
     """Vertices (N, 3) and triangles (M, 3)."""
-    u, v = np.meshgrid(np.arange(around) * 2 * np.pi / around, np.arange(across) * 2 * np.pi / across,
-                       indexing="ij")
+    u, v = np.meshgrid(
+        np.arange(around) * 2 * np.pi / around,
+        np.arange(across) * 2 * np.pi / across,
+        indexing="ij",
+    )
     ring = big + small * np.cos(v)
     vertices = np.stack([ring * np.cos(u), ring * np.sin(u), small * np.sin(v)], axis=-1)
     a = np.arange(around)[:, None] * across + np.arange(across)
@@ -25,16 +27,17 @@ def torus(around=48, across=24, big=3.0, small=1.25):
 
 
 def interrupted(lines):
-    """What a program of these lines prints after its first line of progress, when it gets Ctrl-C there, which must
-    end it. It has voxdag, and say() to show its progress."""
+    """Returns the output of a program of these lines after its first line of progress, at which
+    Ctrl-C must end it. The program has voxdag, and say() to show its progress."""
     program = textwrap.dedent(f"""
         import sys
         sys.path[:0] = {sys.path!r}
         import voxdag
         say = lambda *status: print(*status, flush=True)
     """) + textwrap.dedent(lines)
-    process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     process.stdout.readline()
     process.send_signal(signal.SIGINT)
     output, messages = process.communicate(timeout=60)

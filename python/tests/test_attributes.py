@@ -2,15 +2,19 @@
 
 import numpy as np
 import pytest
-
 import voxdag
 
 
 @pytest.fixture(scope="module")
 def torus(mesh, tmp_path_factory):
     output = tmp_path_factory.mktemp("attributes") / "torus.vdag"
-    voxdag.build(mesh, resolution=64, output=output, memory="64MiB",
-                 attributes=["color", "alpha", "normal", "material"])
+    voxdag.build(
+        mesh,
+        resolution=64,
+        output=output,
+        memory="64MiB",
+        attributes=["color", "alpha", "normal", "material"],
+    )
     with voxdag.open(output) as opened:
         yield opened
 
@@ -28,8 +32,10 @@ def test_values(torus):
     # Away from the ring in the middle of the tube, whose triangles face outwards.
     positions = torus.to_world(cells + 0.5)
     across = positions[:, :2]
-    ring = np.concatenate([3 * across / np.linalg.norm(across, axis=1, keepdims=True),
-                           np.zeros((len(cells), 1))], axis=1)
+    ring = np.concatenate(
+        [3 * across / np.linalg.norm(across, axis=1, keepdims=True), np.zeros((len(cells), 1))],
+        axis=1,
+    )
     outwards = positions - ring
     outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
     assert np.sum(normals * outwards, axis=1).min() > 0.9

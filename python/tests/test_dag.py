@@ -4,7 +4,6 @@ import threading
 
 import numpy as np
 import pytest
-
 import voxdag
 
 
@@ -51,14 +50,23 @@ def test_levels(dag, cells, level):
     assert dag.lookup(points, level).all()
 
 
-@pytest.mark.parametrize("region", [(10, 3, 20, 41, 64, 50), (-5, -5, -5, 9, 70, 70),
-                                    (0, 0, 0, 1, 1, 1), (7, 7, 7, 7, 9, 9), (64, 0, 0, 80, 64, 64)])
+@pytest.mark.parametrize(
+    "region",
+    [
+        (10, 3, 20, 41, 64, 50),
+        (-5, -5, -5, 9, 70, 70),
+        (0, 0, 0, 1, 1, 1),
+        (7, 7, 7, 7, 9, 9),
+        (64, 0, 0, 80, 64, 64),
+    ],
+)
 def test_regions(dag, cells, region):
     low, high = np.array(region).reshape(2, 3)
     expected = np.zeros(np.maximum(0, high - low), bool)
     inner_low, inner_high = np.clip(low, 0, 64), np.clip(high, 0, 64)
-    expected[tuple(slice(a - l, b - l) for a, b, l in zip(inner_low, inner_high, low))] = \
-        cells[tuple(slice(a, b) for a, b in zip(inner_low, inner_high))]
+    expected[tuple(slice(a - c, b - c) for a, b, c in zip(inner_low, inner_high, low))] = cells[
+        tuple(slice(a, b) for a, b in zip(inner_low, inner_high))
+    ]
     assert np.array_equal(dag.dense(region), expected)
     assert dag.count(region) == expected.sum()
     assert set(map(tuple, dag.points(region))) == set(map(tuple, np.argwhere(expected) + low))
@@ -72,7 +80,7 @@ def test_world_regions(dag, cells):
 
 
 def test_points_outside_are_not_set(dag):
-    assert not dag.lookup([[-1, 0, 0], [64, 0, 0], [2**62, -2**62, 0]]).any()
+    assert not dag.lookup([[-1, 0, 0], [64, 0, 0], [2**62, -(2**62), 0]]).any()
 
 
 def test_rays_along_an_axis(dag, cells):
@@ -115,7 +123,7 @@ def test_nearest(dag, cells):
 
 
 def test_nearest_at_the_distance_that_it_returns(dag):
-    voxels, distances = dag.nearest([[-7, -9, -11], [31, 32, 33]])
+    _, distances = dag.nearest([[-7, -9, -11], [31, 32, 33]])
     for point, distance in zip([[-7, -9, -11], [31, 32, 33]], distances):
         assert dag.nearest([point], distance)[1][0] == distance
         assert np.isinf(dag.nearest([point], np.nextafter(distance, 0))[1][0])
@@ -130,7 +138,9 @@ def test_threads(dag, cells):
 
     def ask():
         for _ in range(20):
-            if dag.count() != cells.sum() or not np.array_equal(dag.dense(level=4), coarse(cells, 4)):
+            if dag.count() != cells.sum() or not np.array_equal(
+                dag.dense(level=4), coarse(cells, 4)
+            ):
                 wrong.append(1)
 
     threads = [threading.Thread(target=ask) for _ in range(4)]
@@ -141,24 +151,27 @@ def test_threads(dag, cells):
     assert not wrong
 
 
-@pytest.mark.parametrize("ask, code", [
-    (lambda dag: dag.lookup([[0.5, 0, 0]]), "invalid_input"),
-    (lambda dag: dag.lookup([[0, 0]]), "invalid_input"),
-    (lambda dag: dag.lookup([[np.nan, 0, 0]], world=True), "invalid_input"),
-    (lambda dag: dag.rays([[0, 0, 0]], [[0, 0, 0]]), "invalid_input"),
-    (lambda dag: dag.rays([[0, 0, 0]], [[np.nan, 0, 1]]), "invalid_input"),
-    (lambda dag: dag.rays([[0, 0, 0]] * 2, [[1, 0, 0]] * 3), "invalid_input"),
-    (lambda dag: dag.count(level=7), "invalid_input"),
-    (lambda dag: dag.count((0, 0, 0, 1)), "invalid_input"),
-    (lambda dag: dag.count((5, 0, 0, 1, 9, 9)), "invalid_input"),
-    (lambda dag: dag.count((0.5, 0, 0, 1, 9, 9)), "invalid_input"),
-    (lambda dag: dag.nearest(np.array([[2**64 - 1, 0, 0]], np.uint64)), "invalid_input"),
-    (lambda dag: dag.rays(np.array([[1j, 0, 0]]), [[1, 0, 0]]), "invalid_input"),
-    (lambda dag: dag.points(attributes="color"), "invalid_input"),
-    (lambda dag: voxdag.open(dag.path + "\0"), "invalid_input"),
-    (lambda dag: voxdag.open("\ud800.vdag"), "invalid_input"),
-    (lambda dag: voxdag.render(dag.path, view="below"), "invalid_input"),
-])
+@pytest.mark.parametrize(
+    "ask, code",
+    [
+        (lambda dag: dag.lookup([[0.5, 0, 0]]), "invalid_input"),
+        (lambda dag: dag.lookup([[0, 0]]), "invalid_input"),
+        (lambda dag: dag.lookup([[np.nan, 0, 0]], world=True), "invalid_input"),
+        (lambda dag: dag.rays([[0, 0, 0]], [[0, 0, 0]]), "invalid_input"),
+        (lambda dag: dag.rays([[0, 0, 0]], [[np.nan, 0, 1]]), "invalid_input"),
+        (lambda dag: dag.rays([[0, 0, 0]] * 2, [[1, 0, 0]] * 3), "invalid_input"),
+        (lambda dag: dag.count(level=7), "invalid_input"),
+        (lambda dag: dag.count((0, 0, 0, 1)), "invalid_input"),
+        (lambda dag: dag.count((5, 0, 0, 1, 9, 9)), "invalid_input"),
+        (lambda dag: dag.count((0.5, 0, 0, 1, 9, 9)), "invalid_input"),
+        (lambda dag: dag.nearest(np.array([[2**64 - 1, 0, 0]], np.uint64)), "invalid_input"),
+        (lambda dag: dag.rays(np.array([[1j, 0, 0]]), [[1, 0, 0]]), "invalid_input"),
+        (lambda dag: dag.points(attributes="color"), "invalid_input"),
+        (lambda dag: voxdag.open(dag.path + "\0"), "invalid_input"),
+        (lambda dag: voxdag.open("\ud800.vdag"), "invalid_input"),
+        (lambda dag: voxdag.render(dag.path, view="below"), "invalid_input"),
+    ],
+)
 def test_refuses(dag, ask, code):
     with pytest.raises(voxdag.Error) as refused:
         ask(dag)

@@ -5,7 +5,6 @@ import pickle
 
 import numpy as np
 import pytest
-
 import voxdag
 from conftest import interrupted
 
@@ -44,17 +43,20 @@ def test_export_in_gray(mesh, tmp_path):
         assert ("colors" in np.load(tmp_path / "c.npz")) == (not gray)
 
 
-@pytest.mark.parametrize("derive, code", [
-    (lambda path, out: voxdag.extract(path, path, force=True), "invalid_input"),
-    (lambda path, out: voxdag.extract(path, out, region=(70, 0, 0, 80, 9, 9)), "invalid_input"),
-    (lambda path, out: voxdag.extract(path, out, level=9), "invalid_input"),
-    (lambda path, out: voxdag.extract(path, out, level=1), "invalid_input"),
-    (lambda path, out: voxdag.extract(path, out, memory="8MiB"), "invalid_input"),
-    (lambda path, out: voxdag.export(path, out, to="svdag", level=0), "invalid_input"),
-    (lambda path, out: voxdag.export(path, out, to="bt", level=1), "invalid_input"),
-    (lambda path, out: voxdag.extract(str(path) + "x", out), "not_found"),
-    (lambda path, out: voxdag.export(path, out, to="obj"), "invalid_input"),
-])
+@pytest.mark.parametrize(
+    "derive, code",
+    [
+        (lambda path, out: voxdag.extract(path, path, force=True), "invalid_input"),
+        (lambda path, out: voxdag.extract(path, out, region=(70, 0, 0, 80, 9, 9)), "invalid_input"),
+        (lambda path, out: voxdag.extract(path, out, level=9), "invalid_input"),
+        (lambda path, out: voxdag.extract(path, out, level=1), "invalid_input"),
+        (lambda path, out: voxdag.extract(path, out, memory="8MiB"), "invalid_input"),
+        (lambda path, out: voxdag.export(path, out, to="svdag", level=0), "invalid_input"),
+        (lambda path, out: voxdag.export(path, out, to="bt", level=1), "invalid_input"),
+        (lambda path, out: voxdag.extract(str(path) + "x", out), "not_found"),
+        (lambda path, out: voxdag.export(path, out, to="obj"), "invalid_input"),
+    ],
+)
 def test_refuses(path, tmp_path, derive, code):
     with pytest.raises(voxdag.Error) as refused:
         derive(path, tmp_path / "out")
@@ -62,18 +64,30 @@ def test_refuses(path, tmp_path, derive, code):
     assert os.listdir(tmp_path) == []
 
 
-@pytest.mark.parametrize("derive", [
-    lambda path, out, **more: voxdag.extract(path, out, **more),
-    lambda path, out, **more: voxdag.export(path, out, to="ply", **more),
-])
+@pytest.mark.parametrize(
+    "derive",
+    [
+        lambda path, out, **more: voxdag.extract(path, out, **more),
+        lambda path, out, **more: voxdag.export(path, out, to="ply", **more),
+    ],
+)
 def test_outputs(path, tmp_path, derive):
     """Outputs that cannot be written are refused before anything is done."""
-    for output, code in [(tmp_path / "none" / "out", "not_found"), (tmp_path, "invalid_input"),
-                         ("", "invalid_input"), (path, "invalid_input")]:
+    for output, code in [
+        (tmp_path / "none" / "out", "not_found"),
+        (tmp_path, "invalid_input"),
+        ("", "invalid_input"),
+        (path, "invalid_input"),
+    ]:
         for force in (False, True):
             started = []
             with pytest.raises(voxdag.Error) as refused:
-                derive(path, output, force=force, progress=lambda *_: started.append(1))
+                derive(
+                    path,
+                    output,
+                    force=force,
+                    progress=lambda *_, started=started: started.append(1),
+                )
             assert (refused.value.code, started) == (code, []), refused.value
     assert os.listdir(tmp_path) == []
     for _ in range(2):
@@ -110,10 +124,12 @@ def test_ctrl_c(mesh, tmp_path):
 
 
 def test_threads(path, dag, tmp_path):
-    calls = [lambda n: voxdag.extract(path, tmp_path / "x.vdag", threads=n),
-             lambda n: dag.lookup([[1, 2, 3]], threads=n),
-             lambda n: dag.nearest([[1, 2, 3]], threads=n),
-             lambda n: dag.rays([[1, 2, 3]], [[1, 0, 0]], threads=n)]
+    calls = [
+        lambda n: voxdag.extract(path, tmp_path / "x.vdag", threads=n),
+        lambda n: dag.lookup([[1, 2, 3]], threads=n),
+        lambda n: dag.nearest([[1, 2, 3]], threads=n),
+        lambda n: dag.rays([[1, 2, 3]], [[1, 0, 0]], threads=n),
+    ]
     for call in calls:
         for threads in (-1, 1 << 40):
             with pytest.raises(voxdag.Error, match="threads"):

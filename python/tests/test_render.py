@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 import voxdag
 from conftest import interrupted
 
@@ -24,53 +23,60 @@ def test_a_picture_shows_the_mesh(path):
     picture = voxdag.render(path, view="top", size=(96, 64), samples=1)
     assert picture.shape == (64, 96, 3) and picture.dtype == np.uint8
     assert 0.1 < shown(picture) < 0.9
-    assert np.array_equal(picture, voxdag.render(path, view="top", size=(96, 64), samples=1, threads=3))
+    assert np.array_equal(
+        picture, voxdag.render(path, view="top", size=(96, 64), samples=1, threads=3)
+    )
 
 
 def test_a_camera_is_placed_in_scene_units(path):
     def picture(distance):
-        return voxdag.render(path, camera=(0.01, 0, distance), target=[0, 0, 0], fov=40, size=(48, 48), samples=1)
+        return voxdag.render(
+            path, camera=(0.01, 0, distance), target=[0, 0, 0], fov=40, size=(48, 48), samples=1
+        )
 
     assert shown(picture(16)) > 2 * shown(picture(40)) > 0
 
 
-@pytest.mark.parametrize("options, code", [
-    ({"view": "behind"}, "invalid_input"),
-    ({"size": (0, 10)}, "invalid_input"),
-    ({"size": (10, 16385)}, "invalid_input"),
-    ({"camera": (1, 2, 3)}, "invalid_input"),
-    ({"camera": (1, 2), "target": (0, 0, 0)}, "invalid_input"),
-    ({"camera": (1, 2, float("nan")), "target": (0, 0, 0)}, "invalid_input"),
-    ({"camera": (1, 2, 3), "target": (1, 2, 3)}, "invalid_input"),
-    ({"camera": (1, 2, 3), "target": (0, 0, 0), "view": "top"}, "invalid_input"),
-    ({"fov": 171}, "invalid_input"),
-    ({"samples": 9}, "invalid_input"),
-    ({"size": (-1, 10)}, "invalid_input"),
-    ({"size": (2**31, 2**31)}, "invalid_input"),
-    ({"size": (10**30, 1)}, "invalid_input"),
-    ({"size": 640}, "invalid_input"),
-    ({"size": (640, 480, 3)}, "invalid_input"),
-    ({"size": (64.0, 48)}, "invalid_input"),
-    ({"size": ("64", "48")}, "invalid_input"),
-    ({"size": None}, "invalid_input"),
-    ({"size": (16384, 16384), "memory": "1GiB"}, "out_of_memory"),
-    ({"size": (2048, 1024), "memory": 100 << 20}, "out_of_memory"),
-    ({"memory": "63MiB"}, "invalid_input"),
-    ({"memory": "much"}, "invalid_input"),
-    ({"memory": -1}, "invalid_input"),
-    ({"camera": (1, 2, 3), "target": (0, 0, float("inf"))}, "invalid_input"),
-    ({"camera": "above", "target": (0, 0, 0)}, "invalid_input"),
-    ({"camera": ((1, 2, 3),), "target": (0, 0, 0)}, "invalid_input"),
-    ({"view": 7}, "invalid_input"),
-    ({"view": None}, "invalid_input"),
-    ({"fov": float("nan")}, "invalid_input"),
-    ({"fov": "wide"}, "invalid_input"),
-    ({"samples": 2.5}, "invalid_input"),
-    ({"samples": 2**40}, "invalid_input"),
-    ({"gray": "no"}, "invalid_input"),
-    ({"threads": -1}, "invalid_input"),
-    ({"threads": "all"}, "invalid_input"),
-])
+@pytest.mark.parametrize(
+    "options, code",
+    [
+        ({"view": "behind"}, "invalid_input"),
+        ({"size": (0, 10)}, "invalid_input"),
+        ({"size": (10, 16385)}, "invalid_input"),
+        ({"camera": (1, 2, 3)}, "invalid_input"),
+        ({"camera": (1, 2), "target": (0, 0, 0)}, "invalid_input"),
+        ({"camera": (1, 2, float("nan")), "target": (0, 0, 0)}, "invalid_input"),
+        ({"camera": (1, 2, 3), "target": (1, 2, 3)}, "invalid_input"),
+        ({"camera": (1, 2, 3), "target": (0, 0, 0), "view": "top"}, "invalid_input"),
+        ({"fov": 171}, "invalid_input"),
+        ({"samples": 9}, "invalid_input"),
+        ({"size": (-1, 10)}, "invalid_input"),
+        ({"size": (2**31, 2**31)}, "invalid_input"),
+        ({"size": (10**30, 1)}, "invalid_input"),
+        ({"size": 640}, "invalid_input"),
+        ({"size": (640, 480, 3)}, "invalid_input"),
+        ({"size": (64.0, 48)}, "invalid_input"),
+        ({"size": ("64", "48")}, "invalid_input"),
+        ({"size": None}, "invalid_input"),
+        ({"size": (16384, 16384), "memory": "1GiB"}, "out_of_memory"),
+        ({"size": (2048, 1024), "memory": 100 << 20}, "out_of_memory"),
+        ({"memory": "63MiB"}, "invalid_input"),
+        ({"memory": "much"}, "invalid_input"),
+        ({"memory": -1}, "invalid_input"),
+        ({"camera": (1, 2, 3), "target": (0, 0, float("inf"))}, "invalid_input"),
+        ({"camera": "above", "target": (0, 0, 0)}, "invalid_input"),
+        ({"camera": ((1, 2, 3),), "target": (0, 0, 0)}, "invalid_input"),
+        ({"view": 7}, "invalid_input"),
+        ({"view": None}, "invalid_input"),
+        ({"fov": float("nan")}, "invalid_input"),
+        ({"fov": "wide"}, "invalid_input"),
+        ({"samples": 2.5}, "invalid_input"),
+        ({"samples": 2**40}, "invalid_input"),
+        ({"gray": "no"}, "invalid_input"),
+        ({"threads": -1}, "invalid_input"),
+        ({"threads": "all"}, "invalid_input"),
+    ],
+)
 def test_refuses(path, options, code):
     with pytest.raises(voxdag.Error) as refused:
         voxdag.render(path, **{"size": (8, 8), **options})
@@ -86,10 +92,15 @@ def test_types_that_are_type_errors(path):
 
 
 def test_what_takes_too_much_memory_says_so(path):
-    with pytest.raises(voxdag.Error, match=r"16384 x 16384 pixels takes 16\.5.* GiB .* at most 1.* GiB: "
-                                           "choose a smaller size, or more with memory="):
+    with pytest.raises(
+        voxdag.Error,
+        match=r"16384 x 16384 pixels takes 16\.5.* GiB .* at most 1.* GiB: "
+        "choose a smaller size, or more with memory=",
+    ):
         voxdag.render(path, size=(16384, 16384), memory="1GiB")
-    assert voxdag.render(path, size=(np.int64(32), np.int32(16)), memory="64MiB", samples=1).shape == (16, 32, 3)
+    assert voxdag.render(
+        path, size=(np.int64(32), np.int32(16)), memory="64MiB", samples=1
+    ).shape == (16, 32, 3)
 
 
 def test_other_threads_run_meanwhile(path):
@@ -127,6 +138,7 @@ def test_a_file_that_is_not_there(path):
 def test_progress_stops_it(path):
     def stop(*_):
         raise RuntimeError("enough")
+
     with pytest.raises(RuntimeError):
         voxdag.render(path, size=(1000, 1000), samples=4, progress=stop)
 
@@ -136,6 +148,10 @@ def test_the_example_of_the_docs(tmp_path):
     text = (Path(__file__).parents[2] / "docs" / "python.md").read_text(encoding="utf-8")
     example = re.search(r"```python\n(.*?)```", text, re.DOTALL).group(1)
     assert len([line for line in example.splitlines() if line.strip()]) <= 6
-    subprocess.run([sys.executable, "-c", example], cwd=tmp_path, check=True,
-                   env={**os.environ, "MPLBACKEND": "Agg"})
+    subprocess.run(
+        [sys.executable, "-c", example],
+        cwd=tmp_path,
+        check=True,
+        env={**os.environ, "MPLBACKEND": "Agg"},
+    )
     assert (tmp_path / "scene.png").read_bytes().startswith(b"\x89PNG")

@@ -1,4 +1,4 @@
-"""The package is typed: mypy finds no contradiction in it, and knows the types of what users call."""
+"""The package is typed: mypy finds no contradiction, and knows the types of the public API."""
 
 import os
 import shutil
@@ -12,20 +12,28 @@ import voxdag
 def mypy(folder, *arguments):
     # The package apart, since mypy does not look at what is installed.
     package = os.path.dirname(voxdag.__file__)
-    shutil.copytree(package, folder / "voxdag", ignore=shutil.ignore_patterns("*.so", "__pycache__"))
-    return subprocess.run([sys.executable, "-m", "mypy", "--cache-dir", str(folder / "cache"), *arguments],
-                          cwd=folder, capture_output=True, text=True)
+    shutil.copytree(
+        package, folder / "voxdag", ignore=shutil.ignore_patterns("*.so", "__pycache__")
+    )
+    return subprocess.run(
+        [sys.executable, "-m", "mypy", "--cache-dir", str(folder / "cache"), *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+    )
 
 
 def test_types(tmp_path):
-    (tmp_path / "user.py").write_text(textwrap.dedent("""
+    (tmp_path / "user.py").write_text(
+        textwrap.dedent("""
         import voxdag
         dag = voxdag.open(b"scene.vdag")
         reveal_type(dag.count())
         dag.count(dag.bounds, world=True)
         voxdag.open(7)
         voxdag.build("scene.glb", resolution="64", output="scene.vdag")
-    """))
+    """)
+    )
     checked = mypy(tmp_path, "-p", "voxdag")
     assert checked.returncode == 0, checked.stdout
     shutil.rmtree(tmp_path / "voxdag")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 import voxdag
 
 
@@ -11,8 +10,13 @@ def fine(tmp_path_factory):
     """A few voxels in a grid of 131072^3 whose corner and edge are no round numbers."""
     output = tmp_path_factory.mktemp("fine") / "fine.vdag"
     corners = np.array([[0.01, 0.02, 0.03], [0.05, 0.02, 0.09], [0.02, 0.07, 0.03]])
-    voxdag.build((corners, np.array([[0, 1, 2]])), resolution=131072, output=output, memory="64MiB",
-                 bounds=(-1920.9469616, -126.4427185, -1861.3, 3720.9632874))
+    voxdag.build(
+        (corners, np.array([[0, 1, 2]])),
+        resolution=131072,
+        output=output,
+        memory="64MiB",
+        bounds=(-1920.9469616, -126.4427185, -1861.3, 3720.9632874),
+    )
     with voxdag.open(output) as dag:
         yield dag
 

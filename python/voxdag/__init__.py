@@ -6,8 +6,8 @@
         dag.rays(origins, directions)           # what do rays hit?
         dag.dense(region, level=8)              # a box of the grid of 2^8 cells as an array
 
-Long calls release the interpreter's lock; build, plan, extract, export and render stop on Ctrl-C. Errors of this package are
-`voxdag.Error`, with a `code`.
+Long calls release the interpreter's lock; build, plan, extract, export and render stop on Ctrl-C.
+Errors of this package are `voxdag.Error`, with a `code`.
 """
 
 from ._build import Mesh, Progress, Scene, build, plan
@@ -16,6 +16,20 @@ from ._derive import export, export_formats, extract
 from ._error import Error
 from ._render import render
 
-__all__ = ["Dag", "Error", "Hits", "Mesh", "Progress", "Region", "Scene", "build", "export",
-           "export_formats", "extract", "open", "plan", "render"]
+__all__ = [
+    "Dag",
+    "Error",
+    "Hits",
+    "Mesh",
+    "Progress",
+    "Region",
+    "Scene",
+    "build",
+    "export",
+    "export_formats",
+    "extract",
+    "open",
+    "plan",
+    "render",
+]
 __version__ = "0.1.0"

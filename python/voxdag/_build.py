@@ -5,9 +5,9 @@ import json
 import operator
 import os
 import tempfile
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import (Any, BinaryIO, Callable, Dict, Iterator, List, Optional, Sequence, SupportsIndex,
-                    Tuple, Union)
+from typing import Any, BinaryIO, Callable, Optional, SupportsIndex, Union
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from . import _native
 from ._error import Error, Path, path_text
 
 # vertices (N, 3) of float, triangles (M, 3) of integers
-Mesh = Tuple[Any, Any]
+Mesh = tuple[Any, Any]
 Scene = Union[Path, Sequence[Path], Mesh]
 # Called with the stage, units done, units in all (0 if unknown) and the unit.
 Progress = Callable[[str, int, int, str], None]
@@ -24,9 +24,15 @@ Progress = Callable[[str, int, int, str], None]
 _ROWS = 1 << 18
 
 
-def build(scene: Scene, *, resolution: SupportsIndex, output: Path,
-          memory: Union[int, str, None] = None, progress: Optional[Progress] = None,
-          **options: Any) -> Dict[str, Any]:
+def build(
+    scene: Scene,
+    *,
+    resolution: SupportsIndex,
+    output: Path,
+    memory: Union[int, str, None] = None,
+    progress: Optional[Progress] = None,
+    **options: Any,
+) -> dict[str, Any]:
     """Builds the DAG of a scene, or resumes a build that was interrupted, and returns its report.
 
     scene       one or several files, together one scene, or a mesh in memory: a tuple of vertices
@@ -36,32 +42,48 @@ def build(scene: Scene, *, resolution: SupportsIndex, output: Path,
     memory      bytes, or text such as "8GiB"; by default half of what the machine has
     progress    called now and then; what it raises cancels the build and is raised here
 
-    The other options are those of the command line (docs/cli.md): bounds=(x, y, z, edge), voxel_size,
-    skip_invalid, hash_bits, color, attributes=["alpha", ...], color_resolution, work, threads,
-    subvolume, backend, method, cache, keep_work, restart, force. The report has the names of `voxdag build --json`. Raises Error.
+    The other options are the options of the command line (docs/cli.md): bounds=(x, y, z, edge),
+    voxel_size, skip_invalid, hash_bits, color, attributes=["alpha", ...], color_resolution, work,
+    threads, subvolume, backend, method, cache, keep_work, restart, force. The report has the names
+    of `voxdag build --json`. Raises Error.
     """
     output = path_text(output)
     with _files_of(scene, output) as files:
-        return _call(_native.build, files, resolution, progress, output=output, memory=memory,
-                     **options)
+        return _call(
+            _native.build, files, resolution, progress, output=output, memory=memory, **options
+        )
 
 
-def plan(scene: Scene, *, resolution: SupportsIndex, memory: Union[int, str, None] = None,
-         output: Optional[Path] = None, progress: Optional[Progress] = None,
-         **options: Any) -> Dict[str, Any]:
+def plan(
+    scene: Scene,
+    *,
+    resolution: SupportsIndex,
+    memory: Union[int, str, None] = None,
+    output: Optional[Path] = None,
+    progress: Optional[Progress] = None,
+    **options: Any,
+) -> dict[str, Any]:
     """What build() would need; builds nothing. The names are those of `voxdag plan --json`."""
     output = "voxdag-plan" if output is None else path_text(output)
     with _files_of(scene, output) as files:
-        return _call(_native.plan, files, resolution, progress, output=output, memory=memory,
-                     **options)
+        return _call(
+            _native.plan, files, resolution, progress, output=output, memory=memory, **options
+        )
 
 
-def _call(function: Callable[..., str], files: List[str], resolution: SupportsIndex,
-          progress: Optional[Progress], memory: Union[int, str, None], **options: Any) -> Any:
+def _call(
+    function: Callable[..., str],
+    files: list[str],
+    resolution: SupportsIndex,
+    progress: Optional[Progress],
+    memory: Union[int, str, None],
+    **options: Any,
+) -> Any:
     resolution = operator.index(resolution)
     if not 0 < resolution < 1 << 63:
-        raise Error(f"resolution={resolution}: expected a power of two from 4 to 2^20",
-                    "invalid_input")
+        raise Error(
+            f"resolution={resolution}: expected a power of two from 4 to 2^20", "invalid_input"
+        )
     if progress is not None and not callable(progress):
         raise TypeError(f"progress={progress!r}: expected a function or None")
     if memory is not None:
@@ -75,7 +97,7 @@ def _call(function: Callable[..., str], files: List[str], resolution: SupportsIn
 
 
 @contextmanager
-def _files_of(scene: Scene, output: str) -> Iterator[List[str]]:
+def _files_of(scene: Scene, output: str) -> Iterator[list[str]]:
     """The files of a scene. A mesh becomes a PLY file next to the output, which is removed."""
     if isinstance(scene, (str, bytes, os.PathLike)):
         yield [path_text(scene)]
@@ -96,8 +118,9 @@ def _mesh_file(mesh: Sequence[Any], output: str) -> str:
     folder, name = os.path.split(os.path.abspath(output))
     path = None
     try:
-        handle, path = tempfile.mkstemp(suffix=".ply", prefix=name + ".scene-",
-                                        dir=folder if os.path.isdir(folder) else None)
+        handle, path = tempfile.mkstemp(
+            suffix=".ply", prefix=name + ".scene-", dir=folder if os.path.isdir(folder) else None
+        )
         with os.fdopen(handle, "wb") as file:
             _write_ply(file, *(np.asarray(part) for part in mesh))
         return path
@@ -106,41 +129,58 @@ def _mesh_file(mesh: Sequence[Any], output: str) -> str:
             os.remove(path)
         if isinstance(error, OSError):
             full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-            raise Error(f"the mesh cannot be written as a file: {error}",
-                        "no_space" if full else "io") from error
+            raise Error(
+                f"the mesh cannot be written as a file: {error}", "no_space" if full else "io"
+            ) from error
         raise
 
 
 def _is_mesh(scene: Scene) -> bool:
-    return (isinstance(scene, (tuple, list)) and len(scene) == 2
-            and not any(isinstance(part, (str, bytes, os.PathLike)) for part in scene))
+    return (
+        isinstance(scene, (tuple, list))
+        and len(scene) == 2
+        and not any(isinstance(part, (str, bytes, os.PathLike)) for part in scene)
+    )
 
 
 def _check_mesh(vertices: Any, triangles: Any) -> None:
     vertices, triangles = np.asarray(vertices), np.asarray(triangles)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
-        raise Error(f"the vertices are an array {vertices.shape} of {vertices.dtype}: "
-                    "expected (N, 3) numbers", "invalid_input")
+        raise Error(
+            f"the vertices are an array {vertices.shape} of {vertices.dtype}: "
+            "expected (N, 3) numbers",
+            "invalid_input",
+        )
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
-        raise Error(f"the triangles are an array {triangles.shape} of {triangles.dtype}: "
-                    "expected (M, 3) integers", "invalid_input")
+        raise Error(
+            f"the triangles are an array {triangles.shape} of {triangles.dtype}: "
+            "expected (M, 3) integers",
+            "invalid_input",
+        )
     if len(vertices) > (1 << 32) - 2:
         raise Error(f"the mesh has {len(vertices)} vertices: expected at most 2^32 - 2", "limit")
     if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(vertices)):
         bad = np.flatnonzero(((triangles < 0) | (triangles >= len(vertices))).any(axis=1))[0]
-        raise Error(f"triangle {bad} has the vertices {triangles[bad].tolist()}: expected 0 to "
-                    f"{len(vertices) - 1}", "invalid_input")
+        raise Error(
+            f"triangle {bad} has the vertices {triangles[bad].tolist()}: expected 0 to "
+            f"{len(vertices) - 1}",
+            "invalid_input",
+        )
 
 
 def _write_ply(file: BinaryIO, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    file.write((f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
-                "property double x\nproperty double y\nproperty double z\n"
-                f"element face {len(triangles)}\n"
-                "property list uchar uint vertex_indices\nend_header\n").encode())
+    file.write(
+        (
+            f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
+            "property double x\nproperty double y\nproperty double z\n"
+            f"element face {len(triangles)}\n"
+            "property list uchar uint vertex_indices\nend_header\n"
+        ).encode()
+    )
     for first in range(0, len(vertices), _ROWS):
-        file.write(np.ascontiguousarray(vertices[first:first + _ROWS], dtype="<f8").data)
+        file.write(np.ascontiguousarray(vertices[first : first + _ROWS], dtype="<f8").data)
     for first in range(0, len(triangles), _ROWS):
-        part = triangles[first:first + _ROWS]
+        part = triangles[first : first + _ROWS]
         rows = np.empty(len(part), dtype=[("count", "u1"), ("corners", "<u4", 3)])
         rows["count"] = 3
         rows["corners"] = part

@@ -1,6 +1,7 @@
 """A finished file, and what can be asked of it."""
 
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union, overload
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Optional, Union, overload
 
 import numpy as np
 
@@ -8,8 +9,9 @@ from . import _native
 from ._error import Error, Path, path_text, thread_count
 
 # By name: the components of a value, and their type. The int64 ones are indexes; -1 means none.
-_ATTRIBUTE_TYPES = {name: (components, np.dtype(dtype))
-                    for name, components, dtype in _native.attribute_types()}
+_ATTRIBUTE_TYPES = {
+    name: (components, np.dtype(dtype)) for name, components, dtype in _native.attribute_types()
+}
 
 # A half-open box: the low corner x, y, z and the high corner x, y, z.
 Region = Union[Sequence[Any], np.ndarray]
@@ -38,8 +40,8 @@ class Dag:
 
     Positions are voxels of the finest grid, (N, 3) integers, unless a `level` l says that they are
     cells of the grid of 2^l per edge, a cell being set where any voxel in it is. A region is
-    half-open, in cells of that grid, and may reach beyond it. With world=True positions, regions and
-    distances are in the units of the scene. `threads` is 0 for all.
+    half-open, in cells of that grid, and may reach beyond it. With world=True positions, regions
+    and distances are in the units of the scene. `threads` is 0 for all.
     """
 
     def __init__(self, path: Path) -> None:
@@ -89,10 +91,12 @@ class Dag:
         return np.stack([low, low + self._dag.edge])
 
     @property
-    def levels(self) -> List[Dict[str, int]]:
+    def levels(self) -> list[dict[str, int]]:
         """Nodes and bytes of each level of the DAG, the root's first; the last has the bricks."""
-        return [{"level": level, "nodes": nodes, "bytes": size}
-                for level, (nodes, size) in enumerate(self._dag.levels())]
+        return [
+            {"level": level, "nodes": nodes, "bytes": size}
+            for level, (nodes, size) in enumerate(self._dag.levels())
+        ]
 
     def to_world(self, positions: Any, level: Optional[int] = None) -> np.ndarray:
         """Where positions in the grid lie in the scene; the center of voxel v is at v + 0.5."""
@@ -110,21 +114,32 @@ class Dag:
         if values.ndim == 0 or values.shape[-1] != 3:
             raise Error(f"the points are an array {values.shape}: expected (N, 3)", "invalid_input")
         cells = np.empty(values.shape, np.int64)
-        self._dag.world_to_cells(np.ascontiguousarray(values.reshape(-1, 3)), self._levels(level),
-                                 cells.reshape(-1, 3))
+        self._dag.world_to_cells(
+            np.ascontiguousarray(values.reshape(-1, 3)), self._levels(level), cells.reshape(-1, 3)
+        )
         return cells
 
-    def lookup(self, points: Any, level: Optional[int] = None, *, world: bool = False,
-               threads: int = 1) -> np.ndarray:
+    def lookup(
+        self, points: Any, level: Optional[int] = None, *, world: bool = False, threads: int = 1
+    ) -> np.ndarray:
         """Whether each voxel is set, (N,) bool. Those outside the grid are not."""
         positions = self._positions(points, level, world)
         found = np.empty(len(positions), np.bool_)
-        self._dag.lookup(positions, self._levels(level), found.view(np.uint8),
-                         thread_count(threads))
+        self._dag.lookup(
+            positions, self._levels(level), found.view(np.uint8), thread_count(threads)
+        )
         return found
 
-    def rays(self, origins: Any, directions: Any, max_distance: float = np.inf,
-             stop_at: float = 1, *, world: bool = False, threads: int = 1) -> Hits:
+    def rays(
+        self,
+        origins: Any,
+        directions: Any,
+        max_distance: float = np.inf,
+        stop_at: float = 1,
+        *,
+        world: bool = False,
+        threads: int = 1,
+    ) -> Hits:
         """The first set voxel on each ray, (N, 3) origins and directions of any length; one of
         them may be a single row for all.
 
@@ -137,34 +152,57 @@ class Dag:
             starts = (starts - np.asarray(self._dag.origin)) / unit
         if 1 in (len(starts), len(ways)):
             shape = (len(ways) if len(starts) == 1 else len(starts), 3)
-            starts, ways = (np.ascontiguousarray(np.broadcast_to(rows, shape))
-                            for rows in (starts, ways))
-        hits = Hits(np.empty(len(starts)), np.empty((len(starts), 3), np.int64),
-                    np.empty((len(starts), 3), np.int8))
-        self._dag.rays(starts, ways, float(max_distance) / unit, float(stop_at), *hits,
-                       thread_count(threads))
+            starts, ways = (
+                np.ascontiguousarray(np.broadcast_to(rows, shape)) for rows in (starts, ways)
+            )
+        hits = Hits(
+            np.empty(len(starts)),
+            np.empty((len(starts), 3), np.int64),
+            np.empty((len(starts), 3), np.int8),
+        )
+        self._dag.rays(
+            starts, ways, float(max_distance) / unit, float(stop_at), *hits, thread_count(threads)
+        )
         np.multiply(hits.distance, unit, out=hits.distance)
         return hits
 
-    def dense(self, region: Optional[Region] = None, level: Optional[int] = None, *,
-              world: bool = False) -> np.ndarray:
+    def dense(
+        self, region: Optional[Region] = None, level: Optional[int] = None, *, world: bool = False
+    ) -> np.ndarray:
         """The cells of a region as an array of bool, indexed [x, y, z] from its low corner."""
         low, high = self._region(region, level, world)
-        cells = np.empty([max(0, h - l) for l, h in zip(low, high)], np.bool_)
+        cells = np.empty([max(0, b - a) for a, b in zip(low, high)], np.bool_)
         self._dag.dense(low, high, self._levels(level), cells.view(np.uint8))
         return cells
 
     @overload
-    def points(self, region: Optional[Region] = None, level: Optional[int] = None, *,
-               world: bool = False, attributes: None = None) -> np.ndarray: ...
+    def points(
+        self,
+        region: Optional[Region] = None,
+        level: Optional[int] = None,
+        *,
+        world: bool = False,
+        attributes: None = None,
+    ) -> np.ndarray: ...
 
     @overload
-    def points(self, region: Optional[Region] = None, level: Optional[int] = None, *,
-               world: bool = False,
-               attributes: Sequence[str]) -> Tuple[np.ndarray, Dict[str, np.ndarray]]: ...
+    def points(
+        self,
+        region: Optional[Region] = None,
+        level: Optional[int] = None,
+        *,
+        world: bool = False,
+        attributes: Sequence[str],
+    ) -> tuple[np.ndarray, dict[str, np.ndarray]]: ...
 
-    def points(self, region: Optional[Region] = None, level: Optional[int] = None, *,
-               world: bool = False, attributes: Optional[Sequence[str]] = None) -> Any:
+    def points(
+        self,
+        region: Optional[Region] = None,
+        level: Optional[int] = None,
+        *,
+        world: bool = False,
+        attributes: Optional[Sequence[str]] = None,
+    ) -> Any:
         """The set cells of a region in Morton order, (N, 3) int64.
 
         With world=True their centers in the units of the scene, float64. With `attributes`, such
@@ -181,61 +219,70 @@ class Dag:
         return cells, {name: self._values(name, found, level, False) for name in attributes}
 
     @property
-    def attributes(self) -> List[str]:
+    def attributes(self) -> list[str]:
         """What the cells have: "color", "alpha", "normal" and "material", those of them that were
         built."""
         return self._dag.attributes
 
     @property
-    def material_names(self) -> List[str]:
+    def material_names(self) -> list[str]:
         """The names that materials() counts from 0. The last, "", is that of triangles without."""
         return [name.decode(errors="replace") for name in self._dag.material_names]
 
-    def colors(self, points: Any, level: Optional[int] = None, *, world: bool = False) -> np.ndarray:
+    def colors(
+        self, points: Any, level: Optional[int] = None, *, world: bool = False
+    ) -> np.ndarray:
         """The color of each cell, (N, 3) uint8, sRGB; 0 where none is set.
 
         As with the other attributes, cells that are finer than those of the color grid have what
         the latter have. A file without the attribute is an Error."""
         return self._values("color", points, level, world)
 
-    def alphas(self, points: Any, level: Optional[int] = None, *, world: bool = False) -> np.ndarray:
+    def alphas(
+        self, points: Any, level: Optional[int] = None, *, world: bool = False
+    ) -> np.ndarray:
         """The alpha of each cell, (N,) uint8; 0 where none is set."""
         return self._values("alpha", points, level, world)
 
-    def normals(self, points: Any, level: Optional[int] = None, *,
-                world: bool = False) -> np.ndarray:
+    def normals(
+        self, points: Any, level: Optional[int] = None, *, world: bool = False
+    ) -> np.ndarray:
         """The normal of each cell, (N, 3) float32, of length 1; 0 where none is set."""
         return self._values("normal", points, level, world)
 
-    def materials(self, points: Any, level: Optional[int] = None, *,
-                  world: bool = False) -> np.ndarray:
+    def materials(
+        self, points: Any, level: Optional[int] = None, *, world: bool = False
+    ) -> np.ndarray:
         """The material of each cell, (N,) int64, an index into material_names; -1 where none is
         set."""
         return self._values("material", points, level, world)
 
-    def count(self, region: Optional[Region] = None, level: Optional[int] = None, *,
-              world: bool = False) -> int:
+    def count(
+        self, region: Optional[Region] = None, level: Optional[int] = None, *, world: bool = False
+    ) -> int:
         """How many cells of a region are set, exactly."""
         low, high = self._region(region, level, world)
         return self._dag.count(low, high, self._levels(level))
 
-    def nearest(self, points: Any, max_distance: float = np.inf,
-                *, threads: int = 1) -> Tuple[np.ndarray, np.ndarray]:
+    def nearest(
+        self, points: Any, max_distance: float = np.inf, *, threads: int = 1
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The set voxel nearest to each voxel, (N, 3) int64, and the distances between the centers.
 
         Of several the first in Morton order. Without one: -1, and an infinite distance."""
         positions = self._positions(points, None, False)
         voxels = np.empty_like(positions)
         distances = np.empty(len(positions))
-        self._dag.nearest(positions, float(max_distance), voxels, distances,
-                          thread_count(threads))
+        self._dag.nearest(positions, float(max_distance), voxels, distances, thread_count(threads))
         return voxels, distances
 
-    def _values(self, attribute: str, points: Any, level: Optional[int],
-                world: bool) -> np.ndarray:
+    def _values(self, attribute: str, points: Any, level: Optional[int], world: bool) -> np.ndarray:
         if attribute not in self._dag.attributes:
-            raise Error(f"{self.path} has no {attribute!r}: expected one of its attributes, "
-                        f"{', '.join(self._dag.attributes) or 'none'}", "invalid_input")
+            raise Error(
+                f"{self.path} has no {attribute!r}: expected one of its attributes, "
+                f"{', '.join(self._dag.attributes) or 'none'}",
+                "invalid_input",
+            )
         positions = self._positions(points, level, world)
         components, dtype = _ATTRIBUTE_TYPES[attribute]
         shape = (len(positions),) if components == 1 else (len(positions), components)
@@ -247,8 +294,11 @@ class Dag:
         if level is None:
             return self._dag.grid_levels
         if not 0 <= level <= self._dag.grid_levels or int(level) != level:
-            raise Error(f"level {level}: expected 0 to {self._dag.grid_levels}, for a grid of "
-                        "2^level cells per edge", "invalid_input")
+            raise Error(
+                f"level {level}: expected 0 to {self._dag.grid_levels}, for a grid of "
+                "2^level cells per edge",
+                "invalid_input",
+            )
         return int(level)
 
     def _positions(self, points: Any, level: Optional[int], world: bool) -> np.ndarray:
@@ -256,27 +306,33 @@ class Dag:
             return np.ascontiguousarray(self.to_voxel(_rows(points, np.float64, "points"), level))
         return _rows(points, np.int64, "points")
 
-    def _region(self, region: Optional[Region], level: Optional[int],
-                world: bool) -> Tuple[Tuple[int, ...], Tuple[int, ...]]:
+    def _region(
+        self, region: Optional[Region], level: Optional[int], world: bool
+    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
         edge = 1 << self._levels(level)
         if region is None:
             return (0, 0, 0), (edge, edge, edge)
         corners = np.asarray(region, np.float64 if world else None).reshape(-1)
         if corners.shape != (6,):
-            raise Error(f"the region {region!r}: expected x, y, z of its low and of its high corner",
-                        "invalid_input")
+            raise Error(
+                f"the region {region!r}: expected x, y, z of its low and of its high corner",
+                "invalid_input",
+            )
         if world:
             if np.any(np.isnan(corners)):
                 raise Error(f"the region {region!r}: expected numbers", "invalid_input")
             low, high = self._dag.world_to_region(corners.tolist(), self._levels(level))
             corners = np.array([*low, *high])
         elif corners.dtype.kind not in "iu":
-            raise Error(f"the region {region!r}: expected whole numbers, or world=True",
-                        "invalid_input")
+            raise Error(
+                f"the region {region!r}: expected whole numbers, or world=True", "invalid_input"
+            )
         numbers = tuple(int(number) for number in corners)
         if any(low > high for low, high in zip(numbers[:3], numbers[3:])):
-            raise Error(f"the region {region!r}: expected the low corner before the high one",
-                        "invalid_input")
+            raise Error(
+                f"the region {region!r}: expected the low corner before the high one",
+                "invalid_input",
+            )
         return numbers[:3], numbers[3:]
 
 
@@ -288,8 +344,9 @@ def _rows(values: Any, dtype: Any, what: str) -> np.ndarray:
     if array.ndim != 2 or array.shape[1] != 3:
         raise Error(f"the {what} are an array {array.shape}: expected (N, 3)", "invalid_input")
     if dtype == np.int64 and array.dtype.kind not in "iu":
-        raise Error(f"the {what} are {array.dtype}: expected integers, or world=True",
-                    "invalid_input")
+        raise Error(
+            f"the {what} are {array.dtype}: expected integers, or world=True", "invalid_input"
+        )
     if array.dtype.kind not in "fiu":
         raise Error(f"the {what} are {array.dtype}: expected numbers", "invalid_input")
     if dtype == np.int64 and array.dtype == np.uint64 and (array >> np.uint64(63)).any():

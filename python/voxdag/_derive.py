@@ -2,7 +2,8 @@
 
 import json
 import os
-from typing import Any, Dict, Optional, Sequence, Union
+from collections.abc import Sequence
+from typing import Any, Optional, Union
 
 from . import _native
 from ._build import Progress
@@ -10,10 +11,19 @@ from ._dag import Dag, Region
 from ._error import Error, Path, memory_text, path_text, thread_count
 
 
-def extract(path: Path, output: Path, *, region: Optional[Region] = None,
-            level: Optional[int] = None, world: bool = False, crop: bool = False,
-            memory: Union[int, str, None] = None, threads: int = 0, force: bool = False,
-            progress: Optional[Progress] = None) -> Dict[str, Any]:
+def extract(
+    path: Path,
+    output: Path,
+    *,
+    region: Optional[Region] = None,
+    level: Optional[int] = None,
+    world: bool = False,
+    crop: bool = False,
+    memory: Union[int, str, None] = None,
+    threads: int = 0,
+    force: bool = False,
+    progress: Optional[Progress] = None,
+) -> dict[str, Any]:
     """Writes a region of a .vdag file, or a coarser level of it, or both, as a .vdag file.
 
     region, level, world  as in Dag
@@ -27,14 +37,35 @@ def extract(path: Path, output: Path, *, region: Optional[Region] = None,
     with Dag(path) as dag:
         low, high = dag._region(region, level, world)
         levels = dag._levels(level)
-    return json.loads(_native.extract(path, output, levels, low, high, crop, memory_text(memory),
-                                      thread_count(threads), force, progress))
+    return json.loads(
+        _native.extract(
+            path,
+            output,
+            levels,
+            low,
+            high,
+            crop,
+            memory_text(memory),
+            thread_count(threads),
+            force,
+            progress,
+        )
+    )
 
 
-def export(path: Path, output: Path, *, to: str, region: Optional[Region] = None,
-           level: Optional[int] = None, world: bool = False, memory: Union[int, str, None] = None,
-           gray: bool = False, force: bool = False,
-           progress: Optional[Progress] = None) -> Dict[str, Any]:
+def export(
+    path: Path,
+    output: Path,
+    *,
+    to: str,
+    region: Optional[Region] = None,
+    level: Optional[int] = None,
+    world: bool = False,
+    memory: Union[int, str, None] = None,
+    gray: bool = False,
+    force: bool = False,
+    progress: Optional[Progress] = None,
+) -> dict[str, Any]:
     """Writes a .vdag file, or a part of it, in the format of another program (docs/export.md).
 
     Formats that have a place for colors get those of the file, unless `gray` is True.
@@ -47,12 +78,15 @@ def export(path: Path, output: Path, *, to: str, region: Optional[Region] = None
     with Dag(path) as dag:
         low, high = dag._region(region, level, world)
         levels = dag._levels(level)
-    report = json.loads(_native.export(path, output, to, levels, low, high, memory_text(memory), gray,
-                                       force, progress))
+    report = json.loads(
+        _native.export(
+            path, output, to, levels, low, high, memory_text(memory), gray, force, progress
+        )
+    )
     return {"files": files, **report}
 
 
-def export_formats() -> Dict[str, str]:
+def export_formats() -> dict[str, str]:
     """The formats of export(), and what each is."""
     return dict(_native.export_formats())
 

@@ -2,7 +2,7 @@
 
 import operator
 import os
-from typing import Any, Tuple, Union
+from typing import Any, Union
 
 Path = Union[str, bytes, "os.PathLike[str]", "os.PathLike[bytes]"]
 
@@ -19,7 +19,7 @@ class Error(Exception):
         super().__init__(message)
         self.code = code
 
-    def __reduce__(self) -> Tuple[Any, ...]:
+    def __reduce__(self) -> tuple[Any, ...]:
         """Of both, so that an error comes through from another process."""
         return type(self), (str(self), self.code)
 

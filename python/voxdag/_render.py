@@ -2,7 +2,7 @@
 
 import math
 import operator
-from typing import Any, Optional, Tuple, Union
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -13,11 +13,20 @@ from ._error import Error, Path, memory_text, path_text
 _MAX_EDGE = 16384  # pixels
 
 
-def render(path: Path, *, view: str = "auto", camera: Optional[Any] = None,
-           target: Optional[Any] = None, fov: Optional[float] = None,
-           size: Tuple[int, int] = (1280, 720), samples: int = 2, gray: bool = False,
-           memory: Union[int, str, None] = None, threads: int = 0,
-           progress: Optional[Progress] = None) -> np.ndarray:
+def render(
+    path: Path,
+    *,
+    view: str = "auto",
+    camera: Optional[Any] = None,
+    target: Optional[Any] = None,
+    fov: Optional[float] = None,
+    size: tuple[int, int] = (1280, 720),
+    samples: int = 2,
+    gray: bool = False,
+    memory: Union[int, str, None] = None,
+    threads: int = 0,
+    progress: Optional[Progress] = None,
+) -> np.ndarray:
     """A picture of a .vdag file as voxdag render makes it: sRGB, (height, width, 3) uint8.
 
     view             auto, iso, front, back, left, right, top or inside
@@ -26,8 +35,8 @@ def render(path: Path, *, view: str = "auto", camera: Optional[Any] = None,
     size             width and height in pixels
     samples          N: N * N samples per pixel, 1 to 8
     gray             leave out the colors that the file may have
-    memory           bytes, or text such as "8GiB"; by default half of what the machine has. A picture
-                     that takes more, some 66 bytes a pixel, is an Error before it begins
+    memory           bytes, or text such as "8GiB"; by default half of what the machine has. A
+                     picture that takes more, some 66 bytes a pixel, is an Error before it begins
 
     The pixels do not depend on threads. Raises Error.
     """
@@ -46,7 +55,9 @@ def render(path: Path, *, view: str = "auto", camera: Optional[Any] = None,
     if progress is not None and not callable(progress):
         raise TypeError(f"progress={progress!r}: expected a function or None")
     samples = _whole(samples, 1, 8, f"samples {samples!r}: expected 1 to 8")
-    threads = _whole(threads, 0, 1 << 16, f"threads {threads!r}: expected a number of threads, 0 for all")
+    threads = _whole(
+        threads, 0, 1 << 16, f"threads {threads!r}: expected a number of threads, 0 for all"
+    )
     place = None if camera is None else _point(camera, "camera")
     aim = (0.0, 0.0, 0.0) if target is None else _point(target, "target")
     file = path_text(path)
@@ -74,7 +85,7 @@ def _whole(value: Any, least: int, most: int, expected: str) -> int:
     return number
 
 
-def _size(size: Any) -> Tuple[int, int]:
+def _size(size: Any) -> tuple[int, int]:
     expected = f"size {size!r}: expected a width and a height of 1 to {_MAX_EDGE} pixels"
     try:
         width, height = size
@@ -83,7 +94,7 @@ def _size(size: Any) -> Tuple[int, int]:
     return _whole(width, 1, _MAX_EDGE, expected), _whole(height, 1, _MAX_EDGE, expected)
 
 
-def _point(point: Any, what: str) -> Tuple[float, float, float]:
+def _point(point: Any, what: str) -> tuple[float, float, float]:
     try:
         numbers = np.asarray(point, np.float64)
     except (TypeError, ValueError):

@@ -4,7 +4,8 @@
 Tests that wait for Slurm to notice a lost node, or build long enough for many kills, run only with
 VOXDAG_LONG=1 in the environment (tools/test-long cluster).
 
-Exits with 77, which ctest shows as skipped, where Slurm is not installed (tools/packages cluster)."""
+Exits with 77, which ctest shows as skipped, where Slurm is not installed (tools/packages cluster).
+"""
 
 import json
 import os
@@ -107,8 +108,8 @@ class ClusterTest(unittest.TestCase):
     def state(self):
         """What a test that waits in vain has to say."""
         commands = [["sinfo", "--long", "--Node"], ["scontrol", "show", "job"]]
-        return "\n".join([self.cluster.command(*command, check=False).stdout for command in commands]
-                         + [self.logs(), self.cluster.logs()])
+        states = [self.cluster.command(*command, check=False).stdout for command in commands]
+        return "\n".join([*states, self.logs(), self.cluster.logs()])
 
     def wait_for(self, condition, what, seconds=60):
         end = time.monotonic() + seconds
@@ -219,7 +220,7 @@ class ClusterTest(unittest.TestCase):
         time.sleep(8)
         self.cluster.start_controller()
         self.finish(build, 16384)
-        # Nodes hold on to the ids of tasks that the new controller may know nothing of, and gives again.
+        # Nodes keep the ids of tasks that the new controller may not know and may assign again.
         self.cluster.restart_nodes()
 
     def test_a_node_that_cannot_start_tasks(self):
@@ -359,14 +360,16 @@ class ClusterTest(unittest.TestCase):
         self.finish(self.start(16384, 4, *options), 16384)
 
     def test_the_service_builds_on_the_cluster(self):
-        with Service(VOXDAG, self.folder / "service", self.scene, self.cluster.environment) as service:
+        folder = self.folder / "service"
+        with Service(VOXDAG, folder, self.scene, self.cluster.environment) as service:
             # Long enough for the service to ask Slurm while tasks run.
             job = service.submit(131072)
             self.wait_for(lambda: service.tasks(job), lambda: f"tasks in {service.job(job)}", 20)
             shown = service.job(job)["progress"]["cluster"]
             self.assertEqual(shown["batches"], 8)
             self.assertTrue(all(node["name"] in self.cluster.nodes for node in shown["nodes"]))
-            self.assertRegex(service.get("/metrics").decode(), r"voxdag_cluster_tasks_running [1-8]")
+            metrics = service.get("/metrics").decode()
+            self.assertRegex(metrics, r"voxdag_cluster_tasks_running [1-8]")
             service.action(job, "cancel")
             self.wait_for(lambda: service.job(job)["state"] == "canceled", "canceled job")
             self.wait_for(lambda: not self.queue(), "empty queue")
@@ -429,7 +432,8 @@ class ClusterTest(unittest.TestCase):
 
     @slow
     def test_a_task_that_is_out_of_memory(self):
-        # No task can run with this little memory. Without cgroups Slurm may report FAILED or CANCELLED.
+        # No task can run with this little memory. Without cgroups Slurm may report FAILED or
+        # CANCELLED.
         build = self.start(32768, 2, "--cluster-options", "--mem=8M", "--cluster-retries", "0")
         _, messages = self.end(build)
         self.assertEqual(build.returncode, 10, messages)

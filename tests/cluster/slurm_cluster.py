@@ -1,5 +1,6 @@
-"""A Slurm cluster on this machine, in a separate folder: munged, slurmctld and some slurmd, each with
-its name and port. No systemd, no extra privileges for the tests; everything ends with the context."""
+"""A Slurm cluster on this machine, in a separate folder: munged, slurmctld and some slurmd, each
+with its name and port. No systemd, no extra privileges for the tests; everything ends with the
+context."""
 
 import os
 import pwd
@@ -65,9 +66,19 @@ class SlurmCluster:
         key.chmod(0o600)
         self.write_configuration()
         munge = self.folder / "munge"
-        self.spawn("munged", ["munged", "--foreground", "--force", f"--socket={munge}/socket",
-                              f"--key-file={munge}/key", f"--pid-file={munge}/pid",
-                              f"--seed-file={munge}/seed", f"--log-file={munge}/log"])
+        self.spawn(
+            "munged",
+            [
+                "munged",
+                "--foreground",
+                "--force",
+                f"--socket={munge}/socket",
+                f"--key-file={munge}/key",
+                f"--pid-file={munge}/pid",
+                f"--seed-file={munge}/seed",
+                f"--log-file={munge}/log",
+            ],
+        )
         self.wait_for(lambda: (munge / "socket").exists(), "munged")
         self.start_controller()
         for node in self.nodes:
@@ -117,23 +128,30 @@ class SlurmCluster:
             self.settings,
         ]
         for node, port in zip(self.nodes, self.node_ports):
-            lines.append(f"NodeName={node} NodeHostname=localhost NodeAddr=127.0.0.1 Port={port} "
-                         f"CPUs={self.cpus} RealMemory=4096 State=UNKNOWN")
-        lines.append(f"PartitionName=all Nodes={','.join(self.nodes)} Default=YES MaxTime=INFINITE "
-                     "State=UP DefMemPerCPU=512")
-        lines.append(f"PartitionName=urgent Nodes={','.join(self.nodes)} PriorityTier=10 "
-                     "PreemptMode=OFF")
+            lines.append(
+                f"NodeName={node} NodeHostname=localhost NodeAddr=127.0.0.1 Port={port} "
+                f"CPUs={self.cpus} RealMemory=4096 State=UNKNOWN"
+            )
+        lines.append(
+            f"PartitionName=all Nodes={','.join(self.nodes)} Default=YES MaxTime=INFINITE "
+            "State=UP DefMemPerCPU=512"
+        )
+        lines.append(
+            f"PartitionName=urgent Nodes={','.join(self.nodes)} PriorityTier=10 PreemptMode=OFF"
+        )
         (self.folder / "slurm.conf").write_text("\n".join(lines) + "\n")
 
     def spawn(self, name, command):
         with open(self.folder / "log" / f"{name}.out", "ab") as log:
-            self.processes[name] = subprocess.Popen(command, stdout=log, stderr=log,
-                                                    env=self.environment, start_new_session=True)
+            self.processes[name] = subprocess.Popen(
+                command, stdout=log, stderr=log, env=self.environment, start_new_session=True
+            )
 
     def start_controller(self):
         self.spawn("slurmctld", ["slurmctld", "-D"])
-        self.wait_for(lambda: self.command("scontrol", "ping", check=False).returncode == 0,
-                      "slurmctld")
+        self.wait_for(
+            lambda: self.command("scontrol", "ping", check=False).returncode == 0, "slurmctld"
+        )
 
     def start_node(self, node):
         self.spawn(node, ["slurmd", "-D", "-N", node])
@@ -141,20 +159,29 @@ class SlurmCluster:
     def restart_nodes(self):
         for node in self.nodes:
             self.kill_machine(node)
-        # Otherwise a job that is completing keeps its node until Slurm asks it again, a minute later.
-        self.command("scontrol", "update", f"nodename={','.join(self.nodes)}", "state=down",
-                     "reason=restart")
+        # Otherwise a completing job keeps its node until Slurm polls it a minute later.
+        self.command(
+            "scontrol", "update", f"nodename={','.join(self.nodes)}", "state=down", "reason=restart"
+        )
         for node in self.nodes:
             self.start_node(node)
         self.wait_for_idle_nodes()
 
     def resume_nodes(self):
         """Makes nodes that Slurm has ceased to trust work again."""
-        drained = self.command("sinfo", "--noheader", "--Node", "--partition=all",
-                               "--states=drained,draining", "--format=%N", check=False).stdout.split()
+        drained = self.command(
+            "sinfo",
+            "--noheader",
+            "--Node",
+            "--partition=all",
+            "--states=drained,draining",
+            "--format=%N",
+            check=False,
+        ).stdout.split()
         if drained:
-            self.command("scontrol", "update", f"nodename={','.join(drained)}", "state=resume",
-                         check=False)
+            self.command(
+                "scontrol", "update", f"nodename={','.join(drained)}", "state=resume", check=False
+            )
 
     def wait_for_idle_nodes(self):
         def are_idle():
@@ -179,19 +206,23 @@ class SlurmCluster:
                 continue
             try:
                 environment = (entry / "environ").read_bytes().split(b"\0")
-                if (marker in environment and
-                        f"SLURM_CONF={self.folder}/slurm.conf".encode() in environment):
+                if (
+                    marker in environment
+                    and f"SLURM_CONF={self.folder}/slurm.conf".encode() in environment
+                ):
                     os.kill(int(entry.name), signal.SIGKILL)
             except OSError:
                 continue
 
     def command(self, *command, check=True):
-        return subprocess.run(command, env=self.environment, capture_output=True, text=True,
-                              timeout=60, check=check)
+        return subprocess.run(
+            command, env=self.environment, capture_output=True, text=True, timeout=60, check=check
+        )
 
     def count_idle(self):
-        shown = self.command("sinfo", "--noheader", "--Node", "--partition=all",
-                             "--format=%N %T", check=False)
+        shown = self.command(
+            "sinfo", "--noheader", "--Node", "--partition=all", "--format=%N %T", check=False
+        )
         return sum(line.split()[1:] == ["idle"] for line in shown.stdout.splitlines())
 
     def wait_for(self, condition, what, seconds=60):
@@ -202,8 +233,10 @@ class SlurmCluster:
             time.sleep(0.1)
 
     def logs(self):
-        parts = [f"--- {log.name}\n{log.read_text(errors='replace')[-1500:]}"
-                 for log in sorted((self.folder / "log").iterdir())]
+        parts = [
+            f"--- {log.name}\n{log.read_text(errors='replace')[-1500:]}"
+            for log in sorted((self.folder / "log").iterdir())
+        ]
         # What the nodes and the jobs are doing says most, so it comes last.
         for command in (["sinfo", "--Node", "--long"], ["squeue"]):
             shown = self.command(*command, check=False)

@@ -17,9 +17,16 @@ class Service:
         folder.mkdir()
         self.settings = folder / "server.json"
         self.port = free_ports(1)[0]
-        self.settings.write_text(json.dumps({
-            "port": self.port, "data_folder": str(folder / "data"), "scene_roots": [str(scene.parent)],
-            "cluster": {"engine": "slurm", "tasks": 8, "grace_s": 2}}))
+        self.settings.write_text(
+            json.dumps(
+                {
+                    "port": self.port,
+                    "data_folder": str(folder / "data"),
+                    "scene_roots": [str(scene.parent)],
+                    "cluster": {"engine": "slurm", "tasks": 8, "grace_s": 2},
+                }
+            )
+        )
         self.scene = scene
 
     def __enter__(self):
@@ -31,8 +38,11 @@ class Service:
         self.process.wait(timeout=30)
 
     def start(self):
-        self.process = subprocess.Popen([self.voxdag, "serve", "--config", self.settings],
-                                        stderr=subprocess.DEVNULL, env=self.environment)
+        self.process = subprocess.Popen(
+            [self.voxdag, "serve", "--config", self.settings],
+            stderr=subprocess.DEVNULL,
+            env=self.environment,
+        )
         for _ in range(200):
             try:
                 self.get("/readyz")
@@ -47,8 +57,12 @@ class Service:
 
     def get(self, path, body=None, method=None):
         data = None if body is None else json.dumps(body).encode()
-        request = urllib.request.Request(f"http://127.0.0.1:{self.port}{path}", data, method=method,
-                                         headers={"Content-Type": "application/json"})
+        request = urllib.request.Request(
+            f"http://127.0.0.1:{self.port}{path}",
+            data,
+            method=method,
+            headers={"Content-Type": "application/json"},
+        )
         with urllib.request.urlopen(request, timeout=30) as answer:
             return answer.read()
 
