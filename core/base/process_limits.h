@@ -13,11 +13,11 @@ inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;
 // Half of what RAM and cgroups allow, at least kMinMemory; bytes.
 uint64_t default_memory();
 // The lowest limit of the cgroups that `membership` (the text of /proc/self/cgroup) names and of
-// their ancestors, of version 2 or 1, mounted under `mount`; UINT64_MAX if there is none.
+// their ancestors, of version 2 or 1, mounted under `mount`; UINT64_MAX without one.
 uint64_t cgroup_memory(const std::string& membership, const std::string& mount);
-// The CPUs that this process may use: those of its affinity mask, or fewer if a cgroup has a quota.
+// The CPUs that this process may use: its affinity mask's, or fewer if a cgroup has a quota.
 unsigned default_threads();
-// The lowest quota of the cgroups as above, in CPUs and rounded up; UINT64_MAX if there is none.
+// The lowest quota of the cgroups as above, in CPUs and rounded up; UINT64_MAX without a quota.
 uint64_t cgroup_cpus(const std::string& membership, const std::string& mount);
 // Largest resident set of this process so far (VmHWM), in bytes.
 uint64_t peak_resident_bytes();

@@ -37,7 +37,7 @@ struct SrgbThresholds {
       54183, 54708, 55235, 55766, 56300, 56836, 57376, 57918, 58464, 59012, 59564, 60118, 60675,
       61236, 61799, 62366, 62935, 63508, 64083, 64662, 65244, 65535};
 };
-// Element k: what is stored for the intensity 16 k, or one less.
+// Element k: the stored value for the intensity 16 k, or one less.
 struct SrgbStarts {
   uint8_t of[4096] = {};
   constexpr SrgbStarts() {
@@ -72,8 +72,8 @@ VOXDAG_HD inline uint64_t rounded_quotient(uint64_t numerator, uint64_t denomina
   return quotient + (rest >= denominator - rest ? 1 : 0);
 }
 
-// For numerators below 2^52 and a denominator below 2^35, in doubles: quotients below k + 1/2, k <
-// 2^16 a whole number, are so by 2^-36 at least, and still are when they are rounded to 2^-37.
+// For numerators below 2^52 and a denominator below 2^35, in doubles: quotients below k + 1/2, for
+// an integer k < 2^16, are below it by at least 2^-36, and still are after rounding to 2^-37.
 VOXDAG_HD inline uint32_t rounded_quotient_in_doubles(uint64_t numerator, double denominator) {
   const double quotient = static_cast<double>(static_cast<int64_t>(numerator)) / denominator;
   return static_cast<uint32_t>(static_cast<int32_t>(quotient + 0.5));
@@ -88,8 +88,8 @@ VOXDAG_HD inline uint8_t alpha_of(const ColorSum& sum) {
   return static_cast<uint8_t>(alpha < 255 ? alpha : 255);
 }
 
-// Of a sum whose weight is above 0. Surfaces count by weight and alpha; where all of them are
-// transparent, by weight, and alpha is 0.
+// The color of a sum with a weight above 0. Surfaces count by weight and alpha; where all of them
+// are transparent, by weight, and alpha is 0.
 VOXDAG_HD inline Color color_of(const ColorSum& sum) {
   const bool visible = sum.seen_weight != 0;
   const std::array<uint64_t, 3>& channels = visible ? sum.seen : sum.plain;

@@ -1,6 +1,6 @@
-// What the surfaces in a cell of the color grid add up to, before it becomes one color. Sums
-// commute, so the order of triangles, threads and subvolumes does not matter, and the sum of a
-// coarser cell is that of its children.
+// The sum over the surfaces in a cell of the color grid, before it becomes one color. Sums commute,
+// so the order of triangles, threads and subvolumes does not matter, and the sum of a coarser cell
+// is the sum of its children.
 #pragma once
 
 #include <array>
@@ -15,11 +15,11 @@ namespace voxdag {
 struct ColorSum {
   std::array<uint64_t, 3> seen{};   // of weight x alpha x intensity: red, green, blue
   uint64_t seen_weight = 0;         // of weight x alpha
-  std::array<uint64_t, 3> plain{};  // of weight x intensity: what is used where all alpha is 0
+  std::array<uint64_t, 3> plain{};  // of weight x intensity: used where all alpha is 0
   uint64_t weight = 0;
 
   VOXDAG_HD void add(const ColorSum& other) {
-    // As eight equal numbers, of which compilers add several at once.
+    // As eight equal numbers, which compilers add with vector instructions.
     uint64_t sums[8], more[8];
     static_assert(sizeof sums == sizeof(ColorSum));
     std::memcpy(sums, this, sizeof sums);

@@ -3,7 +3,7 @@
 //
 //     byte 0: 127 + 127 px, byte 1: 127 + 127 py, each 0 to 254
 //
-// where (px, py) = (x, y) / (|x| + |y| + |z|), and for z < 0 what is mirrored at the diagonals:
+// where (px, py) = (x, y) / (|x| + |y| + |z|), and for z < 0 its mirror image at the diagonals:
 // ((1 - |py|) sign x, (1 - |px|) sign y), the sign of 0 being positive.
 #pragma once
 
@@ -33,7 +33,7 @@ VOXDAG_HD inline int64_t in_127ths(int64_t x, int64_t length) {
 
 }  // namespace color
 
-// Of a direction of any length, with components below 2^53; not all of them 0.
+// The code of a direction of any length, with components below 2^53; not all of them 0.
 VOXDAG_HD inline NormalCode encode_normal(int64_t x, int64_t y, int64_t z) {
   const int64_t width = color::absolute(x), height = color::absolute(y);
   const int64_t length = width + height + color::absolute(z);

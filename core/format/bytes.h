@@ -32,7 +32,7 @@ class ByteSink {
   std::vector<std::byte>& out_;
 };
 
-// Takes fields from the front of a buffer; what is missing reads as zeros and makes ok() false.
+// Takes fields from the front of a buffer. Missing bytes read as zeros and make ok() false.
 class ByteSource {
  public:
   explicit ByteSource(std::span<const std::byte> bytes) : bytes_(bytes) {}

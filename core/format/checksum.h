@@ -45,8 +45,8 @@ class Checksum64 {
 };
 
 // A checksum of 32-bit words that can be computed in parts, in any order and by any number of
-// threads: the sum over all words, weighted by their indices, modulo 2^64. The checksum of the
-// whole is the sum of those of its parts. `first` is the index of words[0].
+// threads: the sum over all words, weighted by their indices, modulo 2^64. The checksum of all
+// words is the sum of the parts' checksums. `first` is the index of words[0].
 uint64_t indexed_checksum(uint64_t first, std::span<const uint32_t> words);
 
 // A running SHA-256.

@@ -1,5 +1,5 @@
-// All file access of voxdag uses this interface. So tests can replace the disk with one that is
-// full, loses unsynced data, or flips bits. Paths are plain byte strings.
+// All file access of voxdag uses this interface, so that tests can replace the disk with a disk
+// that is full, loses unsynced data, or flips bits. Paths are plain byte strings.
 //
 // Errors: kNotFound, kNoSpace (ENOSPC, EDQUOT), kIo; the message names the call, the path, the
 // offset if there is one, and the system's reason. Short reads and writes and EINTR are handled

@@ -78,7 +78,7 @@ struct BuildProgress {
   uint64_t total = 0;  // 0 while unknown
 };
 
-// All members may be empty. The build calls the functions from its own threads, one call at a time.
+// All members may be empty. The build calls the functions from its threads; calls never overlap.
 // They must not throw; a function that wants to end the build calls cancel() of the token.
 struct BuildHooks {
   std::function<void(const BuildProgress&)> on_progress;  // at most ten times a second

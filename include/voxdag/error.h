@@ -20,7 +20,8 @@ enum class ErrorCode {
   kLimit,               // a limit of the format or of the arithmetic, named in the message
 };
 
-// One sentence: what went wrong, where (file, subvolume, scene node) and what was expected.
+// The message is one sentence that names the problem, the place (file, subvolume, scene node) and
+// the expectation.
 class Error : public std::exception {
  public:
   Error(ErrorCode code, std::string message) : code_(code), message_(std::move(message)) {}

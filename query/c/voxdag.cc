@@ -100,7 +100,7 @@ voxdag::query::RayLimits ray_limits_of(const voxdag_ray_limits* limits) {
   return {limits->max_distance, limits->stop_size};
 }
 
-// Items for which memory is taken at a time.
+// Items per allocation.
 constexpr size_t kBatch = 4096;
 
 template <class Work>

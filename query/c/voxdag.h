@@ -103,7 +103,7 @@ VOXDAG_API voxdag_status voxdag_open(const char* path, voxdag_file** file);
 VOXDAG_API void voxdag_close(voxdag_file* file);
 /* Fills the first facts->struct_size bytes. */
 VOXDAG_API voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts);
-/* The name of a material, or null if there is none of this number. The last name is "", for
+/* The name of a material, or null for an unknown number. The last name is "", for
  * triangles without a material. Valid while the file is open. */
 VOXDAG_API const char* voxdag_material_name(const voxdag_file* file, uint32_t material);
 

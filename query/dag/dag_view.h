@@ -1,5 +1,5 @@
-// A finished DAG as cells of any size, from the whole grid down to a voxel. It reads the words of
-// each level in place, as the global file holds them. What lies below a cell is its `content`:
+// A finished DAG as cells of any size, from the complete grid down to a voxel. It reads the words
+// of each level in place, in the layout of the global file. The part below a cell is its `content`:
 //     a node        its word offset in its level
 //     a brick       its 64-bit mask                  (edge 4)
 //     half a brick  the 8 bits of its 2x2x2 voxels   (edge 2)
@@ -33,7 +33,7 @@ class DagView {
 
   bool empty() const { return levels_.empty(); }
   uint32_t grid_levels() const { return grid_levels_; }
-  // The level at `depth`, 0 to L - 2, as it lies in memory; the DAG must not be empty.
+  // The level at `depth`, 0 to L - 2, in its memory layout; the DAG must not be empty.
   const Level& level(uint32_t depth) const { return levels_[depth]; }
   // Begins to load the node or brick at this word offset, if there is such a word.
   void prefetch(uint32_t depth, uint64_t offset) const {

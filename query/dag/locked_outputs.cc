@@ -35,8 +35,8 @@ void refuse_replacing(FileSystem& files, const Outputs& outputs) {
     }
 }
 
-// Whether the last one that wrote there was killed. A file of that name that is not empty is
-// somebody else's, and what a build leaves is of use to it.
+// True if the last writer was killed. A lock file that is not empty was not made by voxdag, and a
+// build's leftovers are kept, because the build can resume from them.
 bool is_left_behind(FileSystem& files, const std::string& output) {
   const auto lock = open_if_there(files, OutputLock::path_of(output));
   return lock && lock->size() == 0 && !files.exists(output + ".work");

@@ -10,10 +10,10 @@
 
 namespace voxdag::query {
 
-// What is about to be written: each of `paths` under the name PATH.partial at first.
+// The outputs of a command; each of `paths` is first written as PATH.partial.
 struct Outputs {
-  std::vector<std::string> paths;  // the first one is the one that is locked
-  std::string input;               // which is read at the same time
+  std::vector<std::string> paths;  // the first one is locked
+  std::string input;               // read while the outputs are written
   bool replace = false;            // files that exist
 };
 

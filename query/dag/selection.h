@@ -9,13 +9,13 @@
 
 namespace voxdag::query {
 
-// Where a coordinate of world space lies along an axis of the grid of 2^grid_levels cells per edge,
-// in cells. What lies on a boundary between cells up to the rounding of a few operations in doubles
-// lies on it: so the corner of a cell, computed as origin + cell * edge, is in that cell, and a box
-// of such corners has no layer more than that.
+// Converts a coordinate of world space to cells along an axis of the grid of 2^grid_levels cells
+// per edge. A coordinate within the rounding of a few double operations of a cell boundary counts
+// as on the boundary. So the corner of a cell, computed as origin + cell * edge, is in that cell,
+// and a box of such corners has no extra layer.
 double world_to_cells(const voxdag_reader::File& file, uint32_t grid_levels, size_t axis,
                       double world);
-// The cell that it lies in, which may lie outside of the grid; at most 2^62 away.
+// The cell of a coordinate, possibly outside the grid; at most 2^62 away.
 int64_t world_to_cell(const voxdag_reader::File& file, uint32_t grid_levels, size_t axis,
                       double world);
 // The cells that the half-open box x0, y0, z0, x1, y1, z1 of world space reaches, of numbers; where
@@ -23,8 +23,7 @@ int64_t world_to_cell(const voxdag_reader::File& file, uint32_t grid_levels, siz
 Region world_to_region(const voxdag_reader::File& file, uint32_t grid_levels,
                        const std::array<double, 6>& box);
 
-// Throws Error{kInvalidInput} for a grid that is finer than that of a file of so many levels, or
-// coarser than a brick.
+// Throws Error{kInvalidInput} for a grid that is finer than the file's, or coarser than a brick.
 void check_grid(const Selection& selection, uint32_t file_levels);
 
 }  // namespace voxdag::query

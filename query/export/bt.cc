@@ -21,8 +21,8 @@ namespace {
 constexpr uint32_t kOctoMapLevels = 16;
 enum BtChild : uint32_t { kUnknown = 0, kFree = 1, kOccupied = 2, kInner = 3 };
 
-// Walks the octree depth first. Cubes without voxels are free if they lie in the region: nothing
-// else is known of what is inside of objects.
+// Walks the octree depth first. Cubes without voxels inside the region are free: the file does not
+// record the inside of objects.
 template <class Inner>
 class BtWalk {
  public:
@@ -71,7 +71,7 @@ class BtWalk {
       bits |= state << 2 * octomap_child(i);
     }
     inner_(bits);
-    // Children follow in OctoMap's order, which is ours with x and z exchanged.
+    // Children follow in OctoMap's order, which is voxdag's with x and z exchanged.
     for (int i = 0; i < 8; ++i) {
       const int ours = octomap_child(i);
       if (inner >> ours & 1)

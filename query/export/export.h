@@ -19,10 +19,10 @@ namespace voxdag::query {
 struct ExportJob;
 
 struct ExportReport {
-  std::vector<std::string> files;  // that were written, the one that was asked for first
+  std::vector<std::string> files;  // written files, the requested one first
   uint64_t bytes = 0;              // of all files
   uint64_t voxels = 0;
-  std::vector<std::string> notes;  // what a user has to know to open the files, a sentence each
+  std::vector<std::string> notes;  // usage notes for the files, one sentence each
 };
 
 struct ExportFormat {
@@ -47,16 +47,16 @@ struct ExportRequest {
   const ExportFormat* format = nullptr;
   Selection selection;
   std::string output;
-  uint64_t memory_bytes = 0;  // the limit of what is allocated; the mapped file is not counted
-  bool gray = false;          // leaves out the colors that the file may have
+  uint64_t memory_bytes = 0;  // limit of allocations; the mapped file is not counted
+  bool gray = false;          // omits colors
   bool replace = false;       // files that exist
 };
 
-// Writes the selected voxels. Each file appears under its name when all are whole; after an error
-// nothing is left, unless the disk refuses the second of two names, and what a process that was
-// killed has left is removed by the next one. Throws Error{kLimit} if the format cannot hold them,
-// Error{kOutOfMemory} if the memory cannot, where the message says what would do, and what
-// LockedOutputs does.
+// Writes the selected voxels. The files get their final names when all are complete. After an error
+// no file remains, unless the disk refuses the second of two renames. Files of a killed process are
+// removed by the next export. Throws Error{kLimit} if the format cannot hold the voxels,
+// Error{kOutOfMemory} if the memory cannot (the message names a selection that fits), and the
+// errors of LockedOutputs.
 ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,
                         const CancelToken& cancel);

@@ -1,5 +1,5 @@
-// A file that an export writes: buffered, under the name "<path>.partial" until it is published.
-// Destroyed before that, it removes what it has written. One thread uses it.
+// A buffered output file of an export, named "<path>.partial" until it is published. If destroyed
+// earlier, it removes the file. One thread uses it.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class ExportFile {
 
   const std::string& path() const { return path_; }
   uint64_t size() const { return size_; }
-  // Continues at `offset`, which may lie before or beyond the end.
+  // Continues at `offset`, which may be before or beyond the end.
   void seek(uint64_t offset);
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text) { write(std::as_bytes(std::span(text))); }

@@ -1,4 +1,4 @@
-// What the writer of a format works with, and what writers have in common.
+// The inputs of a format's writer, and functions shared by the writers.
 #pragma once
 
 #include <array>
@@ -60,7 +60,7 @@ class ExportStage {
     pending_ += count;
     if (++calls_ % kCallsPerCheck == 0) report();
   }
-  // Says at once how far it is.
+  // Reports the progress immediately.
   void report() {
     job_.cancel.check();
     job_.progress.advance(pending_);
@@ -92,7 +92,7 @@ Selection coarser(const Selection& selection, uint32_t grid_levels);
 // The options that select it: "--level 11", and "--region" with cells of that grid if it is a part.
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
-// ExportFile::publish() of what was made from a file that was whole until then; else throws.
+// Publishes the files if the input was intact until then; throws otherwise.
 inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> written) {
   job.watched.expect_whole();
   return ExportFile::publish(written);
@@ -101,8 +101,8 @@ inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> writt
 // Throws Error{kNoSpace} if the disk of the output has less than `bytes` free.
 void require_space(const ExportJob& job, uint64_t bytes);
 
-// Throws Error{code}: "OUTPUT: PROBLEM. --level 11 fits", or "Expected a smaller --region" where no
-// coarser level does; `fits` says whether a level would.
+// Throws Error{code}: "OUTPUT: PROBLEM. --level 11 fits", or "Expected a smaller --region" if no
+// coarser level fits; `fits` tests a level.
 [[noreturn]] void refuse_size(const ExportJob& job, const std::string& problem,
                               const std::function<bool(uint32_t grid_levels)>& fits,
                               ErrorCode code = ErrorCode::kLimit);
@@ -124,7 +124,7 @@ class CellLimit {
 };
 
 // count_voxels() of the job's selection. Throws Error{kLimit} as above if there are more than
-// `limit`, which `reason` explains, Error{kInvalidInput} if there is none.
+// `limit`, which `reason` explains, Error{kInvalidInput} for an empty selection.
 uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string& reason);
 
 [[noreturn]] void refuse_empty(const ExportJob& job);
@@ -136,7 +136,7 @@ void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
                                  const std::array<int64_t, 3>& cell);
 
-// One for each format; those of the libraries exist where the library was found.
+// One writer per format; the formats of optional libraries exist if the library was found.
 ExportReport write_ply(const ExportJob& job);
 ExportReport write_npz(const ExportJob& job);
 ExportReport write_hashdag(const ExportJob& job);
@@ -145,7 +145,7 @@ ExportReport write_voxel(const ExportJob& job);
 ExportReport write_vox(const ExportJob& job);
 ExportReport write_bt(const ExportJob& job);
 ExportReport write_glb(const ExportJob& job);
-// With a smaller limit than that of the format, for tests: files of 4 GiB take too long.
+// Uses a smaller limit than the format's, for tests: files of 4 GiB take too long.
 ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes);
 ExportReport write_vdb(const ExportJob& job);
 ExportReport write_nvdb(const ExportJob& job);

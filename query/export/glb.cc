@@ -1,7 +1,7 @@
 // A surface as a binary glTF 2.0: the faces between set voxels and empty ones, coplanar faces
-// merged to rectangles, of one color where the file has colors. Positions are whole numbers of
+// merged to rectangles, of one color where the file has colors. Positions are integer numbers of
 // cells from the low corner of the region, which floats hold exactly; the node places and scales
-// them. COLOR_0 is linear light, as glTF asks for, in 16 bits: dark sRGB bytes need them.
+// them. COLOR_0 is linear light, as glTF requires, in 16 bits: dark sRGB bytes need them.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -155,7 +155,7 @@ class GlbSurface {
     merge(faces, axis, upward);
   }
 
-  // Of the cell that a face belongs to; the same for all without colors.
+  // Color of a face's cell; black for all cells without colors.
   voxdag_reader::Rgb color_of(uint64_t face, uint8_t axis, bool upward) {
     if (!job_.has_colors) return {};
     std::array<int64_t, 3> cell = job_.selection.region.low;
@@ -292,7 +292,7 @@ std::string glb_json(const ExportJob& job, const std::vector<GlbQuad>& quads) {
   return json;
 }
 
-// Of four vertices. Alpha is there to keep elements at multiples of four bytes.
+// Writes the colors of four vertices. Alpha keeps elements at multiples of four bytes.
 void put_colors(voxdag_reader::Rgb color, ExportFile& file) {
   const auto& linear = linear_of_srgb();
   const std::array<uint16_t, 4> vertex = {linear[color.r], linear[color.g], linear[color.b], 65535};
@@ -335,7 +335,7 @@ ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
   std::optional<GlbSurface> made(std::in_place, job, limit);
   const uint64_t quads = made->quads().size();
   if (quads > limit) {
-    made.reset();  // the search below needs memory, too
+    made.reset();  // the search below also needs memory
     // Even if no faces are merged.
     CellLimit cells(job, limit / 6);
     refuse_size(job,

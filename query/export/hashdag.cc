@@ -2,9 +2,9 @@
 //     NAME.basic_dag.dag.bin                   f64 x 6 bounds | u32 levels | u64 words | u32 ...
 //     NAME.basic_dag.uncompressed_colors.bin   u32 top levels | u64 n, u64 ... | u64 m, u32 ...
 // A node is one word (child mask, and above it the voxels that the node encloses) and the absolute
-// word index of each child; a leaf is two words, as our brick. In the top levels the count is an
+// word index of each child; a leaf is two words, like a brick. In the top levels the count is an
 // index into the 64-bit numbers of the color file instead. The colors are bytes R, G, B and 255 for
-// each voxel in Morton order, or one gray if there are none.
+// each voxel in Morton order, or one gray for a file without colors.
 #include <algorithm>
 #include <array>
 #include <bit>

@@ -1,6 +1,6 @@
-// How many cells are set in the grid of each level of a file, counted from the coarsest one on: how
-// often a node occurs in the octree is passed on to its children, so that the levels above the one
-// that is asked for are read once for all, and none below it.
+// Counts the set cells in the grid of each level of a file, from the coarsest on. The number of
+// occurrences of a node in the octree is passed on to its children. So the levels above the
+// requested one are read once, and no level below it.
 #pragma once
 
 #include <cstdint>

@@ -15,7 +15,7 @@
 namespace voxdag::query {
 namespace {
 
-// The CRC-32 of ZIP, 8 bytes at a time ("slicing by 8").
+// The CRC-32 of ZIP, 8 bytes per step ("slicing by 8").
 class Crc32 {
  public:
   Crc32() {

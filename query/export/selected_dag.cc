@@ -75,7 +75,7 @@ struct MemoSlot {
 class BuiltLevel {
  public:
   explicit BuiltLevel(MemoryBudget& budget) : budget_(budget), table_(budget) {}
-  // The offset of an equal node, added if there is none yet.
+  // The offset of an equal node, which is added if missing.
   uint64_t offset_of(std::span<const uint32_t> node) {
     uint64_t hash = node.size();
     for (const uint32_t word : node) hash = mix_bits(hash ^ word) + word;
@@ -134,7 +134,7 @@ class DagBuilder {
   BuiltNode build(uint32_t depth, uint64_t content, const Position& corner) {
     const int64_t edge = int64_t{1} << (job_.selection.grid_levels - depth);
     if (!job_.selection.region.intersects(corner, edge)) return {};
-    // Only what lies in the region as a whole is the same everywhere. A brick of the file has no
+    // Only nodes completely inside the region are the same everywhere. A brick of the file has no
     // offset here, and is one word of content anyway.
     const bool is_brick = depth + kBrickLevels == job_.dag.grid_levels();
     if (is_brick || !job_.selection.region.contains(corner, edge))
@@ -143,7 +143,7 @@ class DagBuilder {
     const auto is_it = [&](const MemoSlot& slot) { return slot.source == content; };
     MemoSlot& known = memo_[depth].find(hash, is_it);
     if (!known.free()) return {known.offset, known.voxels};
-    // Nodes of this depth lie in no other of it, so that the table does not change below.
+    // No node contains another node of its depth, so the table does not change below.
     const BuiltNode built = build_node(depth, content, corner, edge);
     known = {hash, content, built.offset, built.voxels};
     return built;

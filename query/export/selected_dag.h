@@ -1,7 +1,7 @@
-// The selected cells as a DAG of their own grid, for formats that share equal subtrees. Of a whole
-// file it is the file's levels in place. Of a part it is built in memory, which is charged to the
-// budget: equal subtrees are shared again after clipping, and each node of the file that lies in
-// the region is visited once.
+// The selected cells as a DAG of the selection's grid, for formats that share equal subtrees. For a
+// complete file it is the file's levels in place. For a part it is built in memory, which is
+// charged to the budget: equal subtrees are shared again after clipping, and each node of the file
+// inside the region is visited once.
 //
 // Levels are as in the global file: a node is its child mask and the word offsets of its children
 // in the next level, one word each; a brick is two words, low half first.
@@ -75,7 +75,7 @@ class SelectedDag {
 };
 
 // A number per node or brick of a level, charged to the job's memory. It is found by the node's
-// offset: since each has two words or more, half the offset is a number of its own.
+// offset: because each node has two words or more, half the offset is unique.
 template <class Number>
 class NodeNumbers {
  public:

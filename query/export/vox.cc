@@ -1,8 +1,8 @@
 // MagicaVoxel .vox, version 150: a model of at most 256^3 voxels for each different node of the DAG
 // with that edge, and an instance of it for each place where the node occurs. With colors each
-// place has a model of its own, since equal nodes have different colors.
+// place has a separate model, because equal nodes have different colors.
 //     "VOX " | 150 | MAIN { (SIZE XYZI)... nTRN nGRP (nTRN nSHP)... RGBA }
-// MagicaVoxel's z is up: (x, y, z) of the file is (x, -z, y) of ours.
+// MagicaVoxel's z is up: (x, y, z) of the file is (x, -z, y) in voxdag.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -22,8 +22,8 @@ namespace {
 
 constexpr uint32_t kModelLevels = 8;                         // 256^3 voxels
 constexpr uint64_t kMaxVoxBytes = (uint64_t{1} << 31) - 1;   // of a chunk: its size is an int32
-constexpr uint64_t kMaxVoxModels = (uint64_t{1} << 31) / 4;  // node ids are int32, too
-constexpr uint32_t kMagicaVoxelEdge = 2048;                  // what its editor shows
+constexpr uint64_t kMaxVoxModels = (uint64_t{1} << 31) / 4;  // node ids are also int32
+constexpr uint32_t kMagicaVoxelEdge = 2048;                  // maximum of its editor
 constexpr uint64_t kModelBytes = 12 + 12 + 12 + 4;           // SIZE, and XYZI without voxels
 constexpr uint64_t kChunkHeaderBytes = 12;
 
@@ -84,7 +84,7 @@ VoxChunk palette_chunk(std::span<const voxdag_reader::Rgb> colors) {
 // The voxels' colors, two passes: which there are, and what becomes of each.
 class VoxColors {
  public:
-  // Of so many voxels.
+  // `voxels`: number of voxels to be added.
   VoxColors(const ExportJob& job, uint64_t voxels) : job_(job) {
     if (!job.has_colors) return;
     palette_.emplace(job.budget);
@@ -138,7 +138,7 @@ class VoxWriter {
     return std::max(min_bytes_, 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_);
   }
   size_t instance_count() const { return instances_; }
-  // Of all models together, each of which has its place once.
+  // Voxels of all models, each counted once.
   uint64_t model_voxels() const {
     return std::accumulate(voxels_.begin(), voxels_.end(), uint64_t{0});
   }
@@ -230,7 +230,7 @@ class VoxWriter {
                      visit);
   }
 
-  // Of the node that is content() where an instance is.
+  // The model of a node, given its content().
   uint32_t model_of(uint64_t content) {
     return depth_ + kBrickLevels == view_.grid_levels() ? 0 : models_[content];
   }
@@ -265,8 +265,8 @@ class VoxWriter {
     for (const uint64_t voxels : voxels_) models_bytes_ += model_bytes(voxels);
   }
 
-  // Where the center of an instance is. The grid's center is at the origin of MagicaVoxel's x and
-  // y, its floor at that of z.
+  // Position of an instance's center. The grid's center is at MagicaVoxel's x = y = 0, its floor at
+  // z = 0.
   std::string place_text(const Position& corner) const {
     const int64_t half = edge_ / 2, middle = int64_t{1} << (view_.grid_levels() - 1);
     return std::to_string(corner[0] + half - middle) + " " +

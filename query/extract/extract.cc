@@ -28,8 +28,8 @@
 namespace voxdag::query {
 namespace {
 
-// A worker's share that suffices for every cube of a few bricks, and what it has besides: a segment
-// to write, a window of the file, and pages that are retained for its next cube.
+// Minimum share of a worker, enough for every cube of a few bricks, and the worker's additional
+// memory: a segment to write, a window of the file, and pages retained for its next cube.
 constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
 constexpr uint64_t kOutsideShareBytes =
     kSegmentWriterBytes + NodeReader::kMemoryBytes + ConsingMemory::kMinPageBytes;
@@ -41,7 +41,7 @@ constexpr uint64_t kFewNodes = uint64_t{1} << 17;
 constexpr uint64_t kPartsPerWorker = 4;
 constexpr uint64_t kMaxFirstParts = 4096;
 
-// A folder that is removed with all that is in it.
+// A folder that is removed with its contents.
 class TemporaryWork {
  public:
   TemporaryWork(FileSystem& files, const std::string& prefix)
@@ -199,7 +199,7 @@ std::vector<SelectedPart> Extraction::first_parts(Worker& worker, uint64_t wante
   return parts;
 }
 
-// Returns the parts that replace one that does not fit.
+// Returns the parts that replace a part that does not fit.
 std::vector<SelectedPart> Extraction::build_part(Worker& worker, const SelectedPart& part,
                                                  std::vector<ArtifactRef>& built) {
   const Cube cube = in_new_grid(part.cube);

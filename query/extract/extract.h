@@ -1,7 +1,7 @@
 // Writes a part of a global file as a global file: the grid of a coarser level, a region of it, or
-// both. Its levels are canonical: those of the same voxels, wherever they come from.
+// both. Its levels are canonical: they depend only on the voxels.
 //
-// The grid is divided into octree-aligned cubes. For each cube the part of the DAG that it needs is
+// The grid is divided into octree-aligned cubes. For each cube the necessary part of the DAG is
 // read and reduced in memory (part_builder.h), by several threads, and written as an artifact; a
 // cube that does not fit its share of the budget is divided into its children. The merge then makes
 // the file, as for a build. So memory is bounded by the budget, not by the file. Colors and
@@ -51,10 +51,10 @@ struct ExtractReport {
 // cells per edge or more.
 Cube crop_cube(const Selection& selection);
 
-// Writes spec.output, which appears when it is complete; temporary files lie in a folder next to
-// it, which is removed whatever happens, after a kill by the next extract of that output. Throws
-// Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and what LockedOutputs
-// does.
+// Writes spec.output, which gets its name when it is complete. Temporary files are in a folder next
+// to it, which is always removed; after a kill, the next extract to that output removes it. Throws
+// Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the errors of
+// LockedOutputs.
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel);
 

@@ -10,8 +10,7 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMaxNodeWords = 17;  // a child mask and eight wide offsets
-// Nodes that lie closer together than this are read at once: a read costs about as much as these
-// words do.
+// Nodes with smaller gaps are read in one call, which costs about as much as reading these words.
 constexpr uint64_t kGapWords = 2048;
 
 }  // namespace

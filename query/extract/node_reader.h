@@ -1,6 +1,6 @@
-// Reads nodes of a global file with bounded reads, never through a mapping, so that what is
-// resident does not grow with the file. Every checksum block is compared with its checksum when it
-// is first touched; no more than the blocks that are needed is read.
+// Reads nodes of a global file with bounded reads, never through a mapping, so that resident memory
+// does not grow with the file. Every checksum block is verified when it is first touched; only the
+// necessary blocks are read.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ class CheckedReader {
   CheckedReader(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget);
 
   const voxdag_reader::File& header() const { return header_; }
-  // Fills `words` from word `first` of the level, within which they lie. `block` is a buffer of
+  // Fills `words` from word `first` of the level. `block` is a buffer of
   // kBlockBytes. Throws Error{kCorrupt} for a block that fails its checksum.
   void read(uint32_t level, uint64_t first, std::span<uint32_t> words, std::span<std::byte> block);
 
@@ -42,7 +42,7 @@ class CheckedReader {
   const CheckedBlocks blocks_;
 };
 
-// An entry of a list of nodes: where the node begins, and its number among all that are wanted.
+// An entry of a list of nodes: the node's offset, and its number among all wanted nodes.
 struct WantedNode {
   uint64_t offset = 0;
   uint64_t index = 0;
@@ -63,8 +63,8 @@ class NodeReader {
 
   // The node, valid until the next call.
   voxdag_reader::Node node(uint32_t level, uint64_t offset);
-  // Calls visit(node, words) for each wanted node; `words` begin with the node, and have all of it
-  // that lies within the level. `wanted` is in the order of the offsets.
+  // Calls visit(node, words) for each wanted node; `words` begin with the node, and contain all of
+  // it within the level. `wanted` is in the order of the offsets.
   template <class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Visit&& visit) {
     for_each(

@@ -9,7 +9,7 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kNodesBetweenChecks = 4096;  // of the cancel token
-// New nodes in the level below a node, on average: half of what surfaces have.
+// Expected new nodes in the level below a node: half of the average of surfaces.
 constexpr uint64_t kExpectedChildren = 2;
 constexpr uint64_t kPrefetchAhead = 8;  // nodes
 
@@ -225,7 +225,7 @@ SubDagSummary PartBuilder::build(const SelectedPart& part, const SubDagShape& sh
     built = build_nodes(l, levels[l - top].size(), children[l - top], built, tables);
     children[l - top] = {};
   }
-  // The tables count what is added to them, shared nodes once.
+  // The tables count added nodes, shared nodes once.
   tables.counts() = built[0].counts;
   built = {};
   return emit_levels(tables, shape, sink);

@@ -1,4 +1,4 @@
-// Builds the sub-DAG of what a selection has in one octree-aligned cube, a part of the grid.
+// Builds the sub-DAG of a selection in one octree-aligned cube, a part of the grid.
 //
 // From the cube's root down, every level's nodes are collected (part_level.h) and then read in the
 // order of their offsets. A cell of a coarser grid is set where the octree has a node, so the
@@ -38,8 +38,8 @@ class PartBuilder {
               PooledMemory memory, const CancelToken& cancel)
       : file_(file), selection_(selection), reader_(reader), memory_(memory), cancel_(cancel) {}
 
-  // Passes the part's level arrays to the sink, `shape` being that of the new grid. Throws
-  // OutOfBudget, before the sink was called, if the budget cannot hold the part.
+  // Passes the part's level arrays to the sink; `shape` belongs to the new grid. Throws
+  // OutOfBudget, before the first call of the sink, if the budget cannot hold the part.
   SubDagSummary build(const SelectedPart& part, const SubDagShape& shape, SubDagSink& sink);
 
   // The parts that replace a part above the bricks: its children of which anything is selected.
@@ -52,7 +52,7 @@ class PartBuilder {
   };
   // The children of a level's nodes, as numbers in the level below.
   struct Children {
-    PooledArray<uint8_t> masks;   // by number; without what the region cuts away
+    PooledArray<uint8_t> masks;   // by number; without children outside the region
     PooledArray<uint32_t> first;  // by number
     PooledArray<uint32_t> all;
     uint64_t count = 0;

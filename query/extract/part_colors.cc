@@ -29,13 +29,13 @@ constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
 constexpr uint64_t kWorkerBytes =
     kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) +
     CheckedReader::kBlockBytes;
-// Of a region: colors, or values and those of the coarser levels.
+// Encoded bytes of a region: colors, or values including the coarser levels.
 uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
   if (traits_of(attribute).is_color()) return kMaxRegionCells * 3 / 4;
   return kMaxRegionCells * 5 / 4 *
          value_bytes(attribute, section_of(file, attribute).names().size());
 }
-// Regions that are encoded at a time.
+// Regions encoded per batch.
 constexpr size_t kBatchRegions = 32;
 
 // A set cube of the file, by its Morton code among the cubes of its level.
@@ -151,8 +151,8 @@ class PartColors {
     return encode_cells(0, cube.code, cells);
   }
 
-  // Of another attribute: what coarser cells have follows from the finest ones, so that those that
-  // are not cut have what they have in the file.
+  // Encodes a region of an attribute other than color. Values of coarser cells follow from the
+  // finest ones, so cells that are not cut have the file's values.
   EncodedRegion encode_valued(const PlacedCube& cube) const {
     voxdag_reader::ColorCursor cursor(file_, section_);
     std::vector<ValuedCell> cells;
@@ -175,7 +175,7 @@ class PartColors {
                          morton_in_part(region_level(0), cube.code), cells);
   }
 
-  // Of a tier above the finest; `morton` is that of the part.
+  // Encodes a region of a tier above the finest; `morton` is the code in the part.
   EncodedRegion encode_coarse(uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
     const uint32_t level = region_level(tier);
     const uint64_t code = crop_code_ << 3 * (level - part_.crop.level) | morton;
@@ -232,7 +232,7 @@ class PartColors {
       if (children.has(i)) walk(level + 1, child(level, cube, children, i), target, visit);
   }
 
-  // Whether the bytes of a region are those of one of the file.
+  // True if the bytes of a region equal the bytes of a region of the file.
   bool is_copied(uint32_t tier, uint64_t code) const {
     const uint32_t finest = finest_of(tier);
     if (finest > section_.color_levels()) return false;

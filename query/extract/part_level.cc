@@ -16,7 +16,7 @@ uint64_t digit_of(const WantedNode& node, int shift) {
   return node.offset >> shift & (kDigits - 1);
 }
 
-// Moves the nodes to `to` in the order of one digit of their offsets; those of equal digit stay in
+// Moves the nodes to `to` in the order of one digit of their offsets; nodes of equal digit keep
 // their order.
 void sort_by_digit(std::span<const WantedNode> from, WantedNode* to, int shift) {
   uint64_t next[kDigits] = {};

@@ -32,10 +32,10 @@ inline Position child_corner(const Position& corner, int index, int64_t edge) {
           corner[2] + (index & 1 ? edge : 0)};
 }
 
-// The cells of a brick at `low` that lie in the region.
+// The cells of a brick at `low` that are in the region.
 uint64_t mask_within(const Region& region, const Position& low);
 
-// Throws Error{kInvalidInput} unless 0 <= grid_levels <= those of the file.
+// Throws Error{kInvalidInput} unless 0 <= grid_levels <= the file's levels.
 void check_grid_levels(const DagView& dag, uint32_t grid_levels);
 
 // The walk of for_each_brick().
@@ -88,8 +88,8 @@ class BrickWalk {
 };
 
 // Calls visit(const Brick&) for every brick that has set cells in the region, in Morton order,
-// until it returns false, if it returns anything; the mask is cut to the region. What lies outside
-// the region, or outside the grid, is not visited; no node above a brick is read twice for it.
+// until it returns false, if it returns anything; the mask is clipped to the region. Cells outside
+// the region or the grid are not visited; no node above a brick is read twice for it.
 // Throws Error{kInvalidInput} unless the selection's grid has at most the file's levels, and
 // Error{kCorrupt} for a damaged DAG.
 template <class Visit>

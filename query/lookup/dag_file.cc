@@ -26,7 +26,7 @@
 namespace voxdag::query {
 namespace {
 
-// Items that one thread takes at once: a multiple of a packet of rays.
+// Items per batch of a thread: a multiple of a packet of rays.
 constexpr size_t kBatch = 4096;
 
 [[noreturn]] void refuse(const char* expected) {
@@ -45,8 +45,8 @@ void for_each_batch(unsigned threads, size_t items, const Body& body) {
   });
 }
 
-// Rays with directions of length 1, two at a time: their divisions would take longer than their
-// walk through large cells.
+// Makes rays with directions of length 1, two per step: their divisions would otherwise take longer
+// than their walk through large cells.
 void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
                Ray* rays) {
   const DoublePair zero = DoublePair::of(0), one = DoublePair::of(1);
@@ -114,7 +114,7 @@ struct DagFile::State {
   MemoryBudget budget;
   std::once_flag huge_pages, make_top;
   std::atomic<uint64_t> points_asked = 0;
-  std::optional<TopCells> top;  // of a file that many points were looked up in
+  std::optional<TopCells> top;  // made after many lookups
   std::mutex mutex;
   std::array<std::unique_ptr<NodeCounts>, 21> counts_of;  // by grid levels; guarded by mutex
 };

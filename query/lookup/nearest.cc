@@ -29,7 +29,8 @@ class NearestSearch {
     Position low;
   };
 
-  // From the point to the nearest of the cells of a cube; exact, since both are whole numbers.
+  // Squared distance from the point to the nearest cell of a cube; exact, because both are
+  // integers.
   uint64_t distance_to(const Position& low, int64_t edge) const {
     uint64_t squared = 0;
     for (size_t axis = 0; axis < 3; ++axis) {

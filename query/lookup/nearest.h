@@ -8,10 +8,10 @@
 
 namespace voxdag::query {
 
-// The set cell of the grid of 2^grid_levels per edge whose center is nearest to that of the cell
-// `from`; of several the one with the lowest Morton code. None if it is farther than the root of
-// max_squared. Descends into near children first, and into none that is farther than what was
-// found. grid_levels is at most the file's, coordinates at most kMaxCoordinate. Throws
+// The set cell of the grid of 2^grid_levels per edge whose center is nearest to the center of the
+// cell `from`; the lowest Morton code wins a tie. No result if it is farther than the root of
+// max_squared. Descends into near children first, and never into children farther than the best
+// cell so far. grid_levels is at most the file's, coordinates at most kMaxCoordinate. Throws
 // Error{kCorrupt} for a damaged DAG.
 Nearest find_nearest(const DagView& dag, uint32_t grid_levels, const Position& from,
                      uint64_t max_squared);

@@ -1,4 +1,4 @@
-// How many set cells lie below each node, for exact counts of regions: one 64-bit number per node,
+// The number of set cells below each node, for exact counts of regions: one 64-bit number per node,
 // computed from the bricks up.
 #pragma once
 
@@ -15,7 +15,7 @@
 
 namespace voxdag::query {
 
-// Of the cells of one grid. Immutable after construction; any number of threads may count.
+// Counts the cells of one grid. Immutable after construction; safe to use from several threads.
 class NodeCounts {
  public:
   // Takes 8 bytes per node above the bricks and 2 bits per word of theirs. If that does not fit in

@@ -7,10 +7,10 @@
 namespace voxdag::query {
 namespace {
 
-// So many descents hide the latency of memory; more gain nothing. Measured.
+// Number of descents in flight that hides the latency of memory; more gain nothing (measured).
 constexpr size_t kGroup = 32;
 
-// Descents, kGroup at a time.
+// Descents in groups of kGroup.
 class Descents {
  public:
   Descents(const DagView& dag, const TopCells* top, uint32_t grid_levels)
@@ -92,7 +92,7 @@ class Descents {
     count_ = left;
   }
 
-  // Whether what a descent arrived at is set.
+  // True if the cell at the end of a descent is set.
   bool ends_set(const Descent& d) const {
     if (grid_levels_ + 2 <= dag_.grid_levels()) return true;
     const uint32_t voxel_levels = grid_levels_ + 2 - dag_.grid_levels();  // below the brick: 1 or 2

@@ -19,15 +19,15 @@ class TopCells {
     return !dag.empty() && dag.grid_levels() > kLevels + kBrickLevels && grid_levels > kLevels;
   }
 
-  // Of a DAG that they serve. Reads the levels above them; throws Error{kCorrupt} for a damaged
-  // one.
+  // `dag` must satisfy serve(). Reads the levels above the cells; throws Error{kCorrupt} for a
+  // damaged one.
   explicit TopCells(const DagView& dag) : cells_(size_t{1} << (3 * kLevels)) {
     fill(dag, 0, dag.root(), 0);
   }
 
   struct Cell {
     uint64_t word;
-    uint32_t mask() const { return word & 255; }  // 0 if no node is there
+    uint32_t mask() const { return word & 255; }  // 0 without a node
     uint64_t offset() const { return word >> 8; }
   };
   // Coordinates are less than 2^kLevels.
@@ -36,7 +36,7 @@ class TopCells {
   }
 
  private:
-  // `place` is that of the cell's low corner in the array.
+  // `place` is the index of the cell's low corner in the array.
   void fill(const DagView& dag, uint32_t depth, uint64_t offset, size_t place) {
     const DagView::Children children = dag.children_of_node(depth, offset);
     if (depth == kLevels) {

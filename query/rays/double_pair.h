@@ -1,5 +1,5 @@
-// Two doubles at once: SSE2, which every x86-64 has, or plain C++ elsewhere. Each operation rounds
-// as that on one double does.
+// Two doubles per operation: SSE2, which every x86-64 has, or plain C++ elsewhere. Each operation
+// rounds as an operation on one double does.
 #pragma once
 
 #include <cmath>

@@ -11,7 +11,8 @@
 namespace voxdag::query {
 namespace {
 
-// Of the children of a cell, mirrored: those in which a ray has an interval, and one of length 0.
+// Masks of a cell's mirrored children: children in which a ray has an interval, and children with
+// an interval of length 0.
 struct Crossed {
   uint32_t inside, touching;
 };
@@ -51,7 +52,7 @@ VOXDAG_INLINE FourPlanes<Four> min(FourPlanes<Four> x, FourPlanes<Four> y) {
   return {min(x.lower, y.lower), min(x.upper, y.upper)};
 }
 
-// The parameters `in` may be lower bounds, those of `out` upper ones.
+// The parameters `in` may be lower bounds, and `out` upper bounds.
 template <class Four>
 VOXDAG_INLINE Crossed cross(FourPlanes<Four> in, FourPlanes<Four> out, double t_min, double t_max) {
   const Four first = Four::of(t_min), last = Four::of(t_max);

@@ -19,13 +19,13 @@ struct WaitingCell {
   Int4 low;         // its low corner
   uint64_t offset;  // in the words of its level
   uint32_t depth;
-  int32_t next;  // of the same ray; -1 if there is none
+  int32_t next;  // next cell of the same ray, or -1
 };
 
 // The descent of one ray.
 struct RayDescent {
   static constexpr int kMaxLevels = 20;
-  Int4 low;  // the cell that the ray enters next, as that of a WaitingCell
+  Int4 low;  // the cell that the ray enters next, as in WaitingCell
   uint64_t offset;
   uint32_t depth;
   uint32_t open;  // bit d: children of the path's node at depth d are left; d is less than `depth`
@@ -48,7 +48,7 @@ struct PacketJob {
     bool wide_children;
   };
 
-  // The DAG. Cells at `leaf_depth` are hit as a whole; it is at least 1.
+  // The DAG. Cells at `leaf_depth` count as solid; it is at least 1.
   const DagView* dag = nullptr;
   Level levels[kMaxLevels];
   uint32_t grid_levels = 0, leaf_depth = 0;
@@ -60,16 +60,16 @@ struct PacketJob {
   PacketRay rays[kPacketRays];
   Hit* hits = nullptr;
   uint64_t found = 0;   // rays that have a hit, hits[ray], the first of its cells
-  uint64_t single = 0;  // rays that have been given up: to be cast by themselves
+  uint64_t single = 0;  // rays to be cast separately
 
-  // So many cells that are under way or wait begin a round: as many as memory can load at a time
-  // (measured). One more packet may come before.
+  // Number of loading or waiting cells that begins a round: as many as memory can load concurrently
+  // (measured). One more packet may come first.
   static constexpr int kRoundCells = 24, kMaxWaiting = kRoundCells + kPacketRays;
   WaitingCell waiting[kMaxWaiting];
   RayDescent descents[kPacketRays];
 };
 
-// Casts those of the job's rays that are in `rays`.
+// Casts the job's rays selected by `rays`.
 void walk_packet_portable(PacketJob& job, uint64_t rays);
 using WalkPacket = void (*)(PacketJob& job, uint64_t rays);
 // The same for AVX2, with the same results; null if it was not built or this machine cannot run it.

@@ -1,11 +1,11 @@
-// The walk of a packet of rays, for any implementation of four doubles at once. Each source that
-// includes this is compiled for its own instructions, so everything here has internal linkage.
+// The walk of a packet of rays, for any implementation of vectors of four doubles. Each source that
+// includes this is compiled for different instructions, so everything here has internal linkage.
 //
 // Large cells are visited depth first, once for all rays that may cross them: bounds of all rays
-// together leave out most children, and each ray is tested with those that remain if there are
-// several. Where few rays are left, each descends by itself through its cells in their order, so
-// that it loads nothing behind its hit. Rays take turns, a step each: what a ray enters next is
-// under way from memory while the others step.
+// together skip most children, and each ray is tested with the remaining ones if there are
+// several. Where few rays remain, each descends by itself through its cells in their order, so
+// that it loads nothing behind its hit. Rays take turns, a step each: memory loads the next
+// cell of a ray while the others step.
 //
 // A cell is crossed where a ray has an interval in it that is not empty. One of length 0 in an
 // occupied cell, or two planes passed at the parameter of a hit, mean that the path from the root
@@ -171,8 +171,8 @@ class PacketWalk {
                  job_.t_min, job_.t_max);
   }
 
-  // Which children of a cell some ray may cross or touch. Rounding is monotonic, so that bounds of
-  // parameters come from those of origins and inverse directions.
+  // The children of a cell that some ray may cross or touch. Rounding is monotonic, so bounds of
+  // origins and inverse directions give bounds of the parameters.
   VOXDAG_INLINE uint32_t cross_any(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);
@@ -228,7 +228,7 @@ class PacketWalk {
     const int32_t half = edge / 2;
     uint32_t candidates = mirrored_[n.mask] & cross_any(low, half);
     const bool only = (candidates & (candidates - 1)) == 0;
-    // For these, rays need no test of their own.
+    // Rays need no separate test for these.
     const uint32_t by_all = only ? candidates : cross_all(low, half);
     Child children[8];
     int count = 0;

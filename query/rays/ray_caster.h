@@ -5,8 +5,8 @@
 // coordinates by one formula: cells on both sides of a plane agree to the last bit, so there are no
 // cracks at any resolution. The ray is mirrored so that its direction is positive on every axis.
 //
-// A ray widens into a cone: an occupied cell that is no larger than the cone's width there is hit
-// as a whole. That ends the descent where finer cells could not be seen.
+// A ray widens into a cone: an occupied cell that is no larger than the cone's width there
+// counts as solid. That ends the descent where finer cells would be invisible.
 //
 // Immutable; any number of threads may cast rays.
 #pragma once
@@ -35,7 +35,7 @@ class RayCaster {
  public:
   explicit RayCaster(const DagView& dag) : dag_(dag) {}
 
-  // Finds the first occupied cell between t_min and t_max; false if there is none. Throws
+  // Finds the first occupied cell between t_min and t_max; false without one. Throws
   // Error{kCorrupt} for a damaged DAG.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit) const;
   // The same with at most `steps_left` nodes and bricks, which it lowers by as many as it read. If

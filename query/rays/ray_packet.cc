@@ -37,7 +37,7 @@ uint64_t RayPacket::cast(std::span<const Ray> rays, Hit* hits) {
   job_.found = job_.single = 0;
   const uint64_t all = ~uint64_t{0} >> (kRays - rays.size());
   if (job_.leaf_depth == 0) {
-    job_.single = all;  // The grid as a whole is what they hit.
+    job_.single = all;  // They hit the complete grid.
   } else {
     load(rays);
     cast_packet(all);
@@ -53,8 +53,7 @@ uint64_t RayPacket::cast(std::span<const Ray> rays, Hit* hits) {
   return found;
 }
 
-// As MirroredRay, but several divisions at once. Lanes without a ray have numbers too, which nobody
-// looks at.
+// As MirroredRay, with several divisions per step. Lanes without a ray have unused numbers.
 void RayPacket::load(std::span<const Ray> rays) {
   const double edge = static_cast<double>(dag_.resolution());
   for (size_t i = 0; i < kRays; ++i) {

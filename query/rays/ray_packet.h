@@ -1,6 +1,6 @@
-// Casts up to 64 rays at once, with the results of RayCaster to the last bit. Rays that lie close
-// to each other, as those of neighboring pixels do, visit the same large cells: a packet visits
-// each once, for all rays that may cross it. See query/rays/packet_walk.h.
+// Casts up to 64 rays together, with the results of RayCaster to the last bit. Neighboring rays
+// visit the same large cells: a packet visits each cell once, for all rays that may cross it. See
+// query/rays/packet_walk.h.
 //
 // About 30 KiB; not thread-safe, each thread has its own.
 #pragma once
@@ -21,11 +21,11 @@ class RayPacket {
  public:
   static constexpr size_t kRays = kPacketRays;
 
-  // Cells no larger than `stop_size` voxels are hit as a whole. The DAG must outlive the packet.
+  // Cells no larger than `stop_size` voxels count as solid. The DAG must outlive the packet.
   RayPacket(const DagView& dag, double stop_size, double t_min, double t_max,
             WalkPacket walk = fastest_packet_walk());
 
-  // Casts up to kRays rays; bit i of the result says whether ray i has a hit, hits[i]. Throws
+  // Casts up to kRays rays; bit i of the result is set if ray i has a hit, hits[i]. Throws
   // Error{kCorrupt} for a damaged DAG.
   uint64_t cast(std::span<const Ray> rays, Hit* hits);
 

@@ -3,7 +3,7 @@
 // The ray is mirrored so that its direction is positive on every axis. A cell that it enters at `t`
 // is left at the least of `out`, the parameters of its three far planes. A plane's parameter is
 // computed from its integer coordinate by one formula, so a descent can begin in any cell that the
-// ray enters, and finds what it would find from the root on.
+// ray enters, with the same result as from the root.
 #pragma once
 
 #include <algorithm>
@@ -51,8 +51,8 @@ class RayWalk {
 
   // From the root on. The DAG must not be empty. Throws Error{kCorrupt} for a damaged one.
   bool run(double t_min, Hit& hit);
-  // From a cell on that has children: `low` is its low corner, mirrored as the ray is, `size` its
-  // edge, both in voxels; `axis` that of the face by which the ray enters it at `t`, -1 if it
+  // From a cell on that has children: `low` is its low corner, mirrored like the ray, `size` its
+  // edge, both in voxels; `axis` belongs to the face by which the ray enters it at `t`, -1 if it
   // begins there.
   bool run_below(uint32_t depth, const double (&low)[3], double size, uint64_t content,
                  const double (&out)[3], double t, int axis, Hit& hit) {
@@ -62,8 +62,8 @@ class RayWalk {
   }
 
  private:
-  // Visits the children of a cell, the nearest first: those that has(index) calls
-  // enter_child(index, low corner, out, t), which returns whether there is a hit.
+  // Visits the children of a cell with has(index), the nearest first: calls
+  // enter_child(index, low corner, out, t), which returns true for a hit.
   template <class Has, class EnterChild>
   bool cross(const double (&low)[3], double half, const double (&out)[3], double t, const Has& has,
              const EnterChild& enter_child);

@@ -1,4 +1,4 @@
-// The share of light that a surface reflects: that of the file's colors, or of gray plaster. Not
+// The share of light that a surface reflects, from the file's colors or gray plaster. Not
 // thread-safe; refers to the file.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace voxdag::query {
 
-// Of a surface without a color.
+// Albedo of a surface without a color.
 inline constexpr Vec kPlaster{{0.74, 0.70, 0.64}};
 
 class Albedo {

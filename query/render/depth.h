@@ -1,5 +1,5 @@
-// How far a camera sees: for each pixel the distance to what the renderer shows there, for programs
-// that compare or combine pictures.
+// Depth maps: for each pixel the distance to the visible cell, for programs that compare or combine
+// pictures.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ struct DepthMap {
   std::vector<float> depths;
 };
 
-// Of a grid without voxels all is infinite. Throws as render_picture().
+// All distances of a grid without voxels are infinite. Throws the errors of render_picture().
 DepthMap render_depth(const DagView& dag, const Placement& placement, int width, int height,
                       unsigned threads, const CancelToken& cancel);
 

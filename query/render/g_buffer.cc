@@ -5,8 +5,9 @@
 namespace voxdag::query {
 
 GBufferPixel GBuffer::smoothed(int x, int y, double pixel_spread) {
-  constexpr int kReach = 4;          // pixels on each side
-  constexpr double kPlaneSlack = 3;  // pixel widths that a neighbor may lie off the plane
+  constexpr int kReach = 4;  // pixels on each side
+  constexpr double kPlaneSlack =
+      3;  // maximum distance of a neighbor from the plane, in pixel widths
   GBufferPixel pixel = at(x, y);
   const bool on_surface = pixel.coverage > 0;
   const Vec normal = pixel.normal, offset = pixel.offset;

@@ -1,4 +1,4 @@
-// The G-buffer: what each pixel of a picture sees and the light there, before tone mapping, with a
+// The G-buffer: the visible surface of each pixel and its light, before tone mapping, with a
 // filter that removes sampling noise.
 #pragma once
 

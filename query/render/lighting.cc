@@ -90,8 +90,8 @@ double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
   return 1 - fade * (0.75 - 0.35 * open - 0.40 * (sees(s, sun_) ? 1 : 0));
 }
 
-// For a camera outside the scene the sun stands over its left shoulder. Within a scene it takes the
-// one of 48 places all around, at three heights, that lights about a third of what is seen.
+// For a camera outside the scene the sun is over its left shoulder. Within a scene it has the one
+// of 48 positions all around, at three heights, that lights about a third of the visible surface.
 void Lighting::place_sun(const std::vector<SurfaceHit>& seen, const Vec& back) {
   constexpr int kTurns = 16, kHeights = 3;
   constexpr double kLitTarget = 0.35;

@@ -14,8 +14,8 @@ namespace voxdag::query {
 
 class Lighting {
  public:
-  // Places the sun for what the camera sees, of which `seen` is a sample. A camera that looks at
-  // the scene from outside also sees a floor below it, which takes the scene's shadow.
+  // Places the sun for the visible surface; `seen` is a sample of it. A camera outside the scene
+  // also sees a floor below it, which receives the scene's shadow.
   Lighting(const DagView& dag, const Box& box, const Camera& camera,
            const std::vector<SurfaceHit>& seen);
 

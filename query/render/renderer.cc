@@ -40,7 +40,7 @@ std::vector<SurfaceHit> probe_view(const DagView& dag, const Camera& camera, int
 }
 
 // The factor that gives the median light of the probed surfaces a middle tone, and their brightest
-// tenth one below white, if all were of plaster: dark surfaces stay dark.
+// tenth one below white, if all were of plaster: dark surfaces remain dark.
 double choose_exposure(const Lighting& lighting, const std::vector<SurfaceHit>& seen) {
   constexpr int kSkyRays = 8;
   if (seen.empty()) return 1;

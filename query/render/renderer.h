@@ -18,7 +18,7 @@ struct RenderOptions {
   const voxdag_reader::File* colors = nullptr;
 };
 
-// The bytes that render_picture() allocates for each pixel, those of the picture included.
+// Bytes that render_picture() allocates per pixel, including the picture.
 inline constexpr uint64_t kRenderBytesPerPixel = sizeof(GBufferPixel) + 3;
 
 // Shows a plain background if the DAG is empty. Throws Error{kCorrupt} for a damaged DAG, and

@@ -13,7 +13,7 @@ namespace voxdag::query {
 // A ray that sees as far as any does.
 inline constexpr double kFarthest = 1e30;
 // The cone of a ray through a pixel that is `pixel_spread` wide at distance 1: cells of up to three
-// quarters of a pixel are seen as a whole.
+// quarters of a pixel are drawn as one cell.
 inline Cone visible_cone(double pixel_spread) { return {0, 0.75 * pixel_spread}; }
 
 struct SurfaceHit {
@@ -26,7 +26,7 @@ struct SurfaceHit {
 };
 
 // Finds the first surface on a ray through a pixel that is `pixel_spread` wide at distance 1; false
-// if there is none. Voxels of many pixels are shown as cubes, smaller ones as the surface that they
+// without one. Voxels of many pixels are shown as cubes, smaller ones as the surface that they
 // sample. Throws Error{kCorrupt} for a damaged DAG.
 bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, SurfaceHit& surface);
 

@@ -196,7 +196,7 @@ Box occupied_box(const DagView& dag, const CancelToken& cancel) {
     for (int axis = 0; axis < 3; ++axis) {
       if (cell.low[axis] >= box.low[axis] && cell.low[axis] + cell.edge <= box.high[axis]) continue;
       if (cells < kMaxBoxCells) return 0xffu;
-      add(cell);  // as a whole
+      add(cell);  // undivided
       break;
     }
     return 0u;

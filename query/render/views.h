@@ -1,5 +1,5 @@
-// Camera placements for users who do not give one, and where the occupied part of the grid lies.
-// All functions of a DAG need one that is not empty.
+// Default camera placements, and the bounds of the occupied part of the grid. All functions of a
+// DAG require a DAG that is not empty.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct OccupiedCells {
   std::vector<Vec> centers;
   double edge;
   // Points that a view must have in its picture to show the cells: their centers, or their corners
-  // where there are so few that it matters.
+  // if there are few cells.
   std::vector<Vec> outline() const;
 };
 // Those of 1/64 of the grid's edge; finer ones where there are few of them, since the scene is
@@ -51,8 +51,8 @@ const std::vector<std::string>& view_names();
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
                      std::optional<double> fov_degrees, const CancelToken& cancel = {});
 
-// The same for several views of a DAG, with what they have in common computed once. Refers to the
-// DAG and the token.
+// The same for several views of a DAG, with their common parts computed once. Refers to the DAG and
+// the token.
 class NamedViews {
  public:
   NamedViews(const DagView& dag, const CancelToken& cancel) : dag_(dag), cancel_(cancel) {}

@@ -12,7 +12,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint32_t kPageLevels = 3;  // below its root, if the cells are so small
+constexpr uint32_t kPageLevels = 3;  // levels below its root, if the cells are that small
 constexpr size_t kMaskWords = 16, kHeadWords = 1 + kMaskWords;
 constexpr uint64_t kBlockCells = 32;
 constexpr size_t kBlockWords = 4;
@@ -52,7 +52,7 @@ uint32_t first_bit(const uint32_t* mask) {
 
 }  // namespace
 
-// What a node has is read when it is asked for its children, a brick when it is the content.
+// A node is read when its children are requested, a brick when it is the content.
 DagView::Children ColorPages::children(uint32_t depth, uint64_t content) const {
   if (depth < file_->brick_level()) checked_file_.expect_intact(depth, content);
   return dag_->children(depth, content);

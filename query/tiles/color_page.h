@@ -1,6 +1,6 @@
-// Color pages: the colors of 8 x 8 x 8 cells of one level, for viewers that fetch what they see
-// (docs/format.md, "Color pages"). Unlike tiles they are addressed by their place: equal subtrees
-// have colors of their own.
+// Color pages: the colors of 8 x 8 x 8 cells of one level, for viewers that fetch visible data
+// (docs/format.md, "Color pages"). Unlike tiles they are addressed by their position, because equal
+// subtrees have different colors.
 //
 // Addresses may come from anyone, and colors from damaged files; the work for a page is bounded.
 #pragma once
@@ -23,7 +23,7 @@ struct ColorPageAddress {
 // Pages of one file. Refers to it; each thread needs its own.
 class ColorPages {
  public:
-  // `dag` must be that of the file, and so must `blocks`, if it is given.
+  // `dag` must belong to the file, and also `blocks`, if given.
   ColorPages(const voxdag_reader::File& file, const DagView& dag,
              const CheckedBlocks* blocks = nullptr)
       : file_(&file),

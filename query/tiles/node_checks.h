@@ -1,5 +1,5 @@
-// Whether the checksum blocks are intact in which nodes and bricks of a level lie that are about to
-// be read. Without a file to ask, everything counts as intact.
+// Verifies the checksum blocks of nodes and bricks before they are read. Without a file, everything
+// counts as intact.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,9 @@ class NodeChecks {
     bytes_ = 4 * (is_brick ? 2 : dag.level(level + 1).wide ? 17 : 9);
   }
 
-  // The node or brick at this word offset, which may be any; throws DamagedBlock. As many words
-  // behind its first one as the largest node has are looked at, because the first one, which has
-  // the number, may be damaged.
+  // The node or brick at this word offset, which may be any; throws DamagedBlock. Checks as many
+  // words as the largest node has, because the first word, which determines the number, may be
+  // damaged.
   void expect_intact(uint64_t offset) const {
     if (blocks_ && offset < words_) blocks_->expect_intact_at(place_ + 4 * offset, bytes_);
   }

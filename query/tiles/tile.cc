@@ -46,7 +46,7 @@ std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks,
   return starts;
 }
 
-// Replaces the numbers of children from word `begin` to `end` by the words where they lie.
+// Replaces the numbers of children from word `begin` to `end` with their word offsets.
 void point_to(const std::vector<uint32_t>& child_starts, size_t begin, size_t end,
               std::vector<uint32_t>& words) {
   while (begin < end) {
@@ -72,7 +72,8 @@ void add_bricks(const DagView& dag, const CheckedBlocks* blocks,
   }
 }
 
-// What a coarse brick needs is all over the file: each loop begins to load what the next one reads.
+// The nodes for a coarse brick are scattered over the file: each loop prefetches the words that the
+// next one reads.
 void add_cut_off(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
                  const std::vector<uint64_t>& offsets, std::vector<uint32_t>& words) {
   const NodeChecks checks(dag, level, blocks), child_checks(dag, level + 1, blocks);

@@ -1,7 +1,7 @@
-// Tiles: a node of a finished DAG with a few levels below it, for viewers that fetch what they see
+// Tiles: a node of a finished DAG with a few levels below it, for viewers that fetch visible data
 // (docs/format.md, "Tiles"). A tile is addressed by its root, so that equal subtrees are one tile,
-// wherever they occur. Where it ends in the middle of the DAG, it has for each child that is cut
-// off the address of that child's tile and a coarse brick to draw until that is there.
+// wherever they occur. Where it ends in the middle of the DAG, it has for each cut-off child the
+// address of that child's tile and a coarse brick to draw until the tile arrives.
 //
 // Stateless; thread-safe. Offsets may come from anyone and from damaged files: each is checked, and
 // the work for a tile is bounded by its levels.
@@ -29,10 +29,10 @@ struct TileAddress {
 // one below it that is a multiple of `tile_levels` above the bricks.
 uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level);
 
-// The words of the tile. `tile_levels` is 1 to kMaxTileLevels. Throws Error{kNotFound} if no node
-// can lie at the address, and Error{kCorrupt} if what lies there leads to no node or brick: the
-// address is that of a word within a node, or the file is damaged. With the blocks of its file, the
-// latter is DamagedBlock, and found even if what lies there looks like nodes.
+// The words of the tile. `tile_levels` is 1 to kMaxTileLevels. Throws Error{kNotFound} for an
+// address that cannot have a node, and Error{kCorrupt} if the words there lead to no node or brick:
+// the address is inside a node, or the file is damaged. With the blocks of its file, damage is
+// DamagedBlock, and is found even if the words look like nodes.
 std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels, const TileAddress& root,
                                   const CheckedBlocks* blocks = nullptr);
 

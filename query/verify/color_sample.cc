@@ -97,7 +97,7 @@ bool is_same(const EncodedRegion& baked, const ColorRegion& stored) {
          std::equal(bytes, bytes + baked.blocks.size(), stored.blocks);
 }
 
-// Of the colors of the finest cells, which are equally many.
+// Difference of the finest cells' colors; both have the same number of cells.
 ColorDiff difference(const EncodedRegion& baked, const ColorRegion& stored) {
   ColorRegion again;
   again.blocks = reinterpret_cast<const unsigned char*>(baked.blocks.data());
@@ -114,7 +114,7 @@ std::string place_of(const Cube& cube, const ColorGrid& grid) {
   return text;
 }
 
-// Compares what a region becomes now with what the file has of one attribute.
+// Compares a region's newly baked values of one attribute with the file's.
 class RegionComparison {
  public:
   RegionComparison(const voxdag_reader::File& file, const ColorGrid& grid,

@@ -26,9 +26,9 @@ struct ColorSampleReport {
   uint64_t cells = 0;    // in them
 };
 
-// The file has some attribute, and `grid` is its own. One pass over the scene, which must be the
-// one that was built. Images go to a scratch file at `scratch_path` if they are large. Throws
-// Error{kCorrupt} that names the first region that is wrong, and as TextureSet::prepare().
+// The file has some attribute, and `grid` is the file's grid. Makes one pass over the scene, which
+// must be the scene of the build. Large images go to a scratch file at `scratch_path`. Throws
+// Error{kCorrupt} that names the first wrong region, and the errors of TextureSet::prepare().
 ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const Grid& grid,
                                          FileSystem& files, TriangleSource& scene, uint64_t seed,
                                          const std::string& scratch_path, unsigned threads,

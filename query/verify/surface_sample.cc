@@ -152,7 +152,7 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
   Random random(seed);
   std::vector<SampleBox> boxes;
   for (const FixedTriangle& triangle : draw_triangles(scene, grid, random, progress, cancel)) {
-    constexpr int kTries = 16;  // a triangle may lie mostly outside the grid
+    constexpr int kTries = 16;  // a triangle may be mostly outside the grid
     std::optional<std::array<int64_t, 3>> voxel;
     for (int i = 0; i < kTries && !voxel; ++i) voxel = random_voxel(triangle, grid, random);
     if (voxel) boxes.push_back(box_around(*voxel, grid, random));

@@ -1,7 +1,7 @@
 // The encoder of color blocks (block_codec.h), in code that compilers vectorize: it is compiled for
-// each instruction set, with a type `Set` of its own, local to the file. All of it is integer
-// arithmetic, or doubles whose results are exact, so the bytes are the same. Nothing in here calls
-// inline functions that other files may have too.
+// each instruction set, with a separate type `Set`, local to the file. All of it is integer
+// arithmetic, or doubles whose results are exact, so the bytes are the same. Nothing here calls
+// inline functions that other files may also contain.
 #pragma once
 
 #include <cstddef>
@@ -54,7 +54,7 @@ class BlockEncoder {
     alignas(64) int16_t value[3][kBlockCells];
     int32_t sum[3];
   };
-  // Where they lie along an axis, from 0 to `range`.
+  // Positions along an axis, from 0 to `range`.
   struct Projection {
     alignas(64) int32_t at[kBlockCells];
     int32_t range;

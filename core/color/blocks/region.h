@@ -1,7 +1,7 @@
 // The colors of a region, in the order and the bytes in which the file stores them: the cells of
-// its finest level in Morton order, then those of the next coarser one, and so on down to the one
-// cell that is the region, in blocks of 32 cells that begin again in each region. A coarser cell is
-// the sum of its children, not the mean of their stored colors.
+// its finest level in Morton order, then the next coarser level, and so on up to the one cell that
+// is the region, in blocks of 32 cells that begin again in each region. A coarser cell is the sum
+// of its children, not the mean of their stored colors.
 #pragma once
 
 #include <array>
@@ -31,24 +31,24 @@ struct EncodedRegion {
   ColorSum total;
 };
 
-// The stored color of a cell that is `up` levels above the finest one; its code is that of its
+// The stored color of a cell that is `up` levels above the finest one; its code belongs to its
 // level.
 using CellColor = std::function<Color(uint32_t up, const ColoredCell& cell)>;
 
-// Encodes a region whose finest cells come in parts, so that not all of their sums need be there
-// at once. Memory: up to 10 bytes for each cell, and 81 for each cell of the next coarser level,
-// aside from what is returned.
+// Encodes a region whose finest cells come in parts, so that their sums need not be in memory
+// together. Memory: up to 10 bytes for each cell, and 81 for each cell of the next coarser level,
+// in addition to the result.
 class RegionEncoder {
  public:
-  // `levels` is kRegionLevels, or less where a grid, or what is left of its levels, has less. With
-  // a `color` that is not null, cells have that, not the color of their sum.
+  // `levels` is kRegionLevels, or less where the grid has fewer remaining levels. If `color` is not
+  // null, it gives the cells' colors instead of their sums.
   explicit RegionEncoder(uint32_t levels, CellColor color = nullptr)
       : levels_(levels), color_(std::move(color)) {}
   // The next cells in increasing order, their codes counted from `first_code`; with that, they are
   // below 8^levels.
   void add(std::span<const ColoredCell> cells, uint32_t first_code = 0);
   bool empty() const { return colors_.empty(); }
-  // There is at least 1 cell. Once, at last.
+  // Requires at least one cell. Called once, at the end.
   EncodedRegion finish(uint64_t morton);
 
  private:
@@ -65,7 +65,7 @@ class RegionEncoder {
   uint32_t last_code_ = 0;            // of a cell of that level
 };
 
-// All cells at once. Thread-safe.
+// Encodes all cells in one call. Thread-safe.
 EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
                             const CellColor& color = nullptr);
 

@@ -38,13 +38,13 @@ namespace voxdag {
 template <class Textures>
 class RegionBaker {
  public:
-  // At most what it has allocated, `cells` not counted.
+  // Upper bound of its allocations, without `cells`.
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
-  // At most, of the cells of a region that a triangle touches: 4 where its shadow covers one.
+  // Maximum number of cells of a region that a triangle touches: 4 where its projection covers one.
   static constexpr uint32_t kTriangleCells = 4u << (2 * kRegionLevels);
 
   // The references must outlive it. Each triangle's material is an index into `materials`.
-  // `wanted`: which values finish() is to find besides colors. Materials are then those of the
+  // `wanted`: the values that finish() computes in addition to colors. Material values are the
   // materials' numbers.
   RegionBaker(const ColorGrid& grid, std::span<const Material> materials, Textures& textures,
               const AttributeSet& wanted = {})
@@ -82,8 +82,8 @@ class RegionBaker {
     add_waiting();
     return cells_.count() <= max_cells_;
   }
-  // The same in parts; after each, charge(bytes) gets what the sums for `wanted` have allocated,
-  // which is up to 16 MiB more than after the one before, and stops add() if it returns false.
+  // The same in parts; after each, charge(bytes) receives the allocations of the sums for
+  // `wanted`, up to 16 MiB more than in its last call. It stops add() by returning false.
   template <class Charge>
   bool add(std::span<const FixedSurface> triangles, const Charge& charge) {
     constexpr size_t kAtOnce = 16;

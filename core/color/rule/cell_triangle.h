@@ -1,5 +1,5 @@
-// A triangle prepared for the cells of the color grid: exact integer tests of what it touches
-// (core/geometry/overlap.h) and of what its columns cover (docs/color.md).
+// A triangle prepared for the cells of the color grid: exact integer tests of touching
+// (core/geometry/overlap.h) and of covering columns (docs/color.md).
 //
 // Axes 0, 1, 2 are here a cyclic permutation of x, y, z such that axis 2 is the dominant one: that
 // of the largest component of the normal, which is made positive (n_2 > 0, and |n_0|, |n_1| <=
@@ -57,7 +57,7 @@ VOXDAG_HD inline double length_of(const Int (&n)[3]) {
   return std::sqrt(x * x + y * y + z * z);
 }
 
-// Of the triangle, doubled, in lattice units.
+// Twice the triangle's area, in lattice units.
 VOXDAG_HD inline double area_of(const FixedTriangle& triangle) {
   if (is_narrow(triangle)) {
     int64_t n[3];

@@ -40,8 +40,8 @@ VOXDAG_HD inline double closest_on_segment(const Vector& a, const Vector& b, dou
   return t;
 }
 
-// `center` in lattice units. First the center's shadow on the plane, if the triangle contains it;
-// otherwise the closest point of the edges, on ties that of the first.
+// `center` in lattice units. The center's projection on the plane, if the triangle contains it;
+// otherwise the closest point of the edges, of the first edge on ties.
 VOXDAG_HD inline SurfacePoint closest_point(const FixedTriangle& triangle,
                                             const std::array<int64_t, 3>& center) {
   constexpr double kOne = static_cast<double>(kPointOne);

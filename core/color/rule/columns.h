@@ -49,7 +49,7 @@ VOXDAG_HD inline uint32_t negative_columns_one_by_one(Int first, Int a, Int b) {
   return columns;
 }
 
-// The same, two columns at once where there is SSE2, which every x86-64 has.
+// The same, two columns per step with SSE2, which every x86-64 has.
 template <class Int>
 VOXDAG_HD inline uint32_t negative_columns(Int first, Int a, Int b) {
 #ifdef VOXDAG_SSE2

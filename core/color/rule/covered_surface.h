@@ -24,7 +24,7 @@ struct Reciprocals {
 template <class Int>
 class CoveredSurface {
  public:
-  // The triangle must outlive it. One that is degenerate covers nothing.
+  // The triangle must outlive it. A degenerate triangle covers nothing.
   VOXDAG_HD explicit CoveredSurface(const CellTriangle<Int>& triangle) : t_(triangle) {
     if (t_.degenerate) return;
     const double normal = to_double(t_.normal[2]);
@@ -47,7 +47,7 @@ class CoveredSurface {
   }
 
  private:
-  // Of the edge function, which is the area opposite to a vertex, over the columns: exact.
+  // Exact sum over the columns of the edge function, which is the area opposite to a vertex.
   VOXDAG_HD Int sum_of(int i, Int sum_p, Int sum_q, Int count) const {
     const auto& e = t_.edges[2][i];
     const Int quarters = wrapping_sum(wrapping_product(e.a, sum_p), wrapping_product(e.b, sum_q));

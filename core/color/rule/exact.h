@@ -41,8 +41,8 @@ VOXDAG_HD inline Int negative_part(Int x) {
   return x < 0 ? x : 0;
 }
 
-// Rounds to nearest, once. 128-bit numbers that do not fit in 64 bits are rounded by halves, since
-// compilers convert them by functions of their own.
+// Rounds to nearest, once. 128-bit numbers that do not fit in 64 bits are rounded by halves,
+// because compilers convert them with different library functions.
 VOXDAG_HD inline double to_double(int64_t x) { return static_cast<double>(x); }
 VOXDAG_HD inline double to_double(int128 x) {
   const int64_t low = static_cast<int64_t>(x);

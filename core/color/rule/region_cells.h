@@ -20,7 +20,7 @@ namespace voxdag::color {
 class RegionCells {
  public:
   static constexpr uint32_t kMaxCells = 1u << (3 * kRegionLevels);
-  // At most, in all vectors together while they grow, those of AttributeSums not counted.
+  // Upper bound of all vectors while they grow, without AttributeSums.
   static constexpr uint64_t kMaxBytes =
       uint64_t{kMaxCells} * (4 + 3 * sizeof(ColorSum)) + (64 << 10);
 
@@ -28,7 +28,7 @@ class RegionCells {
   explicit RegionCells(const AttributeSet& wanted = {})
       : attributes_(wanted), places_(kMaxCells), touched_(kMaxCells / 64) {}
 
-  // Room for so many sums, which takes no memory before they are there.
+  // Reserves address space for `cells` sums; pages are used when sums are added.
   void reserve(size_t cells) { sums_.reserve(cells); }
 
   bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
@@ -59,8 +59,8 @@ class RegionCells {
 
   AttributeSums& attributes() { return attributes_; }
 
-  // Moves the cells into `cells`, in Morton order, and into `values` what they have besides colors
-  // and alpha; this stays empty if that is nothing.
+  // Moves the cells into `cells`, in Morton order, and their values other than colors and alpha
+  // into `values`, which remains empty without such attributes.
   void take(std::vector<ColoredCell>& cells, std::vector<CellValues>& values) {
     cells.clear();
     cells.reserve(sums_.size());

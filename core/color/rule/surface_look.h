@@ -13,8 +13,8 @@
 
 namespace voxdag::color {
 
-// A point of a triangle: 2^kPointBits times the weights of vertices 1 and 2, which with that of
-// vertex 0 add up to 2^kPointBits.
+// A point of a triangle: 2^kPointBits times the weights of vertices 1 and 2. All three weights add
+// up to 2^kPointBits.
 inline constexpr int kPointBits = 30;
 inline constexpr int64_t kPointOne = int64_t{1} << kPointBits;
 struct SurfacePoint {
@@ -92,7 +92,7 @@ VOXDAG_HD inline void add_weighted_one_by_one(Texel texel, uint64_t weight, uint
   sum.weight += weight;
   sum.seen_weight += seen;
 }
-// The same with SSE2, where there is: two of the eight sums at once.
+// The same with SSE2 if available: two of the eight sums per step.
 VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, ColorSum& sum) {
 #ifdef VOXDAG_SSE2
   static_assert(sizeof(ColorSum) == 4 * sizeof(__m128i));

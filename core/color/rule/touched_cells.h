@@ -154,8 +154,8 @@ class TouchedCells {
     return ~outside & kAllColumns;
   }
 
-  // The columns in which the surface's plane is above a bottom of a cell, or, if that can be and is
-  // asked for, in it. `at_bottom`: the plane's value at the first column there, rounded down.
+  // The columns in which the surface's plane is above a bottom of a cell, or, if possible and
+  // requested, in it. `at_bottom`: the plane's value at the first column there, rounded down.
   VOXDAG_HD uint32_t columns_above(Int at_bottom, bool or_in) const {
     return negative_columns<Int>(wrapping_sum(at_bottom, Int{or_in ? -1 : 0}), t_.normal[0],
                                  t_.normal[1]);

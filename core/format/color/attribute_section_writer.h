@@ -2,7 +2,7 @@
 // section" and "The sections of alpha, normals and materials", is the byte layout.
 //
 // The regions of tier 0 are written as they come. The cells of the coarser tiers and the
-// directories stay in memory until finish(): 32 bytes a region, and tier 1, which is a
+// directories are in memory until finish(): 32 bytes a region, and tier 1, which is a
 // ten-thousandth of tier 0. All of that is charged to the budget. One thread uses a writer.
 #pragma once
 
@@ -27,8 +27,8 @@ class AttributeSectionWriter {
                                                    std::span<const ColoredCell> cells)>;
 
   // The levels of `file` must be complete, and there must be some. The set cells of level
-  // `cell_levels` (2 to 20, at most the grid's) have the attribute, and those of all coarser
-  // levels. `names`: the list that values are indexes of, if the attribute has one. Without
+  // `cell_levels` (2 to 20, at most the grid's) have the attribute, and also the cells of all
+  // coarser levels. `names`: the list indexed by the values, if the attribute has one. Without
   // `encode_coarse` coarser cells have the colors of their sums.
   AttributeSectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
                          std::span<const std::string> names, MemoryBudget& budget,
@@ -36,7 +36,7 @@ class AttributeSectionWriter {
   ~AttributeSectionWriter();
 
   // Adds a region of tier 0: cubes of level max(cell_levels - 6, 0), in increasing Morton order.
-  // Throws Error{kCorrupt} for one that is not in order or does not fit together,
+  // Throws Error{kCorrupt} for a region out of order or with inconsistent parts,
   // Error{kOutOfMemory}.
   void add_region(const EncodedRegion& region);
   // Writes the other tiers and ends the section. There must be at least one region.

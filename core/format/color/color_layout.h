@@ -31,7 +31,7 @@ inline constexpr size_t kTierRegionsAt = 16;
 inline constexpr size_t kTierCellsAt = 24;  // of all levels
 inline constexpr size_t kTierEntryBytes = 32;
 
-// Of the list of materials.
+// Limits of the list of materials.
 inline constexpr uint64_t kMaxMaterials = uint64_t{1} << 20;
 inline constexpr uint64_t kMaxNamesBytes = uint64_t{64} << 20;
 
@@ -43,7 +43,7 @@ inline constexpr uint32_t tier_count(uint32_t color_levels) {
 inline constexpr uint32_t finest_level(uint32_t color_levels, uint32_t tier) {
   return color_levels - tier * kTierLevels;
 }
-// From the finest level of a tier to that of its regions.
+// Number of levels from the finest level of a tier to its regions' level.
 inline constexpr uint32_t levels_in_region(uint32_t finest) {
   return finest < kRegionLevels ? finest : kRegionLevels;
 }

@@ -1,8 +1,8 @@
 // Writes an attribute section behind the levels of a global file, whatever the attribute: tiers of
 // regions with their directories. docs/format.md, "The color section", is the byte layout.
 //
-// The regions of tier 0 go to the file as they come; those of the coarser tiers and the directories
-// stay in memory until finish(), charged to the budget. One thread uses a writer.
+// The regions of tier 0 go to the file as they come; the regions of the coarser tiers and the
+// directories are in memory until finish(), charged to the budget. One thread uses a writer.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ class SectionWriter {
   // Levels of a region of the tier, below that which is the region.
   uint32_t region_levels(uint32_t tier) const { return tiers_[tier].levels(); }
   uint64_t region_count(uint32_t tier) const { return tiers_[tier].regions; }
-  // Adds a region, those of a tier in increasing Morton order. Throws Error{kCorrupt} for one that
-  // is not in order or does not fit together, Error{kOutOfMemory}.
+  // Adds a region; a tier's regions come in increasing Morton order. Throws Error{kCorrupt} for a
+  // region out of order or with inconsistent parts, Error{kOutOfMemory}.
   void add(uint32_t tier, const EncodedRegion& region);
   // Ends the section, in which tier 0 must have a region. `list`: what stands before the tier
   // table.

@@ -17,7 +17,7 @@ struct WideSum {
   std::array<uint128, 3> seen{}, plain{};
   uint128 seen_weight = 0, weight = 0;
 
-  // Of ColorSum or WideSum.
+  // Adds a ColorSum or WideSum.
   template <class Sum>
   void add(const Sum& other) {
     for (size_t c = 0; c < 3; ++c) {

@@ -17,7 +17,7 @@
 
 namespace voxdag {
 
-// Bytes of a file are not those that were written.
+// Bytes of a file differ from the written ones.
 class DamagedBlock : public Error {
  public:
   explicit DamagedBlock(const std::string& message) : Error(ErrorCode::kCorrupt, message) {}
@@ -39,7 +39,7 @@ class CheckedBlocks {
   void expect_intact(const void* begin, uint64_t bytes) const {
     expect_intact_at(place_of(begin), bytes);
   }
-  // The same, faster, for those who remember where an array lies: bytes behind the header page.
+  // The same, faster, for callers that store an array's offset in bytes behind the header page.
   uint64_t place_of(const void* begin) const {
     return static_cast<uint64_t>(static_cast<const unsigned char*>(begin) - first_);
   }

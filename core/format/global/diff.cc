@@ -79,7 +79,7 @@ class PairTable {
   size_t count_ = 0;
 };
 
-// The pairs of one level, for all threads. Parts of the table have locks of their own.
+// The pairs of one level, for all threads. Parts of the table have separate locks.
 class SharedPairTable {
  public:
   explicit SharedPairTable(MemoryBudget& budget) {
@@ -119,8 +119,7 @@ class Differ {
     for (uint32_t level = 0; level < a.brick_level(); ++level) compared_.emplace_back(budget);
   }
 
-  // All threads compare pairs of one level and what is below them; what is above them is then a
-  // matter of adding.
+  // All threads compare pairs of one level and their subtrees; the levels above only add results.
   DiffReport run() {
     std::vector<NodePair> pairs{{a_.empty() ? kAbsent : 0, b_.empty() ? kAbsent : 0}};
     const NodePair root = pairs[0];

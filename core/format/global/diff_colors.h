@@ -1,5 +1,5 @@
-// Compares the colors of two global files of the same grid, cell by cell: those of the cells that
-// are set in both, on the finest level that both have colors for. The result does not depend on
+// Compares the colors of two global files of the same grid, cell by cell: the cells set in both,
+// on the finest level with colors in both. The result does not depend on
 // the number of threads.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// Differences are those of channels, in sRGB bytes.
+// Differences of channels, in sRGB bytes.
 struct ColorDiff {
   uint32_t levels = 0;            // cells of the grid of 2^levels per edge were compared
   uint64_t cells = 0;             // that are set in both files
@@ -19,7 +19,7 @@ struct ColorDiff {
   uint64_t sum = 0, squares = 0;  // of all differences
   // Compares one more cell.
   void add(const voxdag_reader::Rgb& a, const voxdag_reader::Rgb& b);
-  // Of a channel of a cell; 0 if there is none.
+  // Mean difference of a channel of a cell; 0 without cells.
   double mean() const;
   // The peak signal-to-noise ratio in dB; infinite if nothing differs.
   double psnr() const;

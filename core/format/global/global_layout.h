@@ -27,7 +27,7 @@ inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 40;
 #endif
 inline constexpr uint64_t kNarrowLevelWords = VOXDAG_NARROW_LEVEL_WORDS;
 
-// Offsets in an entry of the attribute table; what follows is reserved: 0.
+// Offsets in an entry of the attribute table; the rest is reserved: 0.
 inline constexpr size_t kAttributeKindAt = 0;
 inline constexpr size_t kAttributeLevelsAt = 4;
 inline constexpr size_t kAttributeOffsetAt = 8;

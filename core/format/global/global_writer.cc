@@ -59,7 +59,7 @@ class BlockChecksums {
       : checksums_(whole_blocks.begin(), whole_blocks.end()) {}
 
   void add(std::span<const std::byte> bytes);
-  // The checksums of all blocks; that of the last one covers its bytes so far.
+  // The checksums of all blocks; the last one covers its bytes so far.
   std::vector<uint64_t> values() const;
 
  private:
@@ -320,7 +320,7 @@ HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
   return header;
 }
 
-// Returns the SHA-256 of the whole file, which must be what was written.
+// Returns the SHA-256 of the complete file, which must contain the written bytes.
 std::string GlobalFileWriter::State::digest(const HeaderPage& header,
                                             std::span<const uint64_t> checksums, unsigned threads,
                                             const CancelToken& cancel) const {
@@ -336,7 +336,7 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   };
   add_expected(0, header.bytes());
   BlockChecksums read_back;
-  // The digest takes longest, so a thread of its own digests a chunk while the next one is read.
+  // The digest takes longest, so a separate thread digests a chunk while the next one is read.
   std::vector<std::byte> chunk, digested_chunk;
   std::future<void> digested;
   for (uint64_t at = kPageBytes; at < end; at += kReadBytes) {

@@ -60,7 +60,7 @@ struct GlobalFileProgress {
 
 // Whether the file begins with the magic of a global file.
 bool is_global_file(const ReadableFile& file);
-// Whether it may be one that is not complete: its first page is written last.
+// True if it may be an incomplete global file: its first page is written last.
 bool is_partial_global_file(const ReadableFile& file);
 
 class GlobalFileWriter {
@@ -88,10 +88,10 @@ class GlobalFileWriter {
   // Levels must come as L-2, L-3, ..., 0; none at all for a scene without voxels.
   void begin_level(uint32_t level);
   // Adds the next words of the current level to the checksums without writing them. Called for all
-  // words in order, by one thread at a time.
+  // words in order, without overlapping calls.
   void checksum_words(std::span<const uint32_t> words);
   // Writes words [first, first + words.size()) of the current level. Disjoint ranges may be written
-  // in any order and by several threads at once.
+  // in any order and concurrently from several threads.
   void write_words(uint64_t first, std::span<const uint32_t> words);
   // Ends the level once all its words were written and added to the checksums. Throws Error{kLimit}
   // naming the level if it has over 2^40 words.

@@ -6,11 +6,11 @@
 //   3. Levels strictly increase in the total order (hash, mask, child indices), the hashes
 //      computed from the bricks up. So no two nodes of a level are equal.
 //   4. One root; every other node has a parent.
-//   5. The header's voxels and octree nodes are those of the DAG.
-//   6. Colors and other attributes are as core/format/global/verify_colors.h has it.
+//   5. The header's voxels and octree nodes equal the DAG's.
+//   6. Colors and other attributes follow core/format/global/verify_colors.h.
 //
 // Memory: 2 bits per word of the file, and 9 bytes per node of two levels, charged to the budget.
-// All threads work on one level at a time; what is found does not depend on their number.
+// All threads work on the same level; the result does not depend on their number.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@
 
 namespace voxdag {
 
-// Throws Error{kCorrupt} saying what is wrong, where, and what was expected. Works on up to
+// Throws Error{kCorrupt} that names the problem, the place and the expectation. Works on up to
 // `threads` threads. Levels of over `narrow_words` words must be wide, others not.
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
                         Progress& progress, const CancelToken& cancel,

@@ -16,7 +16,7 @@
 // An offset is one word, or two, low half first, where the next level's pointer_bits are 64. Child
 // index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
 //
-// Opening checks the header, and that the levels and the checksum table lie within the file. Nodes
+// Opening checks the header, and that the levels and the checksum table are within the file. Nodes
 // and bricks are checked when they are read: a bad offset in a damaged file is an Error, and no
 // access leaves the mapping. verify_checksums() compares all data with its checksums. The file is
 // mapped, or read into memory if mmap fails or Access::kRead is requested. A mapped file must not
@@ -50,7 +50,7 @@ struct Level {
   uint64_t word_count = 0;
   uint64_t node_count = 0;   // nodes, or bricks on brick_level()
   uint64_t file_offset = 0;  // of the first word, in bytes
-  // Of the offsets in the level above that point into this one: 32, or 64 in a large level.
+  // Width of the offsets that point into this level: 32, or 64 for a large level.
   uint32_t pointer_bits = 32;
 };
 
@@ -171,8 +171,8 @@ class File {
   // damaged header.
   explicit File(const std::string& path, Access access = Access::kMap)
       : File(path, std::make_shared<const Bytes>(path, access)) {}
-  // The same of bytes that are there already, for programs that do something with the mapping
-  // before it is read. `path` is for messages.
+  // The same for already loaded bytes, for programs that prepare the mapping before it is
+  // read. `path` is for messages.
   File(const std::string& path, std::shared_ptr<const Bytes> bytes)
       : path_(path), bytes_(std::move(bytes)) {
     read_header();
@@ -182,17 +182,17 @@ class File {
   // The size of the file, and its bytes.
   uint64_t file_bytes() const { return bytes_->size(); }
   const unsigned char* data() const { return bytes_->data(); }
-  // For programs that must stay small: what was read of a mapped file is no longer resident.
+  // Drops the resident pages of a mapped file, for programs with little memory.
   void release_pages() const { bytes_->release_pages(); }
   // The low corner of the grid in world space.
   const double (&origin() const)[3] { return origin_; }
-  // The edge length of the grid in world space; that of a voxel is edge() / resolution().
+  // The edge length of the grid in world space; a voxel's is edge() / resolution().
   double edge() const { return edge_; }
   // The resolution is 2^grid_levels() voxels per edge of the grid.
   uint32_t grid_levels() const { return grid_levels_; }
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
   uint32_t brick_level() const { return grid_levels_ - 2; }
-  // Of the format: 1, or 2 if the file has a feature that version 1 has not: wide levels, colors.
+  // Version of the format: 1, or 2 if the file has wide levels or attributes.
   uint32_t version() const { return version_; }
   // The bits of the node hash by which the nodes of a level are ordered, 4 to 64.
   uint32_t hash_bits() const { return hash_bits_; }
@@ -209,7 +209,7 @@ class File {
   uint64_t checksum_table_offset() const { return table_offset_; }
 
   // The mask of the 64 voxels of the brick at word `offset` of level brick_level(). Throws Error if
-  // the offset lies outside the level.
+  // the offset is outside the level.
   uint64_t brick(uint64_t offset) const {
     const Level& bricks = levels_[brick_level()];
     if (bricks.word_count < 2 || offset > bricks.word_count - 2) outside(brick_level(), offset);
@@ -253,7 +253,7 @@ class File {
     return brick(offset) >> brick_bit(x, y, z) & 1;
   }
 
-  // Whether cells have colors: those of the levels 0 to color_levels(). An empty scene has none.
+  // True if the cells of the levels 0 to color_levels() have colors. An empty scene has no colors.
   bool has_colors() const { return colors().tier_count() > 0; }
   uint32_t color_levels() const { return colors().color_levels(); }
   // The section of an attribute. It has no tiers if the file has none of that kind.
@@ -399,7 +399,7 @@ class File {
     read_table(page);
   }
 
-  // Levels lie one after the other, the bricks first, each at the start of a page.
+  // Levels follow each other, the bricks first, each at the start of a page.
   void read_levels(const unsigned char* page) {
     uint64_t end = kPageBytes, nodes = 0;
     for (uint32_t l = brick_level() + 1; l-- > 0;) {

@@ -3,10 +3,10 @@
 // section" and "The sections of alpha, normals and materials", describes the bytes.
 //
 // The set cells of all levels from 0 to a section's finest one have a color, or another value. They
-// are stored by regions of up to 64^3 cells of a tier's finest level: first those of the region's
-// cells of that level in Morton order, then those of the next coarser one, and so on. So the color
-// of a cell is found by its rank: how many set cells of its level are before it in the region,
-// which the DAG tells.
+// are stored by regions of up to 64^3 cells of a tier's finest level: first the region's cells
+// of that level in Morton order, then the next coarser level, and so on. So the color of a cell is
+// found by its rank: the number of set cells of its level before it in the region, which follows
+// from the DAG.
 #pragma once
 
 #include <algorithm>
@@ -150,7 +150,7 @@ struct ColorRegion {
     std::memcpy(&value, blocks + block_bytes * ((cells + 31) / 32) + 4 * entry, sizeof value);
     return value;
   }
-  // Of its data: blocks and prefixes.
+  // Size of its data: blocks and prefixes.
   uint64_t units() const {
     return (cells + 31) / 32 * (block_bytes / 16) + (prefix_count(0) + prefix_count(1) + 3) / 4;
   }
@@ -164,7 +164,7 @@ constexpr uint32_t kKindBlockBytes[kEndOfKinds] = {0, 16, 32, 64, 0};
 // The colors of a file, or another attribute of its cells.
 class ColorSection {
  public:
-  // Opens the section of a known kind. Returns what is wrong with it, or null.
+  // Opens the section of a known kind. Returns the error, or null.
   const char* open(const unsigned char* section, uint64_t bytes, uint32_t color_levels,
                    uint32_t kind = kColors, uint32_t block_bytes = 16) {
     const bool has_names = kKindBlockBytes[kind] == 0;
@@ -229,7 +229,7 @@ class ColorSection {
     region.blocks = tier.data + 16 * region.first_unit;
     return true;
   }
-  // Index of the first region that is not before `morton`; region_count if there is none.
+  // Index of the first region that is not before `morton`, or region_count.
   static uint64_t lower_bound(const ColorTier& tier, uint64_t morton) {
     uint64_t low = 0, high = tier.region_count;
     while (low < high) {
@@ -267,7 +267,7 @@ class ColorSection {
     return bytes - end < 16 ? nullptr : kBroken;
   }
 
-  // Of a list, which is read when the file is opened.
+  // Limits of the list of materials, which is read when the file is opened.
   static constexpr uint64_t kMaxMaterials = uint64_t{1} << 20, kMaxNamesBytes = uint64_t{64} << 20;
 
   uint32_t color_levels_ = 0, tier_count_ = 0;
@@ -356,7 +356,7 @@ class BasicColorCursor {
     return cells;
   }
 
-  // Makes the path that of a cell; false, and the path ends above it, if the cell is not set.
+  // Moves the path to a cell. If the cell is not set, returns false, and the path ends above it.
   bool descend(uint32_t level, uint64_t code) {
     if (dag_->empty()) return false;
     uint32_t shared = std::min(level, depth_);
@@ -374,7 +374,7 @@ class BasicColorCursor {
     return true;
   }
 
-  // Of a cell on the path, in region_.
+  // Index of the value of a cell on the path, in region_.
   uint64_t stored_index(uint32_t level, uint64_t code) {
     const ColorTier& tier = section_->tier_of(level);
     const uint32_t above = std::min<uint32_t>(3, level - tier.region_level);  // to the group
@@ -447,7 +447,7 @@ class BasicColorCursor {
   ColorRegion region_;
   uint32_t group_level_ = kNone;  // of the cells whose parents are below; a group is a cube
   uint64_t group_code_ = 0;
-  uint64_t starts_[64] = {};  // how many cells of the region are before those of a parent
+  uint64_t starts_[64] = {};  // number of the region's cells before a parent's cells
   uint32_t masks_[64] = {};
 };
 

@@ -1,5 +1,5 @@
-// A mapped file while somebody works on it. One that is truncated, or whose disk fails, would end
-// the process by SIGBUS; watched, what cannot be read is zeros, and the work is an error.
+// Protects work on a mapped file. A truncated file, or a failing disk, would end the process with
+// SIGBUS. While the file is watched, unreadable pages are zeros, and the work fails with an error.
 #pragma once
 
 #include "core/base/error.h"
@@ -14,16 +14,16 @@ class WatchedFile {
   explicit WatchedFile(const voxdag_reader::File& file)
       : file_(file), mapping_(file.data(), file.file_bytes()) {}
 
-  // Throws Error{kIo} if a part of the file could not be read since then: what was made from it is
-  // to be thrown away.
+  // Throws Error{kIo} if a part of the file could not be read since then; results made from it must
+  // be discarded.
   void expect_whole() const {
     if (mapping_.is_damaged())
       throw Error(ErrorCode::kIo,
                   file_.path() + ": it became shorter, or its disk failed, while it was read");
   }
 
-  // Returns what work() returns, which has to ask expect_whole() before it shows what it has made.
-  // Its own errors may follow from zeros.
+  // Returns the result of work(), which must call expect_whole() before it publishes a result. Its
+  // errors may be caused by zeros.
   template <class Work>
   auto run(const Work& work) const {
     try {

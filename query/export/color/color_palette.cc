@@ -12,7 +12,7 @@ using voxdag_reader::Rgb;
 using Lab = std::array<uint32_t, 3>;
 
 // 4096 to one, where a step of a gray byte is 16 or so: sums of squares over 2^32 voxels fit into
-// 64 bits. One is added, since a and b are negative, too.
+// 64 bits. One is added, because a and b can be negative.
 constexpr double kLabScale = 4096, kLabShift = 1;
 
 // Newton's method, from above: a fixed number of steps reaches all roots of 16-bit light, whose

@@ -1,8 +1,8 @@
 // Few colors in place of many, for formats of indexed colors: first all colors are added, then the
-// palette is made, then each color is looked up.
+// palette is made, then each color gets an index.
 //
-// Colors that are at most 255 different ones stay as they are. Otherwise those with the same
-// six high bits per channel become one, and boxes of them in Oklab (Ottosson 2020) are cut in two,
+// Up to 255 distinct colors are kept unchanged. Otherwise colors with the same six high bits per
+// channel become one, and boxes of them in Oklab (Ottosson 2020) are cut in two,
 // the one with the largest sum of squared distances along an axis first. The cut is at the mean: at
 // the median, as in Heckbert's method, the picture is 0.3 to 0.6 dB worse. A color of the palette
 // is the mean of a box. All of it is in integers, or in IEEE operations of fixed order: the palette
@@ -32,7 +32,7 @@ class ColorPalette {
   void make();
 
   const std::vector<voxdag_reader::Rgb>& colors() const { return colors_; }
-  // The place in colors() of one that was added.
+  // The index in colors() of an added color.
   uint8_t index_of(voxdag_reader::Rgb color) const;
 
  private:

@@ -9,7 +9,7 @@
 
 namespace voxdag::query {
 
-// Element i is that of the sRGB byte i; 65535 is 1.
+// Element i is the linear value of the sRGB byte i; 65535 is 1.
 inline const std::array<uint16_t, 256>& linear_of_srgb() {
   static const std::array<uint16_t, 256> table = [] {
     std::array<uint16_t, 256> linear{};

@@ -1,6 +1,6 @@
 // OpenVDB's .vdb and NanoVDB's .nvdb, by their own libraries: a grid of voxels that are on, and
 // where the file has colors a grid of linear light with the name that Houdini and Blender give it.
-// They are in memory as a whole before they are written, so their size is counted first.
+// The libraries build them completely in memory, so their size is counted first.
 //
 // Half floats are converted without Imath's table, whose library would have to be linked.
 #define IMATH_HALF_NO_LOOKUP_TABLE
@@ -35,7 +35,7 @@ constexpr VdbNodeBytes kOpenVdbBytes = {192, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kNanoVdbBytes = {96, 34 << 10, 272 << 10};
 // A color is three floats; a node has one, padded, or a pointer for each child.
 constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
-// Of a leaf in a .vdb file, at least: its mask, which is there twice.
+// Minimum size of a leaf in a .vdb file, which stores the mask twice.
 constexpr uint64_t kVdbLeafBytes = 128;
 constexpr const char* kGridName = "voxels";
 constexpr const char* kColorGridName = "Cd";
@@ -44,7 +44,7 @@ VdbNodeBytes operator+(const VdbNodeBytes& a, const VdbNodeBytes& b) {
   return {a.leaf + b.leaf, a.lower + b.lower, a.upper + b.upper};
 }
 
-// Throws what a library threw as an Error; errors of ours, and those of memory, come through.
+// Converts a library's exception to an Error; voxdag's errors and bad_alloc are rethrown.
 template <class Work>
 auto with_vdb_errors(const ExportJob& job, const Work& work) {
   try {
@@ -58,8 +58,8 @@ auto with_vdb_errors(const ExportJob& job, const Work& work) {
   }
 }
 
-// A stream into a file of ours. Streams swallow exceptions, and what the libraries make of that
-// says nothing about the reason: check() throws the first one again.
+// A stream into an ExportFile. Streams swallow exceptions, and the libraries' errors do not name
+// the reason: check() rethrows the first exception.
 class FileBuffer : public std::streambuf {
  public:
   FileBuffer(ExportFile& file, ExportStage& stage) : file_(file), stage_(stage) {}
@@ -69,7 +69,7 @@ class FileBuffer : public std::streambuf {
 
  protected:
   std::streamsize xsputn(const char* bytes, std::streamsize count) override {
-    // A whole grid may come at once.
+    // A complete grid may come in one call.
     constexpr size_t kPieceBytes = 1 << 20;
     const bool done = attempt([&] {
       std::string_view rest(bytes, static_cast<size_t>(count));
@@ -183,7 +183,7 @@ typename GridType::Ptr empty_vdb_grid(const ExportJob& job, const char* name) {
   return grid;
 }
 
-// The selected voxels in a grid, where value(cell) is what a voxel has.
+// Makes a grid of the selected voxels with the values value(cell).
 template <class GridType, class Value>
 typename GridType::Ptr make_vdb_grid(const ExportJob& job, const char* name, uint64_t voxels,
                                      const Value& value) {

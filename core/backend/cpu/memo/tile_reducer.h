@@ -43,8 +43,8 @@ class TileReducer {
   }
 
  private:
-  // Nodes that are looked up together: child masks, and the position of their first child in a
-  // list.
+  // A group of nodes for one batch of lookups: child masks, and the position of their first child
+  // in a list.
   struct Parents {
     int count = 0, children = 0;
     uint16_t first_child[kTileBlocks];
