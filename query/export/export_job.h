@@ -102,7 +102,7 @@ inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> writt
 void require_space(const ExportJob& job, uint64_t bytes);
 
 // Throws Error{code}: "OUTPUT: PROBLEM. --level 11 fits", or "Expected a smaller --region" if no
-// coarser level fits; `fits` tests a level.
+// coarser level fits; `fits` is true for a level that fits.
 [[noreturn]] void refuse_size(const ExportJob& job, const std::string& problem,
                               const std::function<bool(uint32_t grid_levels)>& fits,
                               ErrorCode code = ErrorCode::kLimit);

@@ -1,4 +1,4 @@
-"""Colors equal those of `voxdag render` with all pages, with few, and without any."""
+"""Colors equal the colors of `voxdag render` with all pages, with few, and with none."""
 
 import base64
 import json
@@ -145,7 +145,7 @@ def assert_colored(pixels, reference, what):
 
 
 def check_colors(visitor, voxdag, url, built, camera):
-    """Colors appear first and equal those of `render`. G switches to gray and back."""
+    """Colors appear first and equal `render`'s. G switches to gray and back."""
     reference = rendered(visitor, voxdag, built, camera)
     gray = rendered(visitor, voxdag, built, camera, "--gray")
     visitor.show(camera)

@@ -129,7 +129,7 @@ BAD_INPUT = """async () => {
   };
   if (await take(JSON.stringify(manifest))) wrong.push("refused: a manifest");
   if (await take(JSON.stringify({...manifest, voxels: undefined, colors: undefined})))
-    wrong.push("refused: that of a running job");
+    wrong.push("refused: a running job's manifest");
   for (const edit
            of [{levels: 21},
                {levels: "11"},
@@ -185,7 +185,7 @@ TRIALS = """async (bad) => {
   const unless = (isBad, answer) => (pages) => isBad(pages) ? answer(pages) : all(pages);
   const hasBad = (pages) => pages.includes(bad);
 
-  // `answer(pages, asked, signal)` is the service; at most `ms` are waited for the end.
+  // `answer(pages, asked, signal)` is the service; the check waits at most `ms` for the end.
   const run = async (name, {answer, manifest = here, count = 300, ms = 20000}) => {
     const asked = [], base = name.replaceAll(" ", "-"), signals = [], beginMs = performance.now();
     services.set(base, async (url, options) => {

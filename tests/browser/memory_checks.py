@@ -34,8 +34,8 @@ MANY_TILES = """async ([budgetBytes, maxFailures, first, all]) => {
       return nodes.map(({level}) => tile(level));
     }
   };
-  // All that can be reached: the members of objects and maps, and the elements of arrays. Words are
-  // no more than they were.
+  // Counts everything reachable: the members of objects and maps, and the elements of arrays. Words
+  // count as before.
   const count = (root) => {
     const seen = new Set([root]), todo = [root];
     let things = 0;
@@ -81,7 +81,7 @@ MANY_TILES = """async ([budgetBytes, maxFailures, first, all]) => {
   for (let view = 1; came < all; ++view) {
     store.beginEpoch();
     loader.beginEpoch();
-    // What a view needs: some tiles that are there, and what lies below them.
+    // The demand of a view: some loaded tiles, and the tiles below them.
     for (let round = 0; round < 6; ++round) {
       const wanted = new Map(), level = view % 4 * 3;
       let parents =
@@ -94,7 +94,7 @@ MANY_TILES = """async ([budgetBytes, maxFailures, first, all]) => {
         const node = store.leaf(parent, (random >> 12) % 8);
         wanted.set(node.texel, 1);
       }
-      store.rounds = 4;  // it is known what the view does not need
+      store.rounds = 4;  // the unneeded tiles are known
       const before = store.tiles.size + store.evicted;
       loader.demand(wanted, performance.now());
       while (!isDone()) await new Promise((resolve) => setTimeout(resolve));

@@ -1,4 +1,4 @@
-"""The picture equals that of `voxdag render`; small budgets leave no holes."""
+"""The picture equals the picture of `voxdag render`; small budgets leave no holes."""
 
 import math
 import re

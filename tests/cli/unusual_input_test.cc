@@ -25,7 +25,7 @@ class UnusualInput : public CommandLine {
 
 constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, for a byte that is not UTF-8
 
-// A path is bytes; in JSON those that are not UTF-8 are replaced, and the file has the exact name.
+// A path is bytes. In JSON, bytes that are not UTF-8 are replaced; the file has the exact name.
 TEST_F(UnusualInput, PathsNeedNotBeUtf8) {
   build();
   const auto expect_output = [&](std::vector<std::string> args, const std::string& suffix) {
@@ -64,7 +64,7 @@ TEST_F(UnusualInput, ClientsRefuseNamesThatAreNotUtf8) {
   EXPECT_EQ(server.stop(), 0);
 }
 
-// Only what the same command has made is replaced, unless --force is given; never the input.
+// Without --force only files made by the same command are replaced, and never the input.
 TEST_F(UnusualInput, ForeignFilesAreNotOverwritten) {
   build();
   const std::vector<std::string> render = {"render", "m.vdag", "--size", "32x32", "-o"};
@@ -133,7 +133,7 @@ TEST_F(UnusualInput, AMissingOutputFolderIsNoticedFirst) {
   expect_error(3, "there is no folder none", {"render", "m.vdag", "-o", "none/x.png"});
 }
 
-// Numbers mean what is written, and an error is one line that says what was expected.
+// Numbers are read exactly, and an error is one line that names the expectation.
 TEST_F(UnusualInput, NumbersAndMessages) {
   const std::vector<std::string> build = {"build", "m.glb", "-o", "m.vdag", "-r"};
   for (const char* number : {"-4", "abc", "64x", "", "99999999999999999999", "6.4"}) {
@@ -189,7 +189,7 @@ TEST_F(UnusualInput, OnlyBuildNamesForce) {
   EXPECT_EQ(plan.err.find("--force"), std::string::npos) << plan.err;
 }
 
-// A plan keeps what it spills where it may write, wherever TMPDIR points.
+// A plan spills to a writable folder, wherever TMPDIR points.
 TEST_F(UnusualInput, PlanNeedsNoTmpdir) {
   for (const char* folder : {"/proc/none", ""}) {
     SCOPED_TRACE(folder);

@@ -71,7 +71,7 @@ class HostileView : public testing::Test {
   std::string log_;
 };
 
-// Only what lies in the damaged block is refused, and its file is logged once.
+// Only data in the damaged block is refused, and its file is logged once.
 TEST_F(HostileView, SeesThatAFileIsDamaged) {
   const auto file = open_global_file(path_);
   const uint32_t bricks = file->brick_level();
@@ -94,7 +94,7 @@ TEST_F(HostileView, SeesThatAFileIsDamaged) {
   EXPECT_TRUE(get(above + "/" + offset).body == whole);
 }
 
-// Of a damaged region of colors, its pages are refused, and no others.
+// Only the pages of a damaged region of colors are refused.
 TEST_F(HostileView, SeesThatColorsAreDamaged) {
   const uint64_t data = [&] {
     const auto file = open_global_file(path_);
@@ -152,7 +152,7 @@ TEST_F(HostileView, SurvivesClientsThatLeave) {
   EXPECT_EQ(get("0/0").status, 200);
 }
 
-// Requests for tiles of a job, one at a time.
+// Sequential requests for tiles of a job.
 class TilePermits : public RunningService {
  protected:
   void SetUp() override {

@@ -15,8 +15,8 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// A disk of a size that the test sets, taken up by scenes only, and a hook on what is read of the
-// parts of uploads.
+// A disk of a size set by the test, filled only by scenes, and a hook on reads of the parts of
+// uploads.
 class TestDisk : public ForwardingFiles {
  public:
   TestDisk() : ForwardingFiles(system_files()) {}
@@ -133,7 +133,7 @@ TEST_F(InterruptedUpload, IsNotBlockedBySlowOnes) {
   for (const int socket : sockets) close(socket);
 }
 
-// An upload that starts over may use the space of what it replaces.
+// An upload that starts over may use the space of the upload it replaces.
 TEST_F(InterruptedUpload, StartsOverInItsOwnSpace) {
   disk_.bytes = 60 * kMiB;
   config_.jobs.min_free_disk_bytes = 8 * kMiB;
@@ -142,7 +142,7 @@ TEST_F(InterruptedUpload, StartsOverInItsOwnSpace) {
   close(begin_upload("m.glb", whole.size(), whole.substr(0, 30 * kMiB)));
   ASSERT_TRUE(until([&] { return offset("m.glb") == std::to_string(30 * kMiB); }));
   EXPECT_EQ(put_scene("m.glb", whole).status, 201);
-  // One that does not fit leaves nothing behind.
+  // An upload that does not fit leaves nothing behind.
   EXPECT_EQ(answer_to_upload("n.glb", whole.size()), "HTTP/1.1 507");
   EXPECT_EQ(http_->get("/api/v1/scenes/n.glb").status, 404);
 }

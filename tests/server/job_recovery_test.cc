@@ -13,7 +13,7 @@ class JobRecovery : public RunningService {
  protected:
   ~JobRecovery() override {
     release();
-    stop();  // before what the hook uses is gone
+    stop();  // before the hook's data is destroyed
   }
 
   std::string data(const std::string& name) { return config_.data_folder + "/" + name; }
@@ -87,7 +87,7 @@ TEST_F(JobRecovery, AJobWhoseDeletionFailedIsNotTriedAgain) {
   EXPECT_FALSE(std::filesystem::exists(data("jobs/" + id + ".deleted")));
 }
 
-// Only what is marked is deleted: not the folder that the job has by now, nor its record.
+// Only marked files are deleted: not the job's new folder, nor its record.
 TEST_F(JobRecovery, AMarkedFolderTakesNoOtherAlong) {
   start();
   const std::string id = posted_job(), waiting = posted_job();
@@ -137,7 +137,7 @@ echo '{"json":"{\"triangles\":1}","message":"result"}')");
   EXPECT_EQ(http_->send("DELETE", "/api/v1/scenes/m.glb", "").status, 204);
 }
 
-// A retry is refused for what a new job would be refused for.
+// A retry is refused for the same reasons as a new job.
 TEST_F(JobRecovery, AJobWithoutItsSceneIsNotTriedAgain) {
   use_program("exec sleep 600");
   start();
@@ -169,7 +169,7 @@ TEST_F(JobRecovery, AListWithADamagedRequestIsJson) {
   }
 }
 
-// Once the outcome of a run is recorded, nothing of that run ends what a client asks for.
+// Once the outcome of a run is recorded, nothing of that run affects later requests of a client.
 TEST_F(JobRecovery, ASuspendedJobIsCanceledWhileItsThreadEnds) {
   use_program("exec sleep 600");
   hold_step("remove the work folder of job");
@@ -213,8 +213,7 @@ TEST_F(JobRecovery, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
   std::signal(SIGTERM, before);
 }
 
-// What would start after all others were asked to stop would run to its end, and the service with
-// it.
+// A job started after all others were stopped would run to its end, and so would the service.
 TEST_F(JobRecovery, AServiceThatStopsStartsNoOtherJob) {
   use_program("exec sleep 10");
   config_.jobs.max_concurrent = 2;

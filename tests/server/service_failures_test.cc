@@ -87,7 +87,7 @@ TEST_F(ServiceFailures, NoFailureEndsTheService) {
     EXPECT_TRUE(failed.contains(step)) << step;
 }
 
-// A step that fails for ever, as on a broken disk, stops what depends on it only.
+// A step that always fails, as on a broken disk, stops only the steps that depend on it.
 TEST_F(ServiceFailures, StepsMayFailForEver) {
   std::atomic<bool> fails{true};
   config_.before_step = [&](const std::string& step) {
@@ -140,7 +140,7 @@ TEST_F(ServiceFailures, AJobThatCannotBeReadFails) {
   EXPECT_EQ(Json::parse(http_->get("/api/v1/jobs").body)["jobs"].size(), 2u);
 }
 
-// Without its queue no file is removed, and nothing starts until the operator says so.
+// Without its queue no file is removed, and nothing starts until the operator adopts the jobs.
 TEST_F(ServiceFailures, ALostQueueCostsNothing) {
   start();
   const std::string id = finished_job();
@@ -188,7 +188,7 @@ TEST_F(ServiceFailures, AnUnfinishedJobIsAdopted) {
   EXPECT_TRUE(until_state(id, "succeeded"));
 }
 
-// Only what the service marked itself is removed at its start.
+// At its start the service removes only files that it marked itself.
 TEST_F(ServiceFailures, ForeignFilesAreLeftAlone) {
   start();
   const std::string intact = finished_job(), deleted = finished_job();
@@ -312,8 +312,7 @@ TEST_F(ServiceFailures, APlanEndsWithItsClient) {
   EXPECT_EQ(log().find("failed to"), std::string::npos) << log();
 }
 
-// Neither the answer nor its place in the queue shows what the JSON of a request makes of the
-// stack.
+// A deeply nested JSON value affects neither the answer nor the job's place in the queue.
 TEST_F(ServiceFailures, ADeepValueIsNoPriority) {
   config_.transfers.max_body_bytes = 64 << 20;
   start();
@@ -335,7 +334,7 @@ TEST_F(ServiceFailures, ADeepValueIsNoPriority) {
   EXPECT_TRUE(is_alive());
 }
 
-// A queue or scenes that are gone under the service.
+// A queue or scenes deleted under the running service.
 TEST_F(ServiceFailures, ReadyzNoticesThatTheQueueIsGone) {
   start();
   put_scene("m.glb", scene_bytes());

@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kMaxConnections = 40;
 constexpr size_t kAttackers = 64;
 constexpr useconds_t kAttackBegins_us =
-    1'500'000;  // all attackers are waited for then, for more than a second
+    1'500'000;  // by then the service waits for all attackers, for more than a second
 
 class SlowClients : public RunningService {
  protected:
@@ -107,7 +107,7 @@ TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   EXPECT_EQ(answered(), 20);
 }
 
-// A blank before a colon must not hide how the body ends: what follows would be read as a request.
+// A blank before a colon must not hide the end of the body: the rest would be read as a request.
 TEST_F(SlowClients, ABlankBeforeTheColonIsRejected) {
   start();
   const std::string answer = raw_exchange(
@@ -125,7 +125,7 @@ TEST_F(SlowClients, TwoHostsAreRejected) {
           .starts_with("HTTP/1.1 400 "));
 }
 
-// Readiness is asked for by several at once, and by anybody.
+// Several clients request readiness concurrently, with and without tokens.
 TEST_F(SlowClients, ReadinessDoesNotDependOnWhoElseAsks) {
   config_.transfers.max_requests_per_s = 0;
   start();

@@ -20,7 +20,7 @@ std::vector<BrokenProgram> broken_programs();
 // neighbor's word. Returns the words that were read: the neighbor's number in the block.
 std::vector<uint32_t> exchange_with_neighbors(uint32_t blocks, uint32_t threads);
 
-// The mailbox of a download as the host sees it: before the stream was waited for, and after.
+// The mailbox of a download as the host sees it: before and after the wait for the stream.
 struct DownloadedWord {
   uint32_t before = 0, after = 0;
 };

@@ -343,7 +343,7 @@ TEST(Ply, InvalidTrianglesAreNamedOrSkipped) {
   }
 }
 
-// Counts beyond what the file holds, and invalid headers.
+// Counts beyond the end of the file, and invalid headers.
 TEST(Ply, HostileHeadersAreRefused) {
   const std::string begin = "ply\nformat binary_little_endian 1.0\n";
   const std::string xyz = "property float x\nproperty float y\nproperty float z\n";

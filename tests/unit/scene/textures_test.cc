@@ -140,7 +140,7 @@ TEST(Textures, LinearLight) {
 }
 
 // An image in a buffer view of a data: URI, whose slashes JSON may escape, is found whatever the
-// buffer begins with; "dA" is what the byte 't' begins in base64.
+// buffer begins with; in base64 the byte 't' begins with "dA".
 TEST(Textures, InBase64Buffers) {
   SceneBuilder scene = textured("");
   const std::string png = png_of(1, 1, "\xff\xff\xff\x80");

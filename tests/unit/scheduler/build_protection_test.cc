@@ -50,8 +50,8 @@ class BuildProtection : public testing::Test {
   CancelToken cancel_;
 };
 
-// A build that was killed holds its locks until the system has taken it apart. The next one waits
-// for each of them, and says so.
+// A killed build holds its locks until the system has removed its process. The next one reports
+// that it waits for each of them.
 TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
   for (const std::string& path : {OutputLock::path_of(output()), output() + ".work/lock"}) {
     SCOPED_TRACE(path);
@@ -69,7 +69,7 @@ TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
   }
 }
 
-// A lock that stays is an error that a later try may not have: the service tries again.
+// A persistent lock is a transient error: the service tries again.
 TEST_F(BuildProtection, ALockThatStaysIsATransientError) {
   BuildSpec impatient = spec();
   impatient.run.lock_wait_s = 0.1;
@@ -145,7 +145,7 @@ TEST_F(BuildProtection, ALockOfTheOutputHasAName) {
 }
 
 // The same with whole builds: the second waits, the third waits for the second, and the file is
-// that of the last.
+// the third one's.
 TEST_F(BuildProtection, ABuildHoldsItsOutputUntilItEnds) {
   // Holds the lock while it looks, as the third build would.
   class Looking : public NoProgress {
@@ -168,7 +168,7 @@ TEST_F(BuildProtection, ABuildHoldsItsOutputUntilItEnds) {
   EXPECT_FALSE(std::filesystem::exists(OutputLock::path_of(output())));
 }
 
-// A file of that name that is somebody else's stays.
+// A file of that name not created by voxdag is kept.
 TEST_F(BuildProtection, AForeignFileOfTheLocksNameStays) {
   std::ofstream(OutputLock::path_of(output())) << "mine";
   run_build(spec(), context());
@@ -256,7 +256,7 @@ TEST_F(BuildProtection, ADamagedJobStartsOver) {
   EXPECT_EQ(run_build(again, context()).subvolumes_reused, 0u);
 }
 
-// A scene whose files have names of the build's own is refused, and they stay.
+// A scene whose files have names of the build's files is refused, and they are kept.
 TEST_F(BuildProtection, ABuildDoesNotDestroyItsScene) {
   BuildSpec inside = spec();
   inside.run.work_folder = folder_.file("w");

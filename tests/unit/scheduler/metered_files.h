@@ -1,6 +1,5 @@
-// The machine's files, with a meter on what is read and written, and a disk that is full or fails
-// where a test wants it to. Syncs are only counted: no test cuts the power. Counts are read when no
-// build is under way.
+// The machine's files, with counters of reads and writes, and a disk that is full or fails on
+// request. Syncs are only counted: no test cuts the power. Counters are read when no build runs.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +25,7 @@ class MeteredFiles : public ForwardingFiles {
   std::map<std::string, uint64_t> failing_sync;    // by path, counted from 1: fails with kIo
   std::string full_for;                            // no write to this file finds room
   uint64_t free_bytes = UINT64_MAX;
-  std::string other_disk;  // a folder that is on a disk of its own
+  std::string other_disk;  // a folder on a separate disk
 
   void forget_counts() {
     bytes_read.clear();

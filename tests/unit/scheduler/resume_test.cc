@@ -103,8 +103,8 @@ TEST_F(ResumeTest, ProgressIsThatOfTheWholeBuild) {
   }
 }
 
-// Interrupted in any stage, the same call resumes, reuses what was built and ends with the same
-// bytes; afterwards only the result and its report are left.
+// Interrupted in any stage, the same call resumes, reuses built subvolumes and ends with the same
+// bytes; afterwards only the result and its report remain.
 TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   const std::string expected = build(spec()).sha256;
   std::filesystem::remove(output());
@@ -160,7 +160,7 @@ TEST_F(ResumeTest, RefusesAnotherJobInTheSameFolder) {
   EXPECT_EQ(report.sha256, build(other).sha256);
 }
 
-// Of a damaged or missing segment only the subvolumes are built again.
+// Only the subvolumes of a damaged or missing segment are built again.
 TEST_F(ResumeTest, RebuildsDamagedArtifacts) {
   const std::string expected = build(spec()).sha256;
   for (const bool whole_segment : {false, true}) {
@@ -186,8 +186,8 @@ TEST_F(ResumeTest, RebuildsDamagedArtifacts) {
   }
 }
 
-// Only one build at a time uses a folder; a second one gets an error that names the first. Files of
-// others are not touched.
+// Only one build uses a folder; a second one gets an error that names the first. Files not created
+// by voxdag are not touched.
 TEST_F(ResumeTest, OwnsItsFolderAlone) {
   {
     CancelToken cancel;
@@ -211,7 +211,7 @@ TEST_F(ResumeTest, OwnsItsFolderAlone) {
   EXPECT_TRUE(std::filesystem::exists(work() + "/letter.txt"));
 }
 
-// A folder of somebody else that has a name of ours is refused, and stays as it is.
+// A folder not created by voxdag with one of its names is refused and unchanged.
 TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
   std::filesystem::create_directories(work() + "/merge");
   std::ofstream(work() + "/merge/thesis.txt") << "not ours";
@@ -234,7 +234,7 @@ TEST_F(ResumeTest, WaitsForThoseWhoLook) {
   EXPECT_EQ(sha256.size(), 64u);
 }
 
-// Two builds with work folders of their own cannot write one output; the first one's file so far is
+// Two builds with separate work folders cannot write one output; the first one's file so far is
 // not touched.
 TEST_F(ResumeTest, OwnsItsOutputAlone) {
   BuildSpec first = spec();
@@ -323,7 +323,7 @@ TEST_F(ResumeTest, StartsOverInAFolderOfItsOwnOnly) {
   EXPECT_TRUE(std::filesystem::exists(store));
 }
 
-// A build that is canceled says how to resume it.
+// A canceled build explains how to resume it.
 TEST_F(ResumeTest, SaysHowToResume) {
   CancelToken cancel;
   CancelingProgress progress(cancel, "build", 5);

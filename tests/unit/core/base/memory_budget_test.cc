@@ -12,7 +12,7 @@
 namespace voxdag {
 namespace {
 
-// A charge that fits is recorded; one that does not changes nothing. The limit itself fits.
+// A charge that fits is recorded; a charge that does not changes nothing. The limit itself fits.
 TEST(MemoryBudget, ChargesUpToItsLimit) {
   MemoryBudget budget(100);
   EXPECT_TRUE(budget.try_charge(60));

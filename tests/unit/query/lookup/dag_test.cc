@@ -116,7 +116,7 @@ TEST_P(DagFileTest, CountsWithoutStoredCounts) {
       ASSERT_EQ(poor.count({levels, region}), dag_.count({levels, region}));
 }
 
-// A list that is too short is filled, and the number is that of all cells.
+// A list that is too short is filled, and the number counts all cells.
 TEST_P(DagFileTest, ListsAsManyAsFit) {
   const Selection all{dag_.grid_levels(), whole_grid(dag_.grid_levels())};
   std::vector<Position> some(3), every(dag_.count(all));

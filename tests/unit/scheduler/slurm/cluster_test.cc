@@ -139,7 +139,8 @@ TEST_F(Cluster, WaitsForASlurmThatTakesNoTasksNow) {
   EXPECT_NE(warnings_.text.find("Slurm takes no tasks now"), std::string::npos) << warnings_.text;
 }
 
-// For some seconds after its start Slurm knows no nodes, and refuses what it will take.
+// For some seconds after its start Slurm knows no nodes, and refuses tasks that it will accept
+// later.
 TEST_F(Cluster, WaitsForASlurmThatHasJustBeenStarted) {
   slurm_.test_refusal = "allocation failure: Requested node configuration is not available";
   slurm_.refusal = "Batch job submission failed: Requested node configuration is not available";
@@ -166,8 +167,8 @@ TEST_F(Cluster, AnArrayThatIsTooLargeForSlurmIsHalved) {
   EXPECT_NE(warnings_.text.find("QOSMaxSubmitJobPerUserLimit"), std::string::npos);
 }
 
-// Numbers of segments are not given again when the state is lost or of another version: a row of
-// the job store names what is there.
+// Numbers of segments are not reused when the state is lost or has a different version: the job
+// store's rows name the existing ones.
 TEST_F(Cluster, ALostStateCostsNothingThatIsBuilt) {
   for (const bool is_lost : {true, false}) {
     SCOPED_TRACE(is_lost);
@@ -281,8 +282,8 @@ TEST_F(Cluster, LeftoversThatCannotBeRemovedDoNotStopABuild) {
   EXPECT_EQ(report.sha256, expected_);
 }
 
-// A task that was killed leaves its temporary folder: the next one removes it, but not that of a
-// task that runs.
+// A task that was killed leaves its temporary folder: the next one removes it, but not the folder
+// of a running task.
 TEST_F(Cluster, TemporaryFoldersOfKilledTasksAreRemoved) {
   const std::string killed = folder_.file("tmp/voxdag-batch-killed");
   const std::string running = folder_.file("tmp/voxdag-batch-running");

@@ -27,12 +27,12 @@ namespace voxdag {
 
 inline constexpr const char* kVersion = "1.2.3";
 
-// Runs each task at once, unless a fate for it was given: then it ends in that state without having
-// done anything; or, if that is kHeld, waits until it is canceled.
+// Runs each task immediately, unless it has a fate: then it ends in that state without doing
+// anything, or, for kHeld, waits until it is canceled.
 class PlayedSlurm : public CommandRunner {
  public:
   static constexpr const char* kHeld = "held";
-  std::deque<std::string> fates;  // of the next tasks; "" for one that does its work
+  std::deque<std::string> fates;  // of the next tasks; "" for a normal task
   uint32_t max_array_size = 1001;
   size_t max_tasks = SIZE_MAX;  // of an array
   int squeue_failures = 0;
@@ -44,9 +44,9 @@ class PlayedSlurm : public CommandRunner {
   std::string program = kVersion;
   std::string temporary_folder;
   std::function<void(uint32_t batch)> before_task;
-  std::function<void()> merge_job;           // what it does
+  std::function<void()> merge_job;           // its work
   std::string waiting_merge_job;             // its id
-  std::string merge_state = "RUNNING|None";  // while it is not done
+  std::string merge_state = "RUNNING|None";  // before its end
   std::string merge_end = "COMPLETED Reason=None ExitCode=0:0";
 
   CommandResult run(const std::vector<std::string>& command, const std::string& input, double,
@@ -80,7 +80,7 @@ class PlayedSlurm : public CommandRunner {
   }
 
  private:
-  // A job that merges does its work as soon as somebody asks for it, and is gone then.
+  // A merge job does its work at the first query, and has ended afterwards.
   CommandResult show_merge_job() {
     if (waiting_merge_job.empty()) return ok("");
     const std::string id = std::exchange(waiting_merge_job, "");

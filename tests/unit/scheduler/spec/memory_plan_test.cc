@@ -47,7 +47,7 @@ TEST(MemoryPlan, DividesWhatIsFreeBetweenWorkers) {
   }
 }
 
-// Within a worker's share, and what it retains next to it.
+// The parts fit in a worker's share, next to its retained pages.
 TEST(MemoryPlan, DividesAWorkersShare) {
   EXPECT_EQ(WorkerMemory::key_bytes(64 * kMiB), 56 * kMiB);
   EXPECT_EQ(BackendMemory::page_bytes(10 * kMiB), 8 * kMiB);

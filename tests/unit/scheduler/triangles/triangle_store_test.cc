@@ -99,8 +99,8 @@ TEST_P(TriangleStoreTest, ReturnsWhatWasStored) {
     }
 }
 
-// drop() frees what no other run can read; the last release() frees the rest. The release of a
-// part counts for the bin that the part was copied from.
+// drop() frees triangles that no other run can read; the last release() frees the rest. The release
+// of a part counts for the bin that the part was copied from.
 TEST_P(TriangleStoreTest, FreesABinWithItsLastReference) {
   MemoryBudget share(1 << 20);
   const auto store = open_store(false, share);

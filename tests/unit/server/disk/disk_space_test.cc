@@ -44,8 +44,8 @@ bool fits(DiskSpace& space, uint64_t announced) {
   }
 }
 
-// An upload that cannot fit is refused when it begins, one of unknown size when the part of the
-// disk that stays free is reached.
+// An upload that cannot fit is refused when it begins, an upload of unknown size when only the
+// reserve of the disk is left.
 TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -67,8 +67,8 @@ TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   EXPECT_FALSE(space.is_low());
 }
 
-// Those who announce all of the disk and send little of it keep nobody out; what they do send next
-// has its place.
+// Clients that announce the complete disk and send little do not exclude others; their next bytes
+// have reserved space.
 TEST(DiskReservations, UploadsThatSendSlowlyKeepNobodyOut) {
   const TemporaryFolder folder;
   SmallDisk disk;

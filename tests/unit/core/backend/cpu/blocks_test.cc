@@ -29,7 +29,7 @@ class Blocks : public testing::Test {
 };
 
 // list_blocks() lists the non-empty blocks in order, each with its block_key(), and clears all
-// marks, including those of empty blocks.
+// marks, also of empty blocks.
 TEST_F(Blocks, KernelsListThem) {
   for (const Kernels* kernels : all_kernels())
     for (int round = 0; round < 50; ++round) {

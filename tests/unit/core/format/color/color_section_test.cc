@@ -1,5 +1,5 @@
 // The color section: at every cell of every level the colors of the reader and of the cursor equal
-// those of a decoder written from docs/format.md, and are close to the original colors.
+// a decoder's written from docs/format.md, and are close to the original colors.
 #include <gmock/gmock.h>
 
 #include "core/color/color_of.h"

@@ -1,6 +1,6 @@
 // The sections of alpha, normals and materials: at every cell of every level the reader's value
-// equals that of a decoder written from docs/format.md, and is the original value or follows from
-// the children by the rule.
+// equals the value of a decoder written from docs/format.md, and is the original value or follows
+// from the children by the rule.
 #include <gmock/gmock.h>
 
 #include <cmath>

@@ -115,7 +115,7 @@ TEST_F(ReaderTest, APipeIsRefused) {
   }
 }
 
-// Files that are not readable global files give different errors: missing, other, too new, damaged.
+// Each kind of unreadable file gives a different error: missing, other, too new, damaged.
 TEST_F(ReaderTest, ProblemsAreReported) {
   using voxdag_reader::Problem;
   const auto problem = [&] {

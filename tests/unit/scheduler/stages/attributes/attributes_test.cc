@@ -1,4 +1,4 @@
-// Builds with alpha, normals and materials: what cells have, and the same bytes from every route.
+// Builds with alpha, normals and materials: the cells' values, and the same bytes from every route.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -81,7 +81,7 @@ TEST_F(Attributes, AreThoseOfTheScene) {
         ++cells;
         sheet += *material == 0;
         plain += *material == 1;
-        // The corners run so that all fronts are below; those of the sheet at all angles.
+        // The corners' order puts all fronts below; the sheet's fronts have all angles.
         EXPECT_LT(normal->y, *material == 1 ? -0.999 : -0.1);
       }
   EXPECT_EQ(cells, report.colors->cells);
@@ -146,7 +146,7 @@ TEST_F(Attributes, AreTheSameBytesFromEveryRoute) {
   stop("material", 1);
 }
 
-// A cube counts as baked only if all its attributes are there.
+// A cube counts as baked only if all its attributes are stored.
 TEST_F(Attributes, AHalfStoredCubeIsBakedAgain) {
   const std::string expected = build(spec(256, 256, kAll)).sha256;
   std::filesystem::remove(output());
@@ -172,7 +172,7 @@ TEST_F(Attributes, FollowTheNamesOfMaterials) {
   EXPECT_EQ(open_global_file(output())->material_names()[1], "other");
 }
 
-// The work folder is that of other options.
+// The work folder belongs to other options.
 TEST_F(Attributes, BelongToTheJob) {
   build_until(spec(128, 128, {Attribute::kColor}), "write", 0);
   const Error error = error_of([&] { build(spec(128, 128, kAll)); });

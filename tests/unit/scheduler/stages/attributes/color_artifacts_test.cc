@@ -1,4 +1,4 @@
-// Colors that outlive a run: what is used again, and what is not.
+// Colors that outlive a run: reused and repeated cubes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -75,7 +75,7 @@ TEST_F(ColorArtifacts, WithoutAnythingToBakeNoImageIsDecoded) {
   EXPECT_EQ(report.colors->image_bytes, 0u);
 }
 
-// The image is in a file of its own: the scene's files stay as they are.
+// The image is in a separate file: the scene's files are unchanged.
 TEST_F(ColorArtifacts, AChangedImageRepeatsTheCubesThatShowIt) {
   PaintedScene::write(folder_.path(), 128);
   const std::string changed = build(spec()).sha256;
@@ -124,14 +124,14 @@ TEST_F(ColorArtifacts, WhatIsDamagedIsBakedAgain) {
   std::filesystem::resize_file(artifacts(), std::filesystem::file_size(artifacts()) - 1);
   colors = *resume().colors;
   EXPECT_EQ(colors.cubes_reused + 1, colors.cubes);
-  // Nothing tells what follows a header that is damaged.
+  // The part after a damaged header is unreadable.
   bake();
   damage(20);
   EXPECT_EQ(resume().colors->cubes_reused, 0u);
   EXPECT_EQ(warnings_.text, "");
 }
 
-// What an earlier scene has baked goes when it is more than what this one needs.
+// Cubes of an earlier scene are dropped when they exceed this scene's.
 TEST_F(ColorArtifacts, DoNotGrowWithoutEnd) {
   BuildSpec s = spec();
   s.run.keep_work = true;
