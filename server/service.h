@@ -17,8 +17,8 @@ namespace voxdag::server {
 
 class Service {
  public:
-  // `log` gets what changed, by whom, and what went wrong. Checks the configuration, locks the data
-  // folder (one service at a time), opens the stores, resumes the jobs of the last service, and
+  // `log` receives changes with their author, and failures. Checks the configuration, locks the
+  // data folder for this service, opens the stores, resumes the jobs of the last service, and
   // listens. Throws Error.
   Service(ServerConfig config, FileSystem& files, Log log);
 

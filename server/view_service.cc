@@ -49,7 +49,8 @@ std::string ViewService::url() const {
 }
 
 void ViewService::run() {
-  // The cameras are looked for while a browser starts. If that fails, so will the request for them.
+  // The cameras are computed while a browser starts. If that fails, the request for them fails as
+  // well.
   const std::jthread cameras([this, file = open_sources_.open(path_)] {
     try {
       file->manifest(stopping_);

@@ -10,7 +10,7 @@ inline constexpr double kSecondsPerDay = 86400;
 
 class ClockGuard {
  public:
-  // `last_seen_s` is when the last service is known to have run (Unix time), 0 if there was none.
+  // `last_seen_s` is when the last service is known to have run (Unix time), 0 without one.
   explicit ClockGuard(double last_seen_s) : last_clock_s_(last_seen_s) {}
 
   // Whether the clock jumped since the last call. Call it at least once per hour, with the times of

@@ -1,7 +1,7 @@
-// Why queue, scenes, jobs and tiles refuse a request. They throw a RequestError for what its client
-// can set right, and an Error for everything else; server/api turns both into answers. The message
-// of a RequestError is written for clients and holds no path of the server; that of an Error may,
-// and is replaced by public_error().
+// Errors of the queue, scenes, jobs and tiles for faulty requests. They throw a RequestError if the
+// client can correct the request, and an Error otherwise; server/api turns both into answers. The
+// message of a RequestError is written for clients and has no path of the server. The message of an
+// Error may have one, and public_error() replaces it.
 #pragma once
 
 #include <cstdint>

@@ -14,8 +14,8 @@ namespace voxdag::server {
 
 struct JobLimits {
   unsigned max_concurrent = 1;
-  uint64_t memory_bytes = 0;  // of all running jobs together; 0 for half of what the machine allows
-  unsigned threads = 0;       // of a job that does not say; 0 for all cores
+  uint64_t memory_bytes = 0;  // total of all running jobs; 0 for half of the machine's memory
+  unsigned threads = 0;       // default of a job; 0 for all cores
   uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // with less, no job starts
   int nice = 5;                                      // of the processes that build
   unsigned max_attempts = 5;
@@ -48,7 +48,7 @@ struct ServerConfig {
   std::string data_folder;
   std::string token_file;                // "" for none: loopback only
   std::vector<std::string> scene_roots;  // absolute folders whose scenes jobs may name by path
-  std::vector<std::string> hosts;        // names that a Host header may have besides the loopback's
+  std::vector<std::string> hosts;  // names allowed in a Host header in addition to the loopback's
   // Runs the jobs. This is this program, even after another was installed under the same name.
   std::string program = "/proc/self/exe";
   JobLimits jobs;

@@ -1,6 +1,5 @@
-// What the data folder holds besides the stores, and how it is deleted: only what the service
-// marked itself is ever removed, so that a store that was lost or restored from a backup costs no
-// file.
+// Files of the data folder other than the stores, and their deletion. Only files that the service
+// marked are ever removed, so a store that was lost or restored from a backup costs no file.
 #pragma once
 
 #include <cstdint>
@@ -16,11 +15,11 @@ inline constexpr const char* kDeleted = ".deleted";
 // Whether a folder exists and has any entry.
 bool has_entries(FileSystem& files, const std::string& path);
 
-// A file that must stay under its name while it is open.
+// A file that must keep its name while it is open.
 class NamedFile {
  public:
   explicit NamedFile(const std::string& path);
-  // Throws Error{kIo} if the file was removed or replaced: what is written now would be lost.
+  // Throws Error{kIo} if the file was removed or replaced, because further writes would be lost.
   void check() const;
 
  private:

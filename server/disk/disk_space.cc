@@ -9,7 +9,7 @@ namespace {
 
 constexpr uint64_t kForDatabases = uint64_t{4} << 20;
 constexpr uint64_t kBallastBytes = uint64_t{1} << 20;
-// What an upload reserves at a time.
+// Size of one reservation of an upload.
 constexpr uint64_t kStepBytes = uint64_t{8} << 20;
 
 std::string ballast_of(const std::string& folder) { return folder + "/ballast"; }

@@ -1,9 +1,9 @@
-// The free space on the data folder's disk: part of it stays free, and uploads reserve a few
-// megabytes ahead of what they write, so that no two of them count on the same bytes, and none that
-// sends slowly keeps the others out. Thread-safe.
+// The free space on the data folder's disk. A reserve is kept free, and uploads reserve a few
+// megabytes ahead of their writes. So no two uploads count on the same bytes, and a slow upload
+// does not exclude others. Thread-safe.
 //
-// A ballast file lies there for a disk that other programs fill to the last byte: without it the
-// databases could not even record that something was deleted.
+// A ballast file protects against other programs that fill the disk to the last byte: without it
+// the databases could not even record a deletion.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +38,7 @@ class DiskSpace {
    private:
     DiskSpace& disk_;
     uint64_t left_;          // reserved, not yet written
-    uint64_t not_reserved_;  // of what was announced
+    uint64_t not_reserved_;  // announced, not yet reserved
   };
 
   // Calls `act`, which deletes or cancels something. If the disk has no space to record that, which
@@ -52,9 +52,9 @@ class DiskSpace {
     }
     return act();
   }
-  // Removes the ballast; false if there is none.
+  // Removes the ballast; false if it does not exist.
   bool drop_ballast();
-  // Puts the ballast there again if there is room for it.
+  // Restores the ballast if the disk has space for it.
   void restore_ballast();
 
  private:

@@ -10,7 +10,7 @@ namespace voxdag::server {
 
 struct StoreFormat {
   const char* records;     // "a queue"
-  const char* files;       // what the folders hold: "jobs"
+  const char* files;       // contents of the folders: "jobs"
   int64_t application_id;  // PRAGMA application_id
   int64_t version;         // PRAGMA user_version
   const char* schema;

@@ -102,7 +102,7 @@ bool Exchange::answer(Response response, bool last) {
 }
 
 bool Exchange::send_pieces(ReadableFile& file, const std::vector<FilePiece>& pieces) {
-  // The API limits how many such answers a client may ask for at a time.
+  // The API limits the concurrent answers of this kind per client.
   connection_.allow_large_send_buffer();
   std::string buffer;
   for (const FilePiece& piece : pieces) {
@@ -112,7 +112,7 @@ bool Exchange::send_pieces(ReadableFile& file, const std::vector<FilePiece>& pie
       try {
         file.read_at(at, std::as_writable_bytes(std::span(buffer)));
       } catch (const Error&) {
-        return false;  // the status is already sent: all that is left is to abort the answer
+        return false;  // the status is already sent, so the only option is to abort the answer
       }
       if (!connection_.write(buffer)) return false;
     }

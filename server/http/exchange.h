@@ -18,7 +18,7 @@ class Exchange {
   // Reads the head of the request; its body is read by Request::read_body. Throws Problem if it is
   // malformed, too large or too slow.
   Request& read_request(size_t max_header_bytes);
-  // Sends the answer. Whether another request may follow; never if `last`.
+  // Sends the answer. True if another request may follow; false if `last`.
   bool answer(Response response, bool last);
 
  private:

@@ -23,7 +23,7 @@ class HttpServer {
  public:
   // May throw Problem; any other exception is answered as the problem `internal`.
   using Handler = std::function<Response(Request&)>;
-  // Called with the status of an answer to what is no request that a handler could get.
+  // Called with the status of an answer to a malformed request, which reaches no handler.
   using OnRefused = std::function<void(int status)>;
 
   // Listens, but accepts no connection yet. Throws as Listener and TlsContext do.

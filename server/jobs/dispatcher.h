@@ -1,5 +1,5 @@
-// Runs the queue's jobs, each in a process of its own, as many as their number, memory and disk
-// allow, and stops, resumes and cleans up after them. Thread-safe.
+// Runs the queue's jobs, each in a separate process, within the limits of number, memory and disk,
+// and stops, resumes and cleans up after them. Thread-safe.
 //
 // Why processes: a build's memory limit holds for a process, a scene that crashes a build harms
 // nothing else, and a build can be stopped, killed and reniced without touching the threads that
@@ -36,14 +36,14 @@ class Dispatcher {
   // Called whenever a job's process has ended, with the job as it is then.
   using OnRunEnded = std::function<void(const Job&)>;
 
-  // Repairs what a crash of the last service left in the queue and the folders, then starts jobs.
+  // Repairs the queue and the folders after a crash of the last service, then starts jobs.
   Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue, TaskResolver& tasks,
              DiskSpace& disk, Log log, OnRunEnded on_run_ended);
   // Calls stop().
   ~Dispatcher();
 
   // Stops every build at a checkpoint and waits for it, for at most JobLimits::stop_timeout_s. The
-  // jobs stay in the queue.
+  // jobs remain in the queue.
   void stop();
 
   // Each throws RequestError: kNotFound, or kConflict for a job in another state.
@@ -58,7 +58,7 @@ class Dispatcher {
   // Null unless the job's process runs.
   std::shared_ptr<LiveJob> live(const std::string& id) const;
   size_t running() const;
-  // Of all running jobs together.
+  // Totals of all running jobs.
   ClusterTasks cluster_tasks() const;
   JobFolder folder(const std::string& id) const;
 
@@ -71,8 +71,8 @@ class Dispatcher {
     // Whether it will still record what becomes of the job.
     bool runs() const { return !recorded && !done; }
   };
-  // Keeps the files of a job that has ended for one thread that removes them: other removals wait,
-  // and the job does not start if it is tried again.
+  // Reserves the files of an ended job for the thread that removes them: other removals wait, and a
+  // retried job does not start.
   class FilesLock {
    public:
     FilesLock(Dispatcher& dispatcher, const std::string& id);
@@ -90,9 +90,9 @@ class Dispatcher {
   void retire_old_jobs();
   // Finishes deletions that a crash or an error has interrupted.
   void finish_deletions();
-  // Stops what the job left running on the cluster, since nobody follows it.
+  // Stops the job's tasks on the cluster, because no process follows them.
   void stop_tasks(const std::string& id);
-  // If the job needs its work folder no more.
+  // True if the job no longer needs its work folder.
   void remove_work(const std::string& id);
 
   // The thread that starts jobs.

@@ -2,9 +2,9 @@
 // different jobs.
 //
 // A deletion marks the folder by renaming it, then removes its files, the job's record and the
-// renamed folder: a crash in between loses neither, and a full disk can be emptied. Only what such
-// a deletion has marked is removed; a folder without a record stays, since the queue may be an old
-// one.
+// renamed folder: a crash in between loses neither, and a full disk can be emptied. Only folders
+// marked by a deletion are removed. A folder without a record is kept, because the queue may be an
+// old one.
 #pragma once
 
 #include <string>
@@ -29,16 +29,16 @@ class JobFolders {
   // Removes the work folders of jobs that need them no more.
   void clean_up();
   void remove_work(const std::string& id);
-  // Marks the folder of a job, if it has one: from now on the job is being deleted. Little work,
-  // but for what an earlier deletion left under that name.
+  // Marks the folder of a job, if it has one: from now on the job is being deleted. This is
+  // fast unless an earlier deletion left files under that name.
   void mark(const std::string& id);
   bool is_marked(const std::string& id) const { return files_.exists(of(id).path + kDeleted); }
   std::vector<std::string> marked() const;
   // Removes what mark() has marked and the job's record. Throws RequestError{kConflict} if the job
   // has not ended.
   void remove_marked(const std::string& id);
-  // The same for a deletion that a crash or an error has interrupted. The job stays if it has not
-  // ended, or has another folder by now.
+  // The same for a deletion interrupted by a crash or an error. The job is kept if it has not
+  // ended, or if it has a new folder.
   void finish_deletion(const std::string& id);
 
  private:

@@ -50,7 +50,7 @@ void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
     return finish(job, JobState::kSucceeded, now_s);
   }
   const JobError error = error_of(live, end, now_s);
-  // A process that was asked to stop may end before it can handle the signal, or say why it ends.
+  // A stopped process may end before it can handle the signal or report a reason.
   const bool stopped = asked && (error.code == "canceled" || !live.failure());
   if (!stopped) job.error = error;
   if (job.state == JobState::kCanceling) return finish(job, JobState::kCanceled, now_s);

@@ -11,11 +11,11 @@ namespace voxdag::server {
 // Seconds to wait after so many attempts that failed; they double.
 double pause_s(const JobLimits& limits, unsigned attempts);
 
-// Changes the job, which may have been suspended, resumed or asked to be canceled since it started:
-//   a result                      succeeded (canceled if that was asked for)
-//   stopped because we asked      as asked: canceled, suspended; queued again if the service stops
-//   no_space, io                  queued again after a pause, while there are attempts left
-//   anything else                 failed
+// Changes the job, which may have been suspended, resumed or canceled since it started:
+//   a result                      succeeded (canceled if requested)
+//   stopped on request            as requested: canceled, suspended; queued again if the service
+//   stops no_space, io                  queued again after a pause, while attempts remain anything
+//   else                 failed
 void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
                    const JobLimits& limits, double now_s);
 

@@ -24,11 +24,11 @@ class LiveJob {
   std::string progress_json() const;
   // Counts messages.
   uint64_t version() const { return locked(version_); }
-  // Of the last attempt; nothing if it does not run on a cluster.
+  // Tasks of the last attempt; no value for a build without a cluster.
   std::optional<ClusterTasks> cluster_tasks() const { return locked(cluster_tasks_); }
   std::vector<std::string> warnings() const { return locked(warnings_); }
   std::optional<Failure> failure() const { return locked(failure_); }
-  // JSON, "" if there is none.
+  // JSON, or "".
   std::string result() const { return locked(result_); }
 
   // Asks for an end; only the first call counts.

@@ -43,7 +43,7 @@ void TaskResolver::add_scene(const std::string& scene, JobTask& task) {
   if (is_path(scene)) {
     const std::string path = resolved_path(scene);
     const auto root = std::find_if(roots_.begin(), roots_.end(),
-                                   [&](const std::string& r) { return lies_in(path, r); });
+                                   [&](const std::string& r) { return is_within(path, r); });
     if (root == roots_.end() || !has_scene_ending(path)) throw missing;
     task.readable.push_back(*root);
     return;

@@ -16,9 +16,9 @@ class TaskResolver {
   // Throws Error{kInvalidInput} for a scene root that is not there.
   TaskResolver(const ServerConfig& config, SceneStore& scenes);
 
-  // Throws RequestError: kNotFound for a scene that does not exist or lies outside the configured
-  // roots (the message does not say which), kConflict for one that is still being uploaded, kLimit
-  // for more memory than a job may have.
+  // Throws RequestError: kNotFound for a scene that does not exist or is outside the configured
+  // roots (with the same message), kConflict for an incomplete upload, kLimit for more memory than
+  // a job may have.
   JobTask make(const JobRequest& request, JobTask::Kind kind);
   // The scenes of a request that are uploads.
   static std::vector<std::string> uploads_of(const JobRequest& request);
@@ -29,7 +29,7 @@ class TaskResolver {
   uint64_t memory_of(const JobRequest& request) const;
 
  private:
-  // Adds to the task what the scene needs.
+  // Adds the scene's files and permissions to the task.
   void add_scene(const std::string& scene, JobTask& task);
 
   const ServerConfig& config_;

@@ -17,8 +17,9 @@ namespace {
 
 constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 
-// Interrupted runs in a row after which a job is tried again at once, and after which it is not
-// tried again: with the pauses in between it has then interrupted the service for over an hour.
+// Number of consecutive interrupted runs up to which a job restarts immediately, and up to which it
+// restarts at all. With the pauses in between, such a job has interrupted the service for over an
+// hour.
 constexpr unsigned kFreeInterruptions = 5;
 constexpr unsigned kMaxInterruptions = 15;
 

@@ -32,13 +32,13 @@ struct JobFilter {
 
 struct IdempotencyKey {
   std::string key;      // "" for none
-  std::string request;  // digest of what was asked for
+  std::string request;  // digest of the request
 };
 
 class JobQueue {
  public:
-  // Throws Error{kCorrupt}, {kInvalidInput} for a database of another program, or if there is none
-  // and none may be made, {kUnsupportedVersion}.
+  // Throws Error{kCorrupt}, {kInvalidInput} for a database of another program, or for a missing
+  // one unless `may_create`, {kUnsupportedVersion}.
   explicit JobQueue(const std::string& path, bool may_create = true);
   // Throws Error{kIo} if the database was removed or replaced.
   void check_file() const { file_.check(); }
@@ -66,7 +66,7 @@ class JobQueue {
   // an event. What `edit` throws leaves the job as it was. Throws RequestError{kNotFound}
   // if there is no such job.
   Job change(const std::string& id, const std::function<void(Job&)>& edit);
-  // Throws RequestError{kConflict} unless the job has ended, {kNotFound} if there is none.
+  // Throws RequestError{kConflict} unless the job has ended, {kNotFound} for an unknown job.
   void check_removable(const std::string& id);
   // Throws as check_removable().
   void remove(const std::string& id);
@@ -77,13 +77,13 @@ class JobQueue {
   // A job that succeeded and has no preview yet.
   std::optional<Job> next_without_preview();
   // After a crash: jobs that are running or canceling, but not among `running`, are queued again,
-  // at the front, or canceled. A job that was interrupted often may be what ended the service: it
-  // is not first any more and waits `pause_s` before each further attempt (1, 2, ...), and in the
-  // end it has failed. Returns the jobs that have ended.
+  // at the front, or canceled. A job that was interrupted often may be the cause: it loses its
+  // place at the front and waits `pause_s` before each further attempt (1, 2, ...), and finally it
+  // fails. Returns the jobs that have ended.
   std::vector<Job> recover(const std::set<std::string>& running,
                            const std::function<double(unsigned attempt)>& pause_s);
-  // Ended jobs that finished before `finished_before_s`, or are not among the `max_count` that
-  // finished last of those with the same poster: nobody's jobs make those of others expire.
+  // Ended jobs that finished before `finished_before_s`, or are not among the `max_count`
+  // last-finished jobs of their poster. A poster's jobs never make other posters' jobs expire.
   std::vector<std::string> expired(double finished_before_s, uint64_t max_count);
 
   // When the last change of a state was recorded; 0 for never.
@@ -99,7 +99,7 @@ class JobQueue {
   uint64_t changes() const;
   // Waits until version() differs from `seen`, or for `max_s` seconds.
   void wait_for_change(uint64_t seen, double max_s) const;
-  // Wakes waiting threads as a change does, for what is not in the database (progress).
+  // Wakes waiting threads as a change does, for events outside the database (progress).
   void announce();
 
  private:

@@ -124,7 +124,7 @@ void SceneStore::finish_removals() {
       drop_scene(name);
       log_("scene " + name + ": finished a deletion that was interrupted");
     } catch (const RequestError&) {
-      // It is being uploaded; it is tried again.
+      // It is being uploaded; the next call retries.
     } catch (const std::exception& error) {
       log_("scene " + name + ": failed to finish its deletion: " + error.what());
     }

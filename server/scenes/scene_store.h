@@ -1,13 +1,12 @@
 // Uploaded scenes: complete ones under files/NAME, unfinished uploads under parts/NAME, and the
 // records of both in scenes.db.
 //
-//   1. A scene is complete only when all its bytes are synced and have the digest that the client
-//      named.
-//   2. The recorded offset of an upload counts synced bytes only: a power cut loses what came
-//      after, and the client continues from that offset.
-//   3. One request at a time writes to an upload.
-//   4. What is marked as deleted is what is deleted, not what came in its place.
-//   5. Nothing is recorded in a database that is gone.
+//   1. A scene is complete only when all its bytes are synced and have the client's digest.
+//   2. The recorded offset of an upload counts synced bytes only: a power cut loses later bytes,
+//      and the client continues from that offset.
+//   3. Only one request writes to an upload.
+//   4. A deletion removes the marked files, not a newer upload of the same name.
+//   5. Nothing is recorded in a deleted database.
 // Thread-safe. Callers check names with is_scene_name().
 #pragma once
 
@@ -48,9 +47,9 @@ struct UploadState {
 
 class SceneStore {
  public:
-  // Finishes what a crash interrupted. Throws Error{kInvalidInput} if there are scenes but no
-  // records of them, unless it may adopt them: then they get new ones, and unfinished uploads start
-  // over.
+  // Finishes operations interrupted by a crash. Throws Error{kInvalidInput} if there are scenes
+  // without records, unless it may adopt them: then they get new records, and unfinished uploads
+  // start over.
   SceneStore(FileSystem& files, const std::string& folder, Log log, bool adopt = false);
 
   std::optional<Scene> find(const std::string& name);
@@ -74,7 +73,7 @@ class SceneStore {
  private:
   friend class SceneUpload;
 
-  // Lets one request at a time write to a name.
+  // Exclusive permission to write to a name.
   class NameLock {
    public:
     // Throws RequestError{kConflict} if another one has it.
@@ -92,12 +91,12 @@ class SceneStore {
   void record(const std::string& name, const UploadState& state);
   // Records the digest of a finished upload, then renames it to its final path.
   void publish(const std::string& name, uint64_t size, const std::string& sha256);
-  // The rest of publish(), which a crash interrupted. Throws Error{kCorrupt} if the bytes are gone.
+  // Finishes an interrupted publish(). Throws Error{kCorrupt} if the bytes are missing.
   void finish_publishing(const std::string& name, uint64_t size, const std::string& sha256);
   void check_part(const std::string& name, uint64_t size);
   void move_into_place(const std::string& name, uint64_t size, const std::string& sha256);
   void drop_upload(const std::string& name);
-  // Removes what is marked as deleted, and the record of the scene unless another file has come.
+  // Removes the files marked as deleted, and the record of the scene unless it was uploaded again.
   void drop_scene(const std::string& name);
   void put_scene(const std::string& name, uint64_t size, const std::string& sha256);
   void finish_all_publishing();

@@ -40,9 +40,9 @@ class SceneUpload {
 
  private:
   void flush();
-  // Syncs what was written and records the offset.
+  // Syncs the written bytes and records the offset.
   void checkpoint();
-  // Whether the file has the bytes that are recorded: it may have been lost.
+  // True if the file has the recorded bytes; it may have been lost.
   bool has_part() const;
 
   SceneStore& store_;

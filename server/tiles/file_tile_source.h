@@ -15,9 +15,9 @@ namespace voxdag::server {
 
 class FileTileSource : public TileSource {
  public:
-  // Throws Error if the file is no valid DAG; only its header and checksum table are read. Pages
-  // that cannot be read are survived: while it is opened they are an Error{kIo}.
-  // Manifests are looked for and stored in `manifests`, if it is given.
+  // Throws Error if the file is no valid DAG; only its header and checksum table are read.
+  // Unreadable pages do not end the process: while the file is opened they are an Error{kIo}.
+  // `manifests`, if given, caches manifests.
   FileTileSource(const std::string& path, const FileIdentity& identity,
                  std::shared_ptr<ManifestCache> manifests = nullptr);
   // The same of a file that is mapped already.
@@ -28,11 +28,11 @@ class FileTileSource : public TileSource {
   const query::DagView& dag() const override { return dag_; }
   const CheckedBlocks* blocks() const override { return &blocks_; }
   const voxdag_reader::File* colored_file() const override { return file_.get(); }
-  // Of the file when it was opened.
+  // Identity of the file when it was opened.
   const FileIdentity& identity() const { return identity_; }
-  // Of the contents of the file and of how its tiles are made.
+  // Digest of the file's contents and of the version of tiles.
   const std::string& digest() const override { return digest_; }
-  // The first call looks for the cameras, which may take a second, or longer if the file is not in
+  // The first call computes the cameras, which may take a second, or longer if the file is not in
   // memory; others wait for it. If it is canceled, the next one begins again.
   const std::string& manifest(const CancelToken& cancel) const override;
   void expect_readable() const override;

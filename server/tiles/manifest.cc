@@ -7,7 +7,7 @@ namespace {
 
 using ManifestJson = nlohmann::ordered_json;
 
-// Of the pictures that the named views are made for.
+// Aspect ratio of the named views' pictures.
 constexpr double kAspect = 16.0 / 9;
 
 ManifestJson point(const query::Vec& voxels, const query::DagView& dag, const GridPlace& place) {

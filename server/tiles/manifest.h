@@ -11,7 +11,7 @@
 
 namespace voxdag::server {
 
-// Where a grid lies in the scene.
+// Position of a grid in the scene.
 struct GridPlace {
   std::array<double, 3> origin{};
   double edge = 1;

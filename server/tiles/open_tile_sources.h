@@ -1,7 +1,7 @@
-// The files that viewers look at now, so that a request need not open and check its file again: a
-// few, those asked for last. A file that was removed or replaced is closed when it is asked for, by
-// close(), or by close_stale(), which is to be called now and then. One of which a part could not
-// be read is opened again. Manifests outlive their files here. Thread-safe.
+// Caches the open files of viewers, so that a request need not open and check its file again: the
+// few most recently requested. A removed or replaced file is closed at its next request, by
+// close(), or by close_stale(), which must be called periodically. A file with an unreadable part
+// is opened again. The cache keeps manifests longer than files. Thread-safe.
 #pragma once
 
 #include <list>
@@ -22,7 +22,7 @@ class OpenTileSources {
   // finish.
   std::shared_ptr<const FileTileSource> open(const std::string& path);
   void close(const std::string& path);
-  // Closes what was removed or replaced, or not asked for in `max_idle_s`.
+  // Closes files that were removed or replaced, or not requested for `max_idle_s`.
   void close_stale(double max_idle_s);
   size_t size() const;
 

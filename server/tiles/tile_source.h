@@ -1,5 +1,4 @@
-// A DAG that viewers look at, and what each of their requests needs of it: a finished file, or what
-// a running job has built so far. Thread-safe.
+// A DAG for viewers: a finished file, or the built part of a running job. Thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -25,21 +24,21 @@ class TileSource {
   virtual ~TileSource() = default;
 
   virtual const query::DagView& dag() const = 0;
-  // The blocks in which its nodes lie, to be compared before they are read; null if there are none.
+  // The checksum blocks of its nodes, verified before they are read; may be null.
   virtual const CheckedBlocks* blocks() const { return nullptr; }
-  // The file that has the colors, null if there is none.
+  // The file with the colors; may be null.
   virtual const voxdag_reader::File* colored_file() const { return nullptr; }
-  // 32 hex digits. What lies at an address of a DAG with this digest never changes, and neither
-  // does how its tiles are made.
+  // 32 hex digits. The contents of an address of a DAG with this digest never change, and neither
+  // does the version of tiles.
   virtual const std::string& digest() const = 0;
   // What a viewer needs to begin, as JSON (docs/api.md).
   virtual const std::string& manifest(const CancelToken& cancel) const = 0;
   // Throws Error{kIo} if a part of the file could not be read since it was opened, because it
-  // became shorter or its disk failed: what was made from it then is wrong.
+  // was truncated or its disk failed: results made since then are wrong.
   virtual void expect_readable() const {}
-  // Whether its file was changed since it was opened, so that what was read may be of either.
+  // True if its file was changed since it was opened, so that the read bytes may mix both versions.
   virtual bool was_overwritten() const { return false; }
-  // To be called when damage is found: whether it is the first of this file, to be logged.
+  // To be called when damage is found. True for the first damage of this file, which is logged.
   virtual bool is_first_damage() const { return true; }
 };
 

@@ -44,7 +44,7 @@ AccessControl::AccessControl(const ServerConfig& config, FileSystem& files)
 }
 
 // Without tokens, access is limited to the loopback, but a browser on this machine lets any page
-// send requests there: under a host name of its own (DNS rebinding) or as a cross-site request.
+// send requests there: under the page's host name (DNS rebinding) or as a cross-site request.
 void AccessControl::check_site(const Request& request) const {
   const auto is_ours = [&](const std::string& host) {
     return std::any_of(hosts_.begin(), hosts_.end(),
@@ -53,8 +53,8 @@ void AccessControl::check_site(const Request& request) const {
   const std::string host = request.header("Host");
   if (!host.empty() && !is_ours(without_port(host)))
     throw Problem(403, "forbidden", "the Host header does not name this service");
-  // A page cannot read such an answer, but it could make the service work for nothing, and tell
-  // from the time what there is.
+  // A page cannot read such an answer, but it could waste the service's time, and infer
+  // existing names from response times.
   const auto& segments = request.target.segments;
   if (!segments.empty() && segments[0] == "api" && request.header("Sec-Fetch-Site") == "cross-site")
     throw Problem(403, "forbidden", "cross-site request: expected one of this service's pages");

@@ -6,7 +6,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kDepth_s = 2;
-// Above this count, full buckets are dropped: a new bucket is full, too.
+// Above this count, full buckets are dropped, because a new bucket is also full.
 constexpr size_t kMaxBuckets = 10000;
 constexpr double kSweepInterval_s = 1;
 

@@ -1,4 +1,4 @@
-// Which problem a client sees for what a handler threw.
+// Converts the exception of a handler to the problem sent to the client.
 #pragma once
 
 #include <exception>
@@ -7,7 +7,7 @@
 
 namespace voxdag::server {
 
-// A Problem stays as it is, and a RequestError keeps its message. An Error keeps its code, with a
+// A Problem is unchanged, and a RequestError keeps its message. An Error keeps its code, with a
 // fixed text in place of its message, which may hold paths of the server. Anything else is `busy`
 // (no memory) or `internal`.
 Problem public_problem(const std::exception& error);

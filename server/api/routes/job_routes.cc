@@ -228,13 +228,13 @@ Response delete_job(Context& context, Call& call) {
   const std::string result = context.dispatcher.folder(call.names[0]).result();
   context.open_sources.close(result);
   context.dispatcher.remove(call.names[0]);
-  // Somebody may have asked for a tile in between.
+  // A tile may have been requested in between.
   context.open_sources.close(result);
   context.partial.close(call.names[0]);
   return no_content();
 }
 
-// A job whose scenes are gone is refused, as a new one is.
+// A job whose scenes were deleted is refused, like a new one.
 Response retry_job(Context& context, Call& call) {
   expect_no_body(call.request);
   std::lock_guard lock(context.scene_mutex);

@@ -12,7 +12,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr const char* kDagType = "application/octet-stream";
-// Of what is sent at once: reports, previews and lists of subvolumes.
+// Limit for answers built in memory: reports, previews and lists of subvolumes.
 constexpr uint64_t kMaxResultBytes = uint64_t{1} << 30;
 const Parameter kMaxLogBytes = {"max_bytes", "maximum size of the answer", "",
                                 IntegerRange{1, 1 << 20, 65536}};

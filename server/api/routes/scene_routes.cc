@@ -153,7 +153,7 @@ Response put_scene(Context& context, Call& call) {
   const std::string part_digest = digest_of(call.request, "Content-Digest");
   const std::string whole_digest = digest_of(call.request, "Repr-Digest");
   SceneUpload upload(context.scenes, name, part.first, part.total);
-  // Only now, because an upload that starts over has freed what it had.
+  // Reserved now, because an upload that starts over has freed its old bytes.
   DiskSpace::Reservation space(context.disk, announced);
   switch (receive(context, call, part, space, upload)) {
     case BodyEnd::kComplete:

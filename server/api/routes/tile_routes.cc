@@ -19,13 +19,13 @@ namespace {
 // Cache-Control of URLs with a digest: their contents never change.
 constexpr const char* kImmutable = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
-// Of a node above the bricks in any file (docs/format.md).
+// Limits of the address of a node above the bricks (docs/format.md).
 constexpr uint64_t kMaxLevel = 17, kMaxOffset = (uint64_t{1} << 40) - 1;
-// From how many bytes on an answer holds its permit until it is sent. Permits bound the work for
-// tiles, and the memory of large answers; that of small ones is bounded by the number of
-// connections. So a client with a slow link does not keep others of the same token waiting.
+// Answers of at least this size hold their permit until they are sent. Permits bound the work for
+// tiles and the memory of large answers; the number of connections bounds the memory of small ones.
+// So a client with a slow link does not delay other clients with the same token.
 constexpr size_t kLargeAnswer = 512 << 10;
-// Of the cells of a color page in any file, and of the page's place.
+// Limits of the level of a color page, and of its position.
 constexpr uint64_t kMaxColorLevel = 20, kMaxPage = (uint64_t{1} << 17) - 1;
 
 const Parameter kDigest = {"v", "digest of the manifest", "^[0-9a-f]{32}$", {}, true};
@@ -55,7 +55,7 @@ std::vector<uint32_t> make_tile(const TileSource& dag, const query::TileAddress&
     throw;
   } catch (const Error& error) {
     if (!error.is_corruption()) throw;
-    // The file is as it was written, so the offset is that of no node.
+    // The file is intact, so the offset belongs to no node.
     throw not_found(error.message());
   }
 }

@@ -15,7 +15,7 @@ struct TileAccess {
   std::shared_ptr<const TileSource> dag;
   std::shared_ptr<void> permit;
 };
-// Throws Problem if there is none, or no permit is free.
+// Throws Problem for an unknown job or file, or if no permit is free.
 using OpenTiles = std::function<TileAccess(const Call&)>;
 
 // Whether tiles are compressed for clients that accept it. It halves their bytes, at about 80 MB/s

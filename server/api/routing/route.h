@@ -1,4 +1,4 @@
-// One row of the router's table: what a request looks like, who may send it, and its answers. The
+// One row of the router's table: the form of a request, the required role, and the answers. The
 // router checks requests against the row, and the OpenAPI document is generated from it.
 #pragma once
 
@@ -67,7 +67,7 @@ struct Route {
   std::optional<Content> body = {};
   bool is_body_required = true;
   std::vector<Answer> answers = {};
-  // Statuses of its problems, besides those that every route has (kCommonProblems).
+  // Statuses of its problems, in addition to every route's (kCommonProblems).
   std::vector<int> problems = {};
 };
 

@@ -39,8 +39,8 @@ class Connection {
   void allow_large_send_buffer();
   // Whether the client has closed the connection. Consumes no bytes.
   bool peer_disconnected() const;
-  // Closes the sending side and discards what the client still sends for up to a second, so that
-  // the last answer is not lost to a reset.
+  // Closes the sending side and discards further bytes of the client for up to a second, so that
+  // a reset does not destroy the last answer.
   void linger();
 
   // The next bytes, at least one unless in an error state; valid until the next call.
@@ -53,16 +53,16 @@ class Connection {
 
  private:
   enum class Phase { kWaiting, kHeader, kExchange };
-  // How much longer the client was waited for in this phase than its bytes take at a rate: the
-  // minimum, and a multiple that is fast enough not to be closed in favor of others.
+  // The wait for the client in this phase beyond the time of its bytes at a rate: the minimum rate,
+  // and a multiple that protects the connection from eviction.
   struct Pace {
     double behind_minimum_s = 0;
     double behind_steady_s = 0;
   };
 
   bool fill();
-  // Waits until the socket is ready for what a call on tls_ needs (its `outcome`). False, with the
-  // error state set, if the outcome is an error or the client exceeds its time.
+  // Waits until the socket is ready for the repeated call on tls_ (`outcome` is its result). False,
+  // with the error state set, if the outcome is an error or the client exceeds its time.
   bool wait_for_io(ssize_t outcome, Pace& pace);
   double max_wait_s() const;
   void count(uint64_t bytes, Pace& pace) const;

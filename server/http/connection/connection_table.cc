@@ -11,7 +11,7 @@
 namespace voxdag::server {
 namespace {
 
-// A client within a body or an answer that is waited for only this long is on its way.
+// A client within a body or an answer that was idle for less than this is considered active.
 constexpr double kMinExchangeWait_s = 0.25;
 constexpr std::chrono::seconds kMaxEvictionWait{1};
 

@@ -42,7 +42,7 @@ class ConnectionTable {
   size_t size() const;
   // Closes the connections that wait for a request.
   void close_waiting();
-  // Aborts answers in flight, too.
+  // Closes all connections and aborts answers in flight.
   void close_all();
 
  private:

@@ -20,7 +20,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr int kBacklog = 512;
-// Of the kernel's memory for answers that a client does not read. It doubles this for its own data.
+// Kernel memory per connection for unread answers. The kernel doubles this for its bookkeeping.
 constexpr int kSendBufferBytes = 128 << 10;
 
 struct FreeAddresses {
@@ -62,7 +62,7 @@ Listener::Listener(const std::string& address, int port) {
   const Addresses found = resolve(address, port);
   socket_ = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const int yes = 1;
-  // Allows a port whose old connections are still closing, not one that is in use.
+  // Allows a port whose old connections are still closing, but not a port in use.
   setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   if (socket_ < 0 || bind(socket_, found->ai_addr, found->ai_addrlen) != 0 ||
       ::listen(socket_, kBacklog) != 0 || pipe2(wake_, O_CLOEXEC | O_NONBLOCK) != 0) {

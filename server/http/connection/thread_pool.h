@@ -1,5 +1,5 @@
 // A pool of threads that grows with the number of concurrent tasks: a task never waits for another
-// one to finish. The caller bounds how many run at a time. Thread-safe.
+// one to finish. The caller bounds the number of concurrent tasks. Thread-safe.
 #pragma once
 
 #include <condition_variable>

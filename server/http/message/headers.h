@@ -13,7 +13,7 @@ struct HeaderLess {
 };
 using HeaderMap = std::multimap<std::string, std::string, HeaderLess>;
 
-// The value of the first field of this name, "" if there is none.
+// The value of the first field of this name, or "".
 std::string header_value(const HeaderMap& headers, std::string_view name);
 // `text` without leading and trailing spaces and tabs.
 std::string_view trimmed(std::string_view text);

@@ -46,7 +46,7 @@ struct FilePiece {
   ByteRange range;
 };
 
-// The source of an event stream. A call returns what is to be sent next, "" for nothing yet, or no
+// The source of an event stream. A call returns the next bytes to send, "" for none yet, or no
 // value at the end; it takes at most about a second.
 using EventSource = std::function<std::optional<std::string>()>;
 

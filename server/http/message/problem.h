@@ -20,8 +20,8 @@ struct Problem : std::exception {
   int status;
   std::string code;
   std::string detail;
-  std::string state;     // of the job that is in the wrong one; "" elsewhere
-  std::string log_text;  // what the log gets, clients do not; "" for nothing
+  std::string state;     // state of a job that does not allow the request; "" otherwise
+  std::string log_text;  // for the log only; "" for nothing
   HeaderMap headers;     // fields of the answer: Retry-After, Allow, Content-Range, ...
 };
 

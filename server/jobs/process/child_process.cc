@@ -19,8 +19,8 @@ namespace {
 constexpr int kTick_ms = 100;
 constexpr size_t kMaxLineBytes = 4 << 20;
 
-// Blocks all signals of this thread while it exists. A child that is forked then keeps what it
-// is sent until it unblocks them.
+// Blocks all signals of this thread while it exists. A child forked in that time receives pending
+// signals when it unblocks them.
 class BlockedSignals {
  public:
   BlockedSignals() {

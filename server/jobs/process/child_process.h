@@ -42,7 +42,7 @@ class ChildProcess {
  private:
   void send(int signal);
 
-  std::mutex mutex_;  // guards pid_, so that no signal goes to a process that was waited for
+  std::mutex mutex_;  // guards pid_, so that no signal goes to a reaped process
   pid_t pid_ = -1;
   int output_ = -1;
 };

@@ -27,7 +27,7 @@ std::string resolved_path(const std::string& path) {
   return resolved ? resolved.get() : "";
 }
 
-bool lies_in(const std::string& path, const std::string& place) {
+bool is_within(const std::string& path, const std::string& place) {
   return !path.empty() && (path == place || (place.ends_with('/') && path.starts_with(place)));
 }
 
@@ -42,12 +42,14 @@ ConfinedFiles::ConfinedFiles(FileSystem& files, const std::vector<std::string>& 
 }
 
 std::unique_ptr<ReadableFile> ConfinedFiles::open_read(const std::string& path) {
-  // Whether something lies outside shows in no way: what is missing there is as good as forbidden.
+  // Missing and forbidden files give the same error, so that a scene cannot probe for files
+  // outside.
   std::string resolved = resolved_path(path);
   std::error_code failure;
   if (resolved.empty()) resolved = std::filesystem::weakly_canonical(path, failure);
-  const bool is_readable = std::any_of(readable_.begin(), readable_.end(),
-                                       [&](const std::string& p) { return lies_in(resolved, p); });
+  const bool is_readable =
+      std::any_of(readable_.begin(), readable_.end(),
+                  [&](const std::string& p) { return is_within(resolved, p); });
   if (is_readable) {
     auto file = ForwardingFiles::open_read(path);
     if (is_same_file(resolved, file->identity())) return file;

@@ -23,9 +23,9 @@ class ConfinedFiles : public ForwardingFiles {
   std::vector<std::string> readable_;  // resolved
 };
 
-// The path without symbolic links and dots; "" if there is nothing.
+// The path without symbolic links and dots; "" if nothing exists there.
 std::string resolved_path(const std::string& path);
-// A resolved path is `place` or, if that ends in '/', lies below it.
-bool lies_in(const std::string& path, const std::string& place);
+// True if a resolved path is `place` or, if that ends in '/', below it.
+bool is_within(const std::string& path, const std::string& place);
 
 }  // namespace voxdag::server

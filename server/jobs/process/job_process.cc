@@ -46,7 +46,7 @@ void link_uploads(const JobTask& task) {
   }
 }
 
-// The scene's files, and what the build itself writes and reads again.
+// The scene's files, and the build's own files.
 ConfinedFiles confined(FileSystem& files, const JobTask& task, const JobFolder& folder) {
   const std::string here = resolved_path(".") + "/";
   std::vector<std::string> readable = task.readable;

@@ -79,7 +79,7 @@ void ProgressPipe::set_subvolumes(uint64_t resolution, std::span<const Subvolume
   subvolumes_.set(resolution, all);
   subvolumes_changed_ = !all.empty();
   report_subvolumes(true);
-  next_subvolumes_s_ = 0;  // the first of them that is begun is seen at once
+  next_subvolumes_s_ = 0;  // the first subvolume that begins is reported immediately
   if (!ticker_.joinable())
     ticker_ = std::jthread([this](const std::stop_token& end) { tick(end); });
 }

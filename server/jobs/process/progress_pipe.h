@@ -42,11 +42,12 @@ class ProgressPipe : public Progress {
   void send(const Message& message);
   void send_advance(bool now);
   void report_subvolumes(bool now);
-  // Reports what was too early to be reported when it changed: the next change may be minutes away.
+  // Reports changes that came too early after the last report, because the next change may be
+  // minutes away.
   void tick(const std::stop_token& end);
   void log(const std::string& text);
-  // Writes subvolumes.json, under its name at once. It is not synced, since it can be made again;
-  // failures are ignored, since they must not make a build fail.
+  // Replaces subvolumes.json in one step. It is not synced, because it can be made again. Failures
+  // are ignored, because they must not make a build fail.
   void write_subvolumes();
 
   FileSystem& files_;

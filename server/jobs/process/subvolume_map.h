@@ -17,7 +17,7 @@ class SubvolumeMap {
   void set(uint64_t resolution, std::span<const SubvolumeStatus> all);
   void set_grid(const std::array<double, 3>& origin, double edge);
   void begun(int64_t id);
-  // What was begun and is not built is no longer worked on.
+  // Marks unfinished subvolumes as no longer in progress.
   void stop();
   void built(const SubvolumeStatus& subvolume);
   void split(int64_t id, std::span<const SubvolumeStatus> parts);

@@ -1,5 +1,6 @@
-// Where a job's files lie: DATA/jobs/ID. A job's process has this folder as its working directory
-// and uses the empty path, so that no message of its build names a folder of this machine.
+// The folder of a job's files: DATA/jobs/ID. A job's process has this folder as its working
+// directory and uses the empty path, so that no message of its build names a folder of this
+// machine.
 #pragma once
 
 #include <string>
@@ -9,7 +10,7 @@ namespace voxdag::server {
 struct JobFolder {
   std::string path;  // "" for the working directory
 
-  std::string task() const { return file("task.json"); }  // what the job's process is to do
+  std::string task() const { return file("task.json"); }  // the task of the job's process
   std::string log() const { return file("log"); }
   std::string result() const { return file("result.vdag"); }
   std::string report() const { return result() + ".report.json"; }

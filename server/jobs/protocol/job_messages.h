@@ -32,7 +32,7 @@ struct StageAdvanced {
 };
 // "stage_ended"
 struct StageEnded {};
-// "subvolumes": how many there are, how many are built, and what the built ones consist of.
+// "subvolumes": their number, the number of built ones, and the totals of the built ones.
 struct SubvolumeTotals {
   uint64_t built = 0, total = 0;
   uint64_t voxels = 0, nodes = 0, bytes = 0;

@@ -99,7 +99,7 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, dou
     cubes.insert(*known);
     return true;
   });
-  // Those that cannot be read are tried each time: the others must have their turn, too.
+  // Unreadable cubes are retried each time, so the list is rotated to reach the others.
   std::rotate(leaves.begin(),
               std::find_if(leaves.begin(), leaves.end(),
                            [&](const StoredSubvolume& leaf) { return leaf.id >= next_; }),

@@ -1,6 +1,6 @@
-// What is built so far of an unfinished build, coarsely: its built subvolumes with the occupied
-// cells of a quarter of their edge, read from the work folder at any time, even while another
-// process builds there. Used by one thread at a time.
+// A coarse view of an unfinished build: its built subvolumes with the occupied cells of a quarter
+// of their edge, read from the work folder at any time, even while another process builds there.
+// Not thread-safe.
 #pragma once
 
 #include <cmath>
@@ -30,9 +30,9 @@ class CoarseCubes {
   void refresh(FileSystem& files, const std::string& work_folder, double max_read_s = HUGE_VAL);
 
   uint64_t total() const { return total_; }
-  // Built subvolumes, empty ones and those that are left out among them.
+  // Number of built subvolumes, including empty and omitted ones.
   uint64_t built() const { return built_; }
-  // Those with voxels, as far as they are known.
+  // Known subvolumes with voxels.
   const std::map<SubvolumeId, CoarseCube>& cubes() const { return cubes_; }
 
  private:

@@ -11,7 +11,7 @@ namespace {
 
 constexpr uint64_t kMaxWords = uint64_t{1} << 32;  // that pointers of 32 bits reach
 
-bool lies_in(const Cube& cube, const Cube& whole) {
+bool is_within(const Cube& cube, const Cube& whole) {
   if (cube.level < whole.level) return false;
   for (int axis = 0; axis < 3; ++axis)
     if (cube.position[axis] >> (cube.level - whole.level) != whole.position[axis]) return false;
@@ -44,7 +44,7 @@ std::optional<uint64_t> PartialDag::add(const std::vector<Part>& parts) {
 
 uint64_t PartialDag::add_parts(const Cube& cube, const Parts& parts) {
   for (const Part* part : parts)
-    if (!lies_in(part->cube, cube) || part->cube.level > brick_level_ ||
+    if (!is_within(part->cube, cube) || part->cube.level > brick_level_ ||
         (parts.size() > 1 && part->cube.level == cube.level))
       throw Error(ErrorCode::kCorrupt, "a subvolume lies in another one, or not in the grid");
   if (parts.size() == 1 && parts[0]->cube.level == cube.level)
@@ -55,7 +55,7 @@ uint64_t PartialDag::add_parts(const Cube& cube, const Parts& parts) {
     const Cube child = cube.child(i);
     Parts inside;
     for (const Part* part : parts)
-      if (lies_in(part->cube, child)) inside.push_back(part);
+      if (is_within(part->cube, child)) inside.push_back(part);
     if (inside.empty()) continue;
     mask |= 1u << i;
     children.push_back(add_parts(child, inside));
@@ -112,7 +112,7 @@ uint64_t PartialDag::add_words(uint32_t level, std::vector<uint32_t> words) {
   const uint64_t offset = all.size();
   if (offset + words.size() > kMaxWords)
     throw Error(ErrorCode::kLimit, "what is built so far has more nodes than pointers reach");
-  // First of all: whatever fails later, an offset that is known is that of its words.
+  // The words come first: whatever fails later, a known offset has its words.
   all.insert(all.end(), words.begin(), words.end());
   word_count_ += words.size();
   known_[level].emplace(std::move(words), offset);

@@ -1,9 +1,9 @@
-// The subvolumes that a job has built so far as a DAG of the job's grid, for viewers: each is the
+// A job's built subvolumes as a DAG of the job's grid, for viewers: each is the
 // 4x4x4 cells of a coarse brick, and a cell with voxels is solid. Equal subtrees are one node, so
 // solid cells cost next to nothing at any resolution.
 //
-// It only grows: add() adds the nodes that are new, and a new root. So what lies at an address
-// stays the same, and a viewer keeps all of its tiles when the root changes. Used by one thread.
+// It only grows: add() adds new nodes and a new root. So the contents of an address never change,
+// and a viewer keeps all of its tiles when the root changes. Used by one thread.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,8 @@ class PartialDag {
 
   explicit PartialDag(uint32_t grid_levels);
 
-  // Returns the word offset of the root of a DAG of these parts, which must not overlap; nothing if
-  // there are none. Throws Error{kCorrupt} if two overlap, or one lies outside of the grid.
+  // Returns the word offset of the root of a DAG of these parts, which must not overlap; no value
+  // without parts. Throws Error{kCorrupt} if two overlap, or one is outside the grid.
   std::optional<uint64_t> add(const std::vector<Part>& parts);
 
   // The words of each level, from the root's down to the bricks'.
@@ -48,7 +48,7 @@ class PartialDag {
   const uint32_t brick_level_;
   std::vector<std::vector<uint32_t>> levels_;
   std::vector<std::map<std::vector<uint32_t>, uint64_t>> known_;  // by level: offsets of nodes
-  // The offsets of coarse bricks by level, and of solid cells, so that each is looked for once.
+  // The offsets of coarse bricks by level, and of solid cells, so that each is searched once.
   std::vector<std::map<uint64_t, uint64_t>> coarse_;
   std::vector<std::optional<uint64_t>> solid_;
   uint64_t word_count_ = 0;

@@ -2,7 +2,7 @@
 //
 // 1. The job's folder is read at most once per second, by one of the requests; the others get the
 //    last answer. Reading and converting take at most a twentieth of one core.
-// 2. One reading handles a limited number of subvolumes: those of a large job appear step by step.
+// 2. One reading handles a limited number of subvolumes, so a large job appears step by step.
 // 3. Nodes never move while a digest is in use: a new digest replaces all nodes in one step.
 //
 // Thread-safe.
@@ -52,8 +52,7 @@ class GrowingDag {
  public:
   GrowingDag(std::string job, uint64_t max_words) : job_(std::move(job)), max_words_(max_words) {}
 
-  // Adds what `cubes` has besides the earlier ones. Returns the root's word offset; no value if
-  // nothing is built.
+  // Adds the new cubes of `cubes`. Returns the root's word offset; no value if nothing is built.
   std::optional<uint64_t> add(const CoarseCubes& cubes, uint32_t levels);
   void clear() { nodes_.reset(); }
 
