@@ -7,7 +7,7 @@
 
 namespace {
 
-// Skips every subtree that lies below the highest voxel found so far.
+// Skips every subtree below the highest voxel found so far.
 struct HighestVoxel {
   explicit HighestVoxel(const voxdag_reader::File& file) : dag(file) {}
 
