@@ -212,7 +212,7 @@ def check_file(path, edges):
     if not SOURCE.search(path):
         return
     if layer_of(path) not in INCLUDES:
-        yield 1, "lies in no folder of docs/architecture.md"
+        yield 1, "is in no folder of docs/architecture.md"
         return
     for number, line in enumerate(lines, start=1):
         if match := INCLUDE.match(line):

@@ -54,7 +54,7 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
                                               ": expected the same output, or --restart");
   if (!pending_.fit_at_once(context_.plan.partition_bytes))
     throw Error(ErrorCode::kOutOfMemory,
-                "out of memory: the merge to resume was begun with more: expected as much memory "
+                "out of memory: the interrupted merge used more memory: expected as much memory "
                 "as before (--memory), or --restart");
   if (state.narrow_words != out.narrow_words())
     throw Error(ErrorCode::kCorrupt, "the merge to resume has wide levels from " +
@@ -66,7 +66,7 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
   for (const uint64_t rows : state.map_rows) map_rows += rows;
   if (state.map_rows.size() != pending_.size() + 1 ||
       (state.map.words != map_rows && state.map.words != 2 * map_rows) || state.file.levels.empty())
-    throw Error(ErrorCode::kCorrupt, "the saved position maps are not those of the subvolumes");
+    throw Error(ErrorCode::kCorrupt, "the saved position maps do not match the subvolumes");
   PassProgress progress;
   progress.level = state.level;
   progress.maps.emplace(state.map_rows, std::move(file), context_.plan.resident_bytes,

@@ -244,7 +244,7 @@ class VoxWriter {
       if (depth_ + kBrickLevels != view_.grid_levels() && content >= level_words_)
         throw Error(ErrorCode::kCorrupt, job_.file.path() + ": level " + std::to_string(depth_) +
                                              ", word " + std::to_string(content) +
-                                             ": no node lies here");
+                                             ": no node begins here");
       return visit(corner, content);
     }
     const DagView::Children children = view_.children(depth, content);

@@ -84,7 +84,7 @@ class Extraction {
         spec_.selection.region != whole_grid(spec_.selection.grid_levels))
       progress_.warn(
           "the region has cells on both sides of a plane through the middle of the grid: the "
-          "smallest octree cube around it is the whole grid, which stays");
+          "smallest octree cube around it is the complete grid");
     const MergeInputs inputs = merge_inputs(build_parts());
     GlobalFileWriter out(files_, spec_.output, report_.grid, shape_.hash_bits, spec_.narrow_words);
     const MergeReport merged =

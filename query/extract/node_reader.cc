@@ -48,7 +48,8 @@ void CheckedReader::check(uint64_t begin, uint64_t bytes, std::span<std::byte> b
 
 void NodeReader::corrupt(uint32_t level, uint64_t offset) const {
   throw Error(ErrorCode::kCorrupt, source_.header().path() + ": level " + std::to_string(level) +
-                                       ", word " + std::to_string(offset) + ": no node lies here");
+                                       ", word " + std::to_string(offset) +
+                                       ": no node begins here");
 }
 
 size_t NodeReader::fill(uint32_t level, std::span<const WantedNode> wanted) {

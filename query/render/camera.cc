@@ -36,7 +36,7 @@ double bound(const std::vector<Vec>& points, const Vec& axis) {
 Camera::Camera(const Placement& p, int width, int height)
     : eye_(p.eye), half_width_(width / 2.0), half_height_(height / 2.0) {
   if (!(p.fov_degrees > 0 && p.fov_degrees < 180))
-    throw Error(ErrorCode::kInvalidInput, "the field of view must lie between 0 and 180 degrees");
+    throw Error(ErrorCode::kInvalidInput, "the field of view must be between 0 and 180 degrees");
   const double distance = length(p.target - p.eye);
   if (!(distance > 0))
     throw Error(ErrorCode::kInvalidInput, "the camera must not be at its target");

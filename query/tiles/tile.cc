@@ -23,7 +23,7 @@ void check_address(const DagView& dag, const TileAddress& root, const CheckedBlo
   };
   if (!has_level || !is_node())
     throw Error(ErrorCode::kNotFound, "level " + std::to_string(root.level) + ", word " +
-                                          std::to_string(root.offset) + ": no node lies here");
+                                          std::to_string(root.offset) + ": no node begins here");
 }
 
 // Appends the nodes of a level, with the numbers of their children in place of words, and numbers

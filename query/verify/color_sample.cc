@@ -132,7 +132,7 @@ class RegionComparison {
       throw Error(ErrorCode::kCorrupt,
                   file_.path() + ": the " + traits_of(attribute).plural +
                       " of the region at color cell " + place_of(region.cube, grid_) +
-                      " are not those of the scene (" + std::to_string(stored.counts[0]) +
+                      " differ from the scene's (" + std::to_string(stored.counts[0]) +
                       " cells in the file, " + std::to_string(baked.counts[0]) + " in the scene)");
     return false;
   }
@@ -158,7 +158,7 @@ ColorGrid sampled_grid(const voxdag_reader::File& file) {
     if (section_of(file, attribute).color_levels() != levels ||
         section_of(file, attribute).tier(0).region_count !=
             section_of(file, attributes.front()).tier(0).region_count)
-      file.broken_colors("attributes are those of different cells");
+      file.broken_colors("attributes belong to different cells");
   return {file.grid_levels(), levels};
 }
 
@@ -177,7 +177,7 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
   SceneMaterials materials = scene.materials();
   materials.name_unlisted();
   if (attributes.have_names() && file.material_names() != materials.names)
-    throw Error(ErrorCode::kCorrupt, file.path() + ": its materials are not those of the scene");
+    throw Error(ErrorCode::kCorrupt, file.path() + ": its materials differ from the scene's");
   if (!attributes.use_images()) materials.drop_images();
   progress.begin_stage("images", materials.images.size(), "images");
   const auto textures =

@@ -102,7 +102,7 @@ void JobFolders::finish_deletion(const std::string& id) {
   const auto job = queue_.find(id);
   if (!job || (has_ended(job->state) && !files_.exists(of(id).path))) return remove_marked(id);
   remove_tree(files_, of(id).path + kDeleted);
-  log_("job " + id + ": what an interrupted deletion left was removed, the job stays");
+  log_("job " + id + ": removed the remains of an interrupted deletion; the job is kept");
 }
 
 }  // namespace voxdag::server

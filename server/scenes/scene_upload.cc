@@ -43,7 +43,7 @@ SceneUpload::SceneUpload(SceneStore& store, std::string name, uint64_t first,
   }
   if (known->total && total_ != known->total)
     throw RequestError(RequestError::Kind::kInvalid,
-                       "Content-Range: the total is another than that of the first part");
+                       "Content-Range: the total differs from the first part's");
   file_ = store_.files_.open_write(path);
 }
 

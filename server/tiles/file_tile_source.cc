@@ -85,8 +85,7 @@ const std::string& FileTileSource::manifest(const CancelToken& cancel) const {
 
 void FileTileSource::expect_readable() const {
   if (mapping_.is_damaged())
-    throw Error(ErrorCode::kIo,
-                "the DAG became shorter, or its disk failed, while it was looked at");
+    throw Error(ErrorCode::kIo, "the DAG was truncated, or its disk failed, while it was viewed");
 }
 
 bool FileTileSource::was_overwritten() const {

@@ -71,7 +71,7 @@ def check_measure(visitor):
     page.get_by_role("button", name="Box of the two picks").click()
     low, high = page.evaluate("(({low, high}) => [low, high])(voxdagViewer.viewer.options.clip)")
     assert all(a < b for a, b in zip(low, high))
-    page.get_by_label("Show only what is in a box").uncheck()
+    page.get_by_label("Show only the inside of a box").uncheck()
     assert page.evaluate("voxdagViewer.viewer.options.clip") is None
     # A click into the sky keeps the start of the measurement and its buttons.
     page.evaluate("voxdagViewer.viewer.panel.pick.set(null)")

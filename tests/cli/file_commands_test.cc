@@ -79,7 +79,7 @@ TEST_F(FileCommands, VerifyComparesColors) {
                {"build", "city.glb", "-r", "64", "--attributes", "alpha,shine", "-o", "x.vdag"});
   const Answer other = run({"verify", "city.vdag", "--against", "plain.glb"});
   EXPECT_EQ(other.status, 4) << other.err;
-  EXPECT_NE(other.err.find("are not those of the scene"), std::string::npos) << other.err;
+  EXPECT_NE(other.err.find("differ from the scene"), std::string::npos) << other.err;
 }
 
 // Equal files are exit status 0, different ones 1, files on different grids an error.

@@ -198,7 +198,7 @@ class Client(threading.Thread):
         status, dag = self.request("GET", f"/api/v1/jobs/{job_id}/dag")
         expected = self.expected[name, resolution]
         if status != 200 or hashlib.sha256(dag).hexdigest() != expected:
-            raise SoakError(f"job {job_id}: the downloaded bytes are not those of a local build")
+            raise SoakError(f"job {job_id}: the downloaded bytes differ from a local build")
         if job["result"]["sha256"] != expected:
             raise SoakError(f"job {job_id}: another SHA-256 than that of a local build")
         self.count("verified")

@@ -27,7 +27,7 @@ ArtifactIndex read_single_index(const ReadableFile& file, const ArtifactRef& ref
   file.read_at(ref.index_offset, bytes);
   ArtifactIndex index = decode_index(bytes, ref, file.path());
   if (index.roots.size() != 1)
-    corrupt_copy(file.path(), "the artifact is not that of one subvolume");
+    corrupt_copy(file.path(), "the artifact contains more than one subvolume");
   return index;
 }
 
@@ -37,7 +37,7 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
                           uint32_t grid_levels, SegmentWriter& to) {
   ArtifactIndex index = read_single_index(from, ref);
   if (index.shape.grid_levels - index.roots[0].cube.level != grid_levels - cube.level)
-    corrupt_copy(from.path(), "the artifact is that of a cube of another size");
+    corrupt_copy(from.path(), "the artifact belongs to a cube of a different size");
   index.shape.grid_levels = grid_levels;
   index.roots[0].cube = cube;
   const uint64_t first = to.size();

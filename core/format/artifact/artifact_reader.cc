@@ -73,7 +73,7 @@ void ArtifactReader::read_frame(uint32_t level, size_t index, Frame& out) const 
   if (wrong) damaged(level, index, wrong);
   if (out.hashes.front() != info.first_hash) damaged(level, index, "not the frame of its index");
   if (index + 1 < frames.size() && last.hash > frames[index + 1].first_hash)
-    damaged(level, index, "its hashes run into those of the next frame");
+    damaged(level, index, "its hashes overlap the next frame's");
 }
 
 }  // namespace voxdag

@@ -130,8 +130,8 @@ struct GlobalFileWriter::State {
   std::string digest(const HeaderPage& header, std::span<const uint64_t> checksums,
                      unsigned threads, const CancelToken& cancel) const;
   [[noreturn]] void damaged(uint64_t at) const {
-    throw Error(ErrorCode::kCorrupt,
-                partial_path + " from byte " + std::to_string(at) + " on is not what was written");
+    throw Error(ErrorCode::kCorrupt, partial_path + " from byte " + std::to_string(at) +
+                                         " on differs from the written bytes");
   }
 };
 
@@ -248,10 +248,9 @@ void GlobalFileWriter::end_section(const GlobalAttribute& attribute) {
   State& s = *state_;
   if (!s.section_open || s.section_bytes == 0 ||
       (!s.sections.empty() && s.sections.back().attribute.kind >= attribute.kind))
-    throw Error(ErrorCode::kCorrupt, s.path + ": the section of attribute " +
-                                         std::to_string(attribute.kind) + " has " +
-                                         std::to_string(s.section_bytes) +
-                                         " bytes, or does not follow those of lower kinds");
+    throw Error(ErrorCode::kCorrupt,
+                s.path + ": the section of attribute " + std::to_string(attribute.kind) + " has " +
+                    std::to_string(s.section_bytes) + " bytes, or is out of the order of kinds");
   s.sections.push_back({attribute, s.end, s.section_bytes});
   s.pad(s.end + s.section_bytes);
   s.section_open = false;

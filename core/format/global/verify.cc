@@ -155,10 +155,10 @@ void Verifier::check_attributes(bool has_attributes) const {
   std::memcpy(&count, file_.data() + kAttributeCountAt, sizeof(count));
   const std::vector<Attribute> kinds = attributes_of(file_).list();
   if (count != kinds.size() || has_attributes == kinds.empty())
-    broken(file_.path() + ": header",
-           std::to_string(count) +
-               " attribute sections, expected those of colors, alpha, normals and materials that "
-               "there are, or none and no feature bit 2");
+    broken(file_.path() + ": header", std::to_string(count) +
+                                          " attribute sections, expected only sections of colors, "
+                                          "alpha, normals and materials that "
+                                          "there are, or none and no feature bit 2");
   for (size_t i = 0; i < kinds.size(); ++i)
     check_section(kAttributesAt + i * kAttributeEntryBytes, kinds[i]);
   check_zeros(kAttributesAt + kinds.size() * kAttributeEntryBytes, kFeaturesAt, "reserved");

@@ -147,7 +147,7 @@ class ColorVerifier {
       if (tier.finest_level != section_.color_levels() &&
           value != value_from_below(tier,
                                     region.morton << 3 * (region.level_count - 1) | cells[at].code))
-        fail_at(at, "expected that of its children");
+        fail_at(at, "expected the value that follows from its children");
     }
     const EncodedRegion expected = encode_values(traits_.attribute, region.block_bytes / 32,
                                                  region.level_count - 1, region.morton, cells);
@@ -156,7 +156,8 @@ class ColorVerifier {
     if (differing.first != expected.blocks.end())
       fail(tier, i,
            "byte " + std::to_string(differing.first - expected.blocks.begin()) +
-               " is not that of the value that a cell has from its children, or 0 behind the last "
+               " differs from the value that follows from the cell's children, or from 0 behind "
+               "the last "
                "one");
   }
 

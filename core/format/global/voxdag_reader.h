@@ -338,7 +338,7 @@ class File {
   }
   [[noreturn]] void outside(uint32_t l, uint64_t offset) const {
     corrupt("level " + std::to_string(l) + ", word " + std::to_string(offset) +
-            ": no node lies here");
+            ": no node begins here");
   }
   void expect(bool right, const char* what) const {
     if (!right) throw Error(Problem::kCorrupt, path_ + ": header: " + what);
@@ -448,7 +448,7 @@ class File {
       expect(kind > last_kind, "attribute sections are not in the order of their kinds");
       expect(get<uint64_t>(entry + 8) == table_offset_ && bytes > 0 &&
                  bytes <= bytes_->size() - table_offset_,
-             "an attribute section does not follow what is before it, or ends beyond the file");
+             "an attribute section does not follow the preceding data, or ends beyond the file");
       expect(levels >= 2 && levels <= grid_levels_, "expected attributes of a level of the grid");
       if (kind < kEndOfKinds) {
         const char* const wrong = sections_[kind - 1].open(data() + table_offset_, bytes, levels,

@@ -255,7 +255,7 @@ class ColorSection {
     if (count == 0 || 4 * count > bytes - 4) return kBroken;
     if (count > kMaxMaterials || bytes > kMaxNamesBytes) return "there are too many materials";
     if (value_bytes != (count <= 256 ? 1u : count <= 65536 ? 2u : 4u))
-      return "materials have values of another width than their number needs";
+      return "the values of materials have the wrong width for their number";
     uint64_t end = 4;
     names_.reserve(static_cast<size_t>(count));
     for (uint64_t i = 0; i < count; ++i) {

@@ -33,7 +33,7 @@ constexpr std::pair<int, const char*> kProblems[] = {
     {410, "the file was replaced: its manifest has a new digest"},
     {413, "the body is too large"},
     {415, "the content type is not JSON, or the body is encoded"},
-    {416, "no range lies within the file"},
+    {416, "no range is within the file"},
     {422, "the idempotency key belongs to another request, a limit is exceeded, or no GPU exists"},
     {429, "too many requests"},
     {431, "the header fields are too large"},

@@ -119,10 +119,11 @@ Json options() {
                 described("Attributes per cell of the color grid; \"color\" equals the option "
                           "color.",
                           array(1, 64, one_of({"color", "alpha", "normal", "material"})))),
-       optional("color_resolution",
-                described("Resolution of the color grid, at most that of the job; only with color "
-                          "or attributes.",
-                          integer(4, 1048576))),
+       optional(
+           "color_resolution",
+           described("Resolution of the color grid, at most the job's resolution; only with color "
+                     "or attributes.",
+                     integer(4, 1048576))),
        optional("memory",
                 either(pattern("^((6[4-9]|[7-9][0-9]|[1-9][0-9]{2,5})MiB|[1-9][0-9]{0,5}GiB)$"),
                        at_least(uint64_t{64} << 20))),

@@ -82,7 +82,7 @@ Response answer_with_file(const Request& request, std::shared_ptr<ReadableFile> 
   }
   const RangeAnswer requested = requested_ranges(request, tag, size);
   if (requested.kind == RangeAnswer::Kind::kUnsatisfiable) {
-    Problem problem(416, "range_not_satisfiable", "no requested range lies within the file");
+    Problem problem(416, "range_not_satisfiable", "no requested range is within the file");
     problem.headers.emplace("Content-Range", "bytes */" + std::to_string(size));
     throw problem;
   }

@@ -42,7 +42,7 @@ const Parameter kPages = {"pages",
                           {},
                           true};
 
-static_assert(std::endian::native == std::endian::little, "tiles are sent as they lie in memory");
+static_assert(std::endian::native == std::endian::little, "tiles are sent in their memory layout");
 
 void append_words(const std::vector<uint32_t>& words, std::string& bytes) {
   bytes.append(reinterpret_cast<const char*>(words.data()), words.size() * sizeof(uint32_t));
@@ -221,7 +221,8 @@ Response get_colors(const Call& call, const TileSource& dag) {
 
 std::shared_ptr<void> tile_permit(Context& context, const Call& call) {
   auto permit = context.tiles.acquire(call.caller.client);
-  if (!permit) throw busy("too many requests for tiles at a time, of this client or of all", 1);
+  if (!permit)
+    throw busy("too many concurrent requests for tiles, from this client or in total", 1);
   return permit;
 }
 
@@ -245,7 +246,7 @@ template <class Make>
 auto with_unfinished_job(Context& context, const Call& call, const Make& make) {
   const Job job = find_job(context.queue, call.names[0]);
   if (job.state == JobState::kSucceeded)
-    throw not_found("the job has its result: expected one that has not succeeded");
+    throw not_found("the job has succeeded: expected an unfinished job");
   const uint64_t resolution = nlohmann::json::parse(job.request).at("resolution");
   try {
     return make(job.id, context.dispatcher.folder(job.id), resolution);
@@ -253,7 +254,7 @@ auto with_unfinished_job(Context& context, const Call& call, const Make& make) {
     // A new store has no tables yet, and a job that ends removes its store during the reading.
     const bool is_read = find_job(context.queue, call.names[0]).state != JobState::kSucceeded;
     if (is_read && !error.is_corruption() && error.code() != ErrorCode::kInvalidInput) throw;
-    throw not_found("nothing is known of what the job has built");
+    throw not_found("the subvolumes of the job are not known yet");
   }
 }
 

@@ -54,9 +54,8 @@ std::unique_ptr<ReadableFile> ConfinedFiles::open_read(const std::string& path) 
     auto file = ForwardingFiles::open_read(path);
     if (is_same_file(resolved, file->identity())) return file;
   }
-  throw Error(
-      ErrorCode::kInvalidInput,
-      path + " lies outside the scene's folder: expected a scene that needs no other files");
+  throw Error(ErrorCode::kInvalidInput,
+              path + " is outside the scene's folder: expected a scene that needs no other files");
 }
 
 }  // namespace voxdag::server

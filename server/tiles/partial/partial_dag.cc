@@ -46,7 +46,7 @@ uint64_t PartialDag::add_parts(const Cube& cube, const Parts& parts) {
   for (const Part* part : parts)
     if (!is_within(part->cube, cube) || part->cube.level > brick_level_ ||
         (parts.size() > 1 && part->cube.level == cube.level))
-      throw Error(ErrorCode::kCorrupt, "a subvolume lies in another one, or not in the grid");
+      throw Error(ErrorCode::kCorrupt, "a subvolume overlaps another one, or is outside the grid");
   if (parts.size() == 1 && parts[0]->cube.level == cube.level)
     return add_coarse(cube.level, parts[0]->brick);
   std::vector<uint64_t> children;
@@ -111,7 +111,8 @@ uint64_t PartialDag::add_words(uint32_t level, std::vector<uint32_t> words) {
   std::vector<uint32_t>& all = levels_[level];
   const uint64_t offset = all.size();
   if (offset + words.size() > kMaxWords)
-    throw Error(ErrorCode::kLimit, "what is built so far has more nodes than pointers reach");
+    throw Error(ErrorCode::kLimit,
+                "the built subvolumes have more nodes than pointers can address");
   // The words come first: whatever fails later, a known offset has its words.
   all.insert(all.end(), words.begin(), words.end());
   word_count_ += words.size();

@@ -34,7 +34,7 @@ export class Camera {
     if (![...eye, ...target].every(Number.isFinite))
       throw new Error("A camera has finite coordinates.");
     if (!(fovDegrees >= 1 && fovDegrees <= 170))
-      throw new Error("The field of view must lie between 1 and 170 degrees.");
+      throw new Error("The field of view must be between 1 and 170 degrees.");
     if (!(distance(eye, target) > 0)) throw new Error("The camera must not be at its target.");
     Object.assign(this, {eye: [...eye], target: [...target], fovDegrees});
   }

@@ -22,7 +22,7 @@ export class ClipView {
     this.element =
         h("div", {class: "stack"},
           h("div", {class: "check"}, this.enabled, h("label", {for: "clip-on"
-            }, "Show only what is in a box")), this.rows = h("div", {class: "clip-rows"}, rows));
+            }, "Show only the inside of a box")), this.rows = h("div", {class: "clip-rows"}, rows));
     this.show();
   }
 

@@ -12,7 +12,7 @@ export class View {
     if (![...eye, ...target, ...up, fovDegrees].every(Number.isFinite))
       throw new Error("A camera has a number that is not finite.");
     if (!(fovDegrees > 0 && fovDegrees < 180))
-      throw new Error("The field of view must lie between 0 and 180 degrees.");
+      throw new Error("The field of view must be between 0 and 180 degrees.");
     if (!(length(forward) > 0)) throw new Error("The camera must not be at its target.");
     this.eye = eye.map((x) => Math.min(Math.max(x, -kFar), kFar));
     this.target = target;

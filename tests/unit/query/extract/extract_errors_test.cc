@@ -140,7 +140,7 @@ TEST_F(ExtractErrors, CropOfNothingIsSaid) {
     warnings_.texts.clear();
     extract_file("in.vdag", spec("out.vdag", {6, region}, crop));
     return std::ranges::any_of(warnings_.texts, [](const std::string& text) {
-      return text.ends_with("is the whole grid, which stays");
+      return text.ends_with("is the complete grid");
     });
   };
   EXPECT_TRUE(is_said({{31, 0, 0}, {33, 64, 64}}, true));

@@ -154,7 +154,7 @@ TEST_F(JobProcess, ReadsNoFileOfTheServiceAsABuffer) {
     SCOPED_TRACE(uri);
     write_file_atomically(system_files(), job_.log(), std::string(36, 'x'));
     put_scene(scene_with_buffer(uri));
-    expect_failure("lies outside", run());
+    expect_failure("is outside", run());
   }
 }
 
