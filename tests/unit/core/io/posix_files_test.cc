@@ -161,7 +161,8 @@ TEST_F(PosixFiles, Folders) {
 TEST_F(PosixFiles, DevicesTellDisksApart) {
   put(path_, "x");
   EXPECT_EQ(files_.device(path_), files_.device(folder_.path()));
-  if (files_.exists("/proc")) EXPECT_NE(files_.device("/proc"), files_.device(folder_.path()));
+  if (!files_.exists("/proc")) GTEST_SKIP() << "this system has no /proc";
+  EXPECT_NE(files_.device("/proc"), files_.device(folder_.path()));
 }
 
 // Renaming replaces an existing file; removing removes it.
