@@ -63,7 +63,7 @@ class Upload {
     return bytes;
   }
 
-  // Whether the server has the complete file. Sets offset_ to how many bytes it has.
+  // True if the server has the complete file. Sets offset_ to how many bytes it has.
   bool is_complete() {
     offset_ = 0;
     try {

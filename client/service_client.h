@@ -48,7 +48,7 @@ class ServiceClient {
 
 // "/api/v1/jobs/ID"; throws Error{kInvalidInput} unless the id is 16 hex digits.
 std::string job_path(const std::string& id);
-// Whether a JOB is in a final state: succeeded, failed or canceled.
+// True if a JOB is in a final state: succeeded, failed or canceled.
 bool has_ended(const Json& job);
 
 }  // namespace voxdag::client

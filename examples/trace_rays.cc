@@ -33,7 +33,7 @@ void draw(const DagFile& dag) {
   }
 }
 
-// Whether a box of voxels contains a set one: the collision test of a game or a planner.
+// True if a box of voxels contains a set one: the collision test of a game or a planner.
 bool collides(const DagFile& dag, const voxdag::query::Region& box) {
   return dag.count({dag.grid_levels(), box}) > 0;
 }

@@ -84,7 +84,7 @@ struct SampledCells::Plane {
       length += std::abs(normal[a]);
     }
   }
-  // Whether it misses a cube for sure.
+  // True if it misses a cube for sure.
   bool misses(const double (&center)[3], double half) const {
     double distance = -offset, scale = std::abs(offset);
     for (int a = 0; a < 3; ++a) {

@@ -73,7 +73,7 @@ class NeededTiles {
     }
   }
 
-  // Whether the ray ends in the cell.
+  // True if the ray ends in the cell.
   bool visit(uint32_t level, uint64_t content, const Vec& low, const Span& span) {
     const double edge = static_cast<double>(dag_.resolution()) / static_cast<double>(1ull << level);
     if (level == dag_.grid_levels() || edge <= pixels_ * spread_ * span.enter) return true;

@@ -70,7 +70,7 @@ class Backend {
 // Instruction sets that the CPU backend has kernels for; each includes the previous one.
 enum class Simd { kNone, kAvx2, kAvx512 };
 
-// Whether this machine and this build can run the kernels for an instruction set.
+// True if this machine and this build can run the kernels for an instruction set.
 bool cpu_supports(Simd simd);
 
 // The CPU backend: bricks rasterized tile by tile, nodes hash-consed. Uses the largest instruction

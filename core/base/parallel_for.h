@@ -70,7 +70,7 @@ class Turns {
     ++turn_;
     changed_.notify_all();
   }
-  // Whether an item before this one has failed.
+  // True if an item before this one has failed.
   bool is_lost(size_t item) {
     const std::lock_guard lock(mutex_);
     return item > failed_;

@@ -11,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-// Whether the file system of the file at `path` can make no file any more.
+// True if the file system of the file at `path` can make no file any more.
 bool has_no_inodes(const std::string& path) {
   struct statvfs s {};
   return statvfs(parent_directory(path).c_str(), &s) == 0 && s.f_files > 0 && s.f_favail == 0;

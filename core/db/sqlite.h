@@ -71,7 +71,7 @@ class SqlDatabase {
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
-// Whether a database has no tables and belongs to no program.
+// True if a database has no tables and belongs to no program.
 bool is_new(SqlDatabase& database);
 
 // What is committed with kLater may be lost in a power cut until the next commit with kNow.

@@ -58,7 +58,7 @@ struct Field {
   bool is_required = false;
   bool is_positional = false;     // on the command line
   bool is_left_if_empty = false;  // JSON leaves the member out if it is empty
-  // Whether geometry_json() has it; without a value, if it differs from its default.
+  // True if geometry_json() has it; without a value, if it differs from its default.
   std::optional<bool> in_key;
 
   constexpr Field(const char* its_name, const char* its_help = "")
@@ -219,7 +219,7 @@ std::string expectation(const Field& field) {
   }
 }
 
-// Whether a value respects the limits that its field states.
+// True if a value respects the limits that its field states.
 template <class T>
 bool fits(const Field& field, const T& value) {
   if constexpr (IsOptional<T>::value) {

@@ -93,7 +93,7 @@ class FileSystem {
   virtual void sync_directory(const std::string& path) = 0;
   // Locks the file at `path`, made if it is not there; nullptr if another holder has it.
   virtual std::unique_ptr<FileLock> try_lock(const std::string& path) = 0;
-  // Whether a holder has the lock of the file at `path`, which need only be readable. A try_lock()
+  // True if a holder has the lock of the file at `path`, which need only be readable. A try_lock()
   // at the same instant may fail.
   virtual bool is_locked(const std::string& path) = 0;
   // Bytes that an unprivileged user may still write to the disk of `path`.

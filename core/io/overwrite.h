@@ -26,7 +26,7 @@ void refuse_foreign_file(FileSystem& files, const std::string& path,
                          const std::function<bool(const ReadableFile& file)>& is_own,
                          const std::string& otherwise = "");
 
-// Whether the file begins with `bytes`, or with a part of them where it ends early.
+// True if the file begins with `bytes`, or with a part of them where it ends early.
 bool begins_with(const ReadableFile& file, std::string_view bytes);
 
 }  // namespace voxdag

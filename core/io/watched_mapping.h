@@ -20,8 +20,8 @@ class WatchedMapping {
   ~WatchedMapping();
   WatchedMapping(const WatchedMapping&) = delete;
 
-  // Whether pages of it were read as zeros. What was computed from the mapping since it began is to
-  // be thrown away then.
+  // True if pages of it were read as zeros. Then discard all results computed from the mapping
+  // since it began.
   bool is_damaged() const;
 
  private:

@@ -18,7 +18,7 @@ struct Region {
   Position high{};
 
   bool empty() const { return low[0] >= high[0] || low[1] >= high[1] || low[2] >= high[2]; }
-  // Whether the region has a cell of, or all of, the cube with that low corner and edge.
+  // True if the region has a cell of, or all of, the cube with that low corner and edge.
   bool intersects(const Position& corner, int64_t edge) const {
     for (size_t axis = 0; axis < 3; ++axis)
       if (corner[axis] >= high[axis] || corner[axis] + edge <= low[axis]) return false;

@@ -42,7 +42,7 @@ class BtWalk {
   }
 
  private:
-  // Whether a cube has selected cells.
+  // True if a cube has selected cells.
   bool has_cells(uint32_t depth, uint64_t content, const Position& corner, int64_t edge) const {
     const Region& region = job_.selection.region;
     if (!region.intersects(corner, edge)) return false;

@@ -44,7 +44,7 @@ class NearestSearch {
     return morton_encode(static_cast<uint32_t>(p[0]), static_cast<uint32_t>(p[1]),
                          static_cast<uint32_t>(p[2]));
   }
-  // Whether a cube whose low corner, which has its lowest Morton code, is `low` may have a cell
+  // True if a cube whose low corner, which has its lowest Morton code, is `low` may have a cell
   // that is better than the best so far.
   bool may_improve(const Position& low, uint64_t squared) const {
     if (squared != best_.squared_distance) return squared < best_.squared_distance;

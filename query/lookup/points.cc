@@ -44,7 +44,7 @@ class Descents {
     }
   };
 
-  // Whether the descent's cell of the top has a child that it continues in.
+  // True if the descent's cell of the top has a child that it continues in.
   bool begin_at_top(Descent& d) const {
     const uint32_t shift = grid_levels_ - TopCells::kLevels;
     const TopCells::Cell cell = top_->at(d.x >> shift, d.y >> shift, d.z >> shift);

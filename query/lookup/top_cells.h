@@ -14,7 +14,7 @@ class TopCells {
  public:
   static constexpr uint32_t kLevels = 5;
 
-  // Whether these cells are nodes, which have children in the grid of `grid_levels`.
+  // True if these cells are nodes, which have children in the grid of `grid_levels`.
   static bool serve(const DagView& dag, uint32_t grid_levels) {
     return !dag.empty() && dag.grid_levels() > kLevels + kBrickLevels && grid_levels > kLevels;
   }

@@ -348,7 +348,7 @@ class PacketWalk {
     return true;
   }
 
-  // Whether the ray ends in this brick.
+  // True if the ray ends in this brick.
   VOXDAG_INLINE bool cast_in_brick(const RayDescent& cell, int ray) {
     const uint64_t mask = brick(cell.offset);
     const uint32_t occupied = mirrored_[octants(mask)];
@@ -365,7 +365,7 @@ class PacketWalk {
     return false;
   }
 
-  // Whether the ray ends in a cell of these children.
+  // True if the ray ends in a cell of these children.
   VOXDAG_INLINE bool cast_in(Int4 low, int32_t half, int ray, uint32_t occupied, uint32_t depth) {
     const Crossed crossed = cross_one(low, ray, half);
     if (crossed.touching & occupied) return give_up(ray);

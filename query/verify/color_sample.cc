@@ -121,7 +121,7 @@ class RegionComparison {
                    const std::vector<ColoredCell>& cells, const std::vector<CellValues>& values)
       : file_(file), grid_(grid), cells_(cells), values_(values) {}
 
-  // Whether all bytes are the same. Throws Error{kCorrupt} if they are not near each other.
+  // True if all bytes are the same. Throws Error{kCorrupt} if they are not near each other.
   bool compare(const SampledRegion& region, Attribute attribute) const {
     const ColorRegion& stored = region.stored[index_of(attribute)];
     const EncodedRegion baked = encode(region.cube, attribute, stored);

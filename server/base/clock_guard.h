@@ -13,10 +13,10 @@ class ClockGuard {
   // `last_seen_s` is when the last service is known to have run (Unix time), 0 without one.
   explicit ClockGuard(double last_seen_s) : last_clock_s_(last_seen_s) {}
 
-  // Whether the clock jumped since the last call. Call it at least once per hour, with the times of
+  // True if the clock jumped since the last call. Call it at least once per hour, with the times of
   // unix_seconds() and wall_seconds().
   bool has_jumped(double clock_s, double now_s);
-  // Whether it did within the last day.
+  // True if it did within the last day.
   bool is_in_doubt(double now_s) const { return now_s < doubt_until_s_; }
   // The time (Unix) before which `what`, in the words of a log line, is too old after `days`; 0
   // while the clock is in doubt, which is logged when it begins. Call it instead of has_jumped().

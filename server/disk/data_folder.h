@@ -12,7 +12,7 @@ namespace voxdag::server {
 // The name that something has once its deletion has begun. No scene and no job has such a name.
 inline constexpr const char* kDeleted = ".deleted";
 
-// Whether a folder exists and has any entry.
+// True if a folder exists and has any entry.
 bool has_entries(FileSystem& files, const std::string& path);
 
 // A file that must keep its name while it is open.

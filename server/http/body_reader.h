@@ -15,7 +15,7 @@ class BodyReader {
 
   // As Request::read_body. A malformed chunk is BodyEnd::kBroken.
   BodyEnd read(const Request::Sink& sink);
-  // Whether the body was read to its end, so that another request may follow.
+  // True if the body was read to its end, so that another request may follow.
   bool is_complete() const { return complete_; }
 
  private:

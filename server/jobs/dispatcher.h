@@ -68,7 +68,7 @@ class Dispatcher {
     std::thread thread;
     bool recorded = false;  // what became of the job
     bool done = false;
-    // Whether it will still record what becomes of the job.
+    // True if it will still record what becomes of the job.
     bool runs() const { return !recorded && !done; }
   };
   // Reserves the files of an ended job for the thread that removes them: other removals wait, and a

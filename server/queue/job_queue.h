@@ -59,7 +59,7 @@ class JobQueue {
   // Positions in the queue from 1, by job number, as of the last change.
   using Places = std::unordered_map<int64_t, uint64_t>;
   std::shared_ptr<const Places> places();
-  // Whether a job that has not ended needs this upload.
+  // True if a job that has not ended needs this upload.
   bool uses_scene(const std::string& name);
 
   // Applies `edit` to the job in one transaction and returns it. A change of state is recorded as

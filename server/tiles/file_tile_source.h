@@ -36,7 +36,7 @@ class FileTileSource : public TileSource {
   // memory; others wait for it. If it is canceled, the next one begins again.
   const std::string& manifest(const CancelToken& cancel) const override;
   void expect_readable() const override;
-  // Whether expect_readable() throws: the file is to be opened again.
+  // True if expect_readable() throws: the file is to be opened again.
   bool is_broken() const { return mapping_.is_damaged(); }
   // A file that was removed still has its contents.
   bool was_overwritten() const override;

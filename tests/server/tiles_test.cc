@@ -44,7 +44,7 @@ std::string inflated(const std::string& packed) {
   return out;
 }
 
-// Whether this process has the file mapped.
+// True if this process has the file mapped.
 bool is_mapped(const std::string& path) {
   std::ifstream maps("/proc/self/maps");
   const std::string text{std::istreambuf_iterator<char>(maps), {}};

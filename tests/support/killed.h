@@ -8,7 +8,7 @@
 
 namespace voxdag {
 
-// Whether work(), run in a child process, was ended by SIGKILL. It must not need threads that run
+// True if work(), run in a child process, was ended by SIGKILL. It must not need threads that run
 // already.
 template <class Work>
 bool is_killed(const Work& work) {

@@ -30,7 +30,7 @@ class SubvolumeBuild {
   // The node of a cube of 2^size_log2 voxels that the entries [first, first + count) of the stack
   // may touch.
   NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);
-  // Whether a cube of at most tile size is better split, since its parts may be in the plane memo.
+  // True if a cube of at most tile size is better split, since its parts may be in the plane memo.
   bool worth_splitting(int size_log2, size_t first, size_t count);
   NodeRef build_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   Octants test_octants(Entry entry, const LatticeCube& cube) const;

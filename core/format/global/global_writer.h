@@ -58,7 +58,7 @@ struct GlobalFileProgress {
   std::vector<uint64_t> checksums;  // of their checksum blocks; the last one may be partial
 };
 
-// Whether the file begins with the magic of a global file.
+// True if the file begins with the magic of a global file.
 bool is_global_file(const ReadableFile& file);
 // True if it may be an incomplete global file: its first page is written last.
 bool is_partial_global_file(const ReadableFile& file);

@@ -28,7 +28,7 @@ namespace {
 constexpr uint64_t kBlocksPerItem = 64;  // 4 MiB
 constexpr uint64_t kNodesPerItem = uint64_t{1} << 16;
 
-// Whether `a` is before `b` in the total order of nodes whose hashes are equal.
+// True if `a` is before `b` in the total order of nodes whose hashes are equal.
 bool precedes(const voxdag_reader::Node& a, const voxdag_reader::Node& b) {
   if (a.child_mask != b.child_mask) return a.child_mask < b.child_mask;
   for (int c = 0; c < kPopcount8[a.child_mask]; ++c)

@@ -237,7 +237,7 @@ class File {
                             (y & 1) << 1 | (z & 1));
   }
 
-  // Whether a voxel is set. Voxels outside the grid are not.
+  // True if a voxel is set. Voxels outside the grid are not.
   bool voxel(int64_t x, int64_t y, int64_t z) const {
     const int64_t r = resolution();
     if (empty() || x < 0 || y < 0 || z < 0 || x >= r || y >= r || z >= r) return false;

@@ -14,7 +14,7 @@ constexpr int kLevel = 1;             // higher levels take twice the time for a
 constexpr int kGzipWindow = 15 + 16;  // 32 KiB, with gzip's header
 constexpr int kMemory = 8;
 
-// Whether the parameters of an entry, "; q=0.5", exclude it.
+// True if the parameters of an entry, "; q=0.5", exclude it.
 bool is_excluded(std::string_view parameters) {
   const size_t q = parameters.find("q=");
   if (q == std::string_view::npos) return false;

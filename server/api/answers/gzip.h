@@ -8,7 +8,7 @@
 
 namespace voxdag::server {
 
-// Whether the value of Accept-Encoding allows it.
+// True if the value of Accept-Encoding allows it.
 bool accepts_gzip(std::string_view accepted);
 // Throws Error{kOutOfMemory}.
 std::string gzip(std::string_view bytes);

@@ -122,7 +122,7 @@ Response immutable_response(const Call& call, const TileSource& dag, const std::
   response.headers.emplace("ETag", "W/\"" + tag + '"');
   response.headers.emplace("Vary", "Accept-Encoding, Authorization");
   const std::string known = call.request.header("If-None-Match");
-  // Whether there is such a tile at all, which "*" asks for, is not known before it is made.
+  // The existence of a tile, which "*" tests, is unknown before it is made.
   if (trimmed(known) != "*" && has_tag(known, '"' + tag + '"')) {
     response.status = 304;
     return response;

@@ -18,7 +18,7 @@ struct TileAccess {
 // Throws Problem for an unknown job or file, or if no permit is free.
 using OpenTiles = std::function<TileAccess(const Call&)>;
 
-// Whether tiles are compressed for clients that accept it. It halves their bytes, at about 80 MB/s
+// True if tiles are compressed for clients that accept it. It halves their bytes, at about 80 MB/s
 // of one core: a gain on a network, a loss on the loopback.
 enum class Packing { kNone, kGzip };
 

@@ -37,7 +37,7 @@ class Connection {
   // Lets the kernel choose the size of the send buffer, which is small otherwise: for long answers
   // over long distances.
   void allow_large_send_buffer();
-  // Whether the client has closed the connection. Consumes no bytes.
+  // True if the client has closed the connection. Consumes no bytes.
   bool peer_disconnected() const;
   // Closes the sending side and discards further bytes of the client for up to a second, so that
   // a reset does not destroy the last answer.

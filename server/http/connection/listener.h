@@ -28,7 +28,7 @@ class Listener {
   int port_ = 0;
 };
 
-// Whether the address is reachable from this machine only.
+// True if the address is reachable from this machine only.
 bool is_loopback_name(const std::string& address);
 
 }  // namespace voxdag::server

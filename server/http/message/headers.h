@@ -18,7 +18,7 @@ std::string header_value(const HeaderMap& headers, std::string_view name);
 // `text` without leading and trailing spaces and tabs.
 std::string_view trimmed(std::string_view text);
 bool equal_ignoring_case(std::string_view a, std::string_view b);
-// Whether the value of If-None-Match has this entity tag. The comparison is weak.
+// True if the value of If-None-Match has this entity tag. The comparison is weak.
 bool has_tag(std::string_view list, std::string_view tag);
 
 }  // namespace voxdag::server

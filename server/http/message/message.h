@@ -34,7 +34,7 @@ struct Request {
   using Sink = std::function<bool(std::string_view piece)>;
   std::function<BodyEnd(const Sink& sink)> read_body;
 
-  // Whether the client has closed the connection; for handlers that take long.
+  // True if the client has closed the connection; for handlers that take long.
   std::function<bool()> client_has_left;
 
   std::string header(std::string_view name) const { return header_value(headers, name); }

@@ -21,7 +21,7 @@ struct Fault {
 // Sets the next call to fail, replacing an earlier plan.
 void plan_fault(const Fault& fault);
 void plan_no_fault();
-// Whether the planned call was reached.
+// True if the planned call was reached.
 bool fault_happened();
 
 // The status of a call that begins.

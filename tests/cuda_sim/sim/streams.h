@@ -41,7 +41,7 @@ void run_until(cudaStream_t stream, uint64_t position);
 void run_everything();
 // Runs some work, unless the schedule is late.
 void run_some();
-// Whether work that did not run yet uses a range of the host's memory.
+// True if work that did not run yet uses a range of the host's memory.
 bool is_in_use(const void* memory, size_t bytes);
 
 }  // namespace voxdag::cuda_sim

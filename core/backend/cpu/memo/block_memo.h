@@ -28,7 +28,7 @@ class BlockMemo {
 
   explicit BlockMemo(PooledMemory& memory);
 
-  // Whether to use the memo for the next `count` blocks.
+  // True if the memo should be used for the next `count` blocks.
   bool is_worthwhile(int count) {
     if (bypassed_ > 0) {
       bypassed_ -= count;

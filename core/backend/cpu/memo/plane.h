@@ -26,7 +26,7 @@ struct Plane {
 
   // True if all values n.k + f within a cube that the plane crosses fit 62 bits.
   bool fits(int size_log2) const;
-  // Whether the plane touches a cube of 2^size_log2 voxels with offset f. Needs fits().
+  // True if the plane touches a cube of 2^size_log2 voxels with offset f. Needs fits().
   bool crosses(int64_t f, int size_log2) const;
   // Sets f for a cube; false if the plane misses it. Needs fits().
   bool offset_from(const LatticeCube& cube, int size_log2, int64_t& f) const;

@@ -34,7 +34,7 @@ class PlaneMemo {
   // plane is not in the memo (yet), or not for cubes of this size.
   bool build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube, int size_log2,
              NodeRef& node);
-  // Whether build() would succeed for cubes of up to 64^3 voxels that the triangle covers.
+  // True if build() would succeed for cubes of up to 64^3 voxels that the triangle covers.
   bool has_plane(const TriangleSet& triangles, Entry entry);
 
  private:

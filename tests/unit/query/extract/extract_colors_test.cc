@@ -102,7 +102,7 @@ class ExtractColors : public Extract {
     }
   }
 
-  // Whether a cell of the input is in a region that the part has as it is.
+  // True if a cell of the input is in a region that the part has as it is.
   bool is_copied(const Selection& selection, const Cube& cube, uint32_t finest, uint32_t level,
                  uint64_t code) const {
     const uint32_t c = scene_.color_levels;

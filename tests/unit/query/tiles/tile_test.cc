@@ -219,7 +219,7 @@ TEST(Tile, OfABrickOrAnEmptySceneIsRefused) {
               ErrorCode::kInvalidInput);
 }
 
-// Whether there is a tile at the address; it has the right size then.
+// True if there is a tile at the address; it has the right size then.
 bool has_tile(const DagView& dag, uint32_t depth, const TileAddress& root) {
   try {
     const Tile tile(encode_tile(dag, depth, root));

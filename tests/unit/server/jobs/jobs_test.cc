@@ -297,7 +297,7 @@ TEST(ConfinedFilesTest, OpensNothingOutside) {
   EXPECT_THROW(one.open_read(folder.file("in/side/b")), Error);
 }
 
-// Whether a file exists outside shows in no way, and neither does a path of the machine.
+// An answer reveals neither the existence of a file outside nor a path of the machine.
 TEST(ConfinedFilesTest, DoesNotTellWhatIsOutside) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder.file("in"));

@@ -32,7 +32,7 @@ class ViewedFilesTest : public testing::Test {
     token.cancel();
     return token;
   }
-  // Whether the cameras have to be looked for, which a canceled token forbids.
+  // True if the cameras have to be looked for, which a canceled token forbids.
   static bool needs_work(const FileTileSource& file) {
     try {
       file.manifest(canceled());

@@ -10,7 +10,7 @@
 namespace voxdag::server {
 namespace {
 
-// Whether a voxel of the DAG is set, read from its words alone.
+// True if a voxel of the DAG is set, read from its words alone.
 bool is_set(const PartialDag& dag, uint32_t levels, uint64_t root, uint32_t x, uint32_t y,
             uint32_t z) {
   uint64_t at = root;
@@ -27,7 +27,7 @@ bool is_set(const PartialDag& dag, uint32_t levels, uint64_t root, uint32_t x, u
   return dag.levels()[levels - 2][at + bit / 32] >> (bit % 32) & 1;
 }
 
-// Whether one of the parts has the voxel.
+// True if one of the parts has the voxel.
 bool has(const std::vector<PartialDag::Part>& parts, uint32_t levels, uint32_t x, uint32_t y,
          uint32_t z) {
   for (const auto& [cube, brick] : parts) {
