@@ -8,18 +8,18 @@
 namespace voxdag::client {
 namespace {
 
-constexpr double kMaxPause_s = 10;
-constexpr double kMaxWait_s = 300;
-constexpr double kCancelCheck_s = 0.05;
+constexpr double kMaxPauseS = 10;
+constexpr double kMaxWaitS = 300;
+constexpr double kCancelCheckS = 0.05;
 
 }  // namespace
 
 bool RetryPolicy::wait(double min_wait_s) {
-  if (waited_s_ >= kMaxWait_s) return false;
-  const double seconds = std::max(pause_s_, std::min(min_wait_s, kMaxWait_s));
+  if (waited_s_ >= kMaxWaitS) return false;
+  const double seconds = std::max(pause_s_, std::min(min_wait_s, kMaxWaitS));
   sleep_for(seconds, cancel_);
   waited_s_ += seconds;
-  pause_s_ = std::min(kMaxPause_s, 2 * pause_s_);
+  pause_s_ = std::min(kMaxPauseS, 2 * pause_s_);
   return true;
 }
 
@@ -41,9 +41,9 @@ double retry_after_s(const ClientResponse& response) {
 }
 
 void sleep_for(double seconds, const CancelToken& cancel) {
-  for (; seconds > 0; seconds -= kCancelCheck_s) {
+  for (; seconds > 0; seconds -= kCancelCheckS) {
     cancel.check();
-    std::this_thread::sleep_for(std::chrono::duration<double>(std::min(seconds, kCancelCheck_s)));
+    std::this_thread::sleep_for(std::chrono::duration<double>(std::min(seconds, kCancelCheckS)));
   }
   cancel.check();
 }

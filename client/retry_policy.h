@@ -14,12 +14,12 @@ class RetryPolicy {
   // up. Throws Error{kCanceled}.
   bool wait(double min_wait_s = 0);
   // Starts over, after an attempt that made progress.
-  void reset() { waited_s_ = 0, pause_s_ = kFirstPause_s; }
+  void reset() { waited_s_ = 0, pause_s_ = kFirstPauseS; }
 
  private:
-  static constexpr double kFirstPause_s = 0.5;
+  static constexpr double kFirstPauseS = 0.5;
   const CancelToken& cancel_;
-  double waited_s_ = 0, pause_s_ = kFirstPause_s;
+  double waited_s_ = 0, pause_s_ = kFirstPauseS;
 };
 
 // Seconds to wait before the next request to a busy server (408, 429, 502 to 504), 0 if the answer

@@ -6,7 +6,7 @@
 namespace voxdag::client {
 namespace {
 
-constexpr double kPollInterval_s = 0.5;
+constexpr double kPollIntervalS = 0.5;
 
 std::string text_of(const Json& body) {
   try {
@@ -57,7 +57,7 @@ Json ServiceClient::post_action(const std::string& id, const std::string& action
 Json ServiceClient::follow_job(const std::string& id,
                                const std::function<void(const Json& job)>& on_job) {
   try {
-    for (;; sleep_for(kPollInterval_s, cancel_)) {
+    for (;; sleep_for(kPollIntervalS, cancel_)) {
       Json state = job(id);
       on_job(state);
       if (has_ended(state)) return state;

@@ -18,7 +18,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr std::chrono::minutes kCleanUpInterval{10};
-constexpr double kMaxIdleOfViews_s = 600;
+constexpr double kMaxIdleOfViewsS = 600;
 constexpr size_t kMaxLoggedChars = 200;
 
 ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
@@ -139,9 +139,9 @@ void Service::clean_up_periodically() {
     });
     steps_.run("finish removals of scenes", [this] { scenes_.finish_removals(); });
     steps_.run("close files that nobody views",
-               [this] { context_.open_sources.close_stale(kMaxIdleOfViews_s); });
+               [this] { context_.open_sources.close_stale(kMaxIdleOfViewsS); });
     steps_.run("forget running jobs that nobody views",
-               [this] { context_.partial.close_stale(kMaxIdleOfViews_s); });
+               [this] { context_.partial.close_stale(kMaxIdleOfViewsS); });
     steps_.run("restore the ballast", [this] { disk_.restore_ballast(); });
     std::unique_lock lock(stop_mutex_);
     stop_wake_.wait_for(lock, kCleanUpInterval, [this] { return draining_.load(); });

@@ -10,7 +10,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kDrain_s = 1;
+constexpr double kDrainS = 1;
 // The old and the new file, while one is replaced.
 constexpr size_t kMaxOpen = 2;
 
@@ -57,7 +57,7 @@ void ViewService::run() {
     } catch (const std::exception&) {
     }
   });
-  http_.run(kDrain_s);
+  http_.run(kDrainS);
 }
 
 Response ViewService::answer(Request& request) {

@@ -94,7 +94,7 @@ std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
 // Publishes the files if the input was intact until then; throws otherwise.
 inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> written) {
-  job.watched.expect_whole();
+  job.watched.check_readable();
   return ExportFile::publish(written);
 }
 

@@ -296,7 +296,7 @@ ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, 
   const LockedOutputs lock(files, {{spec.output}, file.path(), spec.replace});
   const WatchedFile watched(file);  // colors are read in place
   return watched.run([&] {
-    return Extraction(file, spec, files, progress, cancel).run([&] { watched.expect_whole(); });
+    return Extraction(file, spec, files, progress, cancel).run([&] { watched.check_readable(); });
   });
 }
 

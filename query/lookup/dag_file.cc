@@ -105,7 +105,7 @@ struct DagFile::State {
   State(const std::string& path, uint64_t memory_bytes)
       : file(open_global_file(path)), view(*file), budget(memory_bytes) {}
 
-  void expect_questions(size_t count);
+  void prepare_for_queries(size_t count);
   const TopCells* top_cells(size_t points);
   const NodeCounts& counts(uint32_t grid_levels);
 
@@ -113,7 +113,7 @@ struct DagFile::State {
   const DagView view;
   MemoryBudget budget;
   std::once_flag huge_pages, make_top;
-  std::atomic<uint64_t> points_asked = 0;
+  std::atomic<uint64_t> points_looked_up = 0;
   std::optional<TopCells> top;  // made after many lookups
   std::mutex mutex;
   std::array<std::unique_ptr<NodeCounts>, 21> counts_of;  // by grid levels; guarded by mutex
@@ -121,12 +121,12 @@ struct DagFile::State {
 
 // Huge pages are requested by a call of this many questions, and the table of the top by this many
 // questions of all calls. Together they reach most of the nodes that later ones do.
-constexpr size_t kManyQuestions = size_t{1} << 14;
+constexpr size_t kManyQueries = size_t{1} << 14;
 
 // A few questions should not read parts of 2 MiB for each node, and neither should many about a
 // file that memory cannot hold.
-void DagFile::State::expect_questions(size_t count) {
-  if (count < kManyQuestions || file->file_bytes() > default_memory()) return;
+void DagFile::State::prepare_for_queries(size_t count) {
+  if (count < kManyQueries || file->file_bytes() > default_memory()) return;
   // Pages in memory keep their size, and not every system has huge pages for files.
   std::call_once(huge_pages, [&] {
     madvise(const_cast<unsigned char*>(file->data()), file->file_bytes(), MADV_HUGEPAGE);
@@ -135,7 +135,7 @@ void DagFile::State::expect_questions(size_t count) {
 
 // Null for few questions, or if the top is damaged: then each descent reports the damage it meets.
 const TopCells* DagFile::State::top_cells(size_t points) {
-  if ((points_asked += points) < kManyQuestions || !TopCells::serve(view, view.grid_levels()))
+  if ((points_looked_up += points) < kManyQueries || !TopCells::serve(view, view.grid_levels()))
     return nullptr;
   std::call_once(make_top, [&] {
     try {
@@ -172,7 +172,7 @@ void DagFile::lookup(std::span<const Position> points, uint32_t grid_levels, std
                      unsigned threads) const {
   check_grid_levels(state_->view, grid_levels);
   require(points.size() == set.size(), "as many results as points");
-  state_->expect_questions(points.size());
+  state_->prepare_for_queries(points.size());
   const TopCells* const top = state_->top_cells(points.size());
   naming_file(file().path(), [&] {
     for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
@@ -277,7 +277,7 @@ void DagFile::rays(std::span<const Coordinates> origins, std::span<const Coordin
   require(origins.size() == directions.size() && origins.size() == hits.size(),
           "as many directions and results as origins");
   require(limits.max_distance >= 0 && limits.stop_size >= 0, "limits of rays that are at least 0");
-  state_->expect_questions(origins.size());
+  state_->prepare_for_queries(origins.size());
   naming_file(file().path(), [&] {
     for_each_batch(threads, origins.size(), [&](size_t batch, size_t count) {
       constexpr size_t kRays = RayPacket::kRays;

@@ -24,8 +24,8 @@ VertexColors::VertexColors(const Mesh& mesh, unsigned readers, MemoryBudget& bud
     light_of_byte_[i] = linear_light(static_cast<double>(i) / 255);
   constexpr uint64_t kBlockBytes = kBlockVertices * sizeof(Color);
   const uint64_t wanted = std::bit_ceil((reader_.count() + kBlockVertices - 1) / kBlockVertices);
-  const uint64_t affordable = budget.available() / kShareOfFree / readers / kBlockBytes;
-  const uint64_t slots = std::clamp<uint64_t>(std::bit_floor(affordable), 1, wanted);
+  const uint64_t fits_budget = budget.available() / kShareOfFree / readers / kBlockBytes;
+  const uint64_t slots = std::clamp<uint64_t>(std::bit_floor(fits_budget), 1, wanted);
   colors_ = PageBuffer<Color>(budget, static_cast<size_t>(slots * kBlockVertices),
                               "the colors of vertices");
   block_in_slot_.assign(static_cast<size_t>(slots), kNoBlock);

@@ -17,7 +17,7 @@ class ClockGuard {
   // unix_seconds() and wall_seconds().
   bool has_jumped(double clock_s, double now_s);
   // True if it did within the last day.
-  bool is_in_doubt(double now_s) const { return now_s < doubt_until_s_; }
+  bool is_uncertain(double now_s) const { return now_s < uncertain_until_s_; }
   // The time (Unix) before which `what`, in the words of a log line, is too old after `days`; 0
   // while the clock is in doubt, which is logged when it begins. Call it instead of has_jumped().
   double oldest_s(double days, const char* what, const Log& log);
@@ -25,7 +25,7 @@ class ClockGuard {
  private:
   double last_clock_s_;
   double last_now_s_ = -1;  // of the last call
-  double doubt_until_s_ = 0;
+  double uncertain_until_s_ = 0;
 };
 
 }  // namespace voxdag::server

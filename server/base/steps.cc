@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kRepeatInterval_s = 60;
+constexpr double kRepeatIntervalS = 60;
 
 }  // namespace
 
@@ -29,7 +29,7 @@ void Steps::report(const std::string& name, const char* reason) noexcept {
     const std::string line = "failed to " + name + ": " + reason;
     {
       std::lock_guard lock(mutex_);
-      if (line == last_line_ && wall_seconds() < last_s_ + kRepeatInterval_s) return;
+      if (line == last_line_ && wall_seconds() < last_s_ + kRepeatIntervalS) return;
       last_line_ = line;
       last_s_ = wall_seconds();
     }

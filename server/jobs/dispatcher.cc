@@ -15,13 +15,13 @@ namespace voxdag::server {
 namespace {
 
 constexpr const char* kPreview = "preview";
-constexpr double kMaxPreview_s = 900;
+constexpr double kMaxPreviewS = 900;
 constexpr int kPreviewNice = 5;  // on top of the builds'
-constexpr double kMaxSleep_s = 1;
-constexpr double kNoTimeLimit_s = 1e9;
-constexpr double kRetireInterval_s = 300;
-constexpr double kDeletionInterval_s = 30;  // between attempts of one that failed
-constexpr size_t kMaxRetiredAtOnce = 100;   // so that jobs can start in between
+constexpr double kMaxSleepS = 1;
+constexpr double kNoTimeLimitS = 1e9;
+constexpr double kRetireIntervalS = 300;
+constexpr double kDeletionIntervalS = 30;  // between attempts of one that failed
+constexpr size_t kMaxRetiredAtOnce = 100;  // so that jobs can start in between
 
 void sleep_s(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
@@ -60,8 +60,7 @@ Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& 
   recovered_ = steps_.run("recover the jobs", [this] { recover(); });
   steps_.run("clean up the folders of jobs", [this] { folders_.clean_up(); });
   thread_ = std::thread([this] {
-    while (!steps_.run("dispatch jobs", [this] { dispatch(); }) && !stopping())
-      sleep_s(kMaxSleep_s);
+    while (!steps_.run("dispatch jobs", [this] { dispatch(); }) && !stopping()) sleep_s(kMaxSleepS);
   });
 }
 
@@ -109,7 +108,7 @@ void Dispatcher::dispatch() {
     });
     steps_.run("finish deletions", [this] { finish_deletions(); });
     steps_.run("remove old jobs", [this] { retire_old_jobs(); });
-    queue_.wait_for_change(seen, kMaxSleep_s);
+    queue_.wait_for_change(seen, kMaxSleepS);
   }
 }
 
@@ -234,7 +233,7 @@ ChildProcess::End Dispatcher::run_child(const ChildProcess::Start& start, LiveJo
       },
       [&] {
         const double stop_s = live.stop_requested_s(), now = wall_seconds();
-        if (stop_s > 0 && !stop_sent) child.ask_to_stop();
+        if (stop_s > 0 && !stop_sent) child.request_stop();
         stop_sent = stop_s > 0;
         return (stop_sent && now > stop_s + config_.jobs.stop_timeout_s) || now > started_s + max_s;
       });
@@ -249,7 +248,7 @@ void Dispatcher::run_job(const Job& job, LiveJob& live) {
     write_task(files_, place.task(),
                tasks_.make(parse_job_request(job.request), JobTask::Kind::kBuild));
     end = run_child({{config_.program, "run-job", place.path}, place.log(), config_.jobs.nice},
-                    live, kNoTimeLimit_s);
+                    live, kNoTimeLimitS);
   } catch (const std::exception& error) {
     log_("job " + job.id + ": " + error.what());
     const PublicError seen = public_error(error);
@@ -269,7 +268,7 @@ void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProces
         job.id, [&](Job& j) { apply_outcome(j, live, end, config_.jobs, unix_seconds()); });
     workers_.at(job.id).recorded = true;
   })) {
-    sleep_s(kMaxSleep_s);
+    sleep_s(kMaxSleepS);
     if (stopping()) return;
   }
   if (!after) return;
@@ -289,7 +288,7 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
                     "960x540", "--samples", "1", "--threads", "1"},
                    place.file("preview.log"),
                    config_.jobs.nice + kPreviewNice},
-                  live, kMaxPreview_s);
+                  live, kMaxPreviewS);
     drawn = end.signal == 0 && end.exit_status == 0 && files_.exists(place.preview());
   });
   if (live.stop_requested_s() > 0) return;
@@ -298,7 +297,7 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
       queue_.change(job.id,
                     [&](Job& j) { j.preview = drawn ? Preview::kReady : Preview::kFailed; });
   });
-  if (!recorded) sleep_s(kMaxSleep_s);
+  if (!recorded) sleep_s(kMaxSleepS);
 }
 
 void Dispatcher::stop_tasks(const std::string& id) {
@@ -321,7 +320,7 @@ void Dispatcher::retire_old_jobs() {
   const double now_s = wall_seconds();
   if (now_s < next_retirement_s_) return;
   const double oldest_s = clock_.oldest_s(config_.retention.finished_days, "job", log_);
-  next_retirement_s_ = now_s + kRetireInterval_s;
+  next_retirement_s_ = now_s + kRetireIntervalS;
   size_t removed = 0;
   for (const std::string& id : queue_.expired(oldest_s, config_.retention.finished_jobs)) {
     if (removed == kMaxRetiredAtOnce) {
@@ -419,7 +418,7 @@ void Dispatcher::remove(const std::string& id) {
     folders_.remove_marked(id);
   } catch (...) {
     std::lock_guard lock(mutex_);
-    next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+    next_deletions_s_ = wall_seconds() + kDeletionIntervalS;
     throw;
   }
 }
@@ -440,7 +439,7 @@ void Dispatcher::finish_deletions() {
       folders_.finish_deletion(id);
     });
     std::lock_guard lock(mutex_);
-    if (!finished) next_deletions_s_ = wall_seconds() + kDeletionInterval_s;
+    if (!finished) next_deletions_s_ = wall_seconds() + kDeletionIntervalS;
   }
 }
 

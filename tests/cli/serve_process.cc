@@ -15,7 +15,7 @@
 namespace command_line {
 namespace {
 
-constexpr int kMaxWait_s = 120;  // a slow machine under load
+constexpr int kMaxWaitS = 120;  // a slow machine under load
 
 }  // namespace
 
@@ -43,7 +43,7 @@ ServeProcess::~ServeProcess() { stop(); }
 
 void ServeProcess::wait_until_it_listens() {
   const std::string words = "listening on ";
-  for (int i = 0; i < 100 * kMaxWait_s && is_running(); ++i) {
+  for (int i = 0; i < 100 * kMaxWaitS && is_running(); ++i) {
     const std::string text = log();
     const size_t at = text.find(words);
     if (at != std::string::npos && text.find('\n', at) != std::string::npos) {

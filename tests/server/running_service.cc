@@ -13,7 +13,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kMaxWait_s = 600;
+constexpr double kMaxWaitS = 600;
 
 }  // namespace
 
@@ -29,8 +29,9 @@ RunningService::RunningService() {
 
 RunningService::~RunningService() {
   stop();
-  if (!injects_statuses_)
+  if (!injects_statuses_) {
     EXPECT_EQ(log_.find("the OpenAPI document lacks"), std::string::npos) << log_;
+  }
 }
 
 void RunningService::start() {
@@ -93,7 +94,7 @@ Json RunningService::job(const std::string& id) {
 }
 
 bool RunningService::until(const std::function<bool()>& condition) {
-  const double deadline = wall_seconds() + kMaxWait_s;
+  const double deadline = wall_seconds() + kMaxWaitS;
   while (!condition()) {
     if (wall_seconds() > deadline) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));

@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kMaxConnections = 40;
 constexpr size_t kAttackers = 64;
-constexpr useconds_t kAttackBegins_us =
+constexpr useconds_t kAttackBeginsUs =
     1'500'000;  // by then the service waits for all attackers, for more than a second
 
 class SlowClients : public RunningService {
@@ -89,7 +89,7 @@ TEST_F(SlowClients, SlowBodiesDoNotBlockOthers) {
     open_with(
         "POST /api/v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
         "Content-Length: 60000\r\n\r\n{");
-  usleep(kAttackBegins_us);
+  usleep(kAttackBeginsUs);
   EXPECT_EQ(answered(), 20);
 }
 
@@ -100,7 +100,7 @@ TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   for (int i = 0; i < 1000; ++i)
     requests += "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n";
   for (size_t i = 0; i < kAttackers; ++i) open_with(requests);
-  usleep(kAttackBegins_us);
+  usleep(kAttackBeginsUs);
   const size_t queued = queued_bytes();
   EXPECT_GT(queued, kMaxConnections * (50 << 10)) << "the attack is on";
   EXPECT_LT(queued, kMaxConnections * (300 << 10));

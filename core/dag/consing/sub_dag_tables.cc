@@ -13,11 +13,11 @@ constexpr uint64_t kBytesPerEntry = 80;  // of a table, at most, records include
 SubDagTables::SubDagTables(PooledMemory& memory, int size_log2, const TableSizes& expected)
     : memory_(memory), bricks_(memory) {
   // Only so much that a cube which turns out smaller has room to spare.
-  uint64_t affordable = ConsingMemory::table_bytes(memory.budget.available());
+  uint64_t fits_budget = ConsingMemory::table_bytes(memory.budget.available());
   const auto reserve = [&](auto& table, int s) {
     const uint64_t bytes = expected.entries[s] * kBytesPerEntry;
-    if (bytes == 0 || bytes > affordable) return;
-    affordable -= bytes;
+    if (bytes == 0 || bytes > fits_budget) return;
+    fits_budget -= bytes;
     table.reserve(expected.entries[s]);
   };
   reserve(bricks_, kBrickLevels);

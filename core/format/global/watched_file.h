@@ -16,20 +16,20 @@ class WatchedFile {
 
   // Throws Error{kIo} if a part of the file could not be read since then; results made from it must
   // be discarded.
-  void expect_whole() const {
+  void check_readable() const {
     if (mapping_.is_damaged())
       throw Error(ErrorCode::kIo,
                   file_.path() + ": it became shorter, or its disk failed, while it was read");
   }
 
-  // Returns the result of work(), which must call expect_whole() before it publishes a result. Its
-  // errors may be caused by zeros.
+  // Returns the result of work(), which must call check_readable() before it publishes a result.
+  // Its errors may be caused by zeros.
   template <class Work>
   auto run(const Work& work) const {
     try {
       return work();
     } catch (const Error&) {
-      expect_whole();
+      check_readable();
       throw;
     }
   }

@@ -13,8 +13,8 @@ LookReader::LookReader(const Document& document, BufferReader& buffers, uint64_t
     : document_(document), buffers_(buffers) {
   constexpr uint64_t kBlockBytes = kBlockVertices * sizeof(SurfaceCorner);
   const uint64_t wanted = std::bit_ceil((vertices + kBlockVertices - 1) / kBlockVertices);
-  const uint64_t affordable = buffers.budget().available() / kShareOfFree / readers / kBlockBytes;
-  const uint64_t slots = std::clamp<uint64_t>(std::bit_floor(affordable), 1, wanted);
+  const uint64_t fits_budget = buffers.budget().available() / kShareOfFree / readers / kBlockBytes;
+  const uint64_t slots = std::clamp<uint64_t>(std::bit_floor(fits_budget), 1, wanted);
   corners_ =
       PageBuffer<SurfaceCorner>(buffers.budget(), static_cast<size_t>(slots * kBlockVertices),
                                 "texture coordinates of a scene");

@@ -9,11 +9,11 @@ namespace voxdag::gltf {
 VertexCache::VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches) {
   constexpr uint64_t kBlockBytes = kBlockVertices * 3 * sizeof(double);
   const uint64_t blocks = (vertices + kBlockVertices - 1) / kBlockVertices;
-  const uint64_t affordable = budget.available() / kShareOfFree / caches / kBlockBytes;
-  const uint64_t retained = std::min({blocks, kMaxRetainedBlocks, affordable / 2});
+  const uint64_t fits_budget = budget.available() / kShareOfFree / caches / kBlockBytes;
+  const uint64_t retained = std::min({blocks, kMaxRetainedBlocks, fits_budget / 2});
   const uint64_t wanted = std::bit_ceil(blocks);
   const uint64_t slots =
-      std::clamp<uint64_t>(std::min(wanted, std::bit_floor(affordable - retained)), 1, wanted);
+      std::clamp<uint64_t>(std::min(wanted, std::bit_floor(fits_budget - retained)), 1, wanted);
   const auto positions = [&](uint64_t count) {
     return PageBuffer<double>(budget, static_cast<size_t>(count * kBlockVertices * 3),
                               "vertices of a scene");

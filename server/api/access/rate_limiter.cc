@@ -5,19 +5,19 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kDepth_s = 2;
+constexpr double kDepthS = 2;
 // Above this count, full buckets are dropped, because a new bucket is also full.
 constexpr size_t kMaxBuckets = 10000;
-constexpr double kSweepInterval_s = 1;
+constexpr double kSweepIntervalS = 1;
 
 }  // namespace
 
 bool RateLimiter::take(const std::string& client, double now_s) {
   if (per_s_ <= 0) return true;
   std::lock_guard lock(mutex_);
-  const double depth = std::max(1.0, per_s_ * kDepth_s);
+  const double depth = std::max(1.0, per_s_ * kDepthS);
   if (buckets_.size() > kMaxBuckets && now_s >= next_sweep_s_) {
-    next_sweep_s_ = now_s + kSweepInterval_s;
+    next_sweep_s_ = now_s + kSweepIntervalS;
     std::erase_if(buckets_, [&](const auto& entry) {
       return entry.second.level + (now_s - entry.second.at_s) * per_s_ >= depth;
     });

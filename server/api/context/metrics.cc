@@ -23,7 +23,7 @@ void Metrics::count_request(int status, double wall_s) {
   std::lock_guard lock(mutex_);
   ++requests_[status];
   size_t bucket = 0;
-  while (bucket < kBounds_s.size() && wall_s > kBounds_s[bucket]) ++bucket;
+  while (bucket < kBoundsS.size() && wall_s > kBoundsS[bucket]) ++bucket;
   ++durations_[bucket];
   duration_sum_s_ += wall_s;
 }
@@ -57,10 +57,10 @@ std::string Metrics::text(const std::map<JobState, uint64_t>& jobs,
   write_header(out, "voxdag_http_request_duration_seconds", "histogram",
                "Time from the end of a request's header to its answer, without sending files.");
   uint64_t total = 0;
-  for (size_t i = 0; i <= kBounds_s.size(); ++i) {
+  for (size_t i = 0; i <= kBoundsS.size(); ++i) {
     total += durations_[i];
     out << "voxdag_http_request_duration_seconds_bucket{le=\"";
-    out << (i < kBounds_s.size() ? short_text(kBounds_s[i]) : "+Inf") << "\"} " << total << '\n';
+    out << (i < kBoundsS.size() ? short_text(kBoundsS[i]) : "+Inf") << "\"} " << total << '\n';
   }
   out << "voxdag_http_request_duration_seconds_sum " << duration_sum_s_
       << "\nvoxdag_http_request_duration_seconds_count " << total << '\n';

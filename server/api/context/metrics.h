@@ -32,11 +32,11 @@ class Metrics {
   std::string text(const std::map<JobState, uint64_t>& jobs, std::vector<Sample> samples) const;
 
  private:
-  static constexpr std::array<double, 8> kBounds_s = {0.001, 0.005, 0.01, 0.05, 0.1, 0.5, 1, 10};
+  static constexpr std::array<double, 8> kBoundsS = {0.001, 0.005, 0.01, 0.05, 0.1, 0.5, 1, 10};
 
   mutable std::mutex mutex_;  // guards all but the atomics
   std::map<int, uint64_t> requests_;
-  std::array<uint64_t, kBounds_s.size() + 1> durations_{};
+  std::array<uint64_t, kBoundsS.size() + 1> durations_{};
   double duration_sum_s_ = 0;
   std::map<std::string, uint64_t> runs_;  // by state
   uint64_t voxels_ = 0, result_bytes_ = 0;

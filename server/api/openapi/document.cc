@@ -121,7 +121,7 @@ Json describe(const Answer& answer) {
   return json;
 }
 
-bool takes_only_an_id(const Route& route) {
+bool has_only_id_parameter(const Route& route) {
   const auto streams = [](const Answer& answer) {
     return answer.contents.size() == 1 && answer.contents[0].type == "text/event-stream";
   };
@@ -135,7 +135,7 @@ bool takes_only_an_id(const Route& route) {
 Json job_links(const std::vector<Route>& routes) {
   Json links = Json::object();
   for (const Route& route : routes)
-    if (takes_only_an_id(route))
+    if (has_only_id_parameter(route))
       links[route.id] = {{"operationId", route.id}, {"parameters", {{"id", "$response.body#/id"}}}};
   return links;
 }

@@ -9,9 +9,9 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kProgressInterval_s = 0.5;
-constexpr double kKeepAliveInterval_s = 15;
-constexpr double kMaxWait_s = 1;
+constexpr double kProgressIntervalS = 0.5;
+constexpr double kKeepAliveIntervalS = 15;
+constexpr double kMaxWaitS = 1;
 
 std::string event_text(const char* name, const std::string& data, int64_t id = -1) {
   std::string text = "event: " + std::string(name) + "\n";
@@ -66,15 +66,15 @@ std::optional<std::string> EventFeed::next() {
   if (!ended_) add_progress(text);
   started_ = true;
   const double now = wall_seconds();
-  if (text.empty() && now - last_sent_s_ > kKeepAliveInterval_s) text = ": keep-alive\n\n";
+  if (text.empty() && now - last_sent_s_ > kKeepAliveIntervalS) text = ": keep-alive\n\n";
   if (!text.empty()) last_sent_s_ = now;
   return text;
 }
 
 void EventFeed::wait() {
   // Wakes up in time for progress that came too soon after the last event.
-  const double left_s = last_progress_s_ + kProgressInterval_s - wall_seconds();
-  context_.queue.wait_for_change(seen_version_, left_s > 0 ? left_s : kMaxWait_s);
+  const double left_s = last_progress_s_ + kProgressIntervalS - wall_seconds();
+  context_.queue.wait_for_change(seen_version_, left_s > 0 ? left_s : kMaxWaitS);
 }
 
 void EventFeed::add_changes(std::string& text) {
@@ -103,7 +103,7 @@ void EventFeed::add_progress(std::string& text) {
   if (!live) return;
   const uint64_t version = live->version();
   const double now = wall_seconds();
-  if (version == seen_progress_ || now - last_progress_s_ < kProgressInterval_s) return;
+  if (version == seen_progress_ || now - last_progress_s_ < kProgressIntervalS) return;
   const std::string progress = live->progress_json();
   if (progress.empty()) return;
   seen_progress_ = version;

@@ -12,7 +12,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kBufferBytes = 16384;
-constexpr double kLinger_s = 1;
+constexpr double kLingerS = 1;
 constexpr size_t kLingerBytes = 1 << 20;
 constexpr double kSteadyRates = 8;  // times the minimum rate
 
@@ -163,7 +163,7 @@ void Connection::linger() {
   tls_.shutdown();
   if (shutdown(socket_, SHUT_WR) != 0) return;
   table_.set_waiting(place_, 0, true);  // the first to be closed
-  const double deadline = wall_seconds() + kLinger_s;
+  const double deadline = wall_seconds() + kLingerS;
   for (size_t bytes = 0; bytes < kLingerBytes;) {
     pollfd waiting{socket_, POLLIN, 0};
     const double left_s = deadline - wall_seconds();

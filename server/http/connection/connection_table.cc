@@ -12,7 +12,7 @@ namespace voxdag::server {
 namespace {
 
 // A client within a body or an answer that was idle for less than this is considered active.
-constexpr double kMinExchangeWait_s = 0.25;
+constexpr double kMinExchangeWaitS = 0.25;
 constexpr std::chrono::seconds kMaxEvictionWait{1};
 
 }  // namespace
@@ -57,7 +57,7 @@ bool ConnectionTable::evict_one() {
   for (Entry& entry : entries_) {
     const bool may_be_closed =
         entry.waiting && !entry.evicted &&
-        (entry.between_requests || now - entry.waiting_since_s >= kMinExchangeWait_s);
+        (entry.between_requests || now - entry.waiting_since_s >= kMinExchangeWaitS);
     if (may_be_closed && (!longest || entry.waiting_since_s < longest->waiting_since_s))
       longest = &entry;
   }

@@ -16,7 +16,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr int kTick_ms = 100;
+constexpr int kTickMs = 100;
 constexpr size_t kMaxLineBytes = 4 << 20;
 
 // Blocks all signals of this thread while it exists. A child forked in that time receives pending
@@ -107,7 +107,7 @@ void ChildProcess::read_lines(const std::function<void(std::string_view)>& use,
   for (;;) {
     if (tick()) kill();
     pollfd waiting{output_, POLLIN, 0};
-    const int ready = poll(&waiting, 1, kTick_ms);
+    const int ready = poll(&waiting, 1, kTickMs);
     if (ready == 0 || (ready < 0 && errno == EINTR)) continue;
     const ssize_t got = read(output_, piece, sizeof piece);
     if (got < 0 && errno == EINTR) continue;
@@ -121,7 +121,7 @@ void ChildProcess::read_lines(const std::function<void(std::string_view)>& use,
   }
 }
 
-void ChildProcess::ask_to_stop() { send(SIGTERM); }
+void ChildProcess::request_stop() { send(SIGTERM); }
 void ChildProcess::kill() { send(SIGKILL); }
 
 void ChildProcess::send(int signal) {

@@ -30,7 +30,7 @@ class ChildProcess {
                   const std::function<bool()>& tick);
   // Sends SIGTERM, upon which a build stops at a checkpoint; a program that has not begun yet ends.
   // From any thread.
-  void ask_to_stop();
+  void request_stop();
   void kill();
 
   struct End {

@@ -14,8 +14,8 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kAdvanceInterval_s = 0.25;
-constexpr double kSubvolumesInterval_s = 1;
+constexpr double kAdvanceIntervalS = 0.25;
+constexpr double kSubvolumesIntervalS = 1;
 // Writing subvolumes.json takes at most this part of one core.
 constexpr double kMaxSubvolumesShare = 0.01;
 
@@ -141,7 +141,7 @@ void ProgressPipe::send(const Message& message) {
 
 void ProgressPipe::send_advance(bool now) {
   const double time_s = wall_seconds();
-  if (!now && time_s - last_advance_s_ < kAdvanceInterval_s) return;
+  if (!now && time_s - last_advance_s_ < kAdvanceIntervalS) return;
   last_advance_s_ = time_s;
   send(StageAdvanced{done_, total_});
 }
@@ -153,13 +153,13 @@ void ProgressPipe::report_subvolumes(bool now) {
   const double start_s = thread_cpu_seconds();
   write_subvolumes();
   const double pause_s = (thread_cpu_seconds() - start_s) / kMaxSubvolumesShare;
-  next_subvolumes_s_ = wall_seconds() + std::max(kSubvolumesInterval_s, pause_s);
+  next_subvolumes_s_ = wall_seconds() + std::max(kSubvolumesIntervalS, pause_s);
 }
 
 void ProgressPipe::tick(const std::stop_token& end) {
   std::unique_lock lock(mutex_);
   while (!end.stop_requested()) {
-    ticks_.wait_for(lock, end, std::chrono::duration<double>(kSubvolumesInterval_s),
+    ticks_.wait_for(lock, end, std::chrono::duration<double>(kSubvolumesIntervalS),
                     [] { return false; });
     report_subvolumes(false);
   }

@@ -15,9 +15,9 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kReadInterval_s = 1;
+constexpr double kReadIntervalS = 1;
 constexpr double kMaxCpuShare = 0.05;  // of one core
-constexpr double kMaxReading_s = 0.5;  // wall time of one reading
+constexpr double kMaxReadingS = 0.5;   // wall time of one reading
 constexpr size_t kDagDigits = 32;
 
 class PartialTileSource : public TileSource {
@@ -48,7 +48,7 @@ ReadLimiter::Charge::~Charge() {
 
 bool ReadLimiter::may_read() const { return wall_seconds() >= std::max(next_s_, idle_until_s_); }
 
-void ReadLimiter::note_read() { next_s_ = wall_seconds() + kReadInterval_s; }
+void ReadLimiter::note_read() { next_s_ = wall_seconds() + kReadIntervalS; }
 
 std::optional<uint64_t> GrowingDag::add(const CoarseCubes& cubes, uint32_t levels) {
   std::vector<PartialDag::Part> parts;
@@ -129,7 +129,7 @@ void PartialView::refresh(const std::string& work_folder) {
   limiter_.note_read();
   has_failed_ = true;
   try {
-    cubes_.refresh(files_, work_folder, kMaxReading_s);
+    cubes_.refresh(files_, work_folder, kMaxReadingS);
     if (cubes_.total() == 0)
       throw Error(ErrorCode::kNotFound, "the subvolumes are not planned yet");
   } catch (const Error& error) {

@@ -11,7 +11,7 @@ namespace voxdag::server {
 namespace {
 
 // Viewers of a job send requests more often than this.
-constexpr int kMinIdle_s = 10;
+constexpr int kMinIdleS = 10;
 
 }  // namespace
 
@@ -83,9 +83,9 @@ std::shared_ptr<PartialView> PartialViews::view_of(const std::string& job,
   if (auto view = find(job)) return view;
   if (entries_.size() == max_jobs_) {
     // A job that is being viewed keeps its entry: otherwise its viewers would take the next one's.
-    if (wall_seconds() - entries_.back().used_s < kMinIdle_s) {
+    if (wall_seconds() - entries_.back().used_s < kMinIdleS) {
       RequestError busy(RequestError::Kind::kBusy, "too many running jobs are being viewed");
-      busy.retry_after_s = kMinIdle_s;
+      busy.retry_after_s = kMinIdleS;
       throw busy;
     }
     entries_.pop_back();

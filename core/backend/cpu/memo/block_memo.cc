@@ -16,10 +16,10 @@ constexpr uint64_t kMaxSlots = uint64_t{1} << 16;  // more would exceed the CPU 
 }  // namespace
 
 BlockMemo::BlockMemo(PooledMemory& memory) : memory_(memory) {
-  set_slots(affordable(kFirstSlots) ? kFirstSlots : kMinSlots);
+  set_slots(fits_budget(kFirstSlots) ? kFirstSlots : kMinSlots);
 }
 
-bool BlockMemo::affordable(uint64_t slots) const {
+bool BlockMemo::fits_budget(uint64_t slots) const {
   return slots * (sizeof(VoxelBlock) + sizeof(Node)) <=
          BackendMemory::block_memo_bytes(memory_.budget.available());
 }
@@ -34,7 +34,7 @@ void BlockMemo::set_slots(uint64_t slots) {
 void BlockMemo::grow() {
   inserted_ = 0;
   const uint64_t old_slots = slots_, slots = 4 * slots_;
-  if (slots > kMaxSlots || !affordable(slots)) return;
+  if (slots > kMaxSlots || !fits_budget(slots)) return;
   const PooledArray<VoxelBlock> blocks = std::move(blocks_);
   const PooledArray<Node> nodes = std::move(nodes_);
   set_slots(slots);

@@ -62,7 +62,7 @@ class BlockMemo {
   static constexpr int64_t kBypass = 16 * kWindow;
 
   uint64_t slot_of(uint64_t key) const { return key * 0x9e3779b97f4a7c15ull >> shift_; }
-  bool affordable(uint64_t slots) const;
+  bool fits_budget(uint64_t slots) const;
   void set_slots(uint64_t slots);
   // Makes four times the slots if the budget has room for them.
   void grow();

@@ -55,7 +55,7 @@ const PlaneMemo::KnownPlane* PlaneMemo::find(const TriangleSet& triangles, Entry
                                              uint64_t tiles) {
   if (entry.wide()) return nullptr;
   if (known_.size() == 0) {
-    if (!affordable(triangles.narrow_count() * sizeof(uint32_t))) return nullptr;
+    if (!fits_budget(triangles.narrow_count() * sizeof(uint32_t))) return nullptr;
     known_ = PooledArray<uint32_t>(memory_, triangles.narrow_count(), PooledArray<uint32_t>::kZero);
   }
   uint32_t& known = known_[entry.number()];
@@ -77,7 +77,7 @@ uint32_t PlaneMemo::add_plane(const Plane& plane) {
   }
   if (plane_count_ == kMaxPlanes) return kNever;
   if (plane_count_ == planes_.size()) {
-    if (!affordable((plane_count_ + 256) * sizeof(KnownPlane))) return kNever;
+    if (!fits_budget((plane_count_ + 256) * sizeof(KnownPlane))) return kNever;
     planes_.grow(memory_, plane_count_ + 256);
   }
   planes_[plane_count_] = {plane, direction};
@@ -87,13 +87,13 @@ uint32_t PlaneMemo::add_plane(const Plane& plane) {
 PlaneDirection* PlaneMemo::direction_of(const Plane& plane) {
   for (PooledArray<PlaneDirection>& direction : directions_)
     if (direction[0].is_direction_of(plane)) return direction.data();
-  if (!affordable((directions_.size() + 1) * sizeof(PlaneDirection))) return nullptr;
+  if (!fits_budget((directions_.size() + 1) * sizeof(PlaneDirection))) return nullptr;
   directions_.emplace_back(memory_, 1);
   directions_.back()[0].set_up(plane);
   return directions_.back().data();
 }
 
-bool PlaneMemo::affordable(uint64_t bytes) const {
+bool PlaneMemo::fits_budget(uint64_t bytes) const {
   return bytes <=
          BackendMemory::plane_table_bytes(memory_.budget.limit(), memory_.budget.available());
 }
@@ -162,7 +162,7 @@ NodeRef PlaneMemo::make_small_node(const Plane& plane, int64_t f, int size_log2)
 void PlaneMemo::reserve_small_nodes() {
   if ((small_count_ + kSpareSlots) * 2 <= small_slots_) return;
   const uint64_t slots = small_slots_ == 0 ? kMinPlaneSlots : 2 * small_slots_;
-  if (small_slots_ != 0 && !affordable(slots * sizeof(SmallNode))) {
+  if (small_slots_ != 0 && !fits_budget(slots * sizeof(SmallNode))) {
     std::fill(small_nodes_.begin(), small_nodes_.end(), SmallNode{});
     small_count_ = 0;
     return;

@@ -57,7 +57,7 @@ class PlaneMemo {
   const KnownPlane* find(const TriangleSet& triangles, Entry entry, uint64_t tiles);
   uint32_t add_plane(const Plane& plane);
   PlaneDirection* direction_of(const Plane& plane);
-  bool affordable(uint64_t bytes) const;
+  bool fits_budget(uint64_t bytes) const;
 
   NodeRef small_node(const Plane& plane, int64_t f, int size_log2);
   NodeRef make_small_node(const Plane& plane, int64_t f, int size_log2);

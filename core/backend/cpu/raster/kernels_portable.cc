@@ -27,7 +27,7 @@ struct PlainQuad {
     return {x[0] * o.x[0], x[1] * o.x[1], x[2] * o.x[2], x[3] * o.x[3]};
   }
   PlainQuad rotated() const { return {x[1], x[2], x[0], x[3]}; }
-  PlainQuad above_zero() const {
+  PlainQuad clamp_to_zero() const {
     PlainQuad out(0.0);
     for (int i = 0; i < 4; ++i) out.x[i] = x[i] > 0 ? x[i] : 0;
     return out;

@@ -10,7 +10,7 @@
 //
 // Quad is a vector of four doubles with load(coordinates, origin), arithmetic and
 //   rotated()        elements 1, 2, 0, 3
-//   above_zero()     max(x, 0)
+//   clamp_to_zero()     max(x, 0)
 //   negative()       the sign bits, one per element
 #pragma once
 
@@ -113,7 +113,7 @@ struct OctantTest {
     const Quad sign(normal[d] < 0 ? -1.0 : 1.0);
     const Quad a = (vq - vq.rotated()) * sign, b = (vp.rotated() - vp) * sign;
     const Quad at_low = Quad(0.0) - (a * vp + b * vq);
-    const Quad rise_a = a.above_zero(), rise_b = b.above_zero();
+    const Quad rise_a = a.clamp_to_zero(), rise_b = b.clamp_to_zero();
     const Quad size = rise_a + rise_b + (rise_a - a) + (rise_b - b);
     const Quad slack = size * Quad(reach * kRoundingSlack), half4(half);
     const Quad highest = at_low + (rise_a + rise_b) * half4 + slack;

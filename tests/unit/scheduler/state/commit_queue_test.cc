@@ -92,7 +92,7 @@ class CommitQueueTest : public testing::Test {
   static constexpr uint32_t kLevels = 10, kBits = 64;
   static constexpr size_t kSubvolumes = 200;
   static constexpr uint64_t kGroup = 60000;  // bytes: a few artifacts
-  static constexpr double kNever_s = 1e9;
+  static constexpr double kNeverS = 1e9;
 
   CommitQueueTest() {
     std::vector<StoredSubvolume> plan(kSubvolumes);
@@ -141,7 +141,7 @@ class CommitQueueTest : public testing::Test {
   JobStore store_{folder_.file("job.db"), JobStore::Access::kBuild};
   MemoryStore triangles_{system_files(), folder_.file("spill"), false, budget_};
   CommitQueue queue_{store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 0, budget_),
-                     triangles_, kNever_s, kGroup};
+                     triangles_, kNeverS, kGroup};
   SegmentWriter& segment_ = queue_.segment();
   std::vector<StoredSubvolume> planned_;
   size_t next_ = 0;
@@ -214,7 +214,7 @@ TEST_F(CommitQueueTest, FinishedQueuesBecomeDurableEachForItself) {
   CommitQueues queues;
   for (uint32_t id = 1; id <= 3; ++id) {
     auto segment = std::make_unique<SegmentWriter>(disk_, folder_.path(), id, budget_);
-    auto queue = std::make_unique<CommitQueue>(store_, std::move(segment), triangles_, kNever_s);
+    auto queue = std::make_unique<CommitQueue>(store_, std::move(segment), triangles_, kNeverS);
     build_one(*queue);
     queue->finish();
     queues.add(std::move(queue));
@@ -254,7 +254,7 @@ TEST_F(CommitQueueTest, DurableTrianglesStayUntilTheirSubvolumesAreRecorded) {
   writer.append(0, FixedTriangle{});
   writer.flush();
   CommitQueue queue(store_, std::make_unique<SegmentWriter>(disk_, folder_.path(), 1, budget_),
-                    durable, kNever_s);
+                    durable, kNeverS);
   disk_.block_syncs();
   build_one(queue, bin);
   queue.commit_in_background();

@@ -37,7 +37,7 @@ struct SingleLanes {
 };
 constexpr SingleLanes kLanes;
 
-VOXDAG_INLINE int64_t above_zero(int64_t a) { return a > 0 ? a : 0; }
+VOXDAG_INLINE int64_t clamp_to_zero(int64_t a) { return a > 0 ? a : 0; }
 VOXDAG_INLINE int64_t magnitude(int64_t a) { return a < 0 ? -a : a; }
 
 template <int D>
@@ -49,7 +49,7 @@ class Heights {
     const double column_unit = inverse * static_cast<double>(int64_t{1} << kColumnBits);
     step_p_ = static_cast<int64_t>(-4.0 * static_cast<double>(np) * column_unit);
     step_q_ = static_cast<int64_t>(-4.0 * static_cast<double>(nq) * column_unit);
-    const int64_t lowest = t.lowest + 3 * (above_zero(np) + above_zero(nq));
+    const int64_t lowest = t.lowest + 3 * (clamp_to_zero(np) + clamp_to_zero(nq));
     origin_ = static_cast<int64_t>(-static_cast<double>(lowest) * column_unit -
                                    kLowered * (int64_t{1} << (kColumnBits - kHeightBits)));
     const double unit = inverse * (1 << kHeightBits);

@@ -24,7 +24,7 @@ struct Avx2Quad {
   Avx2Quad operator-(const Avx2Quad& o) const { return Avx2Quad(_mm256_sub_pd(x, o.x)); }
   Avx2Quad operator*(const Avx2Quad& o) const { return Avx2Quad(_mm256_mul_pd(x, o.x)); }
   Avx2Quad rotated() const { return Avx2Quad(_mm256_permute4x64_pd(x, 0b11'00'10'01)); }
-  Avx2Quad above_zero() const { return Avx2Quad(_mm256_max_pd(x, _mm256_setzero_pd())); }
+  Avx2Quad clamp_to_zero() const { return Avx2Quad(_mm256_max_pd(x, _mm256_setzero_pd())); }
   uint32_t negative() const { return static_cast<uint32_t>(_mm256_movemask_pd(x)); }
 };
 

@@ -28,7 +28,7 @@ TEST(ChildProcesses, AreStoppedBeforeTheirProgramBegins) {
   const HandlesTerm handler;
   for (int i = 0; i < 20; ++i) {
     ChildProcess child({{"/bin/sleep", "10"}, folder.file("log"), 0});
-    child.ask_to_stop();
+    child.request_stop();
     child.read_lines([](std::string_view) {}, [] { return false; });
     const ChildProcess::End end = child.wait();
     ASSERT_EQ(end.signal, SIGTERM) << "child " << i << " ended with status " << end.exit_status;
