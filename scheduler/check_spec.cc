@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <bit>
+#include <filesystem>
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/io/overwrite.h"
-#include "scene/triangle_source.h"
+#include "scheduler/spec/build_report.h"
 #include "scheduler/stages/build/choose_backend.h"
 #include "scheduler/stages/ingest/ingest.h"
+#include "scheduler/state/build_locks.h"
+#include "scheduler/state/job/build_job.h"
 #include "scheduler/state/work_folder.h"
 
 namespace voxdag {
@@ -18,6 +21,8 @@ namespace {
 constexpr uint64_t kColorResolution = 4096;
 
 [[noreturn]] void refuse(const std::string& what) { throw Error(ErrorCode::kInvalidInput, what); }
+
+bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
 
 }  // namespace
 
@@ -51,7 +56,7 @@ BuildSpec checked(const BuildSpec& spec) {
   return out;
 }
 
-void refuse_own_files(const BuildSpec& spec, const std::string& work_folder,
+void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
                       std::span<const std::string> outputs, const BuildContext& context) {
   FileSystem& files = context.files;
   std::vector<std::string> own = WorkFolder::files_in(files, work_folder);
@@ -64,13 +69,37 @@ void refuse_own_files(const BuildSpec& spec, const std::string& work_folder,
     return file && begins_with(*file, std::string_view("\0", 1));
   });
   if (!is_first && !is_unknown) return;
-  MemoryBudget budget(spec.run.memory_bytes);
-  const auto scene =
-      open_scene(files, spec.geometry.scenes, {.skip_invalid = spec.geometry.skip_invalid}, budget,
-                 context.cancel);
   std::vector<std::string> inputs;
-  for (const SourceFile& file : scene->files()) inputs.push_back(file.path);
+  for (const SourceFile& file : scene.open().files()) inputs.push_back(file.path);
   refuse_inputs(files, own, inputs);
+}
+
+void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& context) {
+  FileSystem& files = context.files;
+  const std::string& output = spec.run.output;
+  const std::string work = work_folder_of(spec.run);
+  if (output.empty())
+    throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
+  if (output.ends_with('/'))
+    throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a file, not a folder");
+  const auto resolved = [](const std::string& path) {
+    return std::filesystem::weakly_canonical(path + "/.");
+  };
+  if (!spec.run.cache_folder.empty() && resolved(spec.run.cache_folder) == resolved(work))
+    throw Error(ErrorCode::kInvalidInput,
+                work + " is both the cache (--cache) and the work folder: expected two folders");
+  const std::string partial = output + ".partial", report = report_path(output);
+  const std::string outputs[] = {output, partial, report, report + ".partial",
+                                 OutputLock::path_of(output)};
+  refuse_own_files(spec, scene, work, outputs, context);
+  refuse_foreign_file(files, output, is_global_file, " (-o)");
+  // If a job is in the work folder, the file is ours even if its first bytes are damaged.
+  if (!files.exists(WorkFolder::store_path(work)))
+    refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
+  refuse_foreign_file(files, report, is_report, " (-o)");
+  refuse_foreign_file(files, report + ".partial", is_report, " (-o)");
+  files.make_directories(parent_directory(output));
+  if (!spec.run.cache_folder.empty()) files.make_directories(spec.run.cache_folder);
 }
 
 }  // namespace voxdag

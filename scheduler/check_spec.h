@@ -5,6 +5,7 @@
 #include <string>
 
 #include "scheduler/spec/build_spec.h"
+#include "scheduler/state/build_scene.h"
 
 namespace voxdag {
 
@@ -15,7 +16,11 @@ BuildSpec checked(const BuildSpec& spec);
 // Throws Error{kInvalidInput} if the scene reads one of `outputs` or a file of the work folder,
 // which the build would overwrite or remove. Files that only the scene names, as its buffers, are
 // looked up where no earlier build can have done so.
-void refuse_own_files(const BuildSpec& spec, const std::string& work_folder,
+void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
                       std::span<const std::string> outputs, const BuildContext& context);
+
+// Refuses now an output that could not be written once all is built, and folders and files whose
+// writing would destroy a scene or a file that is not ours.
+void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& context);
 
 }  // namespace voxdag

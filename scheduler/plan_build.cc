@@ -23,7 +23,8 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   const std::string folder = full.run.work_folder.empty()
                                  ? make_temporary_folder(temporary_parent() + "/voxdag-plan-")
                                  : full.run.work_folder;
-  refuse_own_files(full, folder, {}, context);
+  BuildScene source(full.geometry, folder, budget, context);
+  refuse_own_files(full, source, folder, {}, context);
   WorkFolder work(context, folder, full.run.lock_wait_s);
   // Removes spilled triangles; a job in the given work folder stays as it is.
   struct Cleanup {
@@ -32,9 +33,9 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
     ~Cleanup() { own_folder ? work.remove() : work.remove_spilled(); }
   } cleanup{work, full.run.work_folder.empty()};
   IngestCheckpoint no_checkpoints(full, nullptr, work, context);
-  const PreparedScene scene = prepare_scene(full, budget, clock, context, no_checkpoints);
+  const PreparedScene scene = prepare_scene(full, source, budget, clock, context, no_checkpoints);
   Estimate estimate =
-      estimate_build(full.geometry, scene, plan_pilot_levels(scene.state.grid.levels),
+      estimate_build(full.geometry, scene, source, plan_pilot_levels(scene.state.grid.levels),
                      {context, full.run.threads, budget});
   estimate.free_disk = context.files.free_space(work.path());
   return estimate;

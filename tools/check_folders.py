@@ -68,6 +68,7 @@ LAYERS = {
         "scheduler/stages/partition",
         "scheduler/stages/plan",
         "scheduler/stages/ingest",
+        "scheduler/state/job",
         "scheduler/state/checkpoint",
         "scheduler/state",
         "scheduler/triangles",

@@ -48,15 +48,11 @@ ErrorCode code_of(const SlurmEnd& end) {
   return ErrorCode::kIo;
 }
 
-std::string merge_request_of(const BuildSpec& spec, const BuildContext& context) {
-  MemoryBudget budget(spec.run.memory_bytes);
-  const auto scene =
-      open_scene(context.files, spec.geometry.scenes, {.skip_invalid = spec.geometry.skip_invalid},
-                 budget, context.cancel);
+std::string merge_request_of(const BuildSpec& spec, const TriangleSource& scene) {
   std::string text = geometry_json(spec.geometry);
-  std::vector<SourceFile> files = scene->files();
+  std::vector<SourceFile> files = scene.files();
   if (spec.geometry.attributes.any())
-    for (const ImageSource& image : scene->materials().images) files.push_back(image.file);
+    for (const ImageSource& image : scene.materials().images) files.push_back(image.file);
   for (const auto& [path, identity] : files)
     text += '\0' + path + '\0' + std::to_string(identity.bytes) + '\0' +
             std::to_string(identity.modified_ns);
@@ -65,14 +61,15 @@ std::string merge_request_of(const BuildSpec& spec, const BuildContext& context)
 
 }  // namespace
 
-MergeJob::MergeJob(const BuildSpec& spec, const std::string& work_folder,
-                   const BuildContext& context, CommandRunner& commands)
+MergeJob::MergeJob(const BuildSpec& spec, const TriangleSource& scene,
+                   const std::string& work_folder, const BuildContext& context,
+                   CommandRunner& commands)
     : spec_(spec),
       options_(*spec.run.cluster),
       context_(context),
       folder_(work_folder),
       slurm_(commands, context.cancel),
-      request_(merge_request_of(spec, context)) {}
+      request_(merge_request_of(spec, scene)) {}
 
 std::optional<BuildReport> MergeJob::finished() const {
   const std::string path = report_path(spec_.run.output);

@@ -12,6 +12,7 @@
 #include <set>
 #include <string>
 
+#include "scene/triangle_source.h"
 #include "scheduler/slurm/commands/slurm.h"
 #include "scheduler/slurm/files/cluster_folder.h"
 #include "scheduler/slurm/files/cluster_state.h"
@@ -23,8 +24,8 @@ namespace voxdag {
 class MergeJob {
  public:
   // `spec` and `context` must outlive this.
-  MergeJob(const BuildSpec& spec, const std::string& work_folder, const BuildContext& context,
-           CommandRunner& commands);
+  MergeJob(const BuildSpec& spec, const TriangleSource& scene, const std::string& work_folder,
+           const BuildContext& context, CommandRunner& commands);
 
   // The geometry options and the scene's files, those of its images too if there are to be colors,
   // with their sizes and times, as a digest; of the time when this was made.

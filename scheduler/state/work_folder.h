@@ -36,7 +36,7 @@ class WorkFolder {
   static std::vector<std::string> files_in(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
   // What a scene's compressed geometry is decoded to.
-  std::string decoded_path() const { return path_ + "/decoded.vdspill"; }
+  static std::string decoded_path(const std::string& folder) { return folder + "/decoded.vdspill"; }
   // Triangles that outlive a run.
   std::string durable_path() const { return path_ + "/triangles.vddurable"; }
   // Colors of cubes that outlive a run.

@@ -96,7 +96,6 @@ struct ColorStage::State {
   const StageContext context;
   const ColorGrid grid;
   const std::vector<Cube> cubes;
-  std::unique_ptr<TriangleSource> scene;
   SceneMaterials materials;
   std::vector<StoredAttribute> attributes;
   std::vector<std::string> images;  // their digests
@@ -135,10 +134,7 @@ bool ColorStage::State::is_stored(const ColorStore& artifacts, size_t cube) cons
 
 void ColorStage::State::open() {
   const BuildContext& build = context.build;
-  scene = open_scene(build.files, source.options.scenes,
-                     {source.options.skip_invalid, source.work_folder + "/decoded.vdspill"},
-                     context.budget, build.cancel);
-  materials = scene->materials();
+  materials = source.scene.open().materials();
   materials.name_unlisted();
   const AttributeSet& wanted = source.options.attributes;
   for (const Attribute attribute : wanted.list())
@@ -164,8 +160,8 @@ void ColorStage::State::read_surfaces() {
       .record_bytes = triangle_record_bytes(source.options.bounds.has_value()),
       .digest = source.digest,
       .buffer_bytes = MemoryPlan::divide(context.budget.limit()).partition_buffer_bytes};
-  surfaces = bin_surfaces(*scene, binning, *store, context);
-  scene.reset();
+  surfaces = bin_surfaces(source.scene.open(), binning, *store, context);
+  source.scene.close();
   trim_heap();
   for (const StoredAttribute& attribute : attributes)
     for (auto& of_attribute = keys.emplace_back(); of_attribute.size() < cubes.size();) {

@@ -17,10 +17,12 @@
 #include "core/geometry/grid.h"
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/spec/stage_totals.h"
+#include "scheduler/state/build_scene.h"
 
 namespace voxdag {
 
 struct ColorSource {
+  BuildScene& scene;
   const GeometryOptions& options;  // with attributes and a color resolution
   Grid grid;
   std::string digest;            // of the scene's triangles, as ingest read them

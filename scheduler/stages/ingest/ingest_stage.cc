@@ -41,9 +41,9 @@ TopTreeCells cells_of(const TopTree& top) { return {top.cells(), top.total_weigh
 
 class Preparation {
  public:
-  Preparation(const BuildSpec& spec, MemoryBudget& budget, const BuildContext& context,
-              IngestCheckpoint& checkpoint)
-      : spec_(spec), budget_(budget), context_(context), checkpoint_(checkpoint) {}
+  Preparation(const BuildSpec& spec, BuildScene& scene, MemoryBudget& budget,
+              const BuildContext& context, IngestCheckpoint& checkpoint)
+      : spec_(spec), scene_(scene), budget_(budget), context_(context), checkpoint_(checkpoint) {}
 
   PreparedScene run(StageClock& clock) {
     state_ = checkpoint_.resume().value_or(IngestState{});
@@ -58,40 +58,33 @@ class Preparation {
   }
 
  private:
-  void reopen() {
-    scene_ = open_scene(context_.files, spec_.geometry.scenes,
-                        {spec_.geometry.skip_invalid, checkpoint_.decoded_path()}, budget_,
-                        context_.cancel);
-  }
-
   void open() {
-    const int64_t opened_ns = unix_ns();
-    reopen();
-    if (!checkpoint_.matches(scene_->files())) {
+    if (!checkpoint_.matches(scene_.open().files())) {
       state_ = {};
-      enable_checkpoints(opened_ns);
+      enable_checkpoints();
     }
-    state_.declared_triangles = scene_->declared_triangles();
-    if (state_.position == 0) checkpoint_.check_disk_space(*scene_);
-    for (const std::string& warning : scene_->warnings()) context_.progress.warn(warning);
+    const TriangleSource& scene = scene_.open();
+    state_.declared_triangles = scene.declared_triangles();
+    if (state_.position == 0) checkpoint_.check_disk_space(scene);
+    for (const std::string& warning : scene.warnings()) context_.progress.warn(warning);
   }
 
   // Waits until the scene's files are old enough to trust their times, if that is soon.
-  void enable_checkpoints(int64_t opened_ns) {
+  void enable_checkpoints() {
     checkpoint_.forget();
-    if (!checkpoint_.is_worthwhile(*scene_)) return;
-    const int64_t wait_ns = trusted_from_ns(scene_->files()) - opened_ns;
+    if (!checkpoint_.is_worthwhile(scene_.open())) return;
+    const int64_t wait_ns = trusted_from_ns(scene_.open().files()) - scene_.opened_ns();
     if (wait_ns > 0 && wait_ns <= kMaxWait_ns) {
       std::this_thread::sleep_for(std::chrono::nanoseconds(wait_ns));
-      opened_ns = unix_ns();
-      reopen();
+      scene_.close();
     }
-    checkpoint_.enable(*scene_, opened_ns);
+    const TriangleSource& scene = scene_.open();
+    checkpoint_.enable(scene, scene_.opened_ns());
   }
 
   void find_grid() {
     if (!spec_.geometry.bounds)
-      scan(*scene_, state_, stage_context(), [&] {
+      scan(scene_.open(), state_, stage_context(), [&] {
         if (checkpoint_.is_due()) checkpoint_.save(state_);
       });
     state_.grid = choose_grid(spec_.geometry, state_.bounds);
@@ -113,7 +106,7 @@ class Preparation {
     if (checkpoint_.has_top_tree(state_))
       checkpoint_.load_top_tree(state_, top.fill(state_.top_tree_weight));
     if (state_.stage == IngestStage::kIngest) {
-      ingest(*scene_, state_, *prepared_.triangles, top, stage_context(), [&] {
+      ingest(scene_.open(), state_, *prepared_.triangles, top, stage_context(), [&] {
         if (checkpoint_.is_due()) checkpoint_.save_in_background(state_, cells_of(top));
       });
       state_.stage = IngestStage::kPartition;
@@ -126,20 +119,21 @@ class Preparation {
   StageContext stage_context() const { return {context_, spec_.run.threads, budget_}; }
 
   const BuildSpec& spec_;
+  BuildScene& scene_;
   MemoryBudget& budget_;
   const MemoryPlan memory_ = MemoryPlan::divide(budget_.limit());
   const BuildContext& context_;
   IngestCheckpoint& checkpoint_;
-  std::unique_ptr<TriangleSource> scene_;
   PreparedScene prepared_;
   IngestState& state_ = prepared_.state;
 };
 
 }  // namespace
 
-PreparedScene prepare_scene(const BuildSpec& spec, MemoryBudget& budget, StageClock& clock,
-                            const BuildContext& context, IngestCheckpoint& checkpoint) {
-  return Preparation(spec, budget, context, checkpoint).run(clock);
+PreparedScene prepare_scene(const BuildSpec& spec, BuildScene& scene, MemoryBudget& budget,
+                            StageClock& clock, const BuildContext& context,
+                            IngestCheckpoint& checkpoint) {
+  return Preparation(spec, scene, budget, context, checkpoint).run(clock);
 }
 
 }  // namespace voxdag

@@ -10,6 +10,7 @@
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/spec/stage_clock.h"
 #include "scheduler/stages/ingest/top_tree.h"
+#include "scheduler/state/build_scene.h"
 #include "scheduler/state/checkpoint/ingest_checkpoint.h"
 #include "scheduler/triangles/triangle_store.h"
 
@@ -30,7 +31,8 @@ struct PreparedScene {
 // Scans and ingests the scene of a checked spec and plans its subvolumes, resuming at the
 // checkpoint of an earlier run; the scene is not opened if that one was past ingest. Throws
 // DamagedTriangles if the stored triangles are damaged.
-PreparedScene prepare_scene(const BuildSpec& spec, MemoryBudget& budget, StageClock& clock,
-                            const BuildContext& context, IngestCheckpoint& checkpoint);
+PreparedScene prepare_scene(const BuildSpec& spec, BuildScene& scene, MemoryBudget& budget,
+                            StageClock& clock, const BuildContext& context,
+                            IngestCheckpoint& checkpoint);
 
 }  // namespace voxdag

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "scene/textures/texture_set.h"
-#include "scene/triangle_source.h"
 #include "scheduler/spec/memory_plan.h"
 
 namespace voxdag {
@@ -46,12 +45,11 @@ EstimateRange above(const EstimateRange& range, double limit) {
 
 }  // namespace
 
-ColorEstimate estimate_colors(const GeometryOptions& options, const EstimateRange& cells,
-                              uint64_t triangles, const StageContext& context) {
+ColorEstimate estimate_colors(const GeometryOptions& options, BuildScene& scene,
+                              const EstimateRange& cells, uint64_t triangles,
+                              const StageContext& context) {
   const BuildContext& build = context.build;
-  const auto scene = open_scene(build.files, options.scenes, {.skip_invalid = options.skip_invalid},
-                                context.budget, build.cancel);
-  SceneMaterials materials = scene->materials();
+  SceneMaterials materials = scene.open().materials();
   materials.name_unlisted();
   if (!options.attributes.use_images()) materials.drop_images();
   const auto image_bytes =

@@ -5,6 +5,7 @@
 
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/stages/plan/estimate_range.h"
+#include "scheduler/state/build_scene.h"
 
 namespace voxdag {
 
@@ -20,7 +21,8 @@ struct ColorEstimate {
 };
 
 // `options` with a color resolution. Opens the scene and the headers of its images.
-ColorEstimate estimate_colors(const GeometryOptions& options, const EstimateRange& cells,
-                              uint64_t triangles, const StageContext& context);
+ColorEstimate estimate_colors(const GeometryOptions& options, BuildScene& scene,
+                              const EstimateRange& cells, uint64_t triangles,
+                              const StageContext& context);
 
 }  // namespace voxdag

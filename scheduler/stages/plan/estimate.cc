@@ -153,7 +153,7 @@ void add_colors(const ColorEstimate& colors, Estimate& estimate) {
 // An upper bound for the disk that a build of the scene needs, computed without pilots: several
 // times what it will need.
 double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
-                      const StageContext& context) {
+                      BuildScene& source, const StageContext& context) {
   // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
   // (expected_work()): over all levels twice its bricks, and one cube per level.
   double bricks = 0;
@@ -166,9 +166,10 @@ double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene
   const double cells =
       kMaxCellsPerBrick * bricks * std::exp2(-2.0 * (scene.state.grid.levels - color_levels)) +
       triangles;
-  return geometry + estimate_colors(options, exactly(cells), scene.state.counts.triangles, context)
-                        .disk_bytes()
-                        .high;
+  return geometry +
+         estimate_colors(options, source, exactly(cells), scene.state.counts.triangles, context)
+             .disk_bytes()
+             .high;
 }
 
 void check_disk(const char* what, const EstimateRange& bytes, const std::string& folder,
@@ -207,7 +208,7 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
 }  // namespace
 
 Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
-                        uint32_t pilot_levels, const StageContext& context) {
+                        BuildScene& source, uint32_t pilot_levels, const StageContext& context) {
   const MemoryBudget& budget = context.budget;
   Estimate estimate;
   estimate.triangles = scene.state.counts.triangles;
@@ -254,13 +255,13 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
                                 static_cast<int>(last.levels);
     const EstimateRange cells = within(grow_as_surface(before.voxels, last.voxels, color_doublings),
                                        1.02 + 0.02 * std::abs(color_doublings));
-    add_colors(estimate_colors(options, cells, estimate.triangles, context), estimate);
+    add_colors(estimate_colors(options, source, cells, estimate.triangles, context), estimate);
   }
   estimate.wall_s = (1.05 / std::max(1u, context.threads)) * estimate.cpu_s;
   return estimate;
 }
 
-bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene,
+bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
                       const std::string& work_folder, MemoryBudget& budget,
                       const BuildContext& context) {
   const uint32_t levels = scene.state.grid.levels;
@@ -269,8 +270,10 @@ bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene,
   const uint64_t free_bytes =
       std::min(context.files.free_space(work_folder), context.files.free_space(output_folder));
   const StageContext stage{context, spec.run.threads, budget};
-  if (max_disk_bytes(spec.geometry, scene, stage) < static_cast<double>(free_bytes)) return false;
-  const Estimate estimate = estimate_build(spec.geometry, scene, levels - kPilotLevelsBelow, stage);
+  if (max_disk_bytes(spec.geometry, scene, source, stage) < static_cast<double>(free_bytes))
+    return false;
+  const Estimate estimate =
+      estimate_build(spec.geometry, scene, source, levels - kPilotLevelsBelow, stage);
   check_estimate(estimate, context.files, work_folder, output_folder, context.progress);
   return true;
 }

@@ -39,12 +39,12 @@ struct Estimate {
 // most 2^pilot_levels voxels per edge: the finer, the better the estimate and the longer it takes.
 // The pilots run on this thread, within the budget.
 Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
-                        uint32_t pilot_levels, const StageContext& context);
+                        BuildScene& source, uint32_t pilot_levels, const StageContext& context);
 
 // Whether the disk has space for a build, before anything is built: throws Error{kNoSpace} if it
 // cannot fit, unless it is forced; warns if it may not. Returns whether that took an estimate,
 // which runs a pilot build.
-bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene,
+bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
                       const std::string& work_folder, MemoryBudget& budget,
                       const BuildContext& context);
 

@@ -47,12 +47,6 @@ double max_durable_bytes(const BuildSpec& spec, uint64_t triangles) {
   return triangles < spec.run.durable_min_triangles ? 0 : copies_bytes(spec, triangles);
 }
 
-int64_t unix_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_REALTIME, &now);
-  return now.tv_sec * kSecond_ns + now.tv_nsec;
-}
-
 int64_t trusted_from_ns(const std::vector<SourceFile>& files) {
   int64_t trusted = 0;
   for (const auto& [path, identity] : files) {

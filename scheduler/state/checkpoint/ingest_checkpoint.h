@@ -71,9 +71,6 @@ class IngestCheckpoint {
   // lets a later run know the scene without reading it.
   void finish();
 
-  // Where the scene may decode compressed geometry.
-  std::string decoded_path() const { return work_.decoded_path(); }
-
   // Whether the job store has a checkpoint, of whatever scene.
   bool has_saved();
   // Removes all checkpoints, and disables them until the next enable().
@@ -108,6 +105,5 @@ double max_durable_bytes(const BuildSpec& spec, uint64_t triangles);
 // The Unix time from which on a change of these files shows in their identities; INT64_MAX if one
 // of them is not known.
 int64_t trusted_from_ns(const std::vector<SourceFile>& files);
-int64_t unix_ns();
 
 }  // namespace voxdag

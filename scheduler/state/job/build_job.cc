@@ -1,0 +1,71 @@
+#include "scheduler/state/job/build_job.h"
+
+#include <exception>
+
+#include "core/base/error.h"
+
+namespace voxdag {
+namespace {
+
+std::unique_ptr<JobStore> open_job_store(FileSystem& files, const WorkFolder& work, bool restart) {
+  try {
+    return std::make_unique<JobStore>(work.store_path(), JobStore::Access::kBuild);
+  } catch (const Error& error) {
+    const bool is_not_ours = error.code() == ErrorCode::kInvalidInput;
+    const bool is_unreadable =
+        error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kUnsupportedVersion;
+    // A file that is no job store is replaced only if an earlier build used the folder.
+    if (!restart || !(is_unreadable || (is_not_ours && work.was_there()))) throw;
+  }
+  for (const char* suffix : {"", "-wal", "-shm", "-journal"})
+    if (files.exists(work.store_path() + suffix)) files.remove(work.store_path() + suffix);
+  return std::make_unique<JobStore>(work.store_path(), JobStore::Access::kBuild);
+}
+
+}  // namespace
+
+std::string work_folder_of(const RunOptions& options) {
+  return options.work_folder.empty() ? options.output + ".work" : options.work_folder;
+}
+
+BuildJob::BuildJob(const BuildSpec& spec_of_build, BuildScene& scene_of_build,
+                   MemoryBudget& budget_of_build, const BuildContext& outside)
+    : spec(spec_of_build),
+      scene(scene_of_build),
+      budget(budget_of_build),
+      output_lock(lock_output(outside, spec.run.output, spec.run.lock_wait_s)),
+      work(outside, work_folder_of(spec.run), spec.run.lock_wait_s),
+      store(open_job_store(outside.files, work, spec.run.restart)),
+      progress(outside.progress, *store, work),
+      context{outside.files, progress, outside.cancel},
+      checkpoint(spec, store.get(), work, context),
+      start_over(spec.run.restart) {
+  if (!spec.run.cache_folder.empty())
+    cache.emplace(context.files, spec.run.cache_folder, spec.run.cache_bytes);
+  report.output = spec.run.output;
+  report.hash_bits = spec.geometry.hash_bits;
+  report.threads = spec.run.threads;
+  report.memory_bytes = spec.run.memory_bytes;
+}
+
+std::vector<StoredSubvolume> BuildJob::planned() const {
+  std::vector<StoredSubvolume> leaves = store->leaves();
+  std::erase_if(leaves,
+                [](const StoredSubvolume& s) { return s.state != SubvolumeState::kPlanned; });
+  return leaves;
+}
+
+void BuildJob::commit_best_effort() {
+  try {
+    commits.commit();
+  } catch (const std::exception&) {
+  }
+}
+
+void BuildJob::refuse(const std::string& difference) const {
+  throw Error(ErrorCode::kInvalidInput,
+              "the work folder " + work.path() + " holds another job: " + difference +
+                  "; give another folder (--work) or start over (--restart)");
+}
+
+}  // namespace voxdag

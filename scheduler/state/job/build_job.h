@@ -1,0 +1,62 @@
+// What the stages of one build share: its spec, its locks, its durable state and its report. While
+// it exists no other build has the output or the work folder.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/dag/sub_dag.h"
+#include "scheduler/spec/build_report.h"
+#include "scheduler/spec/build_spec.h"
+#include "scheduler/spec/stage_clock.h"
+#include "scheduler/state/artifact_cache.h"
+#include "scheduler/state/build_locks.h"
+#include "scheduler/state/build_scene.h"
+#include "scheduler/state/checkpoint/ingest_checkpoint.h"
+#include "scheduler/state/commit_queue.h"
+#include "scheduler/state/job_progress.h"
+#include "scheduler/state/job_store.h"
+#include "scheduler/state/work_folder.h"
+
+namespace voxdag {
+
+struct BuildJob {
+  // Takes the locks and opens the job store. With RunOptions::restart a job store that cannot be
+  // read is replaced. The references must outlive this.
+  BuildJob(const BuildSpec& spec, BuildScene& scene, MemoryBudget& budget,
+           const BuildContext& context);
+
+  StageContext stage() const { return {context, spec.run.threads, budget}; }
+  DagShape shape() const {
+    return {.grid_levels = report.grid.levels, .hash_bits = spec.geometry.hash_bits};
+  }
+  // The subvolumes that are not built.
+  std::vector<StoredSubvolume> planned() const;
+  // Records finished work. Errors are ignored: the build is already failing with its first error.
+  void commit_best_effort();
+  // Throws Error{kInvalidInput}: the work folder holds another job.
+  [[noreturn]] void refuse(const std::string& difference) const;
+
+  const BuildSpec& spec;
+  BuildScene& scene;
+  MemoryBudget& budget;
+  const OutputLock output_lock;
+  WorkFolder work;
+  std::unique_ptr<JobStore> store;
+  std::optional<ArtifactCache> cache;
+  CommitQueues commits;
+  StageClock clock{[this](const StageTime& stage) { store->add_stage_time(stage); }};
+  JobProgress progress;
+  const BuildContext context;
+  IngestCheckpoint checkpoint;
+  BuildReport report;
+  bool start_over;  // the stored job does not count
+};
+
+// The work folder of a build with these options.
+std::string work_folder_of(const RunOptions& options);
+
+}  // namespace voxdag
