@@ -5,7 +5,7 @@
 
 #include "core/base/error.h"
 #include "merge/checkpoint/merge_recovery.h"
-#include "merge/merge_pass.h"
+#include "merge/pass/merge_pass.h"
 #include "merge/plan/pending_artifacts.h"
 
 namespace voxdag {

@@ -57,6 +57,17 @@ BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 
 # Folders whose inner folders are in layers: each includes only itself and folders further down.
 LAYERS = {
+    "merge": [
+        "merge",
+        "merge/checkpoint",
+        "merge/pass",
+        "merge/fallback",
+        "merge/sort",
+        "merge/plan",
+        "merge/output",
+        "merge/load",
+        "merge/types",
+    ],
     "scheduler": [
         "scheduler",
         "scheduler/slurm",

@@ -9,7 +9,7 @@
 #include "merge/fallback/heap_merge.h"
 #include "merge/load/hash_partition.h"
 #include "merge/merge.h"
-#include "merge/merge_level.h"
+#include "merge/pass/merge_level.h"
 #include "merge/plan/artifact_set.h"
 #include "merge/sort/bucket_sorter.h"
 

@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "merge/checkpoint/state_saver.h"
-#include "merge/merge_pass.h"
+#include "merge/pass/merge_pass.h"
 #include "merge/plan/pending_artifacts.h"
+#include "merge/types/checkpoint.h"
+#include "merge/types/merge_inputs.h"
 
 namespace voxdag {
 

@@ -16,7 +16,7 @@
 #include "core/format/global/global_writer.h"
 #include "merge/load/scratch_file.h"
 #include "merge/load/top_tree_run.h"
-#include "merge/merge.h"
+#include "merge/types/merge_report.h"
 
 namespace voxdag {
 

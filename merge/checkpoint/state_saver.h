@@ -14,6 +14,7 @@
 
 #include "core/base/clock.h"
 #include "merge/checkpoint/merge_state.h"
+#include "merge/types/checkpoint.h"
 
 namespace voxdag {
 

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "merge/merge_context.h"
+#include "merge/plan/merge_context.h"
 
 namespace voxdag {
 

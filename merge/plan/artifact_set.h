@@ -10,7 +10,6 @@
 
 #include "core/base/memory_budget.h"
 #include "core/format/artifact/artifact_reader.h"
-#include "merge/merge.h"
 
 namespace voxdag {
 

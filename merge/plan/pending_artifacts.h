@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "merge/merge.h"
 #include "merge/output/pass_segment.h"
 #include "merge/plan/artifact_set.h"
+#include "merge/types/merge_inputs.h"
 
 namespace voxdag {
 

@@ -1,10 +1,10 @@
-#include "merge/merge_pass.h"
+#include "merge/pass/merge_pass.h"
 
 #include <algorithm>
 #include <memory>
 
 #include "core/base/error.h"
-#include "merge/merge_level.h"
+#include "merge/pass/merge_level.h"
 
 namespace voxdag {
 namespace {

@@ -1,4 +1,4 @@
-#include "merge/merge_level.h"
+#include "merge/pass/merge_level.h"
 
 #include <algorithm>
 #include <optional>

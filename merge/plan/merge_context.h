@@ -11,9 +11,9 @@
 #include "merge/load/level_run.h"
 #include "merge/load/position_maps.h"
 #include "merge/load/scratch_file.h"
-#include "merge/merge.h"
 #include "merge/output/level_output.h"
 #include "merge/plan/merge_memory.h"
+#include "merge/types/merge_report.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag {

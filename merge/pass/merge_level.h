@@ -3,7 +3,7 @@
 // the level above. Buckets and groups of equal hashes that are too large for that go to fallback/.
 #pragma once
 
-#include "merge/merge_context.h"
+#include "merge/plan/merge_context.h"
 
 namespace voxdag {
 

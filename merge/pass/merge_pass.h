@@ -9,7 +9,7 @@
 
 #include "core/format/artifact/artifact_reader.h"
 #include "merge/load/top_tree_run.h"
-#include "merge/merge_context.h"
+#include "merge/plan/merge_context.h"
 
 namespace voxdag {
 

@@ -1,0 +1,30 @@
+// The inputs of a merge. A plain value.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/dag/sub_dag.h"
+#include "core/format/artifact/artifact.h"
+#include "core/io/file_system.h"
+
+namespace voxdag {
+
+struct MergeInputs {
+  DagShape shape;
+  // The artifacts of the subvolumes, in any order; none for an empty scene. Their cubes are
+  // disjoint.
+  std::vector<ArtifactRef> artifacts;
+  // Opens the segment file with an id.
+  std::function<std::shared_ptr<ReadableFile>(uint32_t)> open_segment;
+  // A folder for data that does not fit in memory, used only by this merge. After the merge it has
+  // only the files named by the state in the checkpoint.
+  std::string scratch_folder;
+  // The least CPU time between two checkpoints, in seconds.
+  double checkpoint_interval_s = 2;
+};
+
+}  // namespace voxdag

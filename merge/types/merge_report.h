@@ -1,0 +1,19 @@
+// The report of a finished merge. A plain value.
+#pragma once
+
+#include <cstdint>
+
+namespace voxdag {
+
+struct MergeReport {
+  uint64_t voxels = 0;
+  uint64_t svo_nodes = 0;  // top tree included
+  uint64_t dag_nodes = 0;
+  uint64_t input_nodes = 0;  // rows of all runs of all passes
+  uint32_t passes = 0;       // 1 if all runs were merged in one pass
+  uint64_t scratch_bytes = 0;
+  uint64_t hash_partitions = 0;
+  uint64_t streamed_groups = 0;  // groups of equal hashes that did not fit in memory
+};
+
+}  // namespace voxdag
