@@ -122,7 +122,7 @@ INCLUDED_BY = {
 
 # Below these folders a folder and its parent may still include each other. The list may only
 # shrink.
-NESTED_CYCLES_LEFT = ("merge/", "query/export/", "scene/")
+NESTED_CYCLES_LEFT = ("query/export/", "scene/")
 
 # Third-party headers, and the folders where each may be included.
 THIRD_PARTY = {
