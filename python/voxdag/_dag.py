@@ -135,7 +135,7 @@ class Dag:
         origins: Any,
         directions: Any,
         max_distance: float = np.inf,
-        stop_at: float = 1,
+        stop_size: float = 1,
         *,
         world: bool = False,
         threads: int = 1,
@@ -143,7 +143,7 @@ class Dag:
         """The first set voxel on each ray, (N, 3) origins and directions of any length; one of
         them may be a single row for all.
 
-        `stop_at` is the edge of the cells, in voxels, that are hit as a whole: 1 for voxels.
+        `stop_size` is the edge of the cells, in voxels, that are hit as a whole: 1 for voxels.
         """
         starts = _rows(origins, np.float64, "origins")
         ways = _rows(directions, np.float64, "directions")
@@ -161,7 +161,7 @@ class Dag:
             np.empty((len(starts), 3), np.int8),
         )
         self._dag.rays(
-            starts, ways, float(max_distance) / unit, float(stop_at), *hits, thread_count(threads)
+            starts, ways, float(max_distance) / unit, float(stop_size), *hits, thread_count(threads)
         )
         np.multiply(hits.distance, unit, out=hits.distance)
         return hits
