@@ -2,10 +2,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "cli/build_options.h"
+#include "cli/option_fields.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "scheduler/run_build.h"
+#include "scheduler/spec/build_fields.h"
 #include "scheduler/slurm/commands/slurm.h"
 #include "scheduler/slurm/run_batch.h"
 
@@ -13,9 +14,7 @@ namespace voxdag::cli {
 namespace {
 
 struct BuildCommand {
-  BuildOptions options;
-  RunOptions run;
-  std::string cache_size;
+  BuildSpec spec;
   ClusterOptions cluster;
   bool cluster_merge = false;
   std::string merge_options;
@@ -95,15 +94,8 @@ void take_allocation(RunOptions& run) {
 }
 
 void run(const BuildCommand& command, CommandContext& context) {
-  BuildSpec spec = command.options.spec();
-  spec.run.output = command.run.output;
-  spec.run.keep_work = command.run.keep_work;
-  spec.run.cache_folder = command.run.cache_folder;
-  if (!command.cache_size.empty())
-    spec.run.cache_bytes = parse_size(command.cache_size, "--cache-size");
-  spec.run.restart = command.run.restart;
-  spec.run.force = command.run.force;
-  if (!command.cluster.engine.empty()) {
+  BuildSpec spec = command.spec;
+  if (command.cluster.engine != ClusterEngine::kNone) {
     spec.run.cluster = command.cluster;
     spec.run.cluster->program_version = VOXDAG_VERSION;
     if (command.cluster.is_merge_job)
@@ -126,53 +118,23 @@ void run(const BuildCommand& command, CommandContext& context) {
 }
 
 void declare(Command& command, BuildCommand& state) {
-  state.options.declare(command);
-  state.options.declare_work_folder(command);
-  command.option("-o,--output", state.run.output, "the .vdag file to write").required();
-  command.option("--cache", state.run.cache_folder, "folder in which builds share subvolumes");
-  command.option("--cache-size", state.cache_size, "limit of the cache folder (default: 16GiB)");
-  command.flag("--keep-work", state.run.keep_work, "do not remove the work folder");
-  command.flag("--restart", state.run.restart, "start over instead of resuming the work folder");
-  command.flag("--force", state.run.force, "build even if the estimate says it cannot fit");
-  constexpr const char* kCluster = "Cluster (docs/cluster.md)";
-  const Option engine =
-      command.option("--cluster", state.cluster.engine, "build on a cluster: slurm")
-          .one_of({"slurm"})
-          .group(kCluster);
+  OptionDeclarer options(command, Scope::kBuild);
+  fields(options, state.spec);
+  command.config_option();
+  fields(options, state.cluster);
+  const char* const heading = kClusterHeading;
   const Option merge =
-      command.flag("--cluster-merge", state.cluster_merge, "merge in a job of the cluster, too")
-          .needs(engine)
-          .group(kCluster);
+      command.flag("--cluster-merge", state.cluster_merge, "merge in a job of the cluster as well")
+          .needs(options.at("cluster"))
+          .group(heading);
   command
       .option("--cluster-merge-options", state.merge_options,
               "options of sbatch for that job, after those of --cluster-options")
       .needs(merge)
-      .group(kCluster);
+      .group(heading);
   command.flag(kMergeJobFlag, state.cluster.is_merge_job, "this process is that job")
       .needs(merge)
       .group("");
-  command.option("--cluster-tasks", state.cluster.tasks, "tasks (default: by expected work)")
-      .positive()
-      .group(kCluster);
-  command
-      .option("--cluster-running", state.cluster.max_running,
-              "tasks of an array that run at a time (default: as many as the cluster starts)")
-      .positive()
-      .group(kCluster);
-  command
-      .option("--cluster-options", state.cluster.submit_options,
-              "options of sbatch, such as \"--partition=x --mem=8G --time=2:00:00\"")
-      .group(kCluster);
-  command
-      .option("--cluster-retries", state.cluster.max_retries,
-              "how often a batch that fails is submitted again")
-      .show_default()
-      .group(kCluster);
-  command
-      .option("--cluster-grace", state.cluster.grace_s,
-              "seconds that the shared disk may take to show what a task wrote")
-      .show_default()
-      .group(kCluster);
   command.json_flag(state.json);
 }
 

@@ -81,6 +81,13 @@ template Option Command::option(const char*, std::optional<uint64_t>&, const cha
 template Option Command::option(const char*, std::string&, const char*);
 template Option Command::option(const char*, std::vector<std::string>&, const char*);
 
+Option Command::text_option(const char* names, const char* value_name,
+                            std::function<void(const std::string&)> set,
+                            const std::string& description) {
+  return Option(app_->add_option_function<std::string>(names, std::move(set), description)
+                    ->type_name(value_name));
+}
+
 Option Command::flag(const char* names, bool& value, const char* description) {
   return Option(app_->add_flag(names, value, description));
 }

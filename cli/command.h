@@ -62,6 +62,11 @@ class Command {
   // a vector of strings.
   template <class T>
   Option option(const char* names, T& value, const char* description);
+  // An option of any type: `set` parses the text and throws Error if it is invalid. `value_name`
+  // stands for the value in the help.
+  Option text_option(const char* names, const char* value_name,
+                     std::function<void(const std::string& text)> set,
+                     const std::string& description);
   Option flag(const char* names, bool& value, const char* description);
   void json_flag(bool& value,
                  const char* description = "report as one JSON object on standard output");

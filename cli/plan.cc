@@ -1,18 +1,18 @@
 #include <cstdio>
 
-#include "cli/build_options.h"
+#include "cli/option_fields.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/slurm/cluster_plan.h"
+#include "scheduler/spec/build_fields.h"
 
 namespace voxdag::cli {
 namespace {
 
 struct PlanCommand {
-  BuildOptions options;
-  std::string cluster;
-  uint64_t cluster_tasks = 0;
+  BuildSpec spec;
+  ClusterOptions cluster;
   bool json = false;
 };
 
@@ -54,16 +54,15 @@ void print(const ClusterPlan& plan) {
 
 void run(const PlanCommand& command, CommandContext& context) {
   const auto progress = make_progress_bar();
-  const Estimate estimate =
-      plan_build(command.options.spec(), {context.files, *progress, context.cancel});
-  if (command.cluster.empty()) {
+  const Estimate estimate = plan_build(command.spec, {context.files, *progress, context.cancel});
+  if (command.cluster.engine == ClusterEngine::kNone) {
     if (command.json)
       std::printf("%s\n", estimate_json(estimate).c_str());
     else
       print(estimate);
     return;
   }
-  const ClusterPlan plan = plan_cluster(estimate, command.cluster_tasks);
+  const ClusterPlan plan = plan_cluster(estimate, command.cluster.tasks);
   if (command.json) {
     std::printf("%s\n", cluster_plan_json(estimate, plan).c_str());
   } else {
@@ -73,12 +72,10 @@ void run(const PlanCommand& command, CommandContext& context) {
 }
 
 void declare(Command& command, PlanCommand& state) {
-  state.options.declare(command);
-  state.options.declare_work_folder(command);
-  command.option("--cluster", state.cluster, "also what a cluster would take: slurm")
-      .one_of({"slurm"});
-  command.option("--cluster-tasks", state.cluster_tasks, "tasks (default: by expected work)")
-      .positive();
+  OptionDeclarer options(command, Scope::kPlan);
+  fields(options, state.spec);
+  command.config_option();
+  fields(options, state.cluster);
   command.json_flag(state.json);
 }
 

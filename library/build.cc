@@ -11,10 +11,6 @@
 namespace voxdag {
 namespace {
 
-// By BackendName and MethodName.
-constexpr const char* kBackends[] = {"auto", "cpu", "cuda", "parallel-host"};
-constexpr const char* kMethods[] = {"", "consing", "pointers", "hashes"};
-
 BuildSpec spec_of(const BuildOptions& options) {
   BuildSpec spec;
   GeometryOptions& geometry = spec.geometry;
@@ -41,8 +37,8 @@ BuildSpec spec_of(const BuildOptions& options) {
   run.memory_bytes = options.memory_bytes;
   run.threads = options.threads;
   run.subvolume_edge = options.subvolume_edge;
-  run.backend = kBackends[static_cast<size_t>(options.backend)];
-  run.method = kMethods[static_cast<size_t>(options.method)];
+  run.backend = options.backend;
+  run.method = options.method;
   return spec;
 }
 

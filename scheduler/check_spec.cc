@@ -1,13 +1,12 @@
 #include "scheduler/check_spec.h"
 
 #include <algorithm>
-#include <bit>
 #include <filesystem>
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/io/overwrite.h"
-#include "scheduler/spec/build_report.h"
+#include "scheduler/spec/build_fields.h"
 #include "scheduler/stages/build/choose_backend.h"
 #include "scheduler/stages/ingest/ingest.h"
 #include "scheduler/state/build_locks.h"
@@ -20,8 +19,6 @@ namespace {
 // Default resolution of the color grid: colors do not repeat as geometry does.
 constexpr uint64_t kColorResolution = 4096;
 
-[[noreturn]] void refuse(const std::string& what) { throw Error(ErrorCode::kInvalidInput, what); }
-
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
 
 }  // namespace
@@ -29,23 +26,10 @@ bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"outp
 BuildSpec checked(const BuildSpec& spec) {
   const GeometryOptions& g = spec.geometry;
   const RunOptions& r = spec.run;
-  levels_of_resolution(g.resolution);
   if (g.scenes.empty())
-    refuse("no scene was given: expected at least one .glb, .gltf or .ply file");
-  if (g.hash_bits < 4 || g.hash_bits > 64)
-    refuse("hash bits " + std::to_string(g.hash_bits) + ": expected 4 to 64");
-  if (g.bounds && g.voxel_size) refuse("bounds and a voxel size were both given: expected one");
-  if (r.memory_bytes && r.memory_bytes < kMinMemory)
-    refuse("memory " + std::to_string(r.memory_bytes) + " bytes: expected at least 64 MiB");
-  const uint64_t edge = r.subvolume_edge;
-  if (edge && ((edge & (edge - 1)) || edge < static_cast<uint64_t>(kSmallestEdge)))
-    refuse("subvolume edge " + std::to_string(edge) + ": expected a power of two from 64 voxels");
-  if (g.color_resolution && !g.attributes.any())
-    refuse("a color resolution was given without colors: expected both (--color, or --attributes)");
-  if (g.color_resolution && (!std::has_single_bit(g.color_resolution) || g.color_resolution < 4 ||
-                             g.color_resolution > g.resolution))
-    refuse("color resolution " + std::to_string(g.color_resolution) +
-           ": expected a power of two from 4 to the resolution, " + std::to_string(g.resolution));
+    throw Error(ErrorCode::kInvalidInput,
+                "no scene was given: expected at least one .glb, .gltf or .ply file");
+  check_options(spec);
   choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that makes no grid
   check_backend(r);
   BuildSpec out = spec;

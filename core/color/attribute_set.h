@@ -81,19 +81,4 @@ inline Attribute attribute_named(std::string_view name, const std::string& optio
               option + ": '" + std::string(name) + "' is no attribute: expected " + expected);
 }
 
-inline void add_attribute(AttributeSet& set, std::string_view name, const std::string& option) {
-  set.add(attribute_named(name, option));
-}
-
-// Returns the attributes of a comma list.
-inline AttributeSet parse_attributes(std::string_view text, const std::string& option) {
-  AttributeSet set;
-  for (size_t at = 0; at <= text.size();) {
-    const size_t end = std::min(text.find(',', at), text.size());
-    add_attribute(set, text.substr(at, end - at), option);
-    at = end + 1;
-  }
-  return set;
-}
-
 }  // namespace voxdag

@@ -18,6 +18,14 @@ std::string exact_size_text(uint64_t bytes) {
   return std::to_string(bytes) + kUnits[unit];
 }
 
+std::optional<uint64_t> size_of_text(const std::string& text) {
+  try {
+    return parse_size(text, "");
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 size_t character_count(std::string_view text) {
   return static_cast<size_t>(std::ranges::count_if(
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));

@@ -104,8 +104,8 @@ concept NamedEnum = std::is_enum_v<E> && requires(E e) {
   enum_names(e);
 };
 
-// Of a set of names, such as AttributeSet: `names(set)`, `add(set, name)`, which returns whether
-// there is such a name, and the list `all()`.
+// Describes a set of names, such as AttributeSet: `names(set)`, `add(set, name)`, which returns
+// false for an unknown name, and the list `all()`.
 template <class T>
 struct NameSetTraits;
 template <class T>
@@ -166,7 +166,7 @@ template <NamedEnum E>
 std::optional<E> enum_of(std::string_view text) {
   const auto names = enum_names(E{});
   for (size_t i = 0; i < names.size(); ++i)
-    if (text == names[i] && !text.empty()) return static_cast<E>(i);
+    if (text == names[i]) return static_cast<E>(i);
   return std::nullopt;
 }
 
@@ -174,6 +174,8 @@ std::optional<E> enum_of(std::string_view text) {
 std::string joined(const std::vector<std::string>& words, const char* separator = ", ");
 // "64MiB": a size that parse_size() reads, in the largest unit that is exact.
 std::string exact_size_text(uint64_t bytes);
+// The bytes of a size such as "8GiB"; nothing for another text.
+std::optional<uint64_t> size_of_text(const std::string& text);
 // UTF-8 characters.
 size_t character_count(std::string_view text);
 // The spelling of a field on the command line: "--hash-bits".
@@ -198,7 +200,9 @@ std::string expectation(const Field& field) {
                             field.min ? std::to_string(*field.min) : std::to_string(Limits::min()),
                             field.max ? std::to_string(*field.max) : std::to_string(Limits::max()));
   } else if constexpr (std::is_floating_point_v<T>) {
-    return field.is_above_zero ? "a finite number above 0" : "a finite number";
+    if (field.is_above_zero) return "a finite number above 0";
+    return field.min ? "a finite number, " + std::to_string(*field.min) + " or more"
+                     : "a finite number";
   } else if constexpr (IsNumbers<T>::value) {
     return std::to_string(std::tuple_size_v<T>) + " finite numbers " + field.parts +
            (field.is_above_zero ? ", the last one above 0" : "");
@@ -230,7 +234,8 @@ bool fits(const Field& field, const T& value) {
     if (!field.min && !field.max) return true;
     return std::in_range<int64_t>(value) && fits_integer_limits(field, static_cast<int64_t>(value));
   } else if constexpr (std::is_floating_point_v<T>) {
-    return std::isfinite(value) && (!field.is_above_zero || value > 0);
+    return std::isfinite(value) && (!field.is_above_zero || value > 0) &&
+           (!field.min || value >= static_cast<double>(*field.min));
   } else if constexpr (IsNumbers<T>::value) {
     for (const double number : value)
       if (!std::isfinite(number)) return false;
@@ -283,7 +288,9 @@ bool parse_text(const Field& field, const std::string& text, T& value) {
     value = inner;
   } else if constexpr (std::is_arithmetic_v<T>) {
     if (field.is_bytes) {
-      value = static_cast<T>(parse_size(text, option_name(field.name)));
+      const auto bytes = size_of_text(text);
+      if (!bytes) return false;
+      value = static_cast<T>(*bytes);
     } else {
       const auto number = parse_numbers<T, 1>(text, ',');
       if (!number) return false;
@@ -295,7 +302,7 @@ bool parse_text(const Field& field, const std::string& text, T& value) {
     value = *numbers;
   } else if constexpr (NamedEnum<T>) {
     const auto found = enum_of<T>(text);
-    if (!found) return false;
+    if (!found || text.empty()) return false;
     value = *found;
   } else if constexpr (NameSet<T>) {
     for (size_t at = 0; at <= text.size();) {

@@ -76,8 +76,10 @@ FieldJson encode(T value) {
   return object;
 }
 
-// The members of `options` that differ from those of `defaults`.
+// Returns the members of `options` that differ from the members of `defaults`.
 FieldJson difference(const FieldJson& options, const FieldJson& defaults);
+
+inline constexpr size_t kMaxNames = 64;  // of a set of names in options
 
 // Records have all members, options the given ones.
 enum class Members { kAll, kGiven };
@@ -93,10 +95,8 @@ void decode_integer(const Field& field, const FieldJson& json, T& value) {
     return true;
   };
   if (field.is_bytes && json.is_string()) {
-    try {
-      if (take(parse_size(json.get<std::string>(), field.name))) return;
-    } catch (const Error&) {
-    }
+    const auto bytes = size_of_text(json.get<std::string>());
+    if (bytes && take(*bytes)) return;
   } else if (whole_number(json, take, take)) {
     return;
   }
@@ -123,7 +123,7 @@ void decode_value(const Field& field, const FieldJson& json, Members members, T&
     value = json.get<std::string>();
   } else if constexpr (NamedEnum<T>) {
     const auto found = json.is_string() ? enum_of<T>(json.get<std::string>()) : std::nullopt;
-    expect(found.has_value());
+    expect(found && (members == Members::kAll || *name_of(*found)));
     value = *found;
   } else if constexpr (IsNumbers<T>::value) {
     expect(json.is_array() && json.size() == value.size());
@@ -131,16 +131,19 @@ void decode_value(const Field& field, const FieldJson& json, Members members, T&
       decode_value(Field(field.name), json[i], members, value[i]);
   } else if constexpr (NameSet<T>) {
     std::vector<std::string> names;
-    decode_value(Field(field.name), json, members, names);
-    expect(members == Members::kAll || !names.empty());
+    const size_t max_items = members == Members::kGiven ? kMaxNames : 0;
+    decode_value(Field(field.name).items(max_items), json, members, names);
     for (const std::string& name : names) expect(NameSetTraits<T>::add(value, name));
   } else if constexpr (IsVector<T>::value) {
-    // A list of options may be a single item.
-    const bool is_item = members == Members::kGiven && !json.is_array();
+    // In options, a list of limited length may be a single item. Nothing is copied: copying a value
+    // of a request recurses as deep as the value is nested.
+    const bool is_item = members == Members::kGiven && field.max_items > 0 && !json.is_array();
     expect(is_item || json.is_array());
     value.clear();
-    for (const FieldJson& item : is_item ? FieldJson::array({json}) : json)
-      decode_value(field, item, members, value.emplace_back());
+    if (is_item)
+      decode_value(field, json, members, value.emplace_back());
+    else
+      for (const FieldJson& item : json) decode_value(field, item, members, value.emplace_back());
   } else if constexpr (Described<T>) {
     decode(json, field.name, members, value);
   } else {
@@ -227,7 +230,8 @@ FieldJson options_json(const T& options) {
   return json_fields::difference(json_fields::encode(options), json_fields::encode(T{}));
 }
 
-// Sets the options that are given. Throws FieldError that names the member.
+// Sets the options that are given. Throws FieldError that names the member; `name` is what messages
+// call the object.
 template <class T>
 void set_options(const FieldJson& json, const std::string& name, T& options) {
   json_fields::decode(json, name, json_fields::Members::kGiven, options);

@@ -37,6 +37,7 @@ FieldJson value_schema(const Field& field, Members members) {
   } else if constexpr (NameSet<T>) {
     schema = {{"type", "array"},
               {"minItems", 1},
+              {"maxItems", kMaxNames},
               {"items", {{"type", "string"}, {"enum", NameSetTraits<T>::all()}}}};
   } else if constexpr (IsNumbers<T>::value) {
     return numbers_schema(field, std::tuple_size_v<T>);

@@ -4,63 +4,80 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "core/base/text.h"
+#include <algorithm>
+
 #include "core/io/file_system.h"
 #include "python/native/bindings.h"
 #include "python/native/long_work.h"
 #include "python/native/path_text.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
+#include "scheduler/spec/build_fields.h"
 
 namespace voxdag::python {
 namespace {
 
-// What Python gives; the names are those of the command line.
+// Takes the options out of a dict of keyword arguments; None is as if it were not given.
+class KeywordReader {
+ public:
+  explicit KeywordReader(nb::dict given) : given_(std::move(given)) {}
+
+  template <class T>
+  void operator()(const Field& field, T& value) {
+    if (!given_.contains(field.name)) return;
+    const nb::object object = given_[field.name];
+    nb::del(given_[field.name]);
+    if (object.is_none()) return;
+    const T standard = value;
+    if (!read(field, object, value) || (value != standard && !fits(field, value)))
+      throw Error(ErrorCode::kInvalidInput, std::string(field.name) + "=" +
+                                                nb::repr(object).c_str() + ": expected " +
+                                                expectation<T>(field));
+  }
+
+  void refuse_others() const {
+    for (const auto [name, value] : given_)
+      throw Error(ErrorCode::kInvalidInput,
+                  std::string(nb::str(name).c_str()) + ": expected an option of voxdag.build()");
+  }
+
+ private:
+  template <class T>
+  static bool read(const Field& field, const nb::object& object, T& value) {
+    if constexpr (IsOptional<T>::value) {
+      return read(field, object, value.emplace());
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      PathText text;
+      if (!nb::try_cast<PathText>(object, text)) return false;
+      value = std::move(text.bytes);
+      return true;
+    } else if constexpr (NamedEnum<T> || std::is_integral_v<T>) {
+      if constexpr (std::is_integral_v<T>)
+        if (!nb::isinstance<nb::str>(object)) return nb::try_cast<T>(object, value);
+      std::string text;
+      return (NamedEnum<T> || field.is_bytes) && nb::try_cast<std::string>(object, text) &&
+             parse_text(field, text, value);
+    } else if constexpr (NameSet<T>) {
+      std::vector<std::string> names;
+      return nb::try_cast<std::vector<std::string>>(object, names) &&
+             std::ranges::all_of(names, [&](const std::string& name) {
+               return NameSetTraits<T>::add(value, name);
+             });
+    } else {
+      return nb::try_cast<T>(object, value);
+    }
+  }
+
+  nb::dict given_;
+};
+
 BuildSpec spec_of(std::vector<PathText> scenes, uint64_t resolution, nb::dict options) {
   BuildSpec spec;
   for (PathText& scene : scenes) spec.geometry.scenes.push_back(std::move(scene.bytes));
   spec.geometry.resolution = resolution;
-  // Takes the option out of `options`; None is as if it were not given.
-  const auto take = [&](const char* name, auto& value) {
-    if (!options.contains(name)) return;
-    const nb::object given = options[name];
-    nb::del(options[name]);
-    if (given.is_none()) return;
-    using Value = std::remove_reference_t<decltype(value)>;
-    if (!nb::try_cast<Value>(given, value))
-      throw Error(ErrorCode::kInvalidInput,
-                  std::string(name) + "=" + nb::repr(given).c_str() + ": expected another type");
-  };
-  std::string memory;
-  PathText output, work, cache;
-  take("output", output);
-  spec.run.output = output.bytes;
-  take("bounds", spec.geometry.bounds);
-  take("voxel_size", spec.geometry.voxel_size);
-  take("skip_invalid", spec.geometry.skip_invalid);
-  take("hash_bits", spec.geometry.hash_bits);
-  std::vector<std::string> attributes;
-  take("color", spec.geometry.attributes[Attribute::kColor]);
-  take("attributes", attributes);
-  for (const std::string& name : attributes)
-    add_attribute(spec.geometry.attributes, name, "attributes");
-  take("color_resolution", spec.geometry.color_resolution);
-  take("work", work);
-  spec.run.work_folder = work.bytes;
-  take("memory", memory);
-  take("threads", spec.run.threads);
-  take("subvolume", spec.run.subvolume_edge);
-  take("backend", spec.run.backend);
-  take("method", spec.run.method);
-  take("cache", cache);
-  spec.run.cache_folder = cache.bytes;
-  take("keep_work", spec.run.keep_work);
-  take("restart", spec.run.restart);
-  take("force", spec.run.force);
-  for (const auto [name, value] : options)
-    throw Error(ErrorCode::kInvalidInput,
-                std::string(nb::str(name).c_str()) + ": expected an option of voxdag.build()");
-  if (!memory.empty()) spec.run.memory_bytes = parse_size(memory, "memory");
+  KeywordReader reader(std::move(options));
+  fields(reader, spec);
+  reader.refuse_others();
   return spec;
 }
 

@@ -1,19 +1,75 @@
 #include "scheduler/spec/build_spec.h"
 
-#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/fields/json_fields.h"
+#include "scheduler/spec/build_fields.h"
 
 namespace voxdag {
+namespace {
+
+// Calls `action(field, value)` for every field; `value` is the option as JSON, or null without one.
+template <class Action>
+class JsonVisitor {
+ public:
+  explicit JsonVisitor(const Action& action) : action_(action) {}
+  template <class T>
+  void operator()(const Field& field, T& value) {
+    action_(field, json_fields::encode_value(value));
+  }
+
+ private:
+  const Action& action_;
+};
+
+// Throws FieldError for values that differ from their defaults and break a limit.
+class LimitChecker {
+ public:
+  explicit LimitChecker(const FieldJson& defaults) : defaults_(defaults) {}
+  template <class T>
+  void operator()(const Field& field, T& value) {
+    const FieldJson given = json_fields::encode_value(value);
+    if (given == defaults_.value(field.name, FieldJson())) return;
+    if (!fits(field, value))
+      json_fields::refuse(field.name, expectation<T>(field) + ", not " + given.dump());
+    if (given_.contains(field.excluded))
+      json_fields::refuse(field.name, std::string("no ") + field.excluded + " at the same time");
+    given_.insert(field.name);
+  }
+
+ private:
+  const FieldJson& defaults_;
+  std::set<std::string> given_;
+};
+
+}  // namespace
 
 std::string geometry_json(const GeometryOptions& options) {
-  nlohmann::ordered_json json = {{"resolution", options.resolution},
-                                 {"hash_bits", options.hash_bits},
-                                 {"skip_invalid", options.skip_invalid}};
-  if (options.bounds) json["bounds"] = *options.bounds;
-  if (options.voxel_size) json["voxel_size"] = *options.voxel_size;
-  if (options.attributes.any()) json["color_resolution"] = options.color_resolution;
-  if (options.attributes.any() && options.attributes != AttributeSet{Attribute::kColor})
-    json["attributes"] = options.attributes.names();
-  return json.dump();
+  const FieldJson defaults = record_json(GeometryOptions{});
+  FieldJson key = FieldJson::object();
+  const auto add = [&](const Field& field, const FieldJson& value) {
+    const bool differs = value != defaults.value(field.name, FieldJson());
+    if (field.in_key.value_or(differs)) key[field.name] = value;
+  };
+  GeometryOptions copy = options;
+  JsonVisitor visitor(add);
+  fields(visitor, copy);
+  return key.dump();
+}
+
+void check_options(const BuildSpec& spec) {
+  BuildSpec copy = spec;
+  const FieldJson defaults = record_json(BuildSpec{});
+  LimitChecker checker(defaults);
+  fields(checker, copy);
+  const GeometryOptions& g = spec.geometry;
+  if (g.resolution == 0)
+    json_fields::refuse(kResolutionField.name, expectation<uint64_t>(kResolutionField));
+  if (g.color_resolution && !g.attributes.any())
+    json_fields::refuse("color_resolution", "color or attributes at the same time");
+  if (g.color_resolution > g.resolution)
+    json_fields::refuse("color_resolution",
+                        "at most the resolution, " + std::to_string(g.resolution));
 }
 
 }  // namespace voxdag

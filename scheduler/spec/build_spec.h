@@ -13,11 +13,22 @@
 #include "core/color/attribute_set.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
+#include "voxdag/build.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag {
 
 class CommandRunner;
+
+// The names of these enumerations are the values that people write.
+constexpr std::array<const char*, 4> enum_names(BackendName) {
+  return {"auto", "cpu", "cuda", "parallel-host"};
+}
+constexpr std::array<const char*, 4> enum_names(MethodName) {
+  return {"", "consing", "pointers", "hashes"};
+}
+enum class ClusterEngine { kNone, kSlurm };
+constexpr std::array<const char*, 2> enum_names(ClusterEngine) { return {"", "slurm"}; }
 
 // Geometry options decide the bytes of the global file.
 struct GeometryOptions {
@@ -38,7 +49,7 @@ std::string geometry_json(const GeometryOptions& options);
 
 // Subvolumes are built by the tasks of a cluster's engine instead of this process's threads.
 struct ClusterOptions {
-  std::string engine;          // slurm
+  ClusterEngine engine = ClusterEngine::kNone;
   uint64_t tasks = 0;          // 0 for a choice by expected work
   uint64_t max_running = 0;    // tasks at a time; 0 for as many as the cluster runs
   std::string submit_options;  // further options of sbatch, as a shell would split them
@@ -64,14 +75,14 @@ struct ClusterOptions {
 
 // Run options never change the bytes of the global file.
 struct RunOptions {
-  std::string output;            // the global file
-  std::string work_folder;       // "" for output + ".work"
-  uint64_t memory_bytes = 0;     // 0 for half of what RAM and cgroup allow
-  unsigned threads = 0;          // 0 for all that the process may use
-  uint64_t subvolume_edge = 0;   // voxels, a power of two; 0 for a choice by the plan
-  std::string backend = "auto";  // auto, cpu, cuda or parallel-host
-  std::string method;            // "" for the backend's own, consing, pointers or hashes
-  std::string cache_folder;      // "" for none
+  std::string output;           // the global file
+  std::string work_folder;      // "" for output + ".work"
+  uint64_t memory_bytes = 0;    // 0 for half of what RAM and cgroup allow
+  unsigned threads = 0;         // 0 for all that the process may use
+  uint64_t subvolume_edge = 0;  // voxels, a power of two; 0 for a choice by the plan
+  BackendName backend = BackendName::kAuto;
+  MethodName method = MethodName::kDefault;
+  std::string cache_folder;  // "" for none
   uint64_t cache_bytes = uint64_t{16} << 30;
   // Time that is worth a checkpoint: CPU time of the merge, wall time of what comes before it.
   double checkpoint_interval_s = 2;

@@ -75,7 +75,7 @@ TEST_F(FileCommands, VerifyComparesColors) {
   for (const char* name : {"alpha", "normal", "material"})
     EXPECT_EQ(info["attributes"][name]["cells"], info["colors"]["cells"]) << name;
   EXPECT_GT(info["attributes"]["material"]["names"].size(), 2u);
-  expect_error(2, "'shine' is no attribute",
+  expect_error(2, "'alpha,shine': expected names out of color, alpha, normal, material",
                {"build", "city.glb", "-r", "64", "--attributes", "alpha,shine", "-o", "x.vdag"});
   const Answer other = run({"verify", "city.vdag", "--against", "plain.glb"});
   EXPECT_EQ(other.status, 4) << other.err;

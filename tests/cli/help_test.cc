@@ -1,4 +1,5 @@
 // Tests of --help, --version and mistyped commands.
+#include "scheduler/spec/build_fields.h"
 #include "tests/cli/command_line.h"
 
 namespace command_line {
@@ -27,6 +28,46 @@ TEST_F(Help, OfEveryCommand) {
     EXPECT_NE(answer.out.find(std::string("Usage: voxdag ") + command), std::string::npos);
     EXPECT_NE(answer.out.find("--json"), std::string::npos);
   }
+}
+
+// Finds the options of a description in a help text.
+struct OptionFinder {
+  template <class T>
+  void operator()(const voxdag::Field& field, T&) {
+    if (field.is_positional) return;
+    ++count;
+    EXPECT_EQ(help.find(voxdag::option_name(field.name)) != std::string::npos, field.scope <= scope)
+        << field.name;
+  }
+
+  std::string help;
+  voxdag::Scope scope;
+  int count = 0;
+};
+
+TEST_F(Help, HasTheOptionsOfTheDescription) {
+  const std::pair<const char*, voxdag::Scope> commands[] = {{"submit", voxdag::Scope::kSubmit},
+                                                            {"plan", voxdag::Scope::kPlan},
+                                                            {"build", voxdag::Scope::kBuild}};
+  for (const auto& [command, scope] : commands) {
+    SCOPED_TRACE(command);
+    OptionFinder finder{run({command, "--help"}).out, scope};
+    voxdag::BuildSpec spec;
+    fields(finder, spec);
+    EXPECT_GE(finder.count, 19);
+    voxdag::ClusterOptions cluster;
+    if (scope != voxdag::Scope::kSubmit) fields(finder, cluster);
+  }
+}
+
+TEST_F(Help, AndDocsHaveTheSameOptions) {
+  OptionFinder finder{
+      voxdag::read_small_file(voxdag::system_files(), VOXDAG_SOURCE_DIR "/docs/cli.md", 1 << 20),
+      voxdag::Scope::kBuild};
+  voxdag::BuildSpec spec;
+  fields(finder, spec);
+  voxdag::ClusterOptions cluster;
+  fields(finder, cluster);
 }
 
 TEST_F(Help, Version) {

@@ -140,7 +140,8 @@ TEST_F(UnusualInput, NumbersAndMessages) {
     SCOPED_TRACE(number);
     std::vector<std::string> args = build;
     args.push_back(number);
-    expect_error(2, "--resolution: '" + std::string(number) + "': expected a whole number", args);
+    expect_error(2, "--resolution: '" + std::string(number) + "': expected a power of two from 4",
+                 args);
   }
   expect_error(2, "--threads: '-1'",
                {"build", "m.glb", "-o", "m.vdag", "-r", "64", "--threads", "-1"});

@@ -179,7 +179,7 @@ class ClusterTest(unittest.TestCase):
                            "--cluster-retries", "1")
         # A file in the place of the batch: every attempt finds it damaged.
         batch = self.wait_for(lambda: sorted(self.work.glob("cluster/batch-*.vdbatch")), "batch")[0]
-        batch.write_bytes(b"vdbatch1" + bytes(100))
+        batch.write_bytes(b"vdbatch2" + bytes(100))
         _, messages = self.end(build)
         self.assertNotEqual(build.returncode, 0)
         self.assertIn("it has failed 2 times", messages)

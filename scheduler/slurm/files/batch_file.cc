@@ -2,18 +2,40 @@
 
 #include <array>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/fields/json_fields.h"
+#include "core/format/artifact/artifact_fields.h"
 #include "core/format/checksum.h"
 #include "scheduler/triangles/chunk.h"
 
 namespace voxdag {
+
+template <class Visitor>
+void fields(Visitor& visit, BatchSubvolume& subvolume) {
+  visit("id", subvolume.id);
+  fields(visit, subvolume.cube);
+  visit("weight", subvolume.weight);
+  visit("triangles", subvolume.triangles);
+}
+
+template <class Visitor>
+void fields(Visitor& visit, Batch& batch) {
+  visit("number", batch.number);
+  visit("program", batch.program);
+  visit("build", batch.build);
+  visit("grid_levels", batch.shape.grid_levels);
+  visit("hash_bits", batch.shape.hash_bits);
+  visit("wide", batch.wide);
+  visit("backend", batch.backend);
+  visit("method", batch.method);
+  visit("longest_edge", batch.longest_edge);
+  visit("subvolumes", batch.subvolumes);
+}
+
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-constexpr std::string_view kBatchMagic = "vdbatch1";
+constexpr std::string_view kBatchMagic = "vdbatch2";
 constexpr uint64_t kMaxHeaderBytes = uint64_t{1} << 30;
 
 struct Prologue {
@@ -22,45 +44,6 @@ struct Prologue {
   uint64_t header_checksum;
 };
 static_assert(sizeof(Prologue) == 24);
-
-Json to_json(const Batch& batch) {
-  Json subvolumes = Json::array();
-  for (const BatchSubvolume& s : batch.subvolumes)
-    subvolumes.push_back(
-        {s.id,
-         {s.cube.level, s.cube.position[0], s.cube.position[1], s.cube.position[2]},
-         s.weight,
-         s.triangles});
-  return {{"number", batch.number},
-          {"program", batch.program},
-          {"build", batch.build},
-          {"grid_levels", batch.shape.grid_levels},
-          {"hash_bits", batch.shape.hash_bits},
-          {"wide", batch.wide},
-          {"backend", batch.backend},
-          {"method", batch.method},
-          {"longest_edge", batch.longest_edge},
-          {"subvolumes", subvolumes}};
-}
-
-Batch from_json(const Json& json) {
-  Batch batch;
-  batch.number = json.at("number");
-  batch.program = json.at("program");
-  batch.build = json.at("build");
-  batch.shape = {.grid_levels = json.at("grid_levels"), .hash_bits = json.at("hash_bits")};
-  batch.wide = json.at("wide");
-  batch.backend = json.at("backend");
-  batch.method = json.at("method");
-  batch.longest_edge = json.at("longest_edge");
-  for (const Json& s : json.at("subvolumes"))
-    batch.subvolumes.push_back(
-        {.id = s.at(0),
-         .cube = {s.at(1).at(0), {s.at(1).at(1), s.at(1).at(2), s.at(1).at(3)}},
-         .weight = s.at(2),
-         .triangles = s.at(3)});
-  return batch;
-}
 
 // Collects bytes and writes them by large blocks.
 class BlockWriter {
@@ -125,7 +108,7 @@ double Batch::weight() const {
 void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
                  const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,
                  const CancelToken& cancel) {
-  const std::string header = to_json(batch).dump();
+  const std::string header = record_json(batch).dump();
   const auto header_bytes = std::as_bytes(std::span(header));
   Prologue prologue{{}, header.size(), checksum64(header_bytes)};
   std::memcpy(prologue.magic, kBatchMagic.data(), sizeof prologue.magic);
@@ -163,9 +146,9 @@ BatchFile::BatchFile(FileSystem& files, const std::string& path) : file_(files.o
   if (checksum64(header_bytes) != prologue.header_checksum)
     throw damaged("its header fails its checksum");
   try {
-    batch_ = from_json(Json::parse(header));
-  } catch (const nlohmann::json::exception& error) {
-    throw damaged(std::string("its header has other members (") + error.what() + ")");
+    batch_ = record_from_text<Batch>(header, "its header");
+  } catch (const Error& error) {
+    throw damaged(error.message());
   }
   data_begin_ = sizeof prologue + header.size();
 }

@@ -1,7 +1,7 @@
 // The input of a cluster task: all that it needs to build its subvolumes, their triangles included,
 // in one file that is written once and then only read.
 //
-//   "vdbatch1"  u64 bytes of the header  u64 its XXH64  header (JSON)
+//   "vdbatch2"  u64 bytes of the header  u64 its XXH64  header (JSON)
 //   chunks of records: u64 XXH64 of the records  up to kBatchChunkRecords records (chunk.h)
 //
 // Chunks lie one after the other, those of the first subvolume first; all but the last of a
@@ -19,6 +19,7 @@
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
 #include "core/io/file_system.h"
+#include "scheduler/spec/build_spec.h"
 #include "scheduler/state/job_store.h"
 #include "scheduler/triangles/memory_store.h"
 #include "voxdag/cancel_token.h"
@@ -40,7 +41,8 @@ struct Batch {
   std::string build;    // tells this build from others
   DagShape shape;
   bool wide = false;  // records have 64 bits per coordinate
-  std::string backend, method;
+  BackendName backend = BackendName::kAuto;
+  MethodName method = MethodName::kDefault;
   int64_t longest_edge = INT64_MAX;        // of a subvolume, in voxels
   std::vector<BatchSubvolume> subvolumes;  // in Morton order
 

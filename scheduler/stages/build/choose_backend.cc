@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "core/base/error.h"
+#include "core/fields/field.h"
 
 namespace voxdag {
 namespace {
@@ -18,8 +19,8 @@ constexpr uint64_t kMinMemoryForGpu = uint64_t{2} << 30;
 }
 
 Method method_of(const RunOptions& options) {
-  if (options.method == "pointers") return Method::kPointers;
-  if (options.method == "hashes") return Method::kHashes;
+  if (options.method == MethodName::kPointers) return Method::kPointers;
+  if (options.method == MethodName::kHashes) return Method::kHashes;
   return Method::kFast;
 }
 
@@ -50,27 +51,26 @@ std::string fault_of(const Gpus& gpus, int device) {
 }  // namespace
 
 void check_backend(const RunOptions& options) {
-  const std::string& backend = options.backend;
-  const std::string& method = options.method;
-  const bool parallel = backend == "parallel-host" || backend == "cuda";
-  if (!parallel && backend != "auto" && backend != "cpu")
-    refuse_backend("backend '" + backend + "': expected auto, cpu, cuda or parallel-host");
-  if (!parallel && !method.empty() && method != "consing")
+  const std::string backend = name_of(options.backend), method = name_of(options.method);
+  const bool parallel =
+      options.backend == BackendName::kParallelHost || options.backend == BackendName::kCuda;
+  const bool is_given = options.method != MethodName::kDefault;
+  if (is_given && parallel == (options.method == MethodName::kConsing))
     refuse_backend("method '" + method + "': backend " + backend +
-                   " has consing only; expected --backend parallel-host or cuda");
-  if (parallel && !method.empty() && method != "pointers" && method != "hashes")
-    refuse_backend("method '" + method + "': backend " + backend + " has pointers and hashes");
-  if (backend == "cuda" && !cuda_device_available())
+                   (parallel ? " has pointers and hashes"
+                             : " has consing only; expected --backend parallel-host or cuda"));
+  if (options.backend == BackendName::kCuda && !cuda_device_available())
     throw Error(ErrorCode::kDevice, "backend cuda: " + cuda_device_problem());
 }
 
 BackendChoice choose_backend(const RunOptions& options, Progress& progress) {
   const Method method = method_of(options);
-  if (options.backend == "parallel-host")
+  if (options.backend == BackendName::kParallelHost)
     return {"parallel-host", [method] { return make_parallel_host_backend(method); }};
-  if (options.backend == "cuda") return gpu_choice(cuda_gpus(method));
+  if (options.backend == BackendName::kCuda) return gpu_choice(cuda_gpus(method));
   // With `auto`, a method that is given is one of the CPU backend.
-  if (options.backend == "cpu" || !options.method.empty()) return cpu_choice();
+  if (options.backend == BackendName::kCpu || options.method != MethodName::kDefault)
+    return cpu_choice();
   return choose_automatically(cuda_gpus(method), options.memory_bytes, progress);
 }
 

@@ -18,8 +18,8 @@ struct BackendChoice {
   unsigned max_workers = 256;  // more of them gain nothing
 };
 
-// Throws Error{kInvalidInput} for a backend or method that does not exist or do not go together,
-// Error{kDevice} if there is no GPU for `cuda`.
+// Throws Error{kInvalidInput} for a method that the backend lacks, Error{kDevice} if there is no
+// GPU for `cuda`.
 void check_backend(const RunOptions& options);
 
 // The choice for options that passed check_backend() and have their memory filled in. `auto` takes

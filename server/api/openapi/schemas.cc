@@ -3,13 +3,13 @@
 #include <string>
 #include <vector>
 
+#include "core/fields/json_schema.h"
+#include "server/jobs/protocol/job_request.h"
 #include "server/queue/job.h"
 
 namespace voxdag::server {
 namespace {
 namespace openapi {
-
-constexpr const char* kVisibleText = "^[^\\u0000-\\u001f\\u007f]+$";
 
 struct Member {
   std::string name;
@@ -30,13 +30,6 @@ Json object(const std::vector<Member>& members) {
   return json;
 }
 
-// An object of a request, which may have no other members.
-Json closed_object(const std::vector<Member>& members) {
-  Json json = object(members);
-  json["additionalProperties"] = false;
-  return json;
-}
-
 Json type(const char* name) { return {{"type", name}}; }
 Json text() { return type("string"); }
 Json number() { return type("number"); }
@@ -47,14 +40,8 @@ Json integer(uint64_t min, uint64_t max) {
 }
 Json at_least(uint64_t min) { return {{"type", "integer"}, {"minimum", min}}; }
 Json count() { return at_least(0); }
-Json positive_number() { return {{"type", "number"}, {"exclusiveMinimum", 0}}; }
 Json pattern(const char* expression) { return {{"type", "string"}, {"pattern", expression}}; }
 Json one_of(const std::vector<const char*>& texts) { return {{"type", "string"}, {"enum", texts}}; }
-Json visible_text(size_t max) {
-  Json json = {{"type", "string"}, {"minLength", 1}, {"maxLength", max}};
-  json["pattern"] = kVisibleText;
-  return json;
-}
 Json either(Json a, Json b) { return {{"oneOf", {std::move(a), std::move(b)}}}; }
 Json or_null(const char* name) { return {{"type", {name, "null"}}}; }
 Json time() { return {{"type", {"string", "null"}}, {"format", "date-time"}}; }
@@ -78,14 +65,7 @@ Json described(const char* description, Json schema) {
   return schema;
 }
 
-Json powers_of_two(uint64_t min, uint64_t max) {
-  Json json = type("integer");
-  for (uint64_t value = min; value <= max; value *= 2) json["enum"].push_back(value);
-  return json;
-}
-
 Json state() { return one_of({kJobStateNames.begin(), kJobStateNames.end()}); }
-Json priority() { return {{"type", "integer"}, {"minimum", -100}, {"maximum", 100}}; }
 
 void add_common(Json& all) {
   all["Problem"] = object({{"type", text()},
@@ -108,43 +88,11 @@ void add_scenes(Json& all) {
       object({{"scenes", array(named("Scene"))}, {"next_cursor", or_null("string")}});
 }
 
-Json options() {
-  Json bounds = array_of(4, false);
-  bounds["prefixItems"] = {number(), number(), number(), positive_number()};
-  Json json = closed_object(
-      {optional("bounds", bounds), optional("voxel_size", positive_number()),
-       optional("skip_invalid", boolean()), optional("hash_bits", integer(4, 64)),
-       optional("color", boolean()),
-       optional("attributes",
-                described("Attributes per cell of the color grid; \"color\" equals the option "
-                          "color.",
-                          array(1, 64, one_of({"color", "alpha", "normal", "material"})))),
-       optional(
-           "color_resolution",
-           described("Resolution of the color grid, at most the job's resolution; only with color "
-                     "or attributes.",
-                     integer(4, 1048576))),
-       optional("memory",
-                either(pattern("^((6[4-9]|[7-9][0-9]|[1-9][0-9]{2,5})MiB|[1-9][0-9]{0,5}GiB)$"),
-                       at_least(uint64_t{64} << 20))),
-       optional("threads", integer(1, 1024)), optional("subvolume", powers_of_two(64, 1048576)),
-       optional("backend", one_of({"auto", "cpu", "cuda", "parallel-host"})),
-       optional("method", one_of({"consing", "pointers", "hashes"}))});
-  json["not"] = {{"required", {"bounds", "voxel_size"}}};
-  return json;
-}
-
 void add_requests(Json& all) {
-  Json request =
-      closed_object({{"scene", either(visible_text(1024), array(1, 64, visible_text(1024)))},
-                     {"resolution", powers_of_two(4, 1048576)},
-                     optional("name", visible_text(200)),
-                     optional("priority", priority()),
-                     optional("options", named("Options"))});
+  Json request = options_schema<JobRequest>();
   request["examples"] = {{{"scene", "m.glb"}, {"resolution", 64}}};
   all["JobRequest"] = request;
-  all["Options"] = options();
-  all["JobPatch"] = closed_object({{"priority", priority()}});
+  all["JobPatch"] = options_schema<JobPatch>();
 }
 
 void add_progress(Json& all) {

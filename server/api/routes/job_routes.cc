@@ -212,14 +212,9 @@ Response get_job(Context& context, Call& call) {
 }
 
 Response patch_job(Context& context, Call& call) {
-  const auto body = nlohmann::json::parse(
-      read_json_body(call.request, context.config.transfers.max_body_bytes), nullptr, false);
-  if (!body.is_object() || body.size() != 1 || !body.contains("priority"))
-    throw bad_request("expected {\"priority\": N}");
-  const auto& value = body["priority"];
-  if (!value.is_number()) throw bad_request("'priority': expected a number");
-  const int priority = parse_priority(value.dump());
-  const Job job = context.queue.change(call.names[0], [&](Job& j) { j.priority = priority; });
+  const JobPatch patch =
+      parse_job_patch(read_json_body(call.request, context.config.transfers.max_body_bytes));
+  const Job job = context.queue.change(call.names[0], [&](Job& j) { j.priority = patch.priority; });
   return json_response(200, to_json(context, job));
 }
 

@@ -66,7 +66,7 @@ BuildSpec spec_of(const JobTask& task, const JobFolder& folder) {
   spec.run.work_folder = folder.work();
   if (spec.run.memory_bytes == 0) spec.run.memory_bytes = task.memory_bytes;
   if (spec.run.threads == 0) spec.run.threads = task.threads;
-  if (!task.cluster.engine.empty()) {
+  if (task.cluster.engine != ClusterEngine::kNone) {
     spec.run.cluster = task.cluster;
     spec.run.cluster->program_version = VOXDAG_VERSION;
   }

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "scheduler/spec/build_spec.h"
+#include "scheduler/spec/build_fields.h"
 
 namespace voxdag::server {
 
@@ -18,9 +18,31 @@ struct JobRequest {
   std::string text;                 // JSON of scene, resolution and options, as submitted
 };
 
+inline constexpr Field kPriorityField = Field("priority", "higher runs earlier").range(-100, 100);
+
+template <class Visitor>
+void fields(Visitor& visit, JobRequest& request) {
+  visit(kSceneField.line(4096).items(64), request.scenes);
+  visit(kResolutionField, request.spec.geometry.resolution);
+  visit(Field("name", "name of the job, for people").line(200).omit_empty(), request.name);
+  visit(kPriorityField, request.priority);
+  visit.object("options", [&](auto& options) { visit_job_options(options, request.spec); });
+}
+
 // Throws RequestError{kInvalid} naming the member that is unknown, missing or has a wrong value.
 JobRequest parse_job_request(std::string_view body);
-// A priority as a JSON number. Throws RequestError{kInvalid}.
-int parse_priority(std::string_view number);
+
+// The body of PATCH /jobs/{id}.
+struct JobPatch {
+  int priority = 0;
+};
+
+template <class Visitor>
+void fields(Visitor& visit, JobPatch& patch) {
+  visit(kPriorityField.required(), patch.priority);
+}
+
+// Throws RequestError{kInvalid}.
+JobPatch parse_job_patch(std::string_view body);
 
 }  // namespace voxdag::server

@@ -1,33 +1,40 @@
 #include "server/jobs/protocol/job_task.h"
 
 #include "core/base/error.h"
+#include "core/fields/json_fields.h"
 #include "server/base/json_text.h"
-
-namespace voxdag {
-
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ClusterOptions, engine, tasks, max_running, submit_options,
-                                   program_path, max_retries, grace_s)
-
-}  // namespace voxdag
 
 namespace voxdag::server {
 
-NLOHMANN_JSON_SERIALIZE_ENUM(JobTask::Kind,
-                             {{JobTask::Kind::kBuild, "build"}, {JobTask::Kind::kPlan, "plan"}})
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(JobTask, kind, request, uploads, readable, memory_bytes, threads,
-                                   cluster)
+constexpr std::array<const char*, 2> enum_names(JobTask::Kind) { return {"build", "plan"}; }
+
+template <class Visitor>
+void fields(Visitor& visit, JobTask& task) {
+  visit("kind", task.kind);
+  visit("request", task.request);
+  visit("uploads", task.uploads);
+  visit("readable", task.readable);
+  visit("memory_bytes", task.memory_bytes);
+  visit("threads", task.threads);
+  visit.object("cluster", [&](auto& cluster) {
+    cluster("engine", task.cluster.engine);
+    cluster("tasks", task.cluster.tasks);
+    cluster("max_running", task.cluster.max_running);
+    cluster("submit_options", task.cluster.submit_options);
+    cluster("program_path", task.cluster.program_path);
+    cluster("max_retries", task.cluster.max_retries);
+    cluster("grace_s", task.cluster.grace_s);
+  });
+}
 
 void write_task(FileSystem& files, const std::string& path, const JobTask& task) {
-  write_file_atomically(files, path, json_text(nlohmann::json(task)));
+  write_file_atomically(files, path, json_text(record_json(task)));
 }
 
 JobTask read_task(FileSystem& files, const std::string& path) {
   constexpr uint64_t kMaxTaskBytes = uint64_t{4} << 20;
-  try {
-    return nlohmann::json::parse(read_small_file(files, path, kMaxTaskBytes)).get<JobTask>();
-  } catch (const nlohmann::json::exception&) {
-    throw Error(ErrorCode::kCorrupt, path + ": expected a task of voxdag serve");
-  }
+  return record_from_text<JobTask>(read_small_file(files, path, kMaxTaskBytes),
+                                path + ": expected a task of voxdag serve");
 }
 
 }  // namespace voxdag::server

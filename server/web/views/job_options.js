@@ -34,7 +34,7 @@ class Fields {
       color_resolution: this.choice([kAutomatic, ...gridChoices(kMinLevel, kMaxLevel)]),
       hash_bits: this.number({min: "4", max: "64", step: "1", placeholder: "64"}),
       memory: h("input", {placeholder: "2GiB", autocomplete: "off", on}),
-      threads: this.number({min: "1", step: "1", placeholder: "default"}),
+      threads: this.number({min: "1", max: "1024", step: "1", placeholder: "default"}),
       subvolume: this.choice([kAutomatic, ...gridChoices(6, 14)]),
       backend: this.choice([
         kAutomatic, ["cpu", "CPU"], ["cuda", "CUDA"], ["parallel-host", "GPU pipeline on the CPU"]

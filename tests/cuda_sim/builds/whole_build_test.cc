@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/backend/backend.h"
+#include "core/fields/field.h"
 #include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
 #include "tests/cuda_sim/sim/faults.h"
@@ -29,13 +30,13 @@ class SimulatedBuild : public testing::Test {
     options.triangles = 400;
     NoProgress progress;
     generate_scene(system_files(), folder_.file("scene.glb"), options, progress, CancelToken{});
-    expected_ = run(spec("cpu", ""), system_files()).sha256;
+    expected_ = run(spec(BackendName::kCpu, MethodName::kDefault), system_files()).sha256;
     std::filesystem::remove(output());
   }
 
   std::string output() const { return folder_.file("out.vdag"); }
 
-  BuildSpec spec(const std::string& backend, const std::string& method) const {
+  BuildSpec spec(BackendName backend, MethodName method) const {
     BuildSpec spec;
     spec.geometry.scenes = {folder_.file("scene.glb")};
     spec.geometry.resolution = 256;
@@ -60,11 +61,12 @@ class SimulatedBuild : public testing::Test {
 
 TEST_F(SimulatedBuild, HasTheBytesOfTheCpuBackend) {
   uint64_t seed = 1;
-  for (const std::string method : {"", "hashes", "pointers"}) {
+  for (const MethodName method :
+       {MethodName::kDefault, MethodName::kHashes, MethodName::kPointers}) {
     cuda_sim::set_schedule({seed % 2 == 0, seed});
     ++seed;
-    const BuildReport report = run(spec("cuda", method), system_files());
-    EXPECT_EQ(report.sha256, expected_) << method;
+    const BuildReport report = run(spec(BackendName::kCuda, method), system_files());
+    EXPECT_EQ(report.sha256, expected_) << name_of(method);
     EXPECT_EQ(report.backend, "cuda");
     EXPECT_EQ(cuda_sim::bytes_in_use(), 0u);
     std::filesystem::remove(output());
@@ -74,7 +76,7 @@ TEST_F(SimulatedBuild, HasTheBytesOfTheCpuBackend) {
 // Killed at some operations on the disk, and resumed on the device or on the CPU.
 TEST_F(SimulatedBuild, ResumesAfterAKill) {
   crash::FaultyFiles counting({});
-  run(spec("cuda", ""), counting);
+  run(spec(BackendName::kCuda, MethodName::kDefault), counting);
   std::filesystem::remove(output());
   int kills = 0;
   for (uint64_t part = 1; part <= 6; ++part) {
@@ -84,7 +86,7 @@ TEST_F(SimulatedBuild, ResumesAfterAKill) {
     if (child == 0) {
       crash::FaultyFiles files({crash::Fault::kKillAfter, at});
       try {
-        run(spec("cuda", ""), files);
+        run(spec(BackendName::kCuda, MethodName::kDefault), files);
       } catch (...) {
         _exit(1);
       }
@@ -93,7 +95,10 @@ TEST_F(SimulatedBuild, ResumesAfterAKill) {
     int status = 0;
     waitpid(child, &status, 0);
     kills += WIFSIGNALED(status) ? 1 : 0;
-    EXPECT_EQ(run(spec(part % 2 ? "cuda" : "cpu", ""), system_files()).sha256, expected_);
+    EXPECT_EQ(run(spec(part % 2 ? BackendName::kCuda : BackendName::kCpu, MethodName::kDefault),
+                  system_files())
+                  .sha256,
+              expected_);
     std::filesystem::remove(output());
   }
   EXPECT_GT(kills, 0);
@@ -104,7 +109,7 @@ TEST_F(SimulatedBuild, ResumesAfterAKill) {
 TEST_F(SimulatedBuild, SaysThatTheDeviceFailed) {
   cuda_sim::plan_fault({cuda_sim::Call::kOther, 2000, cudaErrorLaunchFailure, true});
   try {
-    run(spec("cuda", ""), system_files());
+    run(spec(BackendName::kCuda, MethodName::kDefault), system_files());
     FAIL() << "the device failed, and the build did not";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kDevice) << error.what();
@@ -112,7 +117,7 @@ TEST_F(SimulatedBuild, SaysThatTheDeviceFailed) {
   }
   EXPECT_TRUE(cuda_sim::fault_happened());
   cuda_sim::plan_no_fault();
-  const BuildReport report = run(spec("cpu", ""), system_files());
+  const BuildReport report = run(spec(BackendName::kCpu, MethodName::kDefault), system_files());
   EXPECT_EQ(report.sha256, expected_);
   EXPECT_GT(report.subvolumes_reused, 0u);
 }

@@ -131,8 +131,8 @@ TEST(OptionsJson, IsRefusedByNameAndExpectation) {
        "'cube': expected 4 finite numbers X,Y,Z,EDGE, the last one above 0"},
       {R"({"edge":4,"options":{"speed":""}})", "'speed': expected one of slow, fast"},
       {R"({"edge":4,"options":{"loud":1}})", "'loud': expected true or false"},
-      {R"({"edge":4,"options":{"color":1}})", "'color': expected a member of options"},
-      {R"({"edge":4,"speed":"slow"})", "'speed': expected a member of the body"},
+      {R"({"edge":4,"options":{"color":1}})", "'color': expected a documented member of options"},
+      {R"({"edge":4,"speed":"slow"})", "'speed': expected a documented member of the body"},
   };
   for (const auto& [body, part] : bodies) {
     SCOPED_TRACE(body);

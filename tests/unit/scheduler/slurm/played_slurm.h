@@ -185,7 +185,7 @@ class Cluster : public testing::Test {
     cluster.run.subvolume_edge = 64;
     cluster.run.cluster.emplace();
     ClusterOptions& options = *cluster.run.cluster;
-    options.engine = "slurm";
+    options.engine = ClusterEngine::kSlurm;
     options.tasks = tasks;
     options.program_path = "/usr/bin/voxdag";
     options.program_version = kVersion;

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -5,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "core/fields/json_schema.h"
 #include "core/io/file_system.h"
 #include "server/base/request_error.h"
 #include "server/jobs/job_outcome.h"
@@ -17,6 +19,9 @@
 
 namespace voxdag::server {
 namespace {
+
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
 
 TEST(JobRequestBody, HasTheOptionsOfTheCommandLine) {
   const JobRequest request = parse_job_request(R"({
@@ -86,6 +91,48 @@ TEST(JobRequestBody, IsRefusedByName) {
       EXPECT_NE(error.message().find(part), std::string::npos) << error.message();
     }
   }
+}
+
+// Finds the options of a job in the source of the page's form.
+struct FormFinder {
+  template <class T>
+  void operator()(const Field& field, T&) {
+    SCOPED_TRACE(field.name);
+    const std::string name = field.name;
+    EXPECT_THAT(page, ContainsRegex("[ {]" + name + ": "));
+    using Value = typename OptionalValue<T>::type;
+    if constexpr (NamedEnum<Value>) {
+      for (const std::string& choice : choices_of<Value>())
+        if (choice != name_of(Value{})) EXPECT_THAT(page, HasSubstr("[\"" + choice + "\", \""));
+    } else if constexpr (NameSet<Value>) {
+      for (const std::string& choice : NameSetTraits<Value>::all())
+        EXPECT_THAT(page, ContainsRegex("[ {]" + choice + ": "));
+    } else if (field.min && field.max && !field.is_power_of_two) {
+      EXPECT_THAT(page, HasSubstr(name + ": this.number({min: \"" + std::to_string(*field.min) +
+                                  "\", max: \"" + std::to_string(*field.max) + "\""));
+    }
+    ++count;
+  }
+
+  std::string page;
+  int count = 0;
+};
+
+TEST(JobForm, HasTheOptionsOfTheDescription) {
+  FormFinder form{read_small_file(system_files(),
+                                  VOXDAG_SOURCE_DIR "/server/web/views/job_options.js", 1 << 20)};
+  BuildSpec spec;
+  visit_job_options(form, spec);
+  EXPECT_GE(form.count, 12);
+}
+
+TEST(JobRequestSchema, HasTheMembersOfTheRequest) {
+  const FieldJson schema = options_schema<JobRequest>();
+  EXPECT_EQ(schema.at("required").dump(), R"(["scene","resolution"])");
+  const FieldJson& options = schema.at("properties").at("options").at("properties");
+  EXPECT_EQ(options.at("hash_bits").at("maximum"), 64);
+  EXPECT_EQ(options.at("backend").at("enum").dump(), R"(["auto","cpu","cuda","parallel-host"])");
+  EXPECT_FALSE(options.contains("work")) << "a client does not choose folders of the server";
 }
 
 TEST(TaskFile, IsReadAsItWasWritten) {

@@ -10,6 +10,7 @@
 #include "query/verify/color_sample.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
+#include "scheduler/spec/build_fields.h"
 #include "tests/support/error_of.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
@@ -192,14 +193,13 @@ TEST_F(Attributes, ArePlanned) {
 }
 
 TEST(AttributeList, IsParsed) {
-  EXPECT_EQ(parse_attributes("normal,alpha", "--attributes"),
-            (AttributeSet{Attribute::kAlpha, Attribute::kNormal}));
-  EXPECT_EQ(parse_attributes("color", "--attributes"), AttributeSet{Attribute::kColor});
+  const Field field("attributes");
+  AttributeSet set;
+  EXPECT_TRUE(parse_text(field, "normal,alpha", set));
+  EXPECT_EQ(set, (AttributeSet{Attribute::kAlpha, Attribute::kNormal}));
   for (const char* wrong : {"", "normals", "alpha,", "alpha normal"})
-    EXPECT_NE(error_of([&] { parse_attributes(wrong, "--attributes"); })
-                  .message()
-                  .find("is no attribute: expected color, alpha, normal or material"),
-              std::string::npos);
+    EXPECT_FALSE(parse_text(field, wrong, set)) << wrong;
+  EXPECT_EQ(expectation<AttributeSet>(field), "names out of color, alpha, normal, material");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "scheduler/spec/build_fields.h"
 
 namespace voxdag {
 namespace {
@@ -91,12 +92,12 @@ TEST(ChooseBackend, AutoFallsBackToTheCpu) {
   expect_cpu({1, broken}, kPlenty, "cudaStreamCreate failed");
 }
 
-// A backend or method that does not exist, or a pair that does not go together, is refused.
+// A pair that does not go together is refused, and so are names that do not exist.
 TEST(ChooseBackend, RefusesWhatDoesNotGoTogether) {
   const auto refused = [](const std::string& backend, const std::string& method) {
     RunOptions options;
-    options.backend = backend;
-    options.method = method;
+    if (!parse_text("backend", backend, options.backend)) return true;
+    if (!method.empty() && !parse_text("method", method, options.method)) return true;
     try {
       check_backend(options);
       return false;

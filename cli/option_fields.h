@@ -1,0 +1,77 @@
+// Declares the fields of a struct as options of a command, with their help, groups and limits.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "cli/command.h"
+#include "core/fields/field.h"
+
+namespace voxdag::cli {
+
+class OptionDeclarer {
+ public:
+  // Fields of a later scope are left out.
+  OptionDeclarer(Command& command, Scope scope) : command_(command), scope_(scope) {}
+
+  template <class T>
+  void operator()(const Field& field, T& value) {
+    if (field.scope > scope_) return;
+    Option option = declare(field, value);
+    if (*field.heading) option.group(field.heading);
+    if (field.is_required) option.required();
+    if (*field.excluded) option.excludes(at(field.excluded));
+    if (*field.needed) option.needs(at(field.needed));
+    options_.emplace(field.name, option);
+  }
+  void object(const char*, const auto& visit_members) { visit_members(*this); }
+
+  // A declared option, for example to add one that needs it.
+  Option at(const std::string& field_name) const { return options_.at(field_name); }
+
+ private:
+  template <class T>
+  Option declare(const Field& field, T& value) {
+    const std::string names = option_names(field);
+    if constexpr (std::is_same_v<T, bool>) {
+      return command_.flag(names.c_str(), value, field.help);
+    } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+      return command_.option(names.c_str(), value, field.help);
+    } else {
+      const auto set = [field, &value](const std::string& text) {
+        if (!parse_text(field, text, value))
+          throw Error(ErrorCode::kInvalidInput, option_name(field.name) + ": '" + text +
+                                                    "': expected " + expectation<T>(field));
+      };
+      return command_.text_option(names.c_str(), value_name<T>(field), set,
+                                  documentation(field, value, true));
+    }
+  }
+
+  // "scene", "--hash-bits" or "-r,--resolution".
+  static std::string option_names(const Field& field) {
+    if (field.is_positional) return field.name;
+    const std::string separator = *field.shorthand ? "," : "";
+    return field.shorthand + separator + option_name(field.name);
+  }
+
+  // What --help shows in the place of a value.
+  template <class T>
+  static const char* value_name(const Field& field) {
+    using Value = typename OptionalValue<T>::type;
+    if (*field.parts) return field.parts;
+    if (field.is_bytes) return "SIZE";
+    if (field.is_path) return "PATH";
+    if constexpr (std::is_integral_v<Value>) return "N";
+    if constexpr (std::is_floating_point_v<Value>) return "NUMBER";
+    if constexpr (NamedEnum<Value>) return "NAME";
+    if constexpr (NameSet<Value>) return "NAME,...";
+    return "TEXT";
+  }
+
+  Command& command_;
+  const Scope scope_;
+  std::map<std::string, Option> options_;
+};
+
+}  // namespace voxdag::cli
