@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import voxdag
 from conftest import interrupted, torus
+from voxdag._options import BuildOptions
 
 
 def test_report_and_progress(mesh, tmp_path):
@@ -64,6 +65,14 @@ def test_plan(mesh):
     assert estimate["voxels"]["low"] <= estimate["voxels"]["likely"] <= estimate["voxels"]["high"]
 
 
+def test_every_option_is_a_typed_and_documented_keyword(mesh):
+    names = list(BuildOptions.__annotations__)
+    assert {"hash_bits", "color", "memory", "work", "cache_size"} <= set(names)
+    voxdag.plan(mesh, resolution=64, **dict.fromkeys(names))
+    for function in voxdag.build, voxdag.plan:
+        assert all(f"\n    {name} " in function.__doc__ for name in names)
+
+
 @pytest.mark.parametrize(
     "scene, options, code, text",
     [
@@ -77,6 +86,9 @@ def test_plan(mesh):
         (([[0, 0, 0]], [[0, 0, 0]]), {"threads": -1}, "invalid_input", "threads=-1"),
         (([[0, 0, 0]], [[0, 0, 0]]), {"resolution": -4}, "invalid_input", "resolution=-4"),
         (([[0, 0, 0]], [[0, 0, 0]]), {"memory": "1MiB"}, "invalid_input", "memory"),
+        (([[0, 0, 0]], [[0, 0, 0]]), {"hash_bits": 3}, "invalid_input", "from 4 to 64"),
+        (([[0, 0, 0]], [[0, 0, 0]]), {"backend": "gpu"}, "invalid_input", "auto, cpu, cuda"),
+        (([[0, 0, 0]], [[0, 0, 0]]), {"attributes": ["normals"]}, "invalid_input", "alpha"),
         (([[np.nan, 0, 0]], [[0, 0, 0]]), {}, "invalid_input", "finite"),
     ],
 )

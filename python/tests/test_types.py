@@ -32,6 +32,10 @@ def test_types(tmp_path):
         dag.count(dag.bounds, world=True)
         voxdag.open(7)
         voxdag.build("scene.glb", resolution="64", output="scene.vdag")
+        voxdag.build("scene.glb", resolution=64, output="scene.vdag", colors=True)
+        voxdag.plan("scene.glb", resolution=64, backend="gpu")
+        voxdag.build("scene.glb", resolution=64, output="scene.vdag", color=True, memory="8GiB",
+                     bounds=(0, 0, 0, 1), attributes=["alpha"], backend="cpu", work=b"folder")
     """)
     )
     checked = mypy(tmp_path, "-p", "voxdag")
@@ -40,4 +44,6 @@ def test_types(tmp_path):
     user = mypy(tmp_path, "user.py").stdout
     assert 'user.py:4: note: Revealed type is "int"' in user.replace("builtins.", ""), user
     assert "user.py:6: error: Argument 1" in user and "user.py:7: error: Argument" in user, user
-    assert "Found 2 errors" in user, user
+    assert 'user.py:8: error: Unexpected keyword argument "colors"' in user, user
+    assert "user.py:9: error: Argument" in user, user
+    assert "Found 4 errors" in user, user

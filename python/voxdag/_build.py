@@ -1,5 +1,7 @@
 """Builds from files, and from meshes in memory."""
 
+from __future__ import annotations
+
 import errno
 import json
 import operator
@@ -7,12 +9,16 @@ import os
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, BinaryIO, Callable, Optional, SupportsIndex, Union
+from typing import TYPE_CHECKING, Any, BinaryIO, Callable, Optional, SupportsIndex, Union
 
 import numpy as np
 
 from . import _native
 from ._error import Error, Path, path_text
+from ._options import PATHS, BuildOptions
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 # vertices (N, 3) of float, triangles (M, 3) of integers
 Mesh = tuple[Any, Any]
@@ -29,55 +35,55 @@ def build(
     *,
     resolution: SupportsIndex,
     output: Path,
-    memory: Union[int, str, None] = None,
     progress: Optional[Progress] = None,
-    **options: Any,
+    **options: Unpack[BuildOptions],
 ) -> dict[str, Any]:
     """Builds the DAG of a scene, or resumes a build that was interrupted, and returns its report.
 
-    scene       one or several files, together one scene, or a mesh in memory: a tuple of vertices
-                (N, 3), of which doubles stay doubles, and of indices of triangles (M, 3)
-    resolution  voxels per edge of the grid, a power of two from 4 to 2^20
-    output      the .vdag file to write
-    memory      bytes, or text such as "8GiB"; by default half of what the machine has
-    progress    called now and then; what it raises cancels the build and is raised here
+    scene             one or several files, together one scene, or a mesh in memory: a tuple of
+                      vertices (N, 3), of which doubles stay doubles, and of triangles (M, 3)
+    resolution        voxels per edge of the grid, a power of two from 4 to 2^20
+    output            the .vdag file to write
+    progress          called now and then; an exception that it raises cancels the build and is
+                      raised here
 
-    The other options are the options of the command line (docs/cli.md): bounds=(x, y, z, edge),
-    voxel_size, skip_invalid, hash_bits, color, attributes=["alpha", ...], color_resolution, work,
-    threads, subvolume, backend, method, cache, keep_work, restart, force. The report has the names
-    of `voxdag build --json`. Raises Error.
+    The report has the names of `voxdag build --json`. Raises Error. Further options:
+
     """
     output = path_text(output)
     with _files_of(scene, output) as files:
-        return _call(
-            _native.build, files, resolution, progress, output=output, memory=memory, **options
-        )
+        return _call(_native.build, files, resolution, output, progress, options)
 
 
 def plan(
     scene: Scene,
     *,
     resolution: SupportsIndex,
-    memory: Union[int, str, None] = None,
     output: Optional[Path] = None,
     progress: Optional[Progress] = None,
-    **options: Any,
+    **options: Unpack[BuildOptions],
 ) -> dict[str, Any]:
-    """What build() would need; builds nothing. The names are those of `voxdag plan --json`."""
+    """Estimates what build() would need; builds nothing. The names are those of
+    `voxdag plan --json`. Further options:
+
+    """
     output = "voxdag-plan" if output is None else path_text(output)
     with _files_of(scene, output) as files:
-        return _call(
-            _native.plan, files, resolution, progress, output=output, memory=memory, **options
-        )
+        return _call(_native.plan, files, resolution, output, progress, options)
+
+
+for _function in (build, plan):
+    _options_text = (BuildOptions.__doc__ or "").partition("\n\n")[2]
+    _function.__doc__ = (_function.__doc__ or "").rstrip() + "\n\n" + _options_text
 
 
 def _call(
     function: Callable[..., str],
     files: list[str],
     resolution: SupportsIndex,
+    output: str,
     progress: Optional[Progress],
-    memory: Union[int, str, None],
-    **options: Any,
+    options: BuildOptions,
 ) -> Any:
     resolution = operator.index(resolution)
     if not 0 < resolution < 1 << 63:
@@ -86,14 +92,13 @@ def _call(
         )
     if progress is not None and not callable(progress):
         raise TypeError(f"progress={progress!r}: expected a function or None")
-    if memory is not None:
-        options["memory"] = str(memory)
-    if options.get("bounds") is not None:
-        options["bounds"] = [float(number) for number in options["bounds"]]
-    for name in ("work", "cache"):
-        if options.get(name) is not None:
-            options[name] = path_text(options[name])
-    return json.loads(function(files, resolution, progress, options))
+    given: dict[str, Any] = {**options, "output": output}
+    if given.get("bounds") is not None:
+        given["bounds"] = [float(number) for number in given["bounds"]]
+    for name in PATHS:
+        if given.get(name) is not None:
+            given[name] = path_text(given[name])
+    return json.loads(function(files, resolution, progress, given))
 
 
 @contextmanager
