@@ -1,14 +1,13 @@
-// A table's columns, described once for both directions. For a record type `Record`, its namespace
-// has
+// Rows of a table, from the description of a record (core/fields/field.h), whose members are
+// integers, enums, double, text, bytes or optional integers:
 //
 //   template <class Row>
-//   void columns(Row& row, Record& record) {
-//     row.fixed("id", 1);           // the same in every row; not read
-//     row("name", record.name);     // integers, words, enums, double, text, bytes, optional
-//     integers
+//   void fields(Row& row, Record& record) {
+//     row.fixed("id", 1);  // the same in every row; not read
+//     row("name", record.name);
 //   }
 //
-// from which put_row() and select_rows() make their SQL, so that no column is known by its number.
+// From it put_row() and select_rows() make their SQL, so that no column is known by its number.
 #pragma once
 
 #include <optional>
@@ -88,7 +87,7 @@ template <class Record>
 ColumnNames column_names() {
   ColumnNames names;
   Record record;
-  columns(names, record);
+  fields(names, record);
   return names;
 }
 
@@ -102,7 +101,7 @@ void write_row(SqlDatabase& database, const std::string& before, const char* bet
   SqlStatement statement = database.prepare(before + " (" + names.text() + ") " + between + " (" +
                                             parameters + ") " + after);
   RowWriter writer(statement);
-  columns(writer, record);
+  fields(writer, record);
   statement.run();
 }
 
@@ -133,7 +132,7 @@ template <class Record>
 Record read_row(const SqlStatement& statement) {
   Record record;
   RowReader reader(statement);
-  columns(reader, record);
+  fields(reader, record);
   return record;
 }
 

@@ -3,119 +3,114 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "core/fields/field.h"
+#include "core/format/artifact/artifact_fields.h"
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
 
 namespace voxdag {
+
+template <class Visitor>
+void fields(Visitor& visit, GlobalLevel& level) {
+  visit("nodes", level.nodes);
+  visit("words", level.words);
+}
+
+template <class Visitor>
+void fields(Visitor& visit, PlacedNode& node) {
+  visit("cube", node.cube);
+  visit("hash", node.hash);
+  visit("position", node.position);
+}
+
+template <class Visitor>
+void fields(Visitor& visit, ArtifactRoot& root) {
+  visit("cube", root.cube);
+  visit("index", root.index);
+  visit("hash", root.hash);
+  visit("voxels", root.voxels);
+  visit("svo_nodes", root.svo_nodes);
+}
+
+template <class Visitor>
+void fields(Visitor& visit, MergeReport& report) {
+  visit("voxels", report.voxels);
+  visit("svo_nodes", report.svo_nodes);
+  visit("dag_nodes", report.dag_nodes);
+  visit("input_nodes", report.input_nodes);
+  visit("passes", report.passes);
+  visit("scratch_bytes", report.scratch_bytes);
+  visit("hash_partitions", report.hash_partitions);
+  visit("streamed_groups", report.streamed_groups);
+}
+
+template <class Visitor>
+void fields(Visitor& visit, FinalPassState& pass) {
+  visit("level", pass.level);
+  visit("output", pass.output);
+  visit("narrow_words", pass.narrow_words);
+  visit("levels", pass.file.levels);
+  visit("checksums", pass.file.checksums);
+  visit("map_rows", pass.map_rows);
+  visit("map_id", pass.map.id);
+  visit("map_words", pass.map.words);
+  visit("map_checksums", pass.map.checksums);
+  visit("placed", pass.placed);
+  visit("roots", pass.roots);
+}
+
+template <class Visitor>
+void fields(Visitor& visit, MergeState& state) {
+  visit("inputs_checksum", state.inputs_checksum);
+  visit("next_scratch_id", state.next_scratch_id);
+  visit("report", state.report);
+  visit("intermediates", state.intermediates);
+  visit("final_pass", state.final_pass);
+}
+
 namespace {
 
 constexpr uint64_t kMagic = 0x0a4752454d474456;  // "VDGMERG\n"
 constexpr uint32_t kVersion = 3;
 
-// The fields are described once for both directions: `code(field)` puts or gets one.
-template <class Code, class T>
-void code_all(Code& code, std::vector<T>& items) {
-  code.resize(items);
-  for (T& item : items) code_fields(code, item);
-}
+// Puts or gets the members of a description. `Derived` codes words, counts and texts.
+template <class Derived>
+class Coder {
+ public:
+  template <class T>
+  void operator()(const char*, T& value) {
+    auto& self = static_cast<Derived&>(*this);
+    if constexpr (IsVector<T>::value) {
+      self.count(value, 8);
+      for (auto& item : value) (*this)("", item);
+    } else if constexpr (IsOptional<T>::value) {
+      if (!self.flag(value.has_value())) return;
+      if (!value) value.emplace();
+      (*this)("", *value);
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      self.text(value);
+    } else if constexpr (std::is_arithmetic_v<T>) {
+      self.word(value);
+    } else {
+      fields(self, value);
+    }
+  }
+};
 
-template <class Code>
-void code_fields(Code& code, uint64_t& word) {
-  code(word);
-}
-
-template <class Code>
-void code_fields(Code& code, Cube& cube) {
-  code(cube.level);
-  for (uint32_t& coordinate : cube.position) code(coordinate);
-}
-
-template <class Code>
-void code_fields(Code& code, ArtifactRef& ref) {
-  code(ref.segment);
-  code(ref.offset);
-  code(ref.bytes);
-  code(ref.index_offset);
-  code(ref.checksum);
-}
-
-template <class Code>
-void code_fields(Code& code, GlobalLevel& level) {
-  code(level.nodes);
-  code(level.words);
-}
-
-template <class Code>
-void code_fields(Code& code, PlacedNode& node) {
-  code_fields(code, node.cube);
-  code(node.hash);
-  code(node.position);
-}
-
-template <class Code>
-void code_fields(Code& code, ArtifactRoot& root) {
-  code_fields(code, root.cube);
-  code(root.index);
-  code(root.hash);
-  code(root.voxels);
-  code(root.svo_nodes);
-}
-
-template <class Code>
-void code_fields(Code& code, MergeReport& report) {
-  code(report.voxels);
-  code(report.svo_nodes);
-  code(report.dag_nodes);
-  code(report.input_nodes);
-  code(report.passes);
-  code(report.scratch_bytes);
-  code(report.hash_partitions);
-  code(report.streamed_groups);
-}
-
-template <class Code>
-void code_fields(Code& code, FinalPassState& pass) {
-  code(pass.level);
-  code.text(pass.output);
-  code(pass.narrow_words);
-  code_all(code, pass.file.levels);
-  code_all(code, pass.file.checksums);
-  code_all(code, pass.map_rows);
-  code(pass.map.id);
-  code(pass.map.words);
-  code_all(code, pass.map.checksums);
-  code_all(code, pass.placed);
-  code_all(code, pass.roots);
-}
-
-template <class Code>
-void code_state(Code& code, MergeState& state) {
-  code(state.inputs_checksum);
-  code(state.next_scratch_id);
-  code_fields(code, state.report);
-  code_all(code, state.intermediates);
-  if (!code.flag(state.final_pass.has_value())) return;
-  if (!state.final_pass) state.final_pass.emplace();
-  code_fields(code, *state.final_pass);
-}
-
-class Put {
+class Put : public Coder<Put> {
  public:
   explicit Put(ByteSink& out) : out_(out) {}
   template <class T>
-  void operator()(const T& field) {
-    out_.put(field);
+  void word(const T& word) {
+    out_.put(word);
   }
-  template <class T>
-  void resize(const std::vector<T>& items) {
-    out_.put(uint64_t{items.size()});
-  }
+  void count(const auto& items, size_t) { out_.put(uint64_t{items.size()}); }
   bool flag(bool value) {
     out_.put(uint8_t{value});
     return value;
   }
   void text(const std::string& text) {
-    out_.put(uint64_t{text.size()});
+    count(text, 1);
     out_.put_bytes(std::as_bytes(std::span(text)));
   }
 
@@ -123,17 +118,20 @@ class Put {
   ByteSink& out_;
 };
 
-class Get {
+class Get : public Coder<Get> {
  public:
   explicit Get(ByteSource& in) : in_(in) {}
   template <class T>
-  void operator()(T& field) {
-    field = in_.get<T>();
+  void word(T& word) {
+    word = in_.get<T>();
   }
-  // Every item takes at least 8 bytes, so a damaged count cannot allocate more than the bytes hold.
-  template <class T>
-  void resize(std::vector<T>& items) {
-    items.resize(count(8));
+  // Every item takes `min_bytes`, so a damaged count cannot allocate more than the bytes hold.
+  void count(auto& items, size_t min_bytes) {
+    const uint64_t n = in_.get<uint64_t>();
+    if (n <= in_.left() / min_bytes)
+      items.resize(n);
+    else
+      fail();
   }
   bool flag(bool) {
     const uint8_t value = in_.get<uint8_t>();
@@ -141,18 +139,12 @@ class Get {
     return value == 1;
   }
   void text(std::string& text) {
-    text.resize(count(1));
+    count(text, 1);
     const auto bytes = in_.take(text.size());
     std::copy(bytes.begin(), bytes.end(), std::as_writable_bytes(std::span(text)).begin());
   }
 
  private:
-  size_t count(size_t min_bytes) {
-    const uint64_t n = in_.get<uint64_t>();
-    if (n <= in_.left() / min_bytes) return n;
-    fail();
-    return 0;
-  }
   void fail() { in_.take(in_.left() + 1); }  // makes ok() false
 
   ByteSource& in_;
@@ -166,7 +158,7 @@ std::vector<std::byte> encode_state(MergeState state) {
   sink.put(kMagic);
   sink.put(kVersion);
   Put put(sink);
-  code_state(put, state);
+  fields(put, state);
   sink.put(checksum64(bytes));
   return bytes;
 }
@@ -182,7 +174,7 @@ MergeState decode_state(std::span<const std::byte> bytes) {
   }
   if (sound) {
     Get get(source);
-    code_state(get, state);
+    fields(get, state);
     sound = source.ok() && source.left() == sizeof(uint64_t);
   }
   if (!sound) throw Error(ErrorCode::kCorrupt, "the merge's state is damaged");

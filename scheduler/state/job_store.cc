@@ -2,7 +2,9 @@
 
 #include "core/base/error.h"
 #include "core/db/table_rows.h"
+#include "core/format/artifact/artifact_fields.h"
 #include "core/format/checksum.h"
+#include "scheduler/spec/report_fields.h"
 
 namespace voxdag {
 namespace {
@@ -142,25 +144,15 @@ struct SubvolumeRow {
 };
 
 template <class Row>
-void columns(Row& row, SubvolumeRow& r) {
+void fields(Row& row, SubvolumeRow& r) {
   StoredSubvolume& s = r.subvolume;
   row("id", s.id);
   row("parent", r.parent);
-  row("level", s.cube.level);
-  row("x", s.cube.position[0]);
-  row("y", s.cube.position[1]);
-  row("z", s.cube.position[2]);
+  fields(row, s.cube);
   row("weight", s.weight);
   row("state", s.state);
-  row("segment", s.artifact.segment);
-  row("offset", s.artifact.offset);
-  row("bytes", s.artifact.bytes);
-  row("index_offset", s.artifact.index_offset);
-  row("checksum", s.artifact.checksum);
-  row("voxels", s.summary.voxels);
-  row("svo_nodes", s.summary.svo_nodes);
-  row("dag_nodes", s.summary.dag_nodes);
-  row("root_hash", s.summary.root_hash);
+  fields(row, s.artifact);
+  fields(row, s.summary);
 }
 
 struct IngestRow {
@@ -168,7 +160,7 @@ struct IngestRow {
 };
 
 template <class Row>
-void columns(Row& row, IngestRow& r) {
+void fields(Row& row, IngestRow& r) {
   row.fixed("id", 1);
   row("record", r.record);
 }
@@ -181,7 +173,7 @@ struct JobRow {
 }  // namespace
 
 template <class Row>
-void columns(Row& row, JobIdentity& job) {
+void fields(Row& row, JobIdentity& job) {
   row.fixed("id", 1);
   row("scene_digest", job.scene_digest);
   row("geometry", job.geometry);
@@ -189,14 +181,14 @@ void columns(Row& row, JobIdentity& job) {
 }
 
 template <class Row>
-void columns(Row& row, StoredMerge& merge) {
+void fields(Row& row, StoredMerge& merge) {
   row.fixed("id", 1);
   row("level", merge.level);
   row("state", merge.state);
 }
 
 template <class Row>
-void columns(Row& row, JobResult& result) {
+void fields(Row& row, JobResult& result) {
   row.fixed("id", 1);
   row("output", result.output);
   row("sha256", result.sha256);
@@ -211,15 +203,7 @@ void columns(Row& row, JobResult& result) {
 }
 
 template <class Row>
-void columns(Row& row, StageTime& time) {
-  row("name", time.name);
-  row("wall_s", time.wall_s);
-  row("cpu_s", time.cpu_s);
-  row("largest_thread_share", time.largest_thread_share);
-}
-
-template <class Row>
-void columns(Row& row, ProgressSnapshot& progress) {
+void fields(Row& row, ProgressSnapshot& progress) {
   row.fixed("id", 1);
   row("stage", progress.stage);
   row("unit", progress.unit);
@@ -236,21 +220,21 @@ void columns(Row& row, ProgressSnapshot& progress) {
 namespace {
 
 template <class Row>
-void columns(Row& row, JobRow& r) {
-  columns(row, r.job);
+void fields(Row& row, JobRow& r) {
+  fields(row, r.job);
   row("subvolumes", r.subvolumes);
 }
 
 template <class Row, class Record>
-void columns(Row& row, Sealed<Record>& sealed) {
-  columns(row, sealed.record);
+void fields(Row& row, Sealed<Record>& sealed) {
+  fields(row, sealed.record);
   row("row_checksum", sealed.checksum);
 }
 
 template <class Record>
 uint64_t checksum_of(Record& record) {
   RowDigest digest;
-  columns(digest, record);
+  fields(digest, record);
   return digest.value();
 }
 

@@ -80,7 +80,7 @@ struct JobRow {
 };
 
 template <class Row>
-void columns(Row& row, JobRow& r) {
+void fields(Row& row, JobRow& r) {
   Job& job = r.job;
   row("number", job.number);
   row("id", job.id);
