@@ -77,7 +77,7 @@ struct Field {
   constexpr Field power_of_two(int64_t low, int64_t high) const {
     return range(low, high).with(&Field::is_power_of_two, true);
   }
-  constexpr Field clamp_to_zero() const { return with(&Field::is_above_zero, true); }
+  constexpr Field above_zero() const { return with(&Field::is_above_zero, true); }
   constexpr Field bytes() const { return with(&Field::is_bytes, true); }
   constexpr Field line(int64_t characters) const {
     return range(1, characters).with(&Field::is_line, true);

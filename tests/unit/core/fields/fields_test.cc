@@ -56,8 +56,8 @@ void fields(Visitor& visit, Choices& choices) {
         choices.memory);
   visit(Field("rank").range(-3, 3), choices.rank);
   visit.object("options", [&](auto& options) {
-    options(Field("cube").with(&Field::parts, "X,Y,Z,EDGE").clamp_to_zero(), choices.cube);
-    options(Field("size").clamp_to_zero().excludes("cube"), choices.size);
+    options(Field("cube").with(&Field::parts, "X,Y,Z,EDGE").above_zero(), choices.cube);
+    options(Field("size").above_zero().excludes("cube"), choices.size);
     options("speed", choices.speed);
     options("loud", choices.loud);
   });
@@ -154,7 +154,7 @@ TEST(ParseText, ReadsWhatACommandLineGives) {
   for (const char* text : {"12", "128", "-4", "4.0", "", "4k"})
     EXPECT_FALSE(parse_text(edge, text, number)) << text;
   std::optional<std::array<double, 4>> cube;
-  const auto parts = Field("cube").clamp_to_zero();
+  const auto parts = Field("cube").above_zero();
   EXPECT_TRUE(parse_text(parts, "0,0,-1e3,2.5", cube));
   EXPECT_EQ(cube->back(), 2.5);
   for (const char* text : {"0,0,0", "0,0,0,0", "0,nan,0,1", "1,2,3,4,5"})
