@@ -1,6 +1,8 @@
 #include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -10,6 +12,7 @@
 #include "python/native/bindings.h"
 #include "python/native/long_work.h"
 #include "python/native/path_text.h"
+#include "scene/mesh_files.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
 #include "scheduler/spec/build_fields.h"
@@ -17,7 +20,30 @@
 namespace voxdag::python {
 namespace {
 
-// Takes the options out of a dict of keyword arguments; None is as if it were not given.
+// Vertices are floats or doubles.
+using Vertices = nb::ndarray<nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Triangles = nb::ndarray<const uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using MeshArrays = std::pair<Vertices, Triangles>;
+
+template <class Number>
+std::span<const Number> numbers_of(const auto& rows) {
+  return {static_cast<const Number*>(rows.data()), rows.size()};
+}
+
+Mesh mesh_of(const MeshArrays& arrays) {
+  const auto& [vertices, triangles] = arrays;
+  Mesh mesh;
+  if (vertices.dtype() == nb::dtype<float>())
+    mesh.positions = numbers_of<float>(vertices);
+  else if (vertices.dtype() == nb::dtype<double>())
+    mesh.positions = numbers_of<double>(vertices);
+  else
+    throw nb::type_error("vertices: expected float32 or float64");
+  mesh.indices = numbers_of<uint32_t>(triangles);
+  return mesh;
+}
+
+// Removes the options from a dict of keyword arguments. An argument of None counts as absent.
 class KeywordReader {
  public:
   explicit KeywordReader(nb::dict given) : given_(std::move(given)) {}
@@ -51,7 +77,7 @@ class KeywordReader {
       if (!nb::try_cast<PathText>(object, text)) return false;
       value = std::move(text.bytes);
       return true;
-    } else if constexpr (NamedEnum<T> || std::is_integral_v<T>) {
+    } else if constexpr (NamedEnum<T> || (std::is_integral_v<T> && !std::is_same_v<T, bool>)) {
       if constexpr (std::is_integral_v<T>)
         if (!nb::isinstance<nb::str>(object)) return nb::try_cast<T>(object, value);
       std::string text;
@@ -71,9 +97,8 @@ class KeywordReader {
   nb::dict given_;
 };
 
-BuildSpec spec_of(std::vector<PathText> scenes, uint64_t resolution, nb::dict options) {
+BuildSpec spec_of(uint64_t resolution, nb::dict options) {
   BuildSpec spec;
-  for (PathText& scene : scenes) spec.geometry.scenes.push_back(std::move(scene.bytes));
   spec.geometry.resolution = resolution;
   KeywordReader reader(std::move(options));
   fields(reader, spec);
@@ -81,29 +106,49 @@ BuildSpec spec_of(std::vector<PathText> scenes, uint64_t resolution, nb::dict op
   return spec;
 }
 
-std::string build(std::vector<PathText> scenes, uint64_t resolution, nb::object progress,
-                  nb::dict options) {
-  const BuildSpec spec = spec_of(std::move(scenes), resolution, std::move(options));
+// Returns work(spec, context) for a scene of files or of one mesh.
+template <class Work>
+std::string run_with_scene(BuildSpec spec, std::vector<PathText> files,
+                           const std::optional<MeshArrays>& arrays, nb::object progress,
+                           const Work& work) {
+  std::vector<std::string>& scenes = spec.geometry.scenes;
+  for (PathText& file : files) scenes.push_back(std::move(file.bytes));
+  std::optional<MeshFiles> mesh;
+  if (arrays) {
+    scenes.emplace_back(MeshFiles::kPath);
+    mesh.emplace(system_files(), mesh_of(*arrays));
+  }
+  FileSystem& file_system = mesh ? *mesh : system_files();
   return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
-    return report_json(run_build(spec, {system_files(), relay, cancel}));
+    return work(spec, BuildContext{file_system, relay, cancel});
   });
 }
 
-std::string plan(std::vector<PathText> scenes, uint64_t resolution, nb::object progress,
-                 nb::dict options) {
-  const BuildSpec spec = spec_of(std::move(scenes), resolution, std::move(options));
-  return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
-    return estimate_json(plan_build(spec, {system_files(), relay, cancel}));
-  });
+std::string build(std::vector<PathText> files, std::optional<MeshArrays> mesh, uint64_t resolution,
+                  nb::object progress, nb::dict options) {
+  return run_with_scene(spec_of(resolution, std::move(options)), std::move(files), mesh,
+                        std::move(progress),
+                        [](const BuildSpec& spec, const BuildContext& context) {
+                          return report_json(run_build(spec, context));
+                        });
+}
+
+std::string plan(std::vector<PathText> files, std::optional<MeshArrays> mesh, uint64_t resolution,
+                 nb::object progress, nb::dict options) {
+  return run_with_scene(spec_of(resolution, std::move(options)), std::move(files), mesh,
+                        std::move(progress),
+                        [](const BuildSpec& spec, const BuildContext& context) {
+                          return estimate_json(plan_build(spec, context));
+                        });
 }
 
 }  // namespace
 
 void bind_build(nb::module_& module) {
-  module.def("build", &build, nb::arg("scenes"), nb::arg("resolution"), nb::arg("progress").none(),
-             nb::arg("options"));
-  module.def("plan", &plan, nb::arg("scenes"), nb::arg("resolution"), nb::arg("progress").none(),
-             nb::arg("options"));
+  module.def("build", &build, nb::arg("files"), nb::arg("mesh").none(), nb::arg("resolution"),
+             nb::arg("progress").none(), nb::arg("options"));
+  module.def("plan", &plan, nb::arg("files"), nb::arg("mesh").none(), nb::arg("resolution"),
+             nb::arg("progress").none(), nb::arg("options"));
 }
 
 }  // namespace voxdag::python

@@ -1,10 +1,10 @@
-// Work that takes long, called from Python. It runs on a thread of its own without the
-// interpreter's lock; the calling thread also looks for signals (Ctrl-C is KeyboardInterrupt,
-// as everywhere in Python) and passes progress and warnings on. So Python code only ever runs on
-// the caller's thread.
+// Long-running work called from Python. The work runs on its own thread without the interpreter's
+// lock. The calling thread handles signals (Ctrl-C raises KeyboardInterrupt) and forwards progress
+// and warnings, so Python code runs only on the caller's thread.
 #pragma once
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
 
 #include <chrono>
 #include <future>
@@ -45,11 +45,11 @@ class LatestProgress : public Progress {
   std::vector<std::string> warnings_;
 };
 
-// Between two looks at the work.
+// Polling interval of the calling thread.
 inline constexpr std::chrono::milliseconds kLookInterval{50};
 
-// Passes what is new on to Python, as warnings and calls of `callback` (None for nobody) with
-// stage, done, total and unit; raises what Python code raised, and KeyboardInterrupt.
+// Forwards new messages to Python: warnings, and calls of `callback` (unless None) with stage,
+// done, total and unit. Raises the exceptions of Python code, and KeyboardInterrupt.
 class Messenger {
  public:
   explicit Messenger(nb::object callback) : callback_(std::move(callback)) {}
@@ -60,8 +60,8 @@ class Messenger {
   LatestProgress::State last_;
 };
 
-// Returns work(progress, cancel), or throws what it threw. If Python code raised something
-// by then, the work is canceled and that is raised.
+// Returns work(progress, cancel) or throws its exception. An exception of Python code cancels the
+// work and is raised instead.
 template <class Work>
 auto run_long_work(nb::object callback, Work work) {
   LatestProgress progress;

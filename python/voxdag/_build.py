@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import operator
 import os
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, BinaryIO, Callable, Optional, SupportsIndex, Union
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Callable, SupportsIndex, Union
 
 import numpy as np
 
@@ -23,11 +20,9 @@ if TYPE_CHECKING:
 # vertices (N, 3) of float, triangles (M, 3) of integers
 Mesh = tuple[Any, Any]
 Scene = Union[Path, Sequence[Path], Mesh]
-# Called with the stage, units done, units in all (0 if unknown) and the unit.
+# Called with the stage, units done, total units (0 if unknown) and the unit.
 Progress = Callable[[str, int, int, str], None]
-
-# Rows that are converted and written at a time.
-_ROWS = 1 << 18
+_Arrays = tuple[np.ndarray, np.ndarray]
 
 
 def build(
@@ -35,41 +30,40 @@ def build(
     *,
     resolution: SupportsIndex,
     output: Path,
-    progress: Optional[Progress] = None,
+    progress: Progress | None = None,
     **options: Unpack[BuildOptions],
 ) -> dict[str, Any]:
-    """Builds the DAG of a scene, or resumes a build that was interrupted, and returns its report.
+    """Builds the DAG of a scene, or resumes an interrupted build, and returns its report.
 
     scene             one or several files, together one scene, or a mesh in memory: a tuple of
-                      vertices (N, 3), of which doubles stay doubles, and of triangles (M, 3)
+                      vertices (N, 3), with the precision of their type, and triangles (M, 3);
+                      do not change arrays before build() returns
     resolution        voxels per edge of the grid, a power of two from 4 to 2^20
     output            the .vdag file to write
-    progress          called now and then; an exception that it raises cancels the build and is
-                      raised here
+    progress          called up to 20 times a second; if it raises an exception, build() cancels
+                      the build and raises the exception
 
     The report has the names of `voxdag build --json`. Raises Error. Further options:
 
     """
     output = path_text(output)
-    with _files_of(scene, output) as files:
-        return _call(_native.build, files, resolution, output, progress, options)
+    return _call(_native.build, scene, resolution, output, progress, options)
 
 
 def plan(
     scene: Scene,
     *,
     resolution: SupportsIndex,
-    output: Optional[Path] = None,
-    progress: Optional[Progress] = None,
+    output: Path | None = None,
+    progress: Progress | None = None,
     **options: Unpack[BuildOptions],
 ) -> dict[str, Any]:
-    """Estimates what build() would need; builds nothing. The names are those of
+    """Estimates the cost of a build and creates no files. The estimate has the names of
     `voxdag plan --json`. Further options:
 
     """
     output = "voxdag-plan" if output is None else path_text(output)
-    with _files_of(scene, output) as files:
-        return _call(_native.plan, files, resolution, output, progress, options)
+    return _call(_native.plan, scene, resolution, output, progress, options)
 
 
 for _function in (build, plan):
@@ -79,10 +73,10 @@ for _function in (build, plan):
 
 def _call(
     function: Callable[..., str],
-    files: list[str],
+    scene: Scene,
     resolution: SupportsIndex,
     output: str,
-    progress: Optional[Progress],
+    progress: Progress | None,
     options: BuildOptions,
 ) -> Any:
     resolution = operator.index(resolution)
@@ -98,46 +92,17 @@ def _call(
     for name in PATHS:
         if given.get(name) is not None:
             given[name] = path_text(given[name])
-    return json.loads(function(files, resolution, progress, given))
+    files, mesh = _parts_of(scene)
+    return json.loads(function(files, mesh, resolution, progress, given))
 
 
-@contextmanager
-def _files_of(scene: Scene, output: str) -> Iterator[list[str]]:
-    """The files of a scene. A mesh becomes a PLY file next to the output, which is removed."""
+def _parts_of(scene: Scene) -> tuple[list[str], _Arrays | None]:
+    """Returns the files of a scene, and its mesh."""
     if isinstance(scene, (str, bytes, os.PathLike)):
-        yield [path_text(scene)]
-    elif _is_mesh(scene):
-        _check_mesh(*scene)
-        path = _mesh_file(scene, output)
-        try:
-            yield [path]
-        finally:
-            os.remove(path)
-    else:
-        yield [path_text(file) for file in scene]
-
-
-def _mesh_file(mesh: Sequence[Any], output: str) -> str:
-    """Writes a mesh to a new file next to the output, or to a temporary one while that has no
-    folder, and returns its path."""
-    folder, name = os.path.split(os.path.abspath(output))
-    path = None
-    try:
-        handle, path = tempfile.mkstemp(
-            suffix=".ply", prefix=name + ".scene-", dir=folder if os.path.isdir(folder) else None
-        )
-        with os.fdopen(handle, "wb") as file:
-            _write_ply(file, *(np.asarray(part) for part in mesh))
-        return path
-    except BaseException as error:
-        if path is not None:
-            os.remove(path)
-        if isinstance(error, OSError):
-            full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-            raise Error(
-                f"the mesh cannot be written as a file: {error}", "no_space" if full else "io"
-            ) from error
-        raise
+        return [path_text(scene)], None
+    if _is_mesh(scene):
+        return [], _mesh_arrays(*scene)
+    return [path_text(file) for file in scene], None
 
 
 def _is_mesh(scene: Scene) -> bool:
@@ -148,7 +113,8 @@ def _is_mesh(scene: Scene) -> bool:
     )
 
 
-def _check_mesh(vertices: Any, triangles: Any) -> None:
+def _mesh_arrays(vertices: Any, triangles: Any) -> _Arrays:
+    """Checks a mesh and returns its arrays with the types of the native module."""
     vertices, triangles = np.asarray(vertices), np.asarray(triangles)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
         raise Error(
@@ -171,22 +137,8 @@ def _check_mesh(vertices: Any, triangles: Any) -> None:
             f"{len(vertices) - 1}",
             "invalid_input",
         )
-
-
-def _write_ply(file: BinaryIO, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    file.write(
-        (
-            f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
-            "property double x\nproperty double y\nproperty double z\n"
-            f"element face {len(triangles)}\n"
-            "property list uchar uint vertex_indices\nend_header\n"
-        ).encode()
+    is_float = vertices.dtype == np.float32
+    return (
+        np.ascontiguousarray(vertices, dtype=np.float32 if is_float else np.float64),
+        np.ascontiguousarray(triangles, dtype=np.uint32),
     )
-    for first in range(0, len(vertices), _ROWS):
-        file.write(np.ascontiguousarray(vertices[first : first + _ROWS], dtype="<f8").data)
-    for first in range(0, len(triangles), _ROWS):
-        part = triangles[first : first + _ROWS]
-        rows = np.empty(len(part), dtype=[("count", "u1"), ("corners", "<u4", 3)])
-        rows["count"] = 3
-        rows["corners"] = part
-        file.write(rows.data)
