@@ -6,9 +6,9 @@
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "scheduler/run_build.h"
-#include "scheduler/spec/build_fields.h"
 #include "scheduler/slurm/commands/slurm.h"
 #include "scheduler/slurm/run_batch.h"
+#include "scheduler/spec/build_fields.h"
 
 namespace voxdag::cli {
 namespace {
@@ -52,7 +52,7 @@ void print(const BuildReport& r) {
 
 constexpr const char* kMergeJobFlag = "--cluster-merge-job";
 
-// The words of this command, but for the name of the program.
+// This process's command line without the program name.
 std::vector<std::string> own_arguments() {
   std::ifstream line("/proc/self/cmdline");
   std::vector<std::string> words;
@@ -65,11 +65,11 @@ std::vector<std::string> own_arguments() {
   return words;
 }
 
-// The merge gets the memory and threads that were asked for, if any were, else as much as a task.
+// The merge job gets the user's --memory and --threads. Without them it gets as much as a task.
 ClusterOptions::MergeJobOptions merge_job(const BuildCommand& command, const BuildSpec& spec) {
   ClusterOptions::MergeJobOptions job;
   job.arguments = own_arguments();
-  // The command comes first; what follows "--" are scenes.
+  // The first word is the command. Words after "--" are scenes, so the flag cannot be appended.
   job.arguments.insert(job.arguments.begin() + 1, kMergeJobFlag);
   job.folder = std::filesystem::current_path().string();
   if (spec.run.memory_bytes > 0)
@@ -82,7 +82,7 @@ ClusterOptions::MergeJobOptions merge_job(const BuildCommand& command, const Bui
   return job;
 }
 
-// What Slurm has given to this job, where the user does not say.
+// Applies this job's Slurm allocation to the options that the user left out.
 void take_allocation(RunOptions& run) {
   const Allocation given = slurm_allocation();
   if (run.memory_bytes == 0 && given.memory_bytes > 0)
@@ -129,7 +129,7 @@ void declare(Command& command, BuildCommand& state) {
           .group(heading);
   command
       .option("--cluster-merge-options", state.merge_options,
-              "options of sbatch for that job, after those of --cluster-options")
+              "options of sbatch for the merge job, added to --cluster-options")
       .needs(merge)
       .group(heading);
   command.flag(kMergeJobFlag, state.cluster.is_merge_job, "this process is that job")

@@ -29,7 +29,7 @@ void declare(Command& command, BuildBatchCommand& state) {
   command.option("work", state.run.work_folder, "the work folder of the build").required();
   command.option("--batch", state.run.batch, "the number of the batch").required();
   command.option("--memory", state.memory,
-                 "memory budget (default: what Slurm gives, else half the RAM)");
+                 "memory budget (default: the Slurm allocation, otherwise half the RAM)");
   command.threads_option(state.run.threads);
   command.option("--temporary", state.run.temporary_folder,
                  "folder on this machine for temporary files (default: $TMPDIR or /tmp)");

@@ -28,8 +28,8 @@ void read_config_file(const std::string& path, CLI::App& command) {
   }
 }
 
-// "", or what is expected in place of `text`, which CLI11 would convert to something else (-4 to
-// 2^64 - 4) or refuse without saying why.
+// Returns "" for a valid number, otherwise a message. CLI11's own conversion is not enough: it
+// turns -4 into 2^64 - 4 and reports no expectation.
 template <class T>
 std::string integer_problem(const std::string& text) {
   if (parse_numbers<T, 1>(text, ',')) return "";

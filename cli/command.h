@@ -22,8 +22,8 @@ class Option;
 
 namespace voxdag::cli {
 
-// Exactly kCount numbers separated by `separator`, such as X,Y,Z or WIDTHxHEIGHT. Throws
-// Error{kInvalidInput} that names the option and says what was `expected`.
+// Parses exactly kCount numbers separated by `separator`, such as X,Y,Z or WIDTHxHEIGHT. Throws
+// Error{kInvalidInput} with the option's name and the text `expected`.
 template <class Number, size_t kCount>
 std::array<Number, kCount> parse_list(const std::string& option, const std::string& text,
                                       char separator, const std::string& expected) {
@@ -33,7 +33,7 @@ std::array<Number, kCount> parse_list(const std::string& option, const std::stri
   return *numbers;
 }
 
-// An option of a command; a handle, each function of which returns the option again.
+// A handle of a command's option. Each function returns the handle, so calls can be chained.
 class Option {
  public:
   explicit Option(CLI::Option* option) : option_(option) {}
@@ -45,7 +45,7 @@ class Option {
   Option range(int low, int high);
   Option range(double low, double high);
   Option one_of(const std::vector<std::string>& values);
-  // `problem` returns "" for a valid value, else what was expected.
+  // `problem` returns "" for a valid value, otherwise the expectation.
   Option check(std::string (*problem)(const std::string& value));
   Option excludes(Option other);
   Option needs(Option other);

@@ -81,7 +81,7 @@ void run(const DiffCommand& command, CommandContext& context) {
 void declare(Command& command, DiffCommand& state) {
   command.option("a", state.a, "a .vdag file").required();
   command.option("b", state.b, "another .vdag file on the same grid").required();
-  command.flag("--color", state.color, "compare colors, too: of the cells that both have");
+  command.flag("--color", state.color, "also compare the colors of cells that both files have");
   command.threads_option(state.threads);
   command.json_flag(state.json);
 }

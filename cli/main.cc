@@ -12,7 +12,7 @@
 namespace voxdag::cli {
 namespace {
 
-// Of an exception that no part of voxdag should throw (docs/errors.md); EX_SOFTWARE of sysexits.h.
+// Exit status after an unexpected exception (docs/errors.md); EX_SOFTWARE of sysexits.h.
 constexpr int kDefectStatus = 70;
 
 CancelToken g_cancel;
@@ -29,7 +29,7 @@ void catch_signals() {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  // Of a terminal that is closed, unless it is to be ignored (nohup).
+  // The terminal was closed. nohup makes programs ignore this signal.
   struct sigaction hangup {};
   sigaction(SIGHUP, nullptr, &hangup);
   if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
@@ -41,7 +41,7 @@ int report(ErrorCode code, const char* message) {
   return exit_status(code);
 }
 
-// What was printed may still be in a buffer: if it cannot be written, the command has failed.
+// Printed text may still be in a buffer. The command has failed if it cannot be written.
 void check_output() {
   errno = 0;
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return;

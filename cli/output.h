@@ -10,17 +10,17 @@
 
 namespace voxdag::cli {
 
-// Prints one line. Bytes that are not UTF-8, as a path may have, are printed as U+FFFD.
+// Prints one line. Bytes that are not UTF-8, for example in a path, are printed as U+FFFD.
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
 
-// Resolution, cells and bytes of a section that the file has.
+// Resolution, cells and bytes of one section.
 nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section);
-// Those of all that it has, as the members `colors` and `attributes`; the latter has the names of
-// materials, too.
+// Adds the facts of all sections of the file as the members `colors` and `attributes`. The latter
+// also has the names of materials.
 void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json);
 
-// Whether voxdag wrote the file with a command of this kind.
+// True if voxdag wrote the file with a command of this kind.
 using IsOwnFile = std::function<bool(const ReadableFile& file)>;
 
 // A file to write, and the option --force.
@@ -28,9 +28,9 @@ struct OutputFile {
   std::string path;
   bool force = false;
   void declare_force(Command& command);
-  // Throws Error{kInvalidInput} if writing would destroy something: the `input` whatever the
-  // options, another file that is not `is_own` without --force. Checks path + ".partial" as well,
-  // under which write_file_atomically() writes, and that the folder is there.
+  // Throws Error{kInvalidInput} if writing would destroy the `input`, or, without --force, a file
+  // that is not `is_own`. Also checks path + ".partial", the temporary name of
+  // write_file_atomically(), and that the folder exists.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
   // The same for one name.
   void check(FileSystem& files, const std::string& name, const std::string& input,

@@ -36,7 +36,7 @@ uint32_t grid_levels(const SelectionOptions& options, const voxdag_reader::File&
 query::Region world_region(const std::string& text, const voxdag_reader::File& file,
                            uint32_t grid_levels) {
   const auto box = parse_list<double, 6>("--region", text, ',', "six numbers X0,Y0,Z0,X1,Y1,Z1");
-  // Not a number fails this, too.
+  // This also refuses NaN.
   for (size_t axis = 0; axis < 3; ++axis)
     if (!(box[axis] < box[axis + 3])) refuse_order(text);
   return query::cut_to_grid(query::world_to_region(file, grid_levels, box), grid_levels);
@@ -80,9 +80,9 @@ query::Selection SelectionOptions::selection(const voxdag_reader::File& file) co
     selection.region = world ? world_region(region, file, selection.grid_levels)
                              : cell_region(region, selection.grid_levels);
   if (selection.region.empty())
-    throw Error(ErrorCode::kInvalidInput,
-                "--region '" + region + "': it lies outside the grid of " +
-                    std::to_string(int64_t{1} << selection.grid_levels) + " voxels per edge");
+    throw Error(ErrorCode::kInvalidInput, "--region '" + region + "' is outside the grid of " +
+                                              std::to_string(int64_t{1} << selection.grid_levels) +
+                                              " voxels per edge");
   return selection;
 }
 

@@ -18,13 +18,13 @@ struct SelectionOptions {
   std::optional<uint64_t> level, resolution;
 
   void declare(Command& command);
-  // What of `file` is selected. Throws Error{kInvalidInput} for a grid that is finer than the
-  // file's or coarser than 4 cells per edge, and for a region that has no cell of the grid.
+  // Returns the selected cells of `file`. Throws Error{kInvalidInput} for a grid that is finer than
+  // the file's or coarser than 4 cells per edge, and for a region that has no cell of the grid.
   query::Selection selection(const voxdag_reader::File& file) const;
 };
 
-// The option --memory, as typed; "" for half of what the machine has. Throws Error{kInvalidInput}
-// for less than 64 MiB.
+// Parses the option --memory; "" for half of the machine's memory. Throws Error{kInvalidInput} for
+// less than 64 MiB.
 uint64_t memory_limit(const std::string& text);
 
 }  // namespace voxdag::cli

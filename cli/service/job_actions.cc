@@ -22,7 +22,7 @@ void declare(Command& command, JobActionCommand& state) {
   command.json_flag(state.json, "each job as one JSON object on standard output");
 }
 
-// Performs the action on each job; "resume" retries those that have failed or were canceled.
+// Performs the action on each job; "resume" retries failed and canceled jobs.
 void run(const JobActionCommand& command, ServiceClient& service, CommandContext&) {
   for (const std::string& id : command.ids) {
     const std::string state = command.action == "resume" ? service.job(id).at("state") : "";
@@ -41,7 +41,7 @@ void add_job_action_commands(CommandLine& line) {
   const auto add = [&](const char* action, const char* description) {
     add_service_command<JobActionCommand>(line, action, description).action = action;
   };
-  add("cancel", "cancel jobs of a server and discard what they have built");
+  add("cancel", "cancel jobs of a server and discard their results");
   add("suspend", "suspend jobs of a server, to be resumed later");
   add("resume", "resume suspended jobs of a server, or retry failed and canceled ones");
 }

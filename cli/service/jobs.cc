@@ -33,7 +33,7 @@ void run(const JobsCommand& command, ServiceClient& service, CommandContext&) {
     print(answer);
 }
 
-// Accepts what needs no escape in a query.
+// Accepts only characters that need no escape in a query.
 std::string check_states(const std::string& states) {
   const bool fine = states.find_first_not_of("abcdefghijklmnopqrstuvwxyz,") == std::string::npos;
   return fine ? "" : "expected states such as running,queued";

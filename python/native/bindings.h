@@ -1,4 +1,4 @@
-// What module.cc binds.
+// Functions that add the members of the native module.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -7,7 +7,7 @@ namespace voxdag::python {
 
 void bind_build(nanobind::module_& module);   // build and plan
 void bind_dag(nanobind::module_& module);     // finished files
-void bind_derive(nanobind::module_& module);  // what is made of finished files
-void bind_render(nanobind::module_& module);  // pictures of them
+void bind_derive(nanobind::module_& module);  // extracts and exports
+void bind_render(nanobind::module_& module);  // pictures
 
 }  // namespace voxdag::python

@@ -55,7 +55,7 @@ void lookup(const query::DagFile& dag, const Rows<const int64_t>& points, uint32
   dag.lookup(positions_of(points), grid_levels, {set.data(), set.shape(0)}, threads_of(threads));
 }
 
-// Rays that are cast at a time, so that the hits as the library has them take little memory.
+// Rays per batch. It bounds the memory of the library's hits.
 constexpr size_t kRays = size_t{1} << 16;
 
 void rays(const query::DagFile& dag, const Rows<const double>& origins,

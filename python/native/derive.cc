@@ -24,7 +24,7 @@ query::Selection selection_of(uint32_t grid_levels, const Corner& low, const Cor
   const query::Selection selection{grid_levels, query::cut_to_grid({low, high}, grid_levels)};
   if (selection.region.empty())
     throw Error(ErrorCode::kInvalidInput,
-                "the region lies outside the grid: expected one that has voxels of the grid");
+                "the region is outside the grid: expected a region that has voxels of the grid");
   return selection;
 }
 

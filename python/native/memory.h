@@ -9,7 +9,7 @@
 
 namespace voxdag::python {
 
-// "" is half of what the machine has. Throws Error{kInvalidInput}.
+// Parses a limit; "" for half of the machine's memory. Throws Error{kInvalidInput}.
 inline uint64_t memory_of(const std::string& text) {
   const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "memory");
   if (bytes < kMinMemory)

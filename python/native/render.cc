@@ -36,8 +36,8 @@ query::Vec in_voxels(const Point& point, const voxdag_reader::File& file) {
   return voxels;
 }
 
-// What the renderer and the array of pixels take must fit, so that a size which is too large is an
-// error before it is tried.
+// The renderer and the array of pixels must fit the limit. Checked first because an allocation of
+// too much memory can end the process.
 void check_memory(int width, int height, const std::string& memory) {
   const uint64_t limit = memory_of(memory);
   const uint64_t bytes = (query::kRenderBytesPerPixel + 3) * static_cast<uint64_t>(width) *

@@ -1,4 +1,4 @@
-"""Everything that is asked of a file is compared with an array of all its voxels."""
+"""Compares all queries of a file with an array of all its voxels."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""Extracts and exports from Python; what they write is tested in C++ and in tests/export."""
+"""Extracts and exports from Python. C++ tests and tests/export check the files' contents."""
 
 import os
 import pickle

@@ -1,4 +1,4 @@
-"""Pictures from Python; what they show is tested in C++."""
+"""Pictures from Python. C++ tests check the pixels."""
 
 import os
 import re

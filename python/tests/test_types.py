@@ -10,7 +10,7 @@ import voxdag
 
 
 def mypy(folder, *arguments):
-    # The package apart, since mypy does not look at what is installed.
+    # mypy does not check installed packages, so it gets a copy.
     package = os.path.dirname(voxdag.__file__)
     shutil.copytree(
         package, folder / "voxdag", ignore=shutil.ignore_patterns("*.so", "__pycache__")

@@ -3,7 +3,7 @@
     report = voxdag.build("scene.glb", resolution=8192, output="scene.vdag")
     with voxdag.open("scene.vdag") as dag:
         dag.lookup([[10, 20, 30]])              # is the voxel set?
-        dag.rays(origins, directions)           # what do rays hit?
+        dag.rays(origins, directions)           # the first voxel on each ray
         dag.dense(region, level=8)              # a box of the grid of 2^8 cells as an array
 
 Long calls release the interpreter's lock; build, plan, extract, export and render stop on Ctrl-C.

@@ -1,4 +1,4 @@
-"""A finished file, and what can be asked of it."""
+"""Finished files, and queries of them."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Optional, Union, overload
@@ -99,15 +99,14 @@ class Dag:
         ]
 
     def to_world(self, positions: Any, level: Optional[int] = None) -> np.ndarray:
-        """Where positions in the grid lie in the scene; the center of voxel v is at v + 0.5."""
+        """Converts grid positions to scene positions; the center of voxel v is at v + 0.5."""
         size = self._dag.edge / (1 << self._levels(level))
         return np.asarray(self._dag.origin) + np.asarray(positions, np.float64) * size
 
     def to_voxel(self, points: Any, level: Optional[int] = None) -> np.ndarray:
-        """The voxels (or cells) that points of the scene lie in, int64; they may lie outside.
+        """The voxel or cell that contains each point of the scene, int64; may be outside the grid.
 
-        A point that is the corner of a cell up to the rounding of doubles, as to_world() computes
-        it, lies in that cell."""
+        A cell contains its low corner as to_world() computes it, within the rounding of doubles."""
         values = np.asarray(points, np.float64)
         if not np.all(np.isfinite(values)):
             raise Error("a point is not finite: expected finite coordinates", "invalid_input")
@@ -122,7 +121,7 @@ class Dag:
     def lookup(
         self, points: Any, level: Optional[int] = None, *, world: bool = False, threads: int = 1
     ) -> np.ndarray:
-        """Whether each voxel is set, (N,) bool. Those outside the grid are not."""
+        """True for each set voxel, (N,) bool; False outside the grid."""
         positions = self._positions(points, level, world)
         found = np.empty(len(positions), np.bool_)
         self._dag.lookup(
@@ -143,7 +142,7 @@ class Dag:
         """The first set voxel on each ray, (N, 3) origins and directions of any length; one of
         them may be a single row for all.
 
-        `stop_size` is the edge of the cells, in voxels, that are hit as a whole: 1 for voxels.
+        Rays stop at cells with an edge of `stop_size` voxels; 1 stops at voxels.
         """
         starts = _rows(origins, np.float64, "origins")
         ways = _rows(directions, np.float64, "directions")
@@ -220,13 +219,12 @@ class Dag:
 
     @property
     def attributes(self) -> list[str]:
-        """What the cells have: "color", "alpha", "normal" and "material", those of them that were
-        built."""
+        """Names of the file's attributes: "color", "alpha", "normal", "material"."""
         return self._dag.attributes
 
     @property
     def material_names(self) -> list[str]:
-        """The names that materials() counts from 0. The last, "", is that of triangles without."""
+        """Material names; materials() returns indices. The last, "", means no material."""
         return [name.decode(errors="replace") for name in self._dag.material_names]
 
     def colors(
@@ -234,8 +232,8 @@ class Dag:
     ) -> np.ndarray:
         """The color of each cell, (N, 3) uint8, sRGB; 0 where none is set.
 
-        As with the other attributes, cells that are finer than those of the color grid have what
-        the latter have. A file without the attribute is an Error."""
+        If a cell is finer than the color grid, it has the attributes of the coarser cell that
+        contains it. Raises Error if the file has no colors; the other attributes do the same."""
         return self._values("color", points, level, world)
 
     def alphas(
@@ -260,7 +258,7 @@ class Dag:
     def count(
         self, region: Optional[Region] = None, level: Optional[int] = None, *, world: bool = False
     ) -> int:
-        """How many cells of a region are set, exactly."""
+        """The exact number of set cells in a region."""
         low, high = self._region(region, level, world)
         return self._dag.count(low, high, self._levels(level))
 
@@ -269,7 +267,8 @@ class Dag:
     ) -> tuple[np.ndarray, np.ndarray]:
         """The set voxel nearest to each voxel, (N, 3) int64, and the distances between the centers.
 
-        Of several the first in Morton order. Without one: -1, and an infinite distance."""
+        At equal distances it is the first in Morton order. If none is found, the voxel is -1 and
+        the distance infinite."""
         positions = self._positions(points, None, False)
         voxels = np.empty_like(positions)
         distances = np.empty(len(positions))

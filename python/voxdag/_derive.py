@@ -68,7 +68,7 @@ def export(
 ) -> dict[str, Any]:
     """Writes a .vdag file, or a part of it, in the format of another program (docs/export.md).
 
-    Formats that have a place for colors get those of the file, unless `gray` is True.
+    Includes colors if the file and the format have them, unless `gray` is True.
     `to` is one of export_formats(). Returns the files that were written, their bytes, the voxels,
     and notes on how to open them. Raises Error.
     """
@@ -87,7 +87,7 @@ def export(
 
 
 def export_formats() -> dict[str, str]:
-    """The formats of export(), and what each is."""
+    """The formats of export() and a description of each."""
     return dict(_native.export_formats())
 
 

@@ -10,7 +10,7 @@ _MAX_THREADS = 1024
 
 
 class Error(Exception):
-    """What went wrong, where, and what was expected.
+    """The problem, the place and the expectation.
 
     `code` is one of the names in docs/errors.md, such as "invalid_input", "corrupt" or "no_space".
     """
@@ -20,12 +20,12 @@ class Error(Exception):
         self.code = code
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Of both, so that an error comes through from another process."""
+        """Pickles message and code, so that another process can send the error."""
         return type(self), (str(self), self.code)
 
 
 def path_text(path: Path) -> str:
-    """A path that a file can have."""
+    """Returns the path as text, or raises Error if no file can have it."""
     text = os.fsdecode(path)
     try:
         os.fsencode(text)

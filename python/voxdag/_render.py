@@ -27,16 +27,16 @@ def render(
     threads: int = 0,
     progress: Optional[Progress] = None,
 ) -> np.ndarray:
-    """A picture of a .vdag file as voxdag render makes it: sRGB, (height, width, 3) uint8.
+    """Returns the picture of `voxdag render`: sRGB, (height, width, 3) uint8.
 
     view             auto, iso, front, back, left, right, top or inside
-    camera, target   instead of a view: where the camera is and what it looks at, in scene units
+    camera, target   two points of the scene, used instead of a view
     fov              vertical field of view, 1 to 170 degrees
     size             width and height in pixels
     samples          N: N * N samples per pixel, 1 to 8
     gray             leave out the colors that the file may have
-    memory           bytes, or text such as "8GiB"; by default half of what the machine has. A
-                     picture that takes more, some 66 bytes a pixel, is an Error before it begins
+    memory           bytes, or text such as "8GiB"; by default half of the machine's memory. A
+                     picture needs about 66 bytes per pixel; Error if they exceed the limit
 
     The pixels do not depend on threads. Raises Error.
     """
@@ -68,7 +68,7 @@ def render(
 
 
 def _number(value: Any) -> float:
-    """NaN for what is no number."""
+    """Returns NaN if the value is not a number."""
     try:
         return float(value) if np.ndim(value) == 0 and not isinstance(value, str) else math.nan
     except (TypeError, ValueError, OverflowError):
