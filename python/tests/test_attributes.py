@@ -66,5 +66,5 @@ def test_files_without(dag):
 
 
 def test_names_are_checked(mesh, tmp_path):
-    with pytest.raises(voxdag.Error, match="'normals' is no attribute"):
+    with pytest.raises(voxdag.Error, match=r"attributes=\['normals'\]: expected"):
         voxdag.build(mesh, resolution=64, output=tmp_path / "a.vdag", attributes=["normals"])
