@@ -34,7 +34,7 @@ void write_task(FileSystem& files, const std::string& path, const JobTask& task)
 JobTask read_task(FileSystem& files, const std::string& path) {
   constexpr uint64_t kMaxTaskBytes = uint64_t{4} << 20;
   return record_from_text<JobTask>(read_small_file(files, path, kMaxTaskBytes),
-                                path + ": expected a task of voxdag serve");
+                                   path + ": expected a task of voxdag serve");
 }
 
 }  // namespace voxdag::server

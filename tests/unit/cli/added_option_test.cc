@@ -81,8 +81,9 @@ TEST(AddedOption, IsInJsonAndItsSchema) {
   options.smoothness = 5;
   EXPECT_EQ(options_json(options).dump(), R"({"edge_smoothness":5})");
   MoreOptions back;
-  set_options(FieldJson::parse(R"({"scene":["a"],"resolution":4,"output":"b","edge_smoothness":9})"),
-              "the body", back);
+  set_options(
+      FieldJson::parse(R"({"scene":["a"],"resolution":4,"output":"b","edge_smoothness":9})"),
+      "the body", back);
   EXPECT_EQ(back.smoothness, 9u);
   EXPECT_EQ(options_schema<MoreOptions>()["properties"]["edge_smoothness"].dump(),
             R"j({"type":"integer","minimum":0,"maximum":9,)j"
