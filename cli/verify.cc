@@ -13,6 +13,7 @@
 #include "core/format/global/open_global.h"
 #include "query/verify/color_sample.h"
 #include "query/verify/surface_sample.h"
+#include "scene/formats/formats.h"
 
 namespace voxdag::cli {
 namespace {

@@ -1,5 +1,6 @@
 #include "client/scene_upload.h"
 
+#include <algorithm>
 #include <charconv>
 #include <memory>
 #include <optional>
@@ -15,20 +16,21 @@ constexpr size_t kPieceBytes = 1 << 20;
 constexpr uint64_t kFirstPartBytes = 64 << 10;
 constexpr uint64_t kPartBytes = 64 << 20;
 constexpr size_t kDigitsInName = 12;
-constexpr size_t kMaxStemChars = 100;
+constexpr size_t kMaxStemChars = 100, kMaxEndingChars = 10;
 
-// "/a/My hall.glb" -> "My-hall-3f2a91c05b77.glb", a name that the API accepts.
+// "/a/My hall.glb" -> "My-hall-3f2a91c05b77.glb", a name that the API accepts if the service reads
+// files with this ending.
 std::string name_on_server(const std::string& path, const std::string& sha256) {
   std::string stem = path.substr(path.rfind('/') + 1);
   const size_t dot = stem.rfind('.');
-  const std::string suffix = dot == std::string::npos ? "" : stem.substr(dot);
-  if (suffix != ".glb" && suffix != ".gltf")
-    throw Error(ErrorCode::kInvalidInput, "scene " + path + ": expected a .glb or .gltf file");
-  stem.resize(std::min(dot, kMaxStemChars));
-  for (char& c : stem)
-    if (!isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '_') c = '-';
+  std::string ending = dot == std::string::npos ? "" : stem.substr(dot);
+  stem.resize(std::min({dot, stem.size(), kMaxStemChars}));
+  ending.resize(std::min(ending.size(), kMaxEndingChars));
+  for (std::string* text : {&stem, &ending})
+    for (char& c : *text)
+      if (!isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '_') c = '-';
   if (stem.empty() || !isalnum(static_cast<unsigned char>(stem[0]))) stem.insert(0, "scene");
-  return stem + "-" + sha256.substr(0, kDigitsInName) + suffix;
+  return stem + "-" + sha256.substr(0, kDigitsInName) + ending;
 }
 
 class Upload {
@@ -76,6 +78,8 @@ class Upload {
       const auto parsed = std::from_chars(text.data(), text.data() + text.size(), offset);
       if (parsed.ec == std::errc{} && offset <= size_) offset_ = offset;
     } catch (const Error& error) {
+      if (error.code() == ErrorCode::kInvalidInput)
+        throw Error(error.code(), "scene " + file_->path() + ": " + error.message());
       if (error.code() != ErrorCode::kNotFound) throw;
     }
     return false;

@@ -16,6 +16,33 @@ struct Part {
   uint32_t first_material;
 };
 
+// Appends the materials of another source.
+void add_materials(SceneMaterials& all, SceneMaterials more) {
+  for (Material& material : more.materials) {
+    if (material.image != Material::kNoImage)
+      material.image += static_cast<uint32_t>(all.images.size());
+    if (material.number != Material::kNoNumber)
+      material.number += static_cast<uint32_t>(all.names.size());
+    all.materials.push_back(std::move(material));
+  }
+  std::ranges::move(more.images, std::back_inserter(all.images));
+  std::ranges::move(more.names, std::back_inserter(all.names));
+  std::ranges::move(more.warnings, std::back_inserter(all.warnings));
+}
+
+// Returns a visitor of triangles whose materials are numbered from `first_material` on. `visit`
+// must outlive it.
+TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
+                                                    const TriangleCursor::SurfaceVisitor& visit) {
+  if (first_material == 0) return std::cref(visit);
+  return [first_material, &visit,
+          own = std::vector<SurfaceTriangle>()](std::span<const SurfaceTriangle> batch) mutable {
+    own.assign(batch.begin(), batch.end());
+    for (SurfaceTriangle& triangle : own) triangle.material += first_material;
+    visit(own);
+  };
+}
+
 // Has a cursor of one part at a time, which takes the memory of all.
 class ChainedCursor : public TriangleCursor {
  public:
@@ -117,30 +144,6 @@ class ChainedScene : public TriangleSource {
 };
 
 }  // namespace
-
-void add_materials(SceneMaterials& all, SceneMaterials more) {
-  for (Material& material : more.materials) {
-    if (material.image != Material::kNoImage)
-      material.image += static_cast<uint32_t>(all.images.size());
-    if (material.number != Material::kNoNumber)
-      material.number += static_cast<uint32_t>(all.names.size());
-    all.materials.push_back(std::move(material));
-  }
-  std::ranges::move(more.images, std::back_inserter(all.images));
-  std::ranges::move(more.names, std::back_inserter(all.names));
-  std::ranges::move(more.warnings, std::back_inserter(all.warnings));
-}
-
-TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
-                                                    const TriangleCursor::SurfaceVisitor& visit) {
-  if (first_material == 0) return std::cref(visit);
-  return [first_material, &visit,
-          own = std::vector<SurfaceTriangle>()](std::span<const SurfaceTriangle> batch) mutable {
-    own.assign(batch.begin(), batch.end());
-    for (SurfaceTriangle& triangle : own) triangle.material += first_material;
-    visit(own);
-  };
-}
 
 std::unique_ptr<TriangleSource> chain_scenes(std::vector<std::unique_ptr<TriangleSource>> parts) {
   if (parts.size() == 1) return std::move(parts.front());

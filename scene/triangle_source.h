@@ -1,6 +1,6 @@
 // The interface of a scene: it streams its triangles in world space, always in the same order and
-// for any number of threads, without having all of them in memory. Scenes are glTF and PLY files
-// (open_scene) or made by tests.
+// for any number of threads, without having all of them in memory. open_scene() in
+// scene/formats/formats.h opens scene files; tests make their own scenes.
 #pragma once
 
 #include <cstdint>
@@ -112,14 +112,5 @@ struct SceneOptions {
   // name for long. "": in a folder of its own in temporary_parent().
   std::string scratch_path = {};
 };
-
-// One scene made of several files: the default scenes of glTF 2.0 files (.glb, or .gltf with
-// external or data-URI buffers), and PLY files. Geometry is read by windows charged to `budget`;
-// images are never read. The structure is checked here, contents while streaming; `cancel` is
-// checked between batches. Throws Error{kInvalidInput}, {kNotFound}, {kLimit} or {kOutOfMemory}
-// naming the file. The references must outlive the scene.
-std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
-                                           const SceneOptions& options, MemoryBudget& budget,
-                                           const CancelToken& cancel);
 
 }  // namespace voxdag

@@ -6,6 +6,7 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/io/overwrite.h"
+#include "scene/formats/formats.h"
 #include "scheduler/spec/build_fields.h"
 #include "scheduler/stages/build/choose_backend.h"
 #include "scheduler/stages/ingest/ingest.h"
@@ -28,7 +29,7 @@ BuildSpec checked(const BuildSpec& spec) {
   const RunOptions& r = spec.run;
   if (g.scenes.empty())
     throw Error(ErrorCode::kInvalidInput,
-                "no scene was given: expected at least one .glb, .gltf or .ply file");
+                "no scene was given: expected at least one " + list_scene_endings() + " file");
   check_options(spec);
   choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that makes no grid
   check_backend(r);

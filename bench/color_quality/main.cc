@@ -20,6 +20,7 @@
 #include "core/color/color_of.h"
 #include "core/color/rule/bake_region.h"
 #include "core/format/global/open_global.h"
+#include "scene/formats/formats.h"
 #include "scene/textures/texture_set.h"
 
 namespace voxdag {

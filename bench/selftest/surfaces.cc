@@ -13,9 +13,9 @@ struct Point {
 };
 
 // Adds surfaces as meshes of columns x rows quads.
-class Mesh {
+class SurfaceMesher {
  public:
-  Mesh(Scene& scene, uint32_t grid_levels)
+  SurfaceMesher(Scene& scene, uint32_t grid_levels)
       : scene_(scene), scale_(128 * std::ldexp(1.0, static_cast<int>(grid_levels))) {}
 
   // `at` maps [0, 1]^2 to the surface.
@@ -55,7 +55,7 @@ class Mesh {
 Scene scan(uint64_t triangles, uint32_t grid_levels) {
   Scene scene{"scan", {}};
   const auto rows = static_cast<uint64_t>(std::sqrt(static_cast<double>(triangles) / 4)) + 1;
-  Mesh(scene, grid_levels).add(2 * rows, rows, [](double u, double v) {
+  SurfaceMesher(scene, grid_levels).add(2 * rows, rows, [](double u, double v) {
     const double lon = 2 * kPi * u, lat = kPi * v;
     const double bumps = 0.03 * std::sin(9 * lon) * std::sin(7 * lat) +
                          0.01 * std::sin(31 * lon + 3 * lat) * std::sin(29 * lat) +
@@ -69,7 +69,7 @@ Scene scan(uint64_t triangles, uint32_t grid_levels) {
 
 Scene building(uint64_t triangles, uint32_t grid_levels) {
   Scene scene{"building", {}};
-  Mesh mesh(scene, grid_levels);
+  SurfaceMesher mesh(scene, grid_levels);
   constexpr int kFloors = 3, kColumns = 24;
   const auto fine =
       static_cast<uint64_t>(std::sqrt(static_cast<double>(triangles) / (4 * kFloors * kColumns)));

@@ -60,7 +60,7 @@ void add_ridge_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   const auto at = [&](double l, double up, double c) {
     return along_x ? Vec3{tier.x + l, y + up, tier.z + c} : Vec3{tier.x + c, y + up, tier.z - l};
   };
-  Mesh& mesh = scene.mesh_for(6, 6);
+  MeshBuilder& mesh = scene.mesh_for(6, 6);
   const uint32_t first =
       mesh.add_vertices({at(-along, 0, across), at(along, 0, across), at(along, 0, -across),
                          at(-along, 0, -across), at(-ridge, height, 0), at(ridge, height, 0)});

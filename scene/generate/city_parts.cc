@@ -17,11 +17,11 @@ constexpr Rgba8 kGlass{40, 62, 92, 255}, kTrunk{205, 51, 100, 255}, kLeaves{200,
 //     |  |_____|  |
 //     | /       \ |
 //     +-----------+
-Mesh window_wall(const Vec3& u, const Vec3& w) {
+MeshBuilder window_wall(const Vec3& u, const Vec3& w) {
   constexpr double kLeft = 0.1875, kRight = 0.8125, kSill = 0.25, kLintel = 0.875;
   constexpr double kRings[3][4] = {
       {0, 1, 0, 1}, {kLeft, kRight, kSill, kLintel}, {kLeft, kRight, kSill, kLintel}};
-  Mesh mesh;
+  MeshBuilder mesh;
   for (int ring = 0; ring < 3; ++ring) {
     const auto& [left, right, bottom, top] = kRings[ring];
     mesh.color = ring == 2 ? kGlass : kWhite;
@@ -42,8 +42,8 @@ Mesh window_wall(const Vec3& u, const Vec3& w) {
 }
 
 // A trunk and two crowns, each two pyramids base to base.
-Mesh tree_mesh() {
-  Mesh mesh;
+MeshBuilder tree_mesh() {
+  MeshBuilder mesh;
   mesh.color = kTrunk;
   mesh.box({-0.03125, 0, -0.03125}, {0.03125, 0.3125, 0.03125}, false);
   mesh.color = kLeaves;
@@ -64,8 +64,8 @@ Mesh tree_mesh() {
   return mesh;
 }
 
-Mesh car_mesh(bool along_z) {
-  Mesh mesh;
+MeshBuilder car_mesh(bool along_z) {
+  MeshBuilder mesh;
   const auto box = [&](double length_from, double length_to, double half_width, double y0,
                        double y1) {
     along_z ? mesh.box({-half_width, y0, length_from}, {half_width, y1, length_to})

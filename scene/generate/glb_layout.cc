@@ -57,14 +57,14 @@ json instancing_node(uint64_t part, uint64_t translations) {
 
 }  // namespace
 
-void GlbLayout::mesh(const Mesh& mesh) {
+void GlbLayout::mesh(const MeshBuilder& mesh) {
   cancel_.check();
   add_geometry(Kind::kMesh, mesh);
   triangles_ += mesh.triangles();
   progress_.advance(mesh.triangles());
 }
 
-void GlbLayout::part(const Mesh& mesh) {
+void GlbLayout::part(const MeshBuilder& mesh) {
   add_geometry(Kind::kPart, mesh);
   part_triangles_.push_back(mesh.triangles());
 }
@@ -78,7 +78,7 @@ void GlbLayout::instances(uint32_t part, std::span<const Float3> translations,
   add_bytes(2 * sizeof(Float3) * uint64_t{count});
 }
 
-void GlbLayout::add_geometry(Kind kind, const Mesh& mesh) {
+void GlbLayout::add_geometry(Kind kind, const MeshBuilder& mesh) {
   Block block{kind,
               0,
               mesh.vertices(),

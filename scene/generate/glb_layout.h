@@ -25,8 +25,8 @@ class GlbLayout : public BlockSink {
  public:
   // `progress` is advanced by the triangles of meshes.
   GlbLayout(Progress& progress, const CancelToken& cancel) : progress_(progress), cancel_(cancel) {}
-  void mesh(const Mesh& mesh) override;
-  void part(const Mesh& mesh) override;
+  void mesh(const MeshBuilder& mesh) override;
+  void part(const MeshBuilder& mesh) override;
   void instances(uint32_t part, std::span<const Float3> translations,
                  std::span<const Float3> scales) override;
 
@@ -51,7 +51,7 @@ class GlbLayout : public BlockSink {
     uint32_t material = 0;
     bool has_colors = false;
   };
-  void add_geometry(Kind kind, const Mesh& mesh);
+  void add_geometry(Kind kind, const MeshBuilder& mesh);
   void add_bytes(uint64_t bytes);
 
   Progress& progress_;

@@ -56,7 +56,7 @@ void GlbWriter::instances(uint32_t, std::span<const Float3> translations,
   put(scales.data(), scales.size_bytes());
 }
 
-void GlbWriter::write_geometry(const Mesh& mesh) {
+void GlbWriter::write_geometry(const MeshBuilder& mesh) {
   cancel_.check();
   put(mesh.positions.data(), mesh.positions.size() * sizeof(Float3));
   put(mesh.colors.data(), mesh.colors.size() * sizeof(Rgba8));

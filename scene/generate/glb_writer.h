@@ -23,8 +23,8 @@ class GlbWriter : public BlockSink {
   // Removes the partial file unless finish() has returned.
   ~GlbWriter() override;
 
-  void mesh(const Mesh& mesh) override { write_geometry(mesh); }
-  void part(const Mesh& mesh) override { write_geometry(mesh); }
+  void mesh(const MeshBuilder& mesh) override { write_geometry(mesh); }
+  void part(const MeshBuilder& mesh) override { write_geometry(mesh); }
   void instances(uint32_t part, std::span<const Float3> translations,
                  std::span<const Float3> scales) override;
 
@@ -32,7 +32,7 @@ class GlbWriter : public BlockSink {
   uint64_t finish();
 
  private:
-  void write_geometry(const Mesh& mesh);
+  void write_geometry(const MeshBuilder& mesh);
   void put(const void* data, size_t bytes);
   void put_u32(uint64_t value);
   void flush();

@@ -20,16 +20,16 @@ SceneBuilder::SceneBuilder(BlockSink& sink, bool instances, bool colors)
   for (uint32_t i = 0; i < kMaxMaterials; ++i) meshes_[i].material = i;
 }
 
-Mesh& SceneBuilder::mesh_for(uint32_t vertices, uint32_t triangles) {
-  Mesh& mesh = meshes_[colors_ ? paint_.material : 0];
-  if (mesh.vertices() + vertices > Mesh::kMaxVertices ||
-      mesh.triangles() + triangles > Mesh::kMaxTriangles)
+MeshBuilder& SceneBuilder::mesh_for(uint32_t vertices, uint32_t triangles) {
+  MeshBuilder& mesh = meshes_[colors_ ? paint_.material : 0];
+  if (mesh.vertices() + vertices > MeshBuilder::kMaxVertices ||
+      mesh.triangles() + triangles > MeshBuilder::kMaxTriangles)
     flush_mesh(mesh);
   if (colors_) mesh.color = paint_.color;
   return mesh;
 }
 
-uint32_t SceneBuilder::add_part(Mesh mesh) {
+uint32_t SceneBuilder::add_part(MeshBuilder mesh) {
   if (!colors_) mesh.colors.clear();
   if (instances_) sink_.part(mesh);
   parts_.push_back({std::move(mesh), {}, {}});
@@ -44,8 +44,9 @@ void SceneBuilder::place(uint32_t part, const Vec3& translation, const Vec3& sca
   if (p.scales.size() == kInstancesPerBlock) flush_instances(part);
 }
 
-void SceneBuilder::place_triangles(const Mesh& part, const Vec3& translation, const Vec3& scale) {
-  Mesh& mesh = mesh_for(part.vertices(), part.triangles());
+void SceneBuilder::place_triangles(const MeshBuilder& part, const Vec3& translation,
+                                   const Vec3& scale) {
+  MeshBuilder& mesh = mesh_for(part.vertices(), part.triangles());
   const uint32_t first = mesh.vertices();
   for (size_t i = 0; i < part.positions.size(); ++i) {
     const Float3& p = part.positions[i];
@@ -56,7 +57,7 @@ void SceneBuilder::place_triangles(const Mesh& part, const Vec3& translation, co
   for (uint16_t i : part.indices) mesh.indices.push_back(static_cast<uint16_t>(first + i));
 }
 
-void SceneBuilder::flush_mesh(Mesh& mesh) {
+void SceneBuilder::flush_mesh(MeshBuilder& mesh) {
   if (mesh.triangles() > 0) sink_.mesh(mesh);
   mesh.positions.clear();
   mesh.colors.clear();
@@ -71,7 +72,7 @@ void SceneBuilder::flush_instances(uint32_t part) {
 }
 
 void SceneBuilder::finish() {
-  for (Mesh& mesh : meshes_) flush_mesh(mesh);
+  for (MeshBuilder& mesh : meshes_) flush_mesh(mesh);
   for (uint32_t i = 0; i < parts_.size(); ++i) flush_instances(i);
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "scene/generate/generate.h"
-#include "scene/generate/mesh.h"
+#include "scene/generate/mesh_builder.h"
 
 namespace voxdag {
 
@@ -16,10 +16,10 @@ namespace voxdag {
 class BlockSink {
  public:
   virtual ~BlockSink() = default;
-  // 1 to Mesh::kMaxTriangles triangles in world space.
-  virtual void mesh(const Mesh& mesh) = 0;
+  // 1 to MeshBuilder::kMaxTriangles triangles in world space.
+  virtual void mesh(const MeshBuilder& mesh) = 0;
   // The next part, numbered from 0; precedes its instances.
-  virtual void part(const Mesh& mesh) = 0;
+  virtual void part(const MeshBuilder& mesh) = 0;
   // Instances of one part, each of which maps p to p * scale + translation.
   virtual void instances(uint32_t part, std::span<const Float3> translations,
                          std::span<const Float3> scales) = 0;
@@ -36,10 +36,10 @@ class SceneBuilder {
   void paint(uint32_t material, const Rgba8& color) { paint_ = {material, color}; }
 
   // A mesh of the current paint that `vertices` and `triangles` more fit into: the current one, or
-  // an empty one after it was passed to the sink. At most Mesh::kMaxVertices and
-  // Mesh::kMaxTriangles.
-  Mesh& mesh_for(uint32_t vertices, uint32_t triangles);
-  uint32_t add_part(Mesh mesh);
+  // an empty one after it was passed to the sink. At most MeshBuilder::kMaxVertices and
+  // MeshBuilder::kMaxTriangles.
+  MeshBuilder& mesh_for(uint32_t vertices, uint32_t triangles);
+  uint32_t add_part(MeshBuilder mesh);
   // The part's colors are multiplied with the current paint's.
   void place(uint32_t part, const Vec3& translation, const Vec3& scale);
   // Passes the incomplete blocks to the sink.
@@ -47,7 +47,7 @@ class SceneBuilder {
 
  private:
   struct Part {
-    Mesh mesh;
+    MeshBuilder mesh;
     std::vector<Float3> translations, scales;
   };
   struct Paint {
@@ -57,14 +57,14 @@ class SceneBuilder {
   static constexpr size_t kInstancesPerBlock = 32768;
   static constexpr uint32_t kMaxMaterials = 4;
 
-  void place_triangles(const Mesh& part, const Vec3& translation, const Vec3& scale);
-  void flush_mesh(Mesh& mesh);
+  void place_triangles(const MeshBuilder& part, const Vec3& translation, const Vec3& scale);
+  void flush_mesh(MeshBuilder& mesh);
   void flush_instances(uint32_t part);
 
   BlockSink& sink_;
   const bool instances_, colors_;
   Paint paint_;
-  std::array<Mesh, kMaxMaterials> meshes_;  // by material; only the first one without colors
+  std::array<MeshBuilder, kMaxMaterials> meshes_;  // by material; only the first one without colors
   std::vector<Part> parts_;
 };
 

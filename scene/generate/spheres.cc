@@ -12,7 +12,7 @@ constexpr double kBallRadius = 512;
 constexpr uint32_t kSizes = 7;  // radius 64 to 1 and a bit, 64 to 1 cuts an edge
 
 // Adds a face of the octahedron, its edges divided into n parts.
-void add_face(Mesh& mesh, int n, const Vec3& sign) {
+void add_face(MeshBuilder& mesh, int n, const Vec3& sign) {
   const uint32_t first = mesh.vertices();
   for (int i = 0; i <= n; ++i)
     for (int j = 0; j <= n - i; ++j) {
@@ -35,8 +35,8 @@ void add_face(Mesh& mesh, int n, const Vec3& sign) {
     }
 }
 
-Mesh unit_sphere(int n) {
-  Mesh mesh;
+MeshBuilder unit_sphere(int n) {
+  MeshBuilder mesh;
   for (int face = 0; face < 8; ++face)
     add_face(mesh, n, {face & 4 ? -1.0 : 1.0, face & 2 ? -1.0 : 1.0, face & 1 ? -1.0 : 1.0});
   return mesh;
@@ -55,7 +55,7 @@ void make_spheres(const GenerateOptions& options, SceneBuilder& scene) {
   uint32_t parts[kSizes];
   uint64_t triangles[kSizes];
   for (uint32_t size = 0; size < kSizes; ++size) {
-    Mesh sphere = unit_sphere(1 << size);
+    MeshBuilder sphere = unit_sphere(1 << size);
     triangles[size] = sphere.triangles();
     parts[size] = scene.add_part(std::move(sphere));
   }

@@ -83,7 +83,7 @@ class Heights {
 
 void make_tile(SceneBuilder& scene, const Heights& heights, uint64_t i0, uint64_t j0,
                uint32_t width, uint32_t depth) {
-  Mesh& mesh = scene.mesh_for((width + 1) * (depth + 1), 2 * width * depth);
+  MeshBuilder& mesh = scene.mesh_for((width + 1) * (depth + 1), 2 * width * depth);
   const uint32_t first = mesh.vertices();
   for (uint32_t i = 0; i <= width; ++i)
     for (uint32_t j = 0; j <= depth; ++j) mesh.add_vertex(heights.vertex(i0 + i, j0 + j));

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {
@@ -270,7 +270,7 @@ void TriangleReader::report(const uint32_t* corners) const {
                                  document_.name_accessor(primitive.indices) + ", there are " +
                                  std::to_string(vertex_count_) + " vertices");
   refuse(document_.path, where + "a vertex of " + document_.name_accessor(primitive.position) +
-                             (gltf::is_finite(world_) ? " is not a finite position"
+                             (voxdag::is_finite(world_) ? " is not a finite position"
                                                       : " is not finite once transformed"));
 }
 

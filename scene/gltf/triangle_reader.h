@@ -14,9 +14,9 @@
 #include "scene/gltf/mesh_data/corner_reader.h"
 #include "scene/gltf/mesh_data/instance_reader.h"
 #include "scene/gltf/mesh_data/node_walk.h"
-#include "scene/gltf/mesh_data/used_vertices.h"
-#include "scene/gltf/mesh_data/vertex_cache.h"
 #include "scene/gltf/mesh_data/vertex_source.h"
+#include "scene/vertices/used_vertices.h"
+#include "scene/vertices/vertex_cache.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::gltf {

@@ -26,14 +26,14 @@ uint64_t FaceReader::face_of(uint64_t triangle) {
 
 // Reads the face of the triangle: from where the reader is, unless a later block has it.
 void FaceReader::seek(uint64_t triangle) {
-  const auto& blocks = mesh_.face_blocks();
+  const auto& blocks = ply_.face_blocks();
   const bool is_ahead = is_loaded_ && triangle >= first_triangle_;
   if (is_ahead && triangle < face_end()) return;
   const auto after =
-      std::ranges::upper_bound(blocks, triangle, {}, &Mesh::FaceBlock::first_triangle);
+      std::ranges::upper_bound(blocks, triangle, {}, &PlyFile::FaceBlock::first_triangle);
   const auto block = static_cast<uint64_t>(after - blocks.begin()) - 1;
-  if (!is_ahead || face_ < block * Mesh::kBlockRows) {
-    face_ = block * Mesh::kBlockRows;
+  if (!is_ahead || face_ < block * PlyFile::kBlockRows) {
+    face_ = block * PlyFile::kBlockRows;
     first_triangle_ = blocks[static_cast<size_t>(block)].first_triangle;
     next_offset_ = rows_->read(face_, blocks[static_cast<size_t>(block)].offset);
     is_loaded_ = true;

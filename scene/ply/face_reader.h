@@ -5,15 +5,14 @@
 #include <cstdint>
 #include <memory>
 
-#include "scene/ply/mesh.h"
+#include "scene/ply/ply_file.h"
 
 namespace voxdag::ply {
 
 class FaceReader {
  public:
-  // The mesh must outlive the reader.
-  FaceReader(const Mesh& mesh, MemoryBudget& budget)
-      : mesh_(mesh), rows_(mesh.open_faces(budget)) {}
+  // The file must outlive the reader.
+  FaceReader(const PlyFile& ply, MemoryBudget& budget) : ply_(ply), rows_(ply.open_faces(budget)) {}
 
   // Reads the indices of triangles [first, first + count), which exist. They may be out of range.
   void read(uint64_t first, uint64_t count, uint32_t* corners);
@@ -25,7 +24,7 @@ class FaceReader {
   void load();
   uint64_t face_end() const;
 
-  const Mesh& mesh_;
+  const PlyFile& ply_;
   const std::unique_ptr<Rows> rows_;
   // The face that rows_ has read last, its first triangle, and the offset behind it.
   bool is_loaded_ = false;

@@ -9,12 +9,10 @@
 
 #include "core/base/error.h"
 #include "core/base/page_buffer.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::ply {
 namespace {
-
-using gltf::printable;
 
 constexpr uint64_t kMaxHeaderBytes = 64 << 10;
 
@@ -131,7 +129,7 @@ class HeaderParser {
   }
 
   [[noreturn]] void refuse(const std::string& what) const {
-    gltf::refuse(path_, "line " + std::to_string(line_) + " of the header " + what);
+    voxdag::refuse(path_, "line " + std::to_string(line_) + " of the header " + what);
   }
 
   const std::string& path_;
@@ -144,14 +142,6 @@ class HeaderParser {
 };
 
 }  // namespace
-
-bool is_ply(const ReadableFile& file) {
-  std::array<char, 4> first{};
-  if (file.size() < first.size()) return false;
-  file.read_at(0, std::as_writable_bytes(std::span(first)));
-  const std::string_view text(first.data(), first.size());
-  return text == "ply\n" || text == "ply\r";
-}
 
 Header read_header(const ReadableFile& file, MemoryBudget& budget) {
   const auto size = static_cast<size_t>(std::min(file.size(), kMaxHeaderBytes));

@@ -39,9 +39,6 @@ struct Header {
   uint64_t data_begin = 0;  // offset of the first element
 };
 
-// Whether the bytes begin as those of a PLY file do.
-bool is_ply(const ReadableFile& file);
-
 // The header of an open file. Throws Error{kInvalidInput} naming the line for one that is broken,
 // Error{kLimit} for one of over 64 KiB.
 Header read_header(const ReadableFile& file, MemoryBudget& budget);

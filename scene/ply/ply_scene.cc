@@ -1,18 +1,20 @@
 #include "scene/ply/ply_scene.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "core/base/page_buffer.h"
-#include "scene/gltf/mesh_data/used_vertices.h"
-#include "scene/gltf/mesh_data/vertex_cache.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 #include "scene/ply/face_reader.h"
-#include "scene/ply/mesh.h"
+#include "scene/ply/ply_file.h"
 #include "scene/ply/vertex_colors.h"
 #include "scene/ply/vertex_reader.h"
+#include "scene/vertices/used_vertices.h"
+#include "scene/vertices/vertex_cache.h"
 
 namespace voxdag::ply {
 namespace {
@@ -23,15 +25,15 @@ constexpr size_t kWindowTriangles = 4096;
 
 class PlyCursor : public TriangleCursor {
  public:
-  PlyCursor(const Mesh& mesh, const SceneOptions& options, unsigned cursors, MemoryBudget& budget,
+  PlyCursor(const PlyFile& ply, const SceneOptions& options, unsigned cursors, MemoryBudget& budget,
             const CancelToken& cancel)
-      : mesh_(mesh),
+      : ply_(ply),
         skip_invalid_(options.skip_invalid),
         cursors_(cursors),
         budget_(budget),
         cancel_(cancel),
-        faces_(mesh, budget),
-        vertices_(mesh, mesh.axes(), budget),
+        faces_(ply, budget),
+        vertices_(ply, ply.axes(), budget),
         cache_(budget, vertices_.count(), cursors),
         corners_(3 * kWindowTriangles),
         batch_(budget, kBatchTriangles, "a batch of triangles") {
@@ -46,10 +48,10 @@ class PlyCursor : public TriangleCursor {
     read_placed(first, count, &grid, batch_, visit);
   }
   void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit) override {
-    if (mesh_.colors().empty()) return TriangleCursor::read_surfaces(first, count, visit);
+    if (ply_.colors().empty()) return TriangleCursor::read_surfaces(first, count, visit);
     if (!colors_) {
       surfaces_ = PageBuffer<SurfaceTriangle>(budget_, kBatchTriangles, "a batch of triangles");
-      colors_.emplace(mesh_, cursors_, budget_);
+      colors_.emplace(ply_, cursors_, budget_);
     }
     read_placed(first, count, nullptr, surfaces_, visit);
   }
@@ -109,32 +111,29 @@ class PlyCursor : public TriangleCursor {
 
   [[noreturn]] void report(uint64_t triangle, const uint32_t* corners) {
     const std::string where = "face " + std::to_string(faces_.face_of(triangle)) + ": ";
-    const std::string& path = mesh_.file().path();
+    const std::string& path = ply_.file().path();
     for (int k = 0; k < 3; ++k)
       if (corners[k] >= vertices_.count())
-        gltf::refuse(path, where +
-                               (corners[k] == UINT32_MAX ? "an index that is negative or too large"
-                                                         : "index " + std::to_string(corners[k])) +
-                               ", there are " + std::to_string(vertices_.count()) + " vertices");
+        refuse(path, where +
+                         (corners[k] == UINT32_MAX ? "an index that is negative or too large"
+                                                   : "index " + std::to_string(corners[k])) +
+                         ", there are " + std::to_string(vertices_.count()) + " vertices");
     for (int k = 0; k < 3; ++k)
       if (std::isnan(cache_.at(corners[k])[0]))
-        gltf::refuse(path,
-                     where + "vertex " + std::to_string(corners[k]) + " is not a finite position");
-    gltf::refuse(path, where + "is invalid");
+        refuse(path, where + "vertex " + std::to_string(corners[k]) + " is not a finite position");
+    refuse(path, where + "is invalid");
   }
 
-  using Transform = gltf::Transform;
-
-  const Mesh& mesh_;
+  const PlyFile& ply_;
   const bool skip_invalid_;
   const unsigned cursors_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   FaceReader faces_;
   VertexReader vertices_;
-  gltf::VertexCache cache_;
+  VertexCache cache_;
   std::vector<uint32_t> corners_;
-  gltf::UsedVertices used_vertices_;
+  UsedVertices used_vertices_;
   PageBuffer<RealTriangle> batch_;
   // Made by the first read_surfaces().
   PageBuffer<SurfaceTriangle> surfaces_;
@@ -151,23 +150,23 @@ class PlyScene : public TriangleSource {
  public:
   PlyScene(std::unique_ptr<ReadableFile> file, const SceneOptions& options, MemoryBudget& budget,
            const CancelToken& cancel)
-      : mesh_(std::move(file), budget, cancel),
+      : ply_(std::move(file), budget, cancel),
         options_(options),
         budget_(budget),
         cancel_(cancel) {}
 
   std::unique_ptr<TriangleCursor> open(unsigned cursors) override {
-    if (mesh_.triangles() == 0) return std::make_unique<NoTriangles>();
-    return std::make_unique<PlyCursor>(mesh_, options_, cursors, budget_, cancel_);
+    if (ply_.triangles() == 0) return std::make_unique<NoTriangles>();
+    return std::make_unique<PlyCursor>(ply_, options_, cursors, budget_, cancel_);
   }
-  uint64_t declared_triangles() const override { return mesh_.triangles(); }
+  uint64_t declared_triangles() const override { return ply_.triangles(); }
   std::vector<SourceFile> files() const override {
-    return {{mesh_.file().path(), mesh_.file().identity()}};
+    return {{ply_.file().path(), ply_.file().identity()}};
   }
-  std::vector<std::string> warnings() const override { return mesh_.warnings(); }
+  std::vector<std::string> warnings() const override { return ply_.warnings(); }
 
  private:
-  const Mesh mesh_;
+  const PlyFile ply_;
   const SceneOptions options_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
@@ -175,7 +174,15 @@ class PlyScene : public TriangleSource {
 
 }  // namespace
 
-std::unique_ptr<TriangleSource> open_ply(std::unique_ptr<ReadableFile> file,
+bool is_ply(const ReadableFile& file) {
+  std::array<char, 4> first{};
+  if (file.size() < first.size()) return false;
+  file.read_at(0, std::as_writable_bytes(std::span(first)));
+  const std::string_view text(first.data(), first.size());
+  return text == "ply\n" || text == "ply\r";
+}
+
+std::unique_ptr<TriangleSource> open_ply(FileSystem&, std::unique_ptr<ReadableFile> file,
                                          const SceneOptions& options, MemoryBudget& budget,
                                          const CancelToken& cancel) {
   return std::make_unique<PlyScene>(std::move(file), options, budget, cancel);

@@ -10,9 +10,12 @@
 
 namespace voxdag::ply {
 
-// The triangles of an open file, its axes and units as they are. Memory, errors and lifetimes are
-// as for open_scene(); the messages name face or vertex.
-std::unique_ptr<TriangleSource> open_ply(std::unique_ptr<ReadableFile> file,
+// True if the file begins with "ply" and an end of line.
+bool is_ply(const ReadableFile& file);
+
+// The triangles of an open file, its axes and units unchanged. Memory, errors and lifetimes are
+// those of open_scene(); the messages name face or vertex.
+std::unique_ptr<TriangleSource> open_ply(FileSystem& files, std::unique_ptr<ReadableFile> file,
                                          const SceneOptions& options, MemoryBudget& budget,
                                          const CancelToken& cancel);
 

@@ -1,7 +1,7 @@
 #include "scene/ply/rows.h"
 
 #include "core/base/error.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 #include "scene/ply/ascii_text.h"
 #include "scene/ply/file_window.h"
 #include "scene/ply/numbers.h"
@@ -142,7 +142,7 @@ class AsciiRows : public Rows {
   int64_t integer(uint64_t row) {
     const std::string_view text = word(row);
     if (const auto value = parse_integer(text)) return *value;
-    refuse(row, "has " + gltf::printable(text) + ", expected an integer");
+    refuse(row, "has " + printable(text) + ", expected an integer");
   }
   uint32_t index(uint64_t row) {
     const int64_t value = integer(row);
@@ -172,8 +172,7 @@ uint64_t Rows::checked_count(int64_t count, uint64_t row, bool is_wanted) const 
 }
 
 void Rows::refuse(uint64_t row, const std::string& what) const {
-  gltf::refuse(file_.path(),
-               gltf::printable(element_.name) + " " + std::to_string(row) + " " + what);
+  voxdag::refuse(file_.path(), printable(element_.name) + " " + std::to_string(row) + " " + what);
 }
 
 std::unique_ptr<Rows> open_rows(const ReadableFile& file, Format format, const Element& element,

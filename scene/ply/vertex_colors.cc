@@ -16,10 +16,10 @@ double full_intensity_of(Type type) {
 
 }  // namespace
 
-VertexColors::VertexColors(const Mesh& mesh, unsigned readers, MemoryBudget& budget)
-    : reader_(mesh, mesh.colors(), budget), numbers_(mesh.colors().size() * kBlockVertices) {
-  for (const size_t property : mesh.colors())
-    full_.push_back(full_intensity_of(mesh.vertex_element().properties[property].type));
+VertexColors::VertexColors(const PlyFile& ply, unsigned readers, MemoryBudget& budget)
+    : reader_(ply, ply.colors(), budget), numbers_(ply.colors().size() * kBlockVertices) {
+  for (const size_t property : ply.colors())
+    full_.push_back(full_intensity_of(ply.vertex_element().properties[property].type));
   for (size_t i = 0; i < light_of_byte_.size(); ++i)
     light_of_byte_[i] = linear_light(static_cast<double>(i) / 255);
   constexpr uint64_t kBlockBytes = kBlockVertices * sizeof(Color);

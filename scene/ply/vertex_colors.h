@@ -22,8 +22,8 @@ class VertexColors {
   // All of `readers` together take at most one part in so many of what the budget has free.
   static constexpr uint64_t kShareOfFree = 8;
 
-  // The mesh has colors; it and the budget must outlive this.
-  VertexColors(const Mesh& mesh, unsigned readers, MemoryBudget& budget);
+  // The file has colors; it and the budget must outlive this.
+  VertexColors(const PlyFile& ply, unsigned readers, MemoryBudget& budget);
 
   // In the terms of SurfaceCorner, valid until the next call; the vertex exists.
   const Color& at(uint32_t vertex) {

@@ -7,19 +7,19 @@
 #include <span>
 #include <vector>
 
-#include "scene/gltf/mesh_data/position_source.h"
 #include "scene/ply/ascii_text.h"
 #include "scene/ply/file_window.h"
-#include "scene/ply/mesh.h"
+#include "scene/ply/ply_file.h"
+#include "scene/vertices/position_source.h"
 
 namespace voxdag::ply {
 
-class VertexReader : public gltf::PositionSource {
+class VertexReader : public PositionSource {
  public:
-  // Of the vertex element's properties with these indices. The mesh must outlive the reader.
-  VertexReader(const Mesh& mesh, std::span<const size_t> properties, MemoryBudget& budget);
+  // Of the vertex element's properties with these indices. The file must outlive the reader.
+  VertexReader(const PlyFile& ply, std::span<const size_t> properties, MemoryBudget& budget);
 
-  uint64_t count() const override { return mesh_.vertex_element().count; }
+  uint64_t count() const override { return ply_.vertex_element().count; }
   // As many numbers for each vertex as there are properties. Throws Error{kInvalidInput} naming the
   // vertex for text that is no number.
   void read(uint64_t first, size_t count, double* out) override;
@@ -29,7 +29,7 @@ class VertexReader : public gltf::PositionSource {
   void read_text(uint64_t first, size_t count, double* out);
   void read_line(uint64_t vertex, double* out);
 
-  const Mesh& mesh_;
+  const PlyFile& ply_;
   std::optional<FileWindow> window_;
   std::optional<AsciiText> text_;
   const std::vector<size_t> properties_;

@@ -3,18 +3,12 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "scene/base64.h"
 
 namespace voxdag {
 namespace {
 
 constexpr size_t kImageWindow = 64 << 10;
-
-int base64_value(char c) {
-  if (c >= 'A' && c <= 'Z') return c - 'A';
-  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
-  if (c >= '0' && c <= '9') return c - '0' + 52;
-  return c == '+' ? 62 : c == '/' ? 63 : -1;
-}
 
 }  // namespace
 
@@ -51,7 +45,7 @@ size_t ImageBytes::read(std::span<std::byte> out) {
     size = read_plain(out);
   } else {
     while (size < out.size() && (group_at_ < group_size_ || next_group()))
-      out[size++] = static_cast<std::byte>(group_[group_at_++]);
+      out[size++] = group_[group_at_++];
   }
   left_ -= size;
   return size;
@@ -94,21 +88,17 @@ bool ImageBytes::next_character(char& c) {
 
 bool ImageBytes::next_group() {
   group_at_ = group_size_ = 0;
-  uint32_t bits = 0;
-  int count = 0;
+  std::array<std::byte, 4> characters;
+  size_t count = 0;
   char c = 0;
-  while (!has_ended_ && count < 4 && next_character(c)) {
+  while (!has_ended_ && count < characters.size() && next_character(c)) {
     has_ended_ = c == '=' || c == '"';
-    if (has_ended_) break;
-    const int value = base64_value(c);
-    if (value < 0) throw BrokenImage{"has a data: URI that is not base64"};
-    bits = bits << 6 | static_cast<uint32_t>(value);
-    ++count;
+    if (!has_ended_) characters[count++] = static_cast<std::byte>(c);
   }
+  if (!decode_base64(std::span(characters).first(count), group_.data()))
+    throw BrokenImage{"has a data: URI that is not base64"};
   if (count < 2) return false;
-  bits <<= 6 * (4 - count);
-  for (int i = 0; i < 3; ++i) group_[i] = static_cast<uint8_t>(bits >> (16 - 8 * i));
-  group_size_ = static_cast<size_t>(count) - 1;
+  group_size_ = count - 1;
   return true;
 }
 

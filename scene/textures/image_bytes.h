@@ -1,6 +1,7 @@
 // The bytes of an image where it lies in a scene file or a file of its own, read by windows.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -30,7 +31,7 @@ class ImageBytes : public EncodedBytes {
   std::vector<std::byte> window_;
   size_t window_at_ = 0;
   bool has_ended_ = false;
-  uint8_t group_[3] = {};
+  std::array<std::byte, 3> group_{};
   size_t group_at_ = 0, group_size_ = 0;
 };
 

@@ -12,7 +12,7 @@
 #include "core/base/parallel_for.h"
 #include "core/format/checksum.h"
 #include "core/image/image_reader.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 #include "scene/textures/image_bytes.h"
 #include "scene/textures/linear_light.h"
 #include "scene/textures/pyramid.h"
@@ -59,7 +59,7 @@ std::string user_of(const SceneMaterials& materials, uint32_t image) {
   const auto found = std::ranges::find(materials.materials, image, &Material::image);
   if (found == materials.materials.end()) return "";
   const auto index = static_cast<int>(found - materials.materials.begin());
-  return ", the base color of material " + gltf::numbered(index, found->name) + ",";
+  return ", the base color of material " + numbered(index, found->name) + ",";
 }
 
 // What fails for want of memory while others decode may fit alone.
@@ -168,89 +168,137 @@ std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageS
   return digests;
 }
 
+// Fills a TextureSet from the images of a scene, which several threads decode.
+class TextureSet::Builder {
+ public:
+  Builder(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
+          const CancelToken& cancel)
+      : files_(files),
+        materials_(materials),
+        budget_(budget),
+        cancel_(cancel),
+        set_(new TextureSet(budget)),
+        users_(materials.images.size()),
+        problems_(materials.images.size()),
+        levels_(materials.images.size()) {
+    for (size_t i = 0; i < users_.size(); ++i)
+      users_[i] = user_of(materials, static_cast<uint32_t>(i));
+  }
+
+  // Finds the levels of all pyramids, and with them their pages.
+  void measure(unsigned threads) {
+    parallel_for(threads, levels_.size(), [&](unsigned, size_t i) {
+      cancel_.check();
+      with_image(i, [&](const ImageReader& image) {
+        levels_[i] = pyramid_levels(image.width(), image.height(), 0);
+      });
+    });
+    for (auto& image : levels_)
+      for (TextureLevel& level : image) {
+        level.first_page = set_->pages_;
+        set_->pages_ += level.pages();
+      }
+  }
+
+  // Reserves memory for the pages, or creates the scratch file.
+  void reserve(const std::string& path) {
+    const auto pages = static_cast<size_t>(set_->pages_);
+    if (set_->bytes() <= budget_.available() / 2) {
+      set_->memory_ = PageBuffer<uint64_t>(budget_, pages * kPageTexels, "textures");
+      return;
+    }
+    writer_ = files_.create(path);
+    set_->file_ = files_.open_read(path);
+    set_->checksums_ = PageBuffer<uint32_t>(budget_, pages, "checksums of textures");
+    files_.remove(path);  // a file without a name ends with the process
+  }
+
+  void decode(unsigned threads, Progress& progress) {
+    parallel_for(threads, levels_.size(), [&](unsigned, size_t i) {
+      if (problems_[i].empty()) with_image(i, [&](ImageReader& image) { decode_image(i, image); });
+      if (!users_[i].empty()) progress.advance(1);
+    });
+  }
+
+  // Drops unreadable images from the materials, with a warning each.
+  std::unique_ptr<TextureSet> finish(Progress& progress) {
+    for (const std::string& warning : materials_.warnings) progress.warn(warning);
+    set_->materials_ = materials_.materials;
+    TextureLayout& layout = set_->layout_;
+    for (size_t i = 0; i < levels_.size(); ++i) {
+      layout.first_level.push_back(static_cast<uint32_t>(layout.levels.size()));
+      std::ranges::copy(levels_[i], std::back_inserter(layout.levels));
+      if (problems_[i].empty()) continue;
+      progress.warn(materials_.images[i].name + users_[i] + " " + problems_[i] +
+                    "; its base color factor is used alone");
+      for (Material& material : set_->materials_)
+        if (material.image == i) material.image = Material::kNoImage;
+    }
+    layout.first_level.push_back(static_cast<uint32_t>(layout.levels.size()));
+    return std::move(set_);
+  }
+
+ private:
+  // Calls body(image reader), or records the problem of a broken image. Ignores unused images.
+  template <class Body>
+  void with_image(size_t i, const Body& body) {
+    if (users_[i].empty()) return;
+    const ImageSource& source = materials_.images[i];
+    problems_[i] = source.problem;
+    if (!problems_[i].empty()) return;
+    alone_if_necessary(mutex_, source.name + users_[i], [&] {
+      try {
+        ImageBytes bytes(files_, source);
+        body(*open_image(bytes, budget_));
+      } catch (const BrokenImage& broken) {
+        problems_[i] = broken.message;
+      }
+    });
+  }
+
+  void decode_image(size_t i, ImageReader& image) {
+    TexelRow row(image, budget_);
+    PyramidBuilder builder(levels_[i], budget_,
+                           [&](uint64_t first, std::span<const uint64_t> texels) {
+                             cancel_.check();
+                             write_pages(first, texels);
+                           });
+    for (uint32_t y = 0; y < image.height(); ++y) builder.add_row(row.read(image));
+    expect_unchanged(files_, materials_.images[i]);
+  }
+
+  void write_pages(uint64_t first, std::span<const uint64_t> texels) {
+    if (!writer_) {
+      std::ranges::copy(texels, &set_->memory_[static_cast<size_t>(first) * kPageTexels]);
+      return;
+    }
+    for (size_t at = 0; at < texels.size(); at += kPageTexels)
+      set_->checksums_[static_cast<size_t>(first) + at / kPageTexels] =
+          page_checksum(texels.subspan(at, kPageTexels));
+    writer_->write_at(first * kPageBytes, std::as_bytes(texels));
+  }
+
+  FileSystem& files_;
+  const SceneMaterials& materials_;
+  MemoryBudget& budget_;
+  const CancelToken& cancel_;
+  std::unique_ptr<TextureSet> set_;
+  std::unique_ptr<WritableFile> writer_;  // of the scratch file, if there is one
+  std::shared_mutex mutex_;               // held alone by an image that does not fit next to others
+  // For each image: the material that uses it, for messages ("": none), and why it is unreadable.
+  std::vector<std::string> users_, problems_;
+  std::vector<std::vector<TextureLevel>> levels_;
+};
+
 std::unique_ptr<TextureSet> TextureSet::prepare(FileSystem& files, const SceneMaterials& materials,
                                                 const std::string& path, unsigned threads,
                                                 MemoryBudget& budget, Progress& progress,
                                                 const CancelToken& cancel) {
-  std::unique_ptr<TextureSet> set(new TextureSet(budget));
-  const size_t count = materials.images.size();
-  std::vector<std::string> problems(count);
-  std::vector<std::vector<TextureLevel>> levels(count);
-  std::shared_mutex mutex;
-  // Calls body(image reader) unless the image is broken.
-  const auto with_image = [&](size_t i, const auto& body) {
-    const ImageSource& source = materials.images[i];
-    const std::string user = user_of(materials, static_cast<uint32_t>(i));
-    if (user.empty()) return;
-    problems[i] = source.problem;
-    if (!problems[i].empty()) return;
-    const std::string name = source.name + user;
-    alone_if_necessary(mutex, name, [&] {
-      try {
-        ImageBytes bytes(files, source);
-        body(*open_image(bytes, budget));
-      } catch (const BrokenImage& broken) {
-        problems[i] = broken.message;
-      }
-    });
-  };
-  parallel_for(threads, count, [&](unsigned, size_t i) {
-    cancel.check();
-    with_image(i, [&](const ImageReader& image) {
-      levels[i] = pyramid_levels(image.width(), image.height(), 0);
-    });
-  });
-  for (auto& image : levels)
-    for (TextureLevel& level : image) {
-      level.first_page = set->pages_;
-      set->pages_ += level.pages();
-    }
-  std::unique_ptr<WritableFile> writer;
-  if (set->bytes() <= budget.available() / 2) {
-    set->memory_ =
-        PageBuffer<uint64_t>(budget, static_cast<size_t>(set->pages_) * kPageTexels, "textures");
-  } else {
-    writer = files.create(path);
-    set->file_ = files.open_read(path);
-    set->checksums_ =
-        PageBuffer<uint32_t>(budget, static_cast<size_t>(set->pages_), "checksums of textures");
-    files.remove(path);  // without a name it is gone when the process ends, however it ends
-  }
-  const PyramidBuilder::WritePages write = [&](uint64_t first, std::span<const uint64_t> texels) {
-    cancel.check();
-    if (!writer) {
-      std::ranges::copy(texels, &set->memory_[static_cast<size_t>(first) * kPageTexels]);
-      return;
-    }
-    for (size_t at = 0; at < texels.size(); at += kPageTexels)
-      set->checksums_[static_cast<size_t>(first) + at / kPageTexels] =
-          page_checksum(texels.subspan(at, kPageTexels));
-    writer->write_at(first * kPageBytes, std::as_bytes(texels));
-  };
-  parallel_for(threads, count, [&](unsigned, size_t i) {
-    if (problems[i].empty())
-      with_image(i, [&](ImageReader& image) {
-        TexelRow row(image, budget);
-        PyramidBuilder builder(levels[i], budget, write);
-        for (uint32_t y = 0; y < image.height(); ++y) builder.add_row(row.read(image));
-        expect_unchanged(files, materials.images[i]);
-      });
-    if (!user_of(materials, static_cast<uint32_t>(i)).empty()) progress.advance(1);
-  });
-  for (const std::string& warning : materials.warnings) progress.warn(warning);
-  set->materials_ = materials.materials;
-  for (size_t i = 0; i < count; ++i) {
-    set->layout_.first_level.push_back(static_cast<uint32_t>(set->layout_.levels.size()));
-    std::ranges::copy(levels[i], std::back_inserter(set->layout_.levels));
-    if (problems[i].empty()) continue;
-    const auto image = static_cast<uint32_t>(i);
-    progress.warn(materials.images[i].name + user_of(materials, image) + " " + problems[i] +
-                  "; its base color factor is used alone");
-    for (Material& material : set->materials_)
-      if (material.image == image) material.image = Material::kNoImage;
-  }
-  set->layout_.first_level.push_back(static_cast<uint32_t>(set->layout_.levels.size()));
-  return set;
+  Builder builder(files, materials, budget, cancel);
+  builder.measure(threads);
+  builder.reserve(path);
+  builder.decode(threads, progress);
+  return builder.finish(progress);
 }
 
 }  // namespace voxdag

@@ -53,6 +53,8 @@ class TextureSet {
   bool is_in_memory() const { return !file_; }
 
  private:
+  class Builder;
+
   explicit TextureSet(MemoryBudget& budget) : budget_(budget) {}
 
   MemoryBudget& budget_;

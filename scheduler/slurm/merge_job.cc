@@ -8,7 +8,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/checksum.h"
-#include "scene/triangle_source.h"
+#include "scene/formats/formats.h"
 #include "scheduler/slurm/files/cluster_state.h"
 #include "scheduler/state/work_folder.h"
 

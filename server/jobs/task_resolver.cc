@@ -4,6 +4,7 @@
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "scene/formats/formats.h"
 #include "server/base/request_error.h"
 #include "server/jobs/process/confined_files.h"
 

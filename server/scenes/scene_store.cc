@@ -6,13 +6,13 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/checksum.h"
+#include "scene/formats/formats.h"
 #include "server/base/request_error.h"
 #include "server/disk/store.h"
 
 namespace voxdag::server {
 namespace {
 
-constexpr std::string_view kSceneEndings[] = {".glb", ".gltf", ".ply"};
 constexpr size_t kMaxNameBytes = 128;
 
 // `total` is -1 while it is not known; `sha256` is "" until the upload is complete.
@@ -51,18 +51,13 @@ bool is_scene_name(std::string_view name) {
   return has_scene_ending(name);
 }
 
-bool has_scene_ending(std::string_view name) {
-  return std::any_of(std::begin(kSceneEndings), std::end(kSceneEndings),
-                     [&](std::string_view ending) { return name.ends_with(ending); });
-}
-
 std::string scene_name_pattern() {
-  std::string endings;
   size_t longest = 0;
-  for (const std::string_view ending : kSceneEndings) {
-    endings += (endings.empty() ? "" : "|") + std::string(ending.substr(1));
-    longest = std::max(longest, ending.size());
-  }
+  for (const SceneFormat& format : scene_formats())
+    for (const std::string_view ending : format.endings)
+      longest = std::max(longest, ending.size());
+  std::string endings = list_scene_endings("|", "|");
+  std::erase(endings, '.');
   return "^[A-Za-z0-9][A-Za-z0-9._-]{0," + std::to_string(kMaxNameBytes - 1 - longest) + "}\\.(" +
          endings + ")$";
 }

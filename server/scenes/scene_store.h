@@ -26,8 +26,6 @@ namespace voxdag::server {
 
 // 1 to 128 of A–Z a–z 0–9 . _ -, first a letter or digit, with the ending of a scene.
 bool is_scene_name(std::string_view name);
-// True if it ends with ".glb", ".gltf" or ".ply".
-bool has_scene_ending(std::string_view name);
 // A regular expression of scene names, for the OpenAPI document.
 std::string scene_name_pattern();
 

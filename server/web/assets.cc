@@ -1,6 +1,10 @@
 #include "server/web/assets.h"
 
+#include <string_view>
+#include <utility>
+
 #include "core/format/checksum.h"
+#include "scene/formats/formats.h"
 
 namespace voxdag::server {
 namespace {
@@ -15,15 +19,30 @@ std::string type_of(std::string_view name) {
   return "image/svg+xml";
 }
 
-}  // namespace
+std::string with_scene_suffixes(std::string contents) {
+  constexpr std::string_view kMarker = "{{scene_suffixes}}";
+  std::string suffixes = list_scene_endings("|", "|");
+  std::erase(suffixes, '.');
+  for (size_t at = 0; (at = contents.find(kMarker, at)) != contents.npos; at += suffixes.size())
+    contents.replace(at, kMarker.size(), suffixes);
+  return contents;
+}
 
-std::vector<Asset> embedded_assets() {
+std::vector<Asset> make_assets() {
   std::vector<Asset> assets;
   for (const EmbeddedFile* file = kEmbeddedFiles; file->bytes; ++file) {
-    const std::string_view contents(reinterpret_cast<const char*>(file->bytes), file->size);
-    assets.push_back({file->name, contents, type_of(file->name),
-                      '"' + sha256_hex(contents).substr(0, kEtagDigits) + '"'});
+    std::string contents =
+        with_scene_suffixes({reinterpret_cast<const char*>(file->bytes), file->size});
+    std::string etag = '"' + sha256_hex(contents).substr(0, kEtagDigits) + '"';
+    assets.push_back({file->name, std::move(contents), type_of(file->name), std::move(etag)});
   }
+  return assets;
+}
+
+}  // namespace
+
+const std::vector<Asset>& embedded_assets() {
+  static const std::vector<Asset> assets = make_assets();
   return assets;
 }
 

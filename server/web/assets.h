@@ -1,9 +1,9 @@
-// The files of the dashboard, which are compiled into the program (embed.cmake).
+// The files of the dashboard, which are compiled into the program (embed.cmake). In them,
+// "{{scene_suffixes}}" stands for the endings of the scene formats, "glb|gltf|ply".
 #pragma once
 
 #include <cstddef>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace voxdag::server {
@@ -18,10 +18,10 @@ extern const EmbeddedFile kEmbeddedFiles[];
 
 struct Asset {
   std::string name;  // its URL path without the leading slash
-  std::string_view contents;
+  std::string contents;
   std::string type;  // for Content-Type
   std::string etag;  // quoted
 };
-std::vector<Asset> embedded_assets();
+const std::vector<Asset>& embedded_assets();
 
 }  // namespace voxdag::server

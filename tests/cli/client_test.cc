@@ -1,4 +1,5 @@
 // submit, jobs, watch, cancel, suspend, resume and download against a real server.
+#include <gmock/gmock.h>
 #include <signal.h>
 
 #include <algorithm>
@@ -187,6 +188,17 @@ TEST_F(Client, WatchesAcrossARestart) {
   EXPECT_EQ(Json::parse(answer.out)["state"], "succeeded");
 }
 
+// The server decides which formats it reads: the client sends any of them.
+TEST_F(Client, SubmitsEverySceneFormat) {
+  put("square.ply",
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n");
+  const Json job = run_json({"submit", "square.ply", "-r", "64", "--wait"});
+  EXPECT_EQ(job["state"], "succeeded");
+  EXPECT_THAT(job["scene"][0].get<std::string>(), testing::MatchesRegex("square-[0-9a-f]+.ply"));
+}
+
 // Errors have the exit statuses of docs/errors.md.
 TEST_F(Client, ReportsErrors) {
   expect_error(3, "no ", {"watch", "0123456789abcdef"});
@@ -194,6 +206,7 @@ TEST_F(Client, ReportsErrors) {
   expect_error(3, "none.glb", {"submit", "none.glb", "-r", "64"});
   expect_error(2, "power of two", {"submit", "m.glb", "-r", "100"});
   put("text.obj", "no scene");
+  expect_error(2, "ending with .glb, .gltf or .ply", {"submit", "text.obj", "-r", "64"});
   expect_error(2, "text.obj", {"submit", "text.obj", "-r", "64"});
   expect_error(2, "http://", {"jobs", "--server", "ftp://127.0.0.1"});
   expect_error(6, "127.0.0.1:1", {"jobs", "--server", "http://127.0.0.1:1"});

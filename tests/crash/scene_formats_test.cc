@@ -2,7 +2,7 @@
 // killed while it ingests them and run again.
 #include <cstring>
 
-#include "scene/triangle_source.h"
+#include "scene/formats/formats.h"
 #include "tests/crash/crash_fixture.h"
 
 #ifdef VOXDAG_HAS_MESHOPT

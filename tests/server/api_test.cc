@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "core/image/image_reader.h"
+#include "scene/formats/formats.h"
 #include "server/http/message/digest_field.h"
 #include "tests/server/running_service.h"
 
@@ -342,6 +343,26 @@ TEST_F(Api, AcceptsScenesInsideItsRootsOnly) {
   }
   EXPECT_EQ(status("../secret/b.glb"), 404);
   EXPECT_EQ(status("/etc/passwd"), 404);
+}
+
+// The API document, the pages and the messages have the endings of the table of formats.
+TEST_F(Api, ListsTheEndingsOfTheSceneFormats) {
+  start();
+  std::string suffixes = list_scene_endings("|", "|");
+  std::erase(suffixes, '.');
+  const std::string document = http_->get("/openapi.json").body;
+  EXPECT_NE(document.find("(" + suffixes + ")$"), std::string::npos);
+  EXPECT_NE(document.find(list_scene_endings()), std::string::npos);
+  EXPECT_NE(http_->get("/lib/scene_upload.js").body.find('"' + suffixes + '"'), std::string::npos);
+  const ClientResponse refused = http_->get("/api/v1/scenes/a.txt");
+  EXPECT_EQ(refused.status, 400);
+  EXPECT_NE(refused.body.find(list_scene_endings()), std::string::npos) << refused.body;
+  for (const SceneFormat& format : scene_formats())
+    for (const std::string_view ending : format.endings) {
+      const std::string name = std::string(128 - ending.size(), 'a') + std::string(ending);
+      EXPECT_EQ(http_->get("/api/v1/scenes/" + name).status, 404) << name;
+      EXPECT_EQ(http_->get("/api/v1/scenes/a" + name).status, 400) << name;
+    }
 }
 
 // The document is generated from the routes, so it can only lack a description of a status

@@ -6,7 +6,7 @@
 #include "core/base/page_buffer.h"
 #include "core/base/process_limits.h"
 #include "scene/gltf/compressed/codecs.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

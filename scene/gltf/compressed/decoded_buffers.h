@@ -18,7 +18,7 @@
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "scene/gltf/document/document.h"
-#include "scene/gltf/growing_charge.h"
+#include "scene/growing_charge.h"
 
 namespace voxdag::gltf {
 

@@ -21,7 +21,7 @@
 #include "scene/gltf/compressed/draco_header.h"
 #include "scene/gltf/compressed/draco_tables.h"
 #include "scene/gltf/document/document.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 #endif
 
 namespace voxdag::gltf {

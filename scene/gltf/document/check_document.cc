@@ -4,7 +4,7 @@
 
 #include "core/base/error.h"
 #include "core/base/integers.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

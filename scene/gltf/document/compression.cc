@@ -7,7 +7,7 @@
 #include "core/base/error.h"
 #include "core/base/integers.h"
 #include "scene/gltf/document/document.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

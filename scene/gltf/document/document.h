@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "scene/gltf/document/compression.h"
-#include "scene/gltf/growing_charge.h"
 #include "scene/gltf/json/file_range.h"
-#include "scene/gltf/transform.h"
+#include "scene/growing_charge.h"
+#include "scene/vertices/transform.h"
 
 namespace tinygltf {
 class Model;

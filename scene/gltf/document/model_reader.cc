@@ -8,7 +8,7 @@
 #include <exception>
 #include <new>
 
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

@@ -10,7 +10,7 @@
 #include "scene/gltf/document/read_elements.h"
 #include "scene/gltf/json/container.h"
 #include "scene/gltf/json/json_sections.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 #include <string_view>
 
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

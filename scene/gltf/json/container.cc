@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "core/base/error.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

@@ -1,6 +1,6 @@
 #include "scene/gltf/json/json_element.h"
 
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "scene/gltf/growing_charge.h"
 #include "scene/gltf/json/json_window.h"
-#include "scene/gltf/messages.h"
+#include "scene/growing_charge.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

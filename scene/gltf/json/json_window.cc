@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

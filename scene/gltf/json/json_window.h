@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "core/io/file_system.h"
-#include "scene/gltf/growing_charge.h"
 #include "scene/gltf/json/file_range.h"
+#include "scene/growing_charge.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::gltf {

@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "scene/gltf/document/document.h"
 #include "scene/gltf/mesh_data/buffer_reader.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

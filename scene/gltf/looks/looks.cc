@@ -10,7 +10,7 @@
 #include "core/base/error.h"
 #include "scene/gltf/document/check_document.h"
 #include "scene/gltf/looks/material_reader.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

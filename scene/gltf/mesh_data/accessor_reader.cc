@@ -5,7 +5,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "core/base/error.h"
 #include "core/base/text.h"
-#include "scene/gltf/mesh_data/base64.h"
-#include "scene/gltf/messages.h"
+#include "scene/base64.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {
@@ -170,7 +170,7 @@ std::span<const std::byte> BufferReader::decode_base64(int index, uint64_t offse
   const uint64_t end = std::min(begin + 4 * group_count, character_count(buffer));
   const std::span<std::byte> characters(characters_.data(), static_cast<size_t>(end - begin));
   read_characters(scene_file_, buffer, begin, characters);
-  if (!gltf::decode_base64(characters, window_.data()))
+  if (!voxdag::decode_base64(characters, window_.data()))
     refuse(document_.path,
            "buffer " + std::to_string(index) + ": a character of its data: URI is not base64");
   return {window_.data() + offset % 3, size};

@@ -15,7 +15,7 @@
 #include "core/io/file_system.h"
 #include "scene/gltf/compressed/decoded_buffers.h"
 #include "scene/gltf/document/document.h"
-#include "scene/gltf/growing_charge.h"
+#include "scene/growing_charge.h"
 #include "scene/triangle_source.h"
 
 namespace voxdag::gltf {

@@ -4,8 +4,8 @@
 #include <limits>
 #include <unordered_map>
 
-#include "scene/gltf/growing_charge.h"
-#include "scene/gltf/messages.h"
+#include "scene/growing_charge.h"
+#include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {

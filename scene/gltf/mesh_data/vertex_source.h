@@ -11,7 +11,7 @@
 
 #include "core/base/page_buffer.h"
 #include "scene/gltf/mesh_data/accessor_reader.h"
-#include "scene/gltf/mesh_data/position_source.h"
+#include "scene/vertices/position_source.h"
 
 namespace voxdag::gltf {
 

@@ -18,6 +18,7 @@
 #include "core/format/color/color_layout.h"
 #include "core/format/global/global_layout.h"
 #include "core/geometry/morton.h"
+#include "scene/formats/formats.h"
 #include "scene/textures/texture_set.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/attributes/bin_surfaces.h"

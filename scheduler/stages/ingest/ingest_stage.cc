@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "scene/formats/formats.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/ingest/ingest.h"
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "scene/formats/formats.h"
 #include "scene/textures/texture_set.h"
 #include "scheduler/spec/memory_plan.h"
 

@@ -7,6 +7,7 @@
 #include "core/base/text.h"
 #include "server/api/openapi/schemas.h"
 #include "server/http/message/target.h"
+#include "scene/formats/formats.h"
 #include "server/scenes/scene_store.h"
 
 namespace voxdag::server {
@@ -16,7 +17,7 @@ namespace {
 std::vector<Parameter> path_parameters() {
   return {
       {"id", "id of the job, 16 hex digits", "^[0-9a-f]{16}$"},
-      {"name", "name of the scene, ending with .glb, .gltf or .ply", scene_name_pattern()},
+      {"name", "name of the scene, ending with " + list_scene_endings(), scene_name_pattern()},
       {"level", "level of a node, 0 for the root", "", IntegerRange{0, 17}},
       {"offset", "offset of the node within its level, in words", "",
        IntegerRange{0, (uint64_t{1} << 40) - 1}},

@@ -31,7 +31,7 @@ void add_asset_routes(Router& router, const std::string& start_page) {
   for (const Asset& asset : embedded_assets()) {
     const auto add = [&](const std::string& path) {
       router.add({.method = "GET", .pattern = path, .role = Role::kNone, .accepts_any_query = true},
-                 [asset](Call& call) { return get_asset(call, asset); });
+                 [&asset](Call& call) { return get_asset(call, asset); });
     };
     add('/' + asset.name);
     if (asset.name == start_page) add("/");

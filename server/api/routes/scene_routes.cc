@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "scene/formats/formats.h"
 #include "server/api/answers/job_json.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
@@ -38,9 +39,10 @@ nlohmann::ordered_json scene_json(const Scene& scene) {
 
 std::string checked_name(const Call& call) {
   if (!is_scene_name(call.names[0]))
-    throw bad_request(
-        "scene name: expected 1 to 128 of A-Z a-z 0-9 . _ -, beginning with a letter or digit and "
-        "ending with .glb, .gltf or .ply");
+    throw bad_request(std::string("scene name: expected 1 to 128 of A-Z a-z 0-9 . _ -, beginning "
+                                  "with a letter or digit and "
+                                  "ending with ") +
+                      list_scene_endings());
   return call.names[0];
 }
 

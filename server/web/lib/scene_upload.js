@@ -6,7 +6,10 @@ import {authorization, Problem, request, sleep} from "./api.js";
 const kPartBytes = 8 << 20;
 const kMaxFailures = 6;  // in a row, each after a longer pause
 
-export const kSceneName = /^[A-Za-z0-9][A-Za-z0-9._-]{0,122}\.(glb|gltf|ply)$/;
+const kSuffixes = "{{scene_suffixes}}";  // the service fills this in: "glb|gltf|ply"
+export const kSceneEndings = kSuffixes.split("|").map((suffix) => `.${suffix}`);
+export const kSceneName = new RegExp(`^[A-Za-z0-9][A-Za-z0-9._-]{0,122}\\.(${kSuffixes})$`);
+export const kSceneEnding = new RegExp(`\\.(${kSuffixes})$`);
 
 // "My scene (2).glb" -> "My-scene-2.glb"
 export function sceneName(fileName) {

@@ -3,6 +3,7 @@
 import {request, sendJson, token} from "../lib/api.js";
 import {clear, confirmAction, h} from "../lib/dom.js";
 import {hasEnded, sizeText, titleText} from "../lib/format.js";
+import {kSceneEnding} from "../lib/scene_upload.js";
 
 import {copyButton, problemBox} from "./parts.js";
 
@@ -74,8 +75,7 @@ async function deleteJob(job) {
 
 function fileName(job) {
   return `${
-      titleText(job).replace(/\.(glb|gltf|ply)$/, "").replace(/[^A-Za-z0-9._-]+/g, "-") ||
-      "scene"}.vdag`;
+      titleText(job).replace(kSceneEnding, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
 }
 
 // Without a token the browser downloads the link itself, which is resumable. A link cannot carry a

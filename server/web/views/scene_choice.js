@@ -3,7 +3,7 @@
 import {getJson} from "../lib/api.js";
 import {announce, clear, field, h, setText} from "../lib/dom.js";
 import {durationText, sizeText} from "../lib/format.js";
-import {kSceneName, sceneName, upload} from "../lib/scene_upload.js";
+import {kSceneEndings, kSceneName, sceneName, upload} from "../lib/scene_upload.js";
 
 import {meter, problemBox} from "./parts.js";
 
@@ -23,14 +23,14 @@ export class SceneChoice {
     });
     this.file = h("input", {
       type: "file",
-      accept: ".glb,.gltf,.ply",
+      accept: kSceneEndings.join(","),
       id: "scene-file",
       class: "unseen",
       on: {change: () => this.startUpload(this.file.files[0])}
     });
     const drop = h("div", {class: "drop"}, this.file,
       h("label", {for: "scene-file", class: "button"}, "Upload a scene…"),
-      h("span", {class: "hint"}, "or drop a .glb or .ply file here"));
+      h("span", {class: "hint"}, `or drop a file here (${kSceneEndings.join(", ")})`));
       this.dropTarget(drop);
       this.uploadPlace = h("div", {});
       this.element =
@@ -102,7 +102,7 @@ export class SceneChoice {
       if (!kSceneName.test(name)) {
         clear(this.uploadPlace, problemBox({
                 code: "invalid_input",
-                detail: `${file.name}: expected a .glb, .gltf or .ply file.`
+                detail: `${file.name}: expected a file of type ${kSceneEndings.join(", ")}.`
               }));
         return;
       }

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "scene/formats/formats.h"
 #include "scene/triangle_source.h"
 #include "tests/fuzz/targets/fuzz_target.h"
 #include "tests/support/memory_files.h"

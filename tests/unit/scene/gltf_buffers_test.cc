@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "scene/gltf/mesh_data/base64.h"
+#include "scene/base64.h"
 #include "tests/support/error_of.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/scene/scene_files.h"
@@ -196,8 +196,8 @@ TEST(Base64, DecodesTheExamplesOfTheRfc) {
     const std::string characters = text;
     const auto bytes = std::as_bytes(std::span(characters));
     std::string decoded(3 * ((characters.size() + 3) / 4), '\0');
-    ASSERT_TRUE(gltf::decode_base64(bytes, reinterpret_cast<std::byte*>(decoded.data())));
-    decoded.resize(gltf::base64_bytes(bytes.size(), bytes.last(std::min<size_t>(2, bytes.size()))));
+    ASSERT_TRUE(decode_base64(bytes, reinterpret_cast<std::byte*>(decoded.data())));
+    decoded.resize(base64_bytes(bytes.size(), bytes.last(std::min<size_t>(2, bytes.size()))));
     EXPECT_EQ(decoded, expected);
   }
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "scene/formats/formats.h"
 #include "scene/triangle_source.h"
 #include "tests/support/memory_files.h"
 

@@ -298,10 +298,11 @@ TEST(GenerateLimit, MoreThanAGlbHoldsIsRefused) {
 
 // Other scenes are refused while they are counted, with the limit in the message.
 TEST(GenerateLimit, CountingStopsAtTheLimit) {
-  Mesh full;
-  while (full.vertices() < Mesh::kMaxVertices) full.add_vertex({1, 2, 3});
-  for (uint32_t i = 0; i < Mesh::kMaxTriangles; ++i) full.add_triangle(0, 1, 2);
-  const uint64_t block_bytes = 12ull * Mesh::kMaxVertices + 6ull * Mesh::kMaxTriangles;
+  MeshBuilder full;
+  while (full.vertices() < MeshBuilder::kMaxVertices) full.add_vertex({1, 2, 3});
+  for (uint32_t i = 0; i < MeshBuilder::kMaxTriangles; ++i) full.add_triangle(0, 1, 2);
+  const uint64_t block_bytes =
+      12ull * MeshBuilder::kMaxVertices + 6ull * MeshBuilder::kMaxTriangles;
   NoProgress progress;
   const CancelToken never;
   GlbLayout layout(progress, never);

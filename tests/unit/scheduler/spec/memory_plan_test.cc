@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "merge/plan/merge_memory.h"
-#include "scene/gltf/mesh_data/vertex_cache.h"
+#include "scene/vertices/vertex_cache.h"
 
 namespace voxdag {
 namespace {
@@ -80,7 +80,7 @@ TEST(MemoryPlan, PartsFitTheWhole) {
     const uint64_t readers = MemoryPlan::ingest_workers(budget - plan.top_tree_bytes);
     uint64_t ingest =
         plan.top_tree_bytes + plan.triangle_bytes + readers * MemoryPlan::kIngestWorkerBytes;
-    ingest += (budget - ingest) / gltf::VertexCache::kShareOfFree;
+    ingest += (budget - ingest) / VertexCache::kShareOfFree;
     EXPECT_LE(ingest, budget);
     EXPECT_LE(plan.triangle_bytes + plan.partition_buffer_bytes, budget);
     const uint64_t free = budget - plan.triangle_bytes;

@@ -8,6 +8,7 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/verify.h"
 #include "query/verify/color_sample.h"
+#include "scene/formats/formats.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
 #include "scheduler/spec/build_fields.h"

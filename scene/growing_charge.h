@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
 
-namespace voxdag::gltf {
+namespace voxdag {
 
 class GrowingCharge {
  public:
@@ -35,4 +35,4 @@ class GrowingCharge {
   uint64_t added_ = 0;
 };
 
-}  // namespace voxdag::gltf
+}  // namespace voxdag

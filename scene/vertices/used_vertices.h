@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "core/geometry/grid.h"
-#include "scene/gltf/mesh_data/vertex_cache.h"
+#include "scene/vertices/vertex_cache.h"
 
-namespace voxdag::gltf {
+namespace voxdag {
 
 class UsedVertices {
  public:
@@ -31,4 +31,4 @@ class UsedVertices {
   uint32_t highest_ = 0;
 };
 
-}  // namespace voxdag::gltf
+}  // namespace voxdag

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace voxdag::gltf {
+namespace voxdag {
 
 class PositionSource {
  public:
@@ -14,4 +14,4 @@ class PositionSource {
   virtual void read(uint64_t first, size_t count, double* out) = 0;
 };
 
-}  // namespace voxdag::gltf
+}  // namespace voxdag

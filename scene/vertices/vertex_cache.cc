@@ -1,10 +1,10 @@
-#include "scene/gltf/mesh_data/vertex_cache.h"
+#include "scene/vertices/vertex_cache.h"
 
 #include <algorithm>
 #include <cstring>
 #include <limits>
 
-namespace voxdag::gltf {
+namespace voxdag {
 
 VertexCache::VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches) {
   constexpr uint64_t kBlockBytes = kBlockVertices * 3 * sizeof(double);
@@ -76,4 +76,4 @@ void VertexCache::read(uint64_t block, std::span<double> out) {
   std::copy_n(retained, out.size(), out.begin());
 }
 
-}  // namespace voxdag::gltf
+}  // namespace voxdag

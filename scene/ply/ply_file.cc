@@ -1,10 +1,10 @@
-#include "scene/ply/mesh.h"
+#include "scene/ply/ply_file.h"
 
 #include <algorithm>
 
 #include "core/base/error.h"
 #include "core/base/integers.h"
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 #include "scene/ply/numbers.h"
 
 namespace voxdag::ply {
@@ -22,7 +22,8 @@ size_t find_property(const Element& element, const char* name) {
 
 }  // namespace
 
-Mesh::Mesh(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel)
+PlyFile::PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget,
+                 const CancelToken& cancel)
     : file_(std::move(file)),
       header_(read_header(*file_, budget)),
       vertex_(find_element(header_, "vertex")),
@@ -42,11 +43,11 @@ Mesh::Mesh(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const Cance
   for (size_t i = 0; i <= last; ++i) begin = pass_over(i, begin, budget, cancel);
 }
 
-std::unique_ptr<Rows> Mesh::open_faces(MemoryBudget& budget) const {
+std::unique_ptr<Rows> PlyFile::open_faces(MemoryBudget& budget) const {
   return open_rows(*file_, header_.format, header_.elements[face_], face_list_, budget);
 }
 
-void Mesh::find_vertex_properties() {
+void PlyFile::find_vertex_properties() {
   const Element& vertex = header_.elements[vertex_];
   if (vertex.count >= kNoVertex)
     throw Error(ErrorCode::kLimit, file_->path() + ": has " + std::to_string(vertex.count) +
@@ -68,7 +69,7 @@ void Mesh::find_vertex_properties() {
   }
 }
 
-void Mesh::find_face_list() {
+void PlyFile::find_face_list() {
   const Element& face = header_.elements[face_];
   face_list_ = find_property(face, "vertex_indices");
   if (face_list_ == face.properties.size()) face_list_ = find_property(face, "vertex_index");
@@ -80,8 +81,8 @@ void Mesh::find_face_list() {
 }
 
 // Finds the rows of an element that begins at this offset; returns where it ends.
-uint64_t Mesh::pass_over(size_t index, uint64_t begin, MemoryBudget& budget,
-                         const CancelToken& cancel) {
+uint64_t PlyFile::pass_over(size_t index, uint64_t begin, MemoryBudget& budget,
+                            const CancelToken& cancel) {
   const Element& element = header_.elements[index];
   if (index == vertex_) vertices_begin_ = begin;
   const bool has_list = std::ranges::any_of(element.properties, &Property::is_list);
@@ -110,19 +111,19 @@ uint64_t Mesh::pass_over(size_t index, uint64_t begin, MemoryBudget& budget,
   return begin;
 }
 
-uint64_t Mesh::end_of_fixed_rows(const Element& element, uint64_t begin) const {
+uint64_t PlyFile::end_of_fixed_rows(const Element& element, uint64_t begin) const {
   uint64_t row_bytes = 0;
   for (const Property& property : element.properties) row_bytes += bytes_of(property.type);
   const uint128 end = begin + static_cast<uint128>(element.count) * row_bytes;
   if (end > file_->size())
-    refuse("its " + std::to_string(element.count) + " rows of element " +
-           gltf::printable(element.name) + ", " + std::to_string(row_bytes) +
-           " bytes each, end past the " + std::to_string(file_->size()) + " bytes of the file");
+    refuse("its " + std::to_string(element.count) + " rows of element " + printable(element.name) +
+           ", " + std::to_string(row_bytes) + " bytes each, end past the " +
+           std::to_string(file_->size()) + " bytes of the file");
   return static_cast<uint64_t>(end);
 }
 
 // Notes the first row of a block.
-void Mesh::note_row(size_t element, uint64_t offset) {
+void PlyFile::note_row(size_t element, uint64_t offset) {
   if (element == face_) {
     charge_.add(sizeof(FaceBlock));
     face_blocks_.push_back({offset, triangles_});
@@ -132,6 +133,6 @@ void Mesh::note_row(size_t element, uint64_t offset) {
   }
 }
 
-void Mesh::refuse(const std::string& what) const { gltf::refuse(file_->path(), what); }
+void PlyFile::refuse(const std::string& what) const { voxdag::refuse(file_->path(), what); }
 
 }  // namespace voxdag::ply

@@ -14,20 +14,20 @@
 
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
-#include "scene/gltf/growing_charge.h"
+#include "scene/growing_charge.h"
 #include "scene/ply/header.h"
 #include "scene/ply/rows.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::ply {
 
-class Mesh {
+class PlyFile {
  public:
   static constexpr uint64_t kBlockRows = 1024;
 
   // Throws Error{kInvalidInput} naming line, element or row of what is broken, Error{kLimit} for
   // 2^32 vertices and more, Error{kOutOfMemory}.
-  Mesh(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
+  PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
   // The first row of so many, and the number of its first triangle.
   struct FaceBlock {
@@ -71,7 +71,7 @@ class Mesh {
   uint64_t triangles_ = 0;
   std::deque<uint64_t> vertex_blocks_;
   std::deque<FaceBlock> face_blocks_;
-  gltf::GrowingCharge charge_;  // for the blocks
+  GrowingCharge charge_;  // for the blocks
   std::vector<std::string> warnings_;
 };
 

@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace voxdag::gltf {
+namespace voxdag {
 
 // Rows of the upper 3x4 part; the last row of the 4x4 matrix is 0 0 0 1.
 struct Transform {
@@ -78,4 +78,4 @@ inline bool is_finite(const Transform& transform) {
   return finite;
 }
 
-}  // namespace voxdag::gltf
+}  // namespace voxdag

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace voxdag::gltf {
+namespace voxdag {
 
 // A text from the file as messages show it: control characters (those of one byte and those
 // of U+0080 to U+009F, which terminals obey too) and quotes replaced, and shortened
@@ -22,4 +22,4 @@ std::string numbered(int index, const std::string& name);
 // Throws Error{kInvalidInput}: "<scene file>: <what>".
 [[noreturn]] void refuse(const std::string& path, const std::string& what);
 
-}  // namespace voxdag::gltf
+}  // namespace voxdag

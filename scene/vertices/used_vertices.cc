@@ -1,8 +1,8 @@
-#include "scene/gltf/mesh_data/used_vertices.h"
+#include "scene/vertices/used_vertices.h"
 
 #include <algorithm>
 
-namespace voxdag::gltf {
+namespace voxdag {
 
 void UsedVertices::find(std::span<const uint32_t> corners) {
   const auto [low, high] = std::ranges::minmax(corners);
@@ -36,4 +36,4 @@ bool UsedVertices::add_to(WorldBounds& bounds, VertexCache& positions, uint64_t 
   return true;
 }
 
-}  // namespace voxdag::gltf
+}  // namespace voxdag

@@ -1,4 +1,4 @@
-#include "scene/generate/mesh.h"
+#include "scene/generate/mesh_builder.h"
 
 #include <span>
 
@@ -10,7 +10,7 @@ namespace {
 constexpr uint8_t kBoxFaces[6][4] = {{0, 1, 3, 2}, {5, 4, 6, 7}, {4, 0, 2, 6},
                                      {1, 5, 7, 3}, {3, 7, 6, 2}, {0, 4, 5, 1}};
 
-void add_box_faces(Mesh& mesh, uint32_t first, bool bottom) {
+void add_box_faces(MeshBuilder& mesh, uint32_t first, bool bottom) {
   for (const auto& f : std::span(kBoxFaces).first(bottom ? 6 : 5)) {
     mesh.add_triangle(first + f[0], first + f[1], first + f[2]);
     mesh.add_triangle(first + f[0], first + f[2], first + f[3]);
@@ -32,35 +32,35 @@ Turn pythagorean_turn(uint32_t choice) {
   return {triple[swapped ? 0 : 1] / triple[2], triple[swapped ? 1 : 0] / triple[2]};
 }
 
-uint32_t Mesh::add_vertices(std::initializer_list<Vec3> corners) {
+uint32_t MeshBuilder::add_vertices(std::initializer_list<Vec3> corners) {
   const uint32_t first = vertices();
   for (const Vec3& p : corners) add_vertex(p);
   return first;
 }
 
-void Mesh::add_triangle(uint32_t a, uint32_t b, uint32_t c) {
+void MeshBuilder::add_triangle(uint32_t a, uint32_t b, uint32_t c) {
   for (uint32_t i : {a, b, c}) indices.push_back(static_cast<uint16_t>(i));
 }
 
-void Mesh::triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
+void MeshBuilder::triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
   const uint32_t first = add_vertices({a, b, c});
   add_triangle(first, first + 1, first + 2);
 }
 
-void Mesh::quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+void MeshBuilder::quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const uint32_t first = add_vertices({a, b, c, d});
   add_triangle(first, first + 1, first + 2);
   add_triangle(first, first + 2, first + 3);
 }
 
-void Mesh::box(const Vec3& low, const Vec3& high, bool bottom) {
+void MeshBuilder::box(const Vec3& low, const Vec3& high, bool bottom) {
   const uint32_t first = vertices();
   for (int i = 0; i < 8; ++i)
     add_vertex({i & 4 ? high.x : low.x, i & 2 ? high.y : low.y, i & 1 ? high.z : low.z});
   add_box_faces(*this, first, bottom);
 }
 
-void Mesh::turned_box(const Vec3& base, const Vec3& half_and_height, const Turn& turn) {
+void MeshBuilder::turned_box(const Vec3& base, const Vec3& half_and_height, const Turn& turn) {
   const uint32_t first = vertices();
   const Vec3& h = half_and_height;
   for (int i = 0; i < 8; ++i)
@@ -68,7 +68,7 @@ void Mesh::turned_box(const Vec3& base, const Vec3& half_and_height, const Turn&
   add_box_faces(*this, first, false);
 }
 
-void Mesh::pyramid(const Vec3& base, const Vec3& half_and_height, const Turn& turn) {
+void MeshBuilder::pyramid(const Vec3& base, const Vec3& half_and_height, const Turn& turn) {
   const Vec3& h = half_and_height;
   const uint32_t first = add_vertices({turned(base, -h.x, 0, -h.z, turn),
                                        turned(base, -h.x, 0, h.z, turn),

@@ -34,7 +34,7 @@ struct Turn {
 };
 Turn pythagorean_turn(uint32_t choice);
 
-struct Mesh {
+struct MeshBuilder {
   static constexpr uint32_t kMaxVertices = 65535;
   static constexpr uint32_t kMaxTriangles = 131072;
 

@@ -1,8 +1,8 @@
-#include "scene/gltf/messages.h"
+#include "scene/messages.h"
 
 #include "core/base/error.h"
 
-namespace voxdag::gltf {
+namespace voxdag {
 
 std::string printable(std::string_view text, size_t max_bytes) {
   std::string shown(text.substr(0, max_bytes));
@@ -29,4 +29,4 @@ void refuse(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::kInvalidInput, path + ": " + what);
 }
 
-}  // namespace voxdag::gltf
+}  // namespace voxdag

@@ -13,10 +13,10 @@
 
 #include "core/base/page_buffer.h"
 #include "core/geometry/grid.h"
-#include "scene/gltf/mesh_data/position_source.h"
-#include "scene/gltf/transform.h"
+#include "scene/vertices/position_source.h"
+#include "scene/vertices/transform.h"
 
-namespace voxdag::gltf {
+namespace voxdag {
 
 class VertexCache {
  public:
@@ -64,4 +64,4 @@ class VertexCache {
   PositionSource* source_ = nullptr;
 };
 
-}  // namespace voxdag::gltf
+}  // namespace voxdag

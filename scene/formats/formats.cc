@@ -1,0 +1,70 @@
+#include "scene/formats/formats.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "scene/chained_scene.h"
+#include "scene/gltf/gltf_scene.h"
+#include "scene/ply/ply_scene.h"
+
+namespace voxdag {
+namespace {
+
+constexpr std::string_view kGltfEndings[] = {".glb", ".gltf"};
+constexpr std::string_view kPlyEndings[] = {".ply"};
+
+constexpr SceneFormat kFormats[] = {
+    {"glTF", kGltfEndings, nullptr, gltf::open_gltf},
+    {"PLY", kPlyEndings, ply::is_ply, ply::open_ply},
+};
+
+const SceneFormat& format_of(const ReadableFile& file) {
+  const SceneFormat* fallback = nullptr;
+  for (const SceneFormat& format : kFormats) {
+    if (!format.sniff)
+      fallback = &format;
+    else if (format.sniff(file))
+      return format;
+  }
+  return *fallback;
+}
+
+std::vector<std::string_view> all_endings() {
+  std::vector<std::string_view> all;
+  for (const SceneFormat& format : kFormats)
+    all.insert(all.end(), format.endings.begin(), format.endings.end());
+  return all;
+}
+
+}  // namespace
+
+std::span<const SceneFormat> scene_formats() { return kFormats; }
+
+bool has_scene_ending(std::string_view name) {
+  return std::ranges::any_of(all_endings(), [&](std::string_view e) { return name.ends_with(e); });
+}
+
+std::string list_scene_endings(const std::string& separator, const std::string& last_separator) {
+  const std::vector<std::string_view> all = all_endings();
+  std::string list;
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (i > 0) list += i + 1 < all.size() ? separator : last_separator;
+    list += all[i];
+  }
+  return list;
+}
+
+std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
+                                           const SceneOptions& options, MemoryBudget& budget,
+                                           const CancelToken& cancel) {
+  std::vector<std::unique_ptr<TriangleSource>> parts;
+  for (const std::string& path : paths) {
+    cancel.check();
+    std::unique_ptr<ReadableFile> file = files.open_read(path);
+    const SceneFormat& format = format_of(*file);
+    parts.push_back(format.open(files, std::move(file), options, budget, cancel));
+  }
+  return chain_scenes(std::move(parts));
+}
+
+}  // namespace voxdag

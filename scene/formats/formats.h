@@ -1,0 +1,47 @@
+// The table of scene formats. A new format is a reader in a folder of its own and one row in
+// formats.cc; messages, help, the HTTP API and the web pages list the endings of this table.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scene/triangle_source.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag {
+
+struct SceneFormat {
+  std::string_view name;                      // "glTF"
+  std::span<const std::string_view> endings;  // of file names, ".glb"
+  // True if the file begins like this format. nullptr for the format that reads, or refuses, files
+  // that no other format recognizes.
+  bool (*sniff)(const ReadableFile& file);
+  // Opens one file as open_scene() does.
+  std::unique_ptr<TriangleSource> (*open)(FileSystem& files, std::unique_ptr<ReadableFile> file,
+                                          const SceneOptions& options, MemoryBudget& budget,
+                                          const CancelToken& cancel);
+};
+
+std::span<const SceneFormat> scene_formats();
+
+// True if the name ends like the files of a format.
+bool has_scene_ending(std::string_view name);
+// All endings, with `separator` between them and `last_separator` before the last one.
+std::string list_scene_endings(const std::string& separator = ", ",
+                               const std::string& last_separator = " or ");
+
+// Opens scene files, each of any format, as one scene: the triangles of the first file, then the
+// triangles of the next. Contents decide the format, not names. Geometry is read in windows charged
+// to `budget`; images are never read. Opening checks the structure, streaming checks the contents;
+// `cancel` is checked between batches. Throws Error{kInvalidInput}, {kNotFound}, {kLimit} or
+// {kOutOfMemory} naming the file. The references must outlive the scene.
+std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
+                                           const SceneOptions& options, MemoryBudget& budget,
+                                           const CancelToken& cancel);
+
+}  // namespace voxdag
