@@ -2,6 +2,7 @@
 
 #include <ctime>
 
+#include "scene/formats/formats.h"
 #include "scheduler/state/work_folder.h"
 
 namespace voxdag {
