@@ -103,7 +103,9 @@ struct FormFinder {
     using Value = typename OptionalValue<T>::type;
     if constexpr (NamedEnum<Value>) {
       for (const std::string& choice : choices_of<Value>())
-        if (choice != name_of(Value{})) EXPECT_THAT(page, HasSubstr("[\"" + choice + "\", \""));
+        if (choice != name_of(Value{})) {
+          EXPECT_THAT(page, HasSubstr("[\"" + choice + "\", \""));
+        }
     } else if constexpr (NameSet<Value>) {
       for (const std::string& choice : NameSetTraits<Value>::all())
         EXPECT_THAT(page, ContainsRegex("[ {]" + choice + ": "));
