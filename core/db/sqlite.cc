@@ -39,7 +39,8 @@ bool has_no_inodes(const std::string& path) {
       break;
   }
   const int reason = database ? sqlite3_system_errno(database) : 0;
-  if (code == ErrorCode::kIo && (reason == ENOSPC || reason == EDQUOT)) code = ErrorCode::kNoSpace;
+  if (code == ErrorCode::kIo && (reason == ENOSPC || reason == EDQUOT || reason == EFBIG))
+    code = ErrorCode::kNoSpace;
   // SQLite tries again without creating the file, and then reports that it is not there.
   if ((result & 0xff) == SQLITE_CANTOPEN && has_no_inodes(path)) {
     code = ErrorCode::kNoSpace;

@@ -19,7 +19,7 @@ namespace {
 [[noreturn]] void fail(const char* call, const std::string& path, int reason) {
   ErrorCode code = ErrorCode::kIo;
   if (reason == ENOENT || reason == ENOTDIR) code = ErrorCode::kNotFound;
-  if (reason == ENOSPC || reason == EDQUOT) code = ErrorCode::kNoSpace;
+  if (reason == ENOSPC || reason == EDQUOT || reason == EFBIG) code = ErrorCode::kNoSpace;
   throw Error(code, std::string(call) + " " + path + ": " + strerror(reason));
 }
 

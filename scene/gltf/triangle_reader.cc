@@ -271,7 +271,7 @@ void TriangleReader::report(const uint32_t* corners) const {
                                  std::to_string(vertex_count_) + " vertices");
   refuse(document_.path, where + "a vertex of " + document_.name_accessor(primitive.position) +
                              (voxdag::is_finite(world_) ? " is not a finite position"
-                                                      : " is not finite once transformed"));
+                                                        : " is not finite once transformed"));
 }
 
 }  // namespace voxdag::gltf

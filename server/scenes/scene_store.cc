@@ -54,8 +54,7 @@ bool is_scene_name(std::string_view name) {
 std::string scene_name_pattern() {
   size_t longest = 0;
   for (const SceneFormat& format : scene_formats())
-    for (const std::string_view ending : format.endings)
-      longest = std::max(longest, ending.size());
+    for (const std::string_view ending : format.endings) longest = std::max(longest, ending.size());
   std::string endings = list_scene_endings("|", "|");
   std::erase(endings, '.');
   return "^[A-Za-z0-9][A-Za-z0-9._-]{0," + std::to_string(kMaxNameBytes - 1 - longest) + "}\\.(" +

@@ -5,9 +5,9 @@
 #include <stdexcept>
 
 #include "core/base/text.h"
+#include "scene/formats/formats.h"
 #include "server/api/openapi/schemas.h"
 #include "server/http/message/target.h"
-#include "scene/formats/formats.h"
 #include "server/scenes/scene_store.h"
 
 namespace voxdag::server {
