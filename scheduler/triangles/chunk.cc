@@ -32,13 +32,13 @@ class ChunkStream : public TriangleStream {
       : list_(list), file_(file), record_bytes_(record_bytes), first_(first) {
     rewind();
   }
-  uint64_t count() const override { return list_.triangles - first_; }
+  uint64_t count() const override { return list_.records - first_; }
   void rewind() override {
     const auto after = std::ranges::upper_bound(list_.chunks, first_, {}, &Chunk::first);
     chunk_ = static_cast<size_t>(after - list_.chunks.begin());
     if (chunk_ > 0) --chunk_;
     record_ = chunk_ < list_.chunks.size() ? first_ - list_.chunks[chunk_].first : 0;
-    if (first_ >= list_.triangles) chunk_ = list_.chunks.size();
+    if (first_ >= list_.records) chunk_ = list_.chunks.size();
     loaded_ = kNoChunk;
   }
   size_t read(std::span<FixedTriangle> out) override {
@@ -46,11 +46,11 @@ class ChunkStream : public TriangleStream {
     while (filled < out.size() && chunk_ < list_.chunks.size()) {
       const Chunk& chunk = list_.chunks[chunk_];
       const std::byte* const records = load(chunk);
-      const size_t n = std::min<size_t>(out.size() - filled, chunk.triangles - record_);
+      const size_t n = std::min<size_t>(out.size() - filled, chunk.records - record_);
       for (size_t i = 0; i < n; ++i, ++record_)
         decode_record(records + record_ * record_bytes_, out[filled + i]);
       filled += n;
-      if (record_ == chunk.triangles) {
+      if (record_ == chunk.records) {
         ++chunk_;
         record_ = 0;
       }
@@ -93,10 +93,10 @@ class ChunkStream : public TriangleStream {
 
 void ChunkList::sort_by_offset() {
   std::ranges::sort(chunks, {}, [](const Chunk& chunk) { return chunk.extent.offset; });
-  triangles = 0;
+  records = 0;
   for (Chunk& chunk : chunks) {
-    chunk.first = triangles;
-    triangles += chunk.triangles;
+    chunk.first = records;
+    records += chunk.records;
   }
 }
 

@@ -1,9 +1,8 @@
 // Triangles as they are stored: records of fixed size in chunks, each chunk in memory or in a
 // TriangleFile. Both triangle stores are made of these. Nothing here locks: a list of chunks is
 // written by one thread, and read by any number once it is complete.
-//
-// A record is nine coordinates: of 32 bits (36 bytes), or, where the grid was given by hand and
-// triangles may reach far outside of it, of 64 bits ("wide", 72 bytes).
+//  A record has nine coordinates of 32 bits (36 bytes). If the grid is an option of the build,
+// triangles may reach far outside of it, so coordinates have 64 bits ("wide", 72 bytes).
 #pragma once
 
 #include <cstddef>
@@ -25,8 +24,8 @@ void encode_triangle(const FixedTriangle& triangle, size_t record_bytes, std::by
 struct Chunk {
   std::vector<std::byte> memory = {};  // empty if the records are in a file
   Extent extent = {};                  // in that file
-  uint32_t triangles = 0;
-  uint64_t first = 0;  // triangles of the list before this chunk, set by the list
+  uint32_t records = 0;
+  uint64_t first = 0;  // records of the list before this chunk, set by the list
 };
 
 // Bytes that a growing list of chunks takes for each of them.
@@ -34,14 +33,14 @@ inline constexpr uint64_t kChunkListBytes = 2 * sizeof(Chunk);
 
 struct ChunkList {
   std::vector<Chunk> chunks;
-  uint64_t triangles = 0;
+  uint64_t records = 0;
 
   void add(Chunk chunk) {
-    chunk.first = triangles;
-    triangles += chunk.triangles;
+    chunk.first = records;
+    records += chunk.records;
     chunks.push_back(std::move(chunk));
   }
-  // Puts the chunks, all of which are in a file, in the order in which they lie there.
+  // Sorts the chunks, all of which are in a file, by their offsets.
   void sort_by_offset();
 };
 

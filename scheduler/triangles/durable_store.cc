@@ -42,7 +42,7 @@ void DurableStore::read_chain() {
       if (chunk.bin >= bins_.size())
         throw DamagedTriangles("the stored triangles name bin " + std::to_string(chunk.bin) +
                                ": expected one of " + std::to_string(bins_.size()));
-      bins_[chunk.bin]->list.add({.extent = chunk.extent, .triangles = chunk.triangles});
+      bins_[chunk.bin]->list.add({.extent = chunk.extent, .records = chunk.triangles});
       list_bytes_ += kChunkListBytes;
     }
   }
@@ -84,7 +84,7 @@ void DurableStore::add_chunk(BinId bin, std::span<const std::byte> records) {
   const auto triangles = static_cast<uint32_t>(records.size() / record_bytes());
   const Extent extent = file_->append(records);
   std::lock_guard lock(mutex_);
-  bins_[bin]->list.add({.extent = extent, .triangles = triangles});
+  bins_[bin]->list.add({.extent = extent, .records = triangles});
   unnamed_.push_back({bin, triangles, extent});
   // Where the list does not fit, it goes uncharged: it is small compared to the triangles.
   charge_.try_resize(list_bytes_ += kChunkListBytes);
@@ -93,7 +93,7 @@ void DurableStore::add_chunk(BinId bin, std::span<const std::byte> records) {
 uint64_t DurableStore::count(BinId bin) const {
   if (is_part(bin)) return parts_.count(bin - kFirstPart);
   std::lock_guard lock(mutex_);
-  return bins_[bin]->list.triangles;
+  return bins_[bin]->list.records;
 }
 
 std::unique_ptr<TriangleStream> DurableStore::open(BinId bin, uint64_t first) const {

@@ -1,11 +1,10 @@
-// Triangles that outlive the process: the bins of the scene and of the plan's cubes lie in a file
-// from the start, so that a later run resumes with them. Parts of split subvolumes do not: they are
-// made again from the bin that they were copied from, which is released only with the last of them.
-//
-// The file's table of contents is a chain: each link names the chunks since the link before it, and
-// the extent of that link. checkpoint() appends a link; whoever records what it returns, after a
-// sync of the file, can open the store at that point again. Thread-safe as TriangleStore says, but
-// for checkpoint(), which the thread calls that fills the durable bins.
+// Triangles that outlive the process. The bins of the scene and of the plan's cubes are in a file,
+// so that a later run resumes with them. Parts of split subvolumes are not durable: a later run
+// copies them again from their source bin, which is released after its last part.
+//  The file's table of contents is a chain of links. Each link lists the chunks since the previous
+// link, and the extent of that link. checkpoint() appends a link. A caller that syncs the file and
+// records the returned state can open the store at that point again. Thread-safe as documented at
+// TriangleStore; checkpoint() must be called by the thread that fills the durable bins.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
-// Triangles in memory as far as a share of the budget allows, and in a spill file beyond that. They
-// are gone with the process. Thread-safe as TriangleStore says.
+// Triangles in memory within a share of the budget; the rest is in a spill file. Not durable.
+// Thread-safe as documented at TriangleStore.
 #pragma once
 
 #include <memory>
@@ -9,15 +9,15 @@
 
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
-#include "scheduler/triangles/chunk.h"
+#include "scheduler/triangles/record_store.h"
 #include "scheduler/triangles/triangle_store.h"
 
 namespace voxdag {
 
 class MemoryStore : public TriangleStore {
  public:
-  // Chunks are charged to `share`; what it refuses goes to a file at `spill_path`, created when
-  // needed. `wide` as in chunk.h.
+  // Charges chunks to `share`. Chunks that exceed it are written to a file at `spill_path`, which
+  // is created by the first of them. `wide` as in chunk.h.
   MemoryStore(FileSystem& files, std::string spill_path, bool wide, MemoryBudget& share);
 
   size_t record_bytes() const override { return record_bytes_; }
@@ -40,17 +40,13 @@ class MemoryStore : public TriangleStore {
   };
 
   BinId add_bin();
-  void free(Bin& bin);
+  Bin& bin(BinId id) const;
 
-  FileSystem& files_;
-  const std::string spill_path_;
   const size_t record_bytes_;
   std::vector<CubeBin> cube_bins_;
-  MemoryCharge charge_;
-  mutable std::mutex mutex_;  // guards all below; the list of a filled bin no longer changes
+  RecordStore records_;
+  mutable std::mutex mutex_;  // guards bins_ and references; a filled bin's list does not change
   std::vector<std::unique_ptr<Bin>> bins_;
-  uint64_t memory_bytes_ = 0;  // of records and lists
-  std::unique_ptr<TriangleFile> spill_;
 };
 
 }  // namespace voxdag

@@ -75,4 +75,11 @@ std::optional<FixedSurface> SurfaceRecords::next() {
   return surface;
 }
 
+ChunkWriter surface_writer(RecordStore& store, std::span<ChunkList> lists, size_t buffer_bytes) {
+  const size_t chunk_bytes = std::clamp<size_t>(buffer_bytes / lists.size(), 2048, 64 << 10);
+  return ChunkWriter(lists.size(), chunk_bytes,
+                     [&store, lists](size_t list, std::span<const std::byte> records,
+                                     uint32_t count) { store.add(lists[list], records, count); });
+}
+
 }  // namespace voxdag

@@ -17,16 +17,17 @@
 
 #include "core/color/surface.h"
 #include "core/format/bytes.h"
+#include "scheduler/triangles/record_store.h"
 
 namespace voxdag {
 
 inline constexpr size_t kMaxSurfaceRecordBytes = 1 + 4 + 9 * 8 + 6 * 8 + 12 * 2;
 
-// Appends the record of a surface. `has_image`: whether its material has one that can be read.
+// Appends the record of a surface. `has_image` is true if its material has a readable image.
 void append_surface(const FixedSurface& surface, bool has_image, std::vector<std::byte>& out);
 
-// Takes records from the front of bytes, which append_surface() wrote. They were read with their
-// checksum; what is wrong nevertheless is reported as damage of the file.
+// Reads records that append_surface() wrote from the front of `bytes`. The bytes have passed their
+// checksum; remaining defects are reported as damage of the file.
 class SurfaceRecords {
  public:
   explicit SurfaceRecords(std::span<const std::byte> bytes) : in_(bytes) {}
@@ -37,5 +38,19 @@ class SurfaceRecords {
  private:
   ByteSource in_;
 };
+
+// Writes surface records to the lists of a store. The incomplete chunks of all lists take at most
+// about `buffer_bytes`. The references must outlive the writer.
+ChunkWriter surface_writer(RecordStore& store, std::span<ChunkList> lists, size_t buffer_bytes);
+
+// Calls visit(surface) for each surface of a list. Throws DamagedTriangles.
+template <class Visit>
+void for_each_surface(const RecordStore& store, const ChunkList& list, const Visit& visit) {
+  std::vector<std::byte> buffer;
+  for (const Chunk& chunk : list.chunks) {
+    SurfaceRecords records(store.read(chunk, buffer));
+    while (const auto surface = records.next()) visit(*surface);
+  }
+}
 
 }  // namespace voxdag

@@ -1,7 +1,7 @@
-// A file of pieces that are appended, and read back by offset; each has a checksum of its own.
-// Holds triangles that do not fit in memory, or that outlive the process.
+// A file of appended pieces that are read by offset. Each piece has a checksum. Holds triangles
+// that do not fit in memory or that outlive the process.
 //
-// append(), read() and release() may be called by several threads at once.
+// append(), read() and release() are thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +22,8 @@ struct Extent {
   uint64_t checksum = 0;
 };
 
-// Error{kCorrupt} about stored triangles. It is a type of its own because, unlike for any other
-// corruption, the build can help itself: it reads the scene again.
+// Error{kCorrupt} about stored triangles. It is a separate type because the build can recover from
+// it by reading the scene again.
 class DamagedTriangles : public Error {
  public:
   explicit DamagedTriangles(const std::string& what) : Error(ErrorCode::kCorrupt, what) {}
@@ -36,11 +36,11 @@ class TriangleFile {
   TriangleFile(FileSystem& files, std::string path, uint64_t end = 0);
 
   Extent append(std::span<const std::byte> bytes);
-  // Reads all of a piece; throws DamagedTriangles if it is not what was written.
+  // Reads a piece. Throws DamagedTriangles if its checksum differs.
   void read(const Extent& extent, std::span<std::byte> out) const;
   // Frees the disk space of a piece that nobody reads again.
   void release(const Extent& extent);
-  // Returns once all that was appended, and the file's name, are durable.
+  // Makes all appended pieces and the file's name durable.
   void sync();
   uint64_t end() const;
   // Bytes appended since it was opened.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "scheduler/triangles/chunk.h"
 
@@ -10,48 +11,40 @@ namespace {
 
 constexpr size_t kMinChunkRecords = 16;
 
+size_t chunk_bytes(const TriangleStore& store, size_t targets, size_t buffer_bytes) {
+  const size_t records = buffer_bytes / (store.record_bytes() * std::max<size_t>(targets, 1));
+  return std::clamp(records, kMinChunkRecords, store.max_chunk_records()) * store.record_bytes();
+}
+
 }  // namespace
 
 void add_records(TriangleStore& store, BinId bin, std::span<const std::byte> records) {
-  const size_t chunk_bytes = store.max_chunk_records() * store.record_bytes();
+  const size_t max_bytes = store.max_chunk_records() * store.record_bytes();
   while (!records.empty()) {
-    const size_t bytes = std::min(chunk_bytes, records.size());
+    const size_t bytes = std::min(max_bytes, records.size());
     store.add_chunk(bin, records.first(bytes));
     records = records.subspan(bytes);
   }
 }
 
 BinWriter::BinWriter(TriangleStore& store, std::vector<BinId> targets, size_t buffer_bytes)
-    : store_(store),
-      targets_(std::move(targets)),
-      record_bytes_(store.record_bytes()),
-      tails_(targets_.size()) {
-  const size_t records = buffer_bytes / (record_bytes_ * std::max<size_t>(targets_.size(), 1));
-  chunk_bytes_ = std::clamp(records, kMinChunkRecords, store.max_chunk_records()) * record_bytes_;
-}
+    : record_bytes_(store.record_bytes()),
+      writer_(targets.size(), chunk_bytes(store, targets.size(), buffer_bytes),
+              [&store, targets](size_t target, std::span<const std::byte> records, uint32_t) {
+                store.add_chunk(targets[target], records);
+              }) {}
 
 void BinWriter::append(size_t target, const FixedTriangle& triangle) {
   std::array<std::byte, kMaxTriangleRecordBytes> record;
   encode_triangle(triangle, record_bytes_, record.data());
-  append(target, std::span(record).first(record_bytes_));
+  writer_.append(target, std::span(record).first(record_bytes_), 1);
 }
 
 void BinWriter::append(size_t target, std::span<const std::byte> records) {
-  std::vector<std::byte>& tail = tails_[target];
   while (!records.empty()) {
-    const size_t bytes = std::min(records.size(), chunk_bytes_ - tail.size());
-    tail.insert(tail.end(), records.begin(), records.begin() + static_cast<ptrdiff_t>(bytes));
+    const size_t bytes = std::min(records.size(), writer_.missing_bytes(target));
+    writer_.append(target, records.first(bytes), static_cast<uint32_t>(bytes / record_bytes_));
     records = records.subspan(bytes);
-    if (tail.size() < chunk_bytes_) return;
-    store_.add_chunk(targets_[target], tail);
-    tail.clear();
-  }
-}
-
-void BinWriter::flush() {
-  for (size_t i = 0; i < tails_.size(); ++i) {
-    if (!tails_[i].empty()) store_.add_chunk(targets_[i], tails_[i]);
-    tails_[i].clear();
   }
 }
 

@@ -1,15 +1,14 @@
-// Where a build's snapped triangles lie from ingest until their subvolumes are built: in bins, one
-// for the whole scene, then one for each cube of the plan, then one for each part of a subvolume
-// that is split. MemoryStore holds them for this process, DurableStore for later ones as well; who
-// uses a store does not ask which one it is.
+// Holds a build's snapped triangles from ingest until their subvolumes are built. They are in bins:
+// one for the scene, then one for each cube of the plan, then one for each part of a split
+// subvolume. MemoryStore holds them for this process, DurableStore also for later processes.
 //
 // Life of a bin:
 //   1. It is created with one reference, and filled by one BinWriter.
 //   2. Any number of streams read it.
 //   3. drop(): this run does not read it again. A store that no other run can read frees it.
-//   4. release(): what was made of it is durable. The last release() frees it.
-// Thread-safe, except that add_cube_bins() needs the store for itself and that a bin is not filled
-// and read at a time.
+//   4. release(): its artifact is durable. The last release() frees the bin. Thread-safe, except
+//      that add_cube_bins() needs exclusive access and that a bin must not be filled and read
+//      concurrently.
 #pragma once
 
 #include <cstddef>
@@ -20,6 +19,7 @@
 
 #include "core/backend/backend.h"
 #include "core/geometry/cube.h"
+#include "scheduler/triangles/record_store.h"
 
 namespace voxdag {
 
@@ -45,7 +45,8 @@ class TriangleStore {
   // Creates the bins of the plan's cubes; once per store. A store that resumes may have them.
   virtual void add_cube_bins(std::span<const Cube> cubes) = 0;
   virtual const std::vector<CubeBin>& cube_bins() const = 0;
-  // Creates a bin for triangles that are copied from `whole`, which stays retained as long.
+  // Creates a bin for triangles that are copied from `whole`. Retains `whole` until the part is
+  // released.
   virtual BinId add_part(BinId whole) = 0;
 
   virtual void add_chunk(BinId bin, std::span<const std::byte> records) = 0;
@@ -53,7 +54,7 @@ class TriangleStore {
   // Reads the bin's triangles from number `first` on. The store must outlive the stream.
   virtual std::unique_ptr<TriangleStream> open(BinId bin, uint64_t first = 0) const = 0;
 
-  // Whether references remain, so that release() must be called once what was made of the bin is
+  // Returns true if references remain, so that release() must be called when the bin's artifact is
   // durable.
   virtual bool drop(BinId bin) = 0;
   virtual void retain(BinId bin) = 0;
@@ -75,15 +76,12 @@ class BinWriter {
   // `target` is an index into `targets`.
   void append(size_t target, const FixedTriangle& triangle);
   void append(size_t target, std::span<const std::byte> records);
-  // All that was appended is in the bins when this returns.
-  void flush();
+  // Adds the buffered records to the bins.
+  void flush() { writer_.flush(); }
 
  private:
-  TriangleStore& store_;
-  const std::vector<BinId> targets_;
   const size_t record_bytes_;
-  size_t chunk_bytes_;
-  std::vector<std::vector<std::byte>> tails_;
+  ChunkWriter writer_;
 };
 
 }  // namespace voxdag

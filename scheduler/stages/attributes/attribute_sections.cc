@@ -9,7 +9,7 @@ ColorStage AttributeSections::open_stage() {
 }
 
 void AttributeSections::add_to(GlobalFileWriter& out) {
-  if (!is_wanted()) return;
+  if (!is_enabled()) return;
   ColorStage stage = open_stage();
   job_.report.colors = stage.add_to(out);
   added_digest_ = stage.digest();
@@ -18,7 +18,7 @@ void AttributeSections::add_to(GlobalFileWriter& out) {
 }
 
 std::string AttributeSections::digest() {
-  if (!is_wanted() || !added_digest_.empty()) return added_digest_;
+  if (!is_enabled() || !added_digest_.empty()) return added_digest_;
   return open_stage().digest_of(job_.context.files, job_.spec.run.output, job_.report.colors);
 }
 

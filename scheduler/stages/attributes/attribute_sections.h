@@ -21,7 +21,7 @@ class AttributeSections {
   std::string digest();
 
  private:
-  bool is_wanted() const { return job_.spec.geometry.attributes.any(); }
+  bool is_enabled() const { return job_.spec.geometry.attributes.any(); }
   ColorStage open_stage();
 
   BuildJob& job_;

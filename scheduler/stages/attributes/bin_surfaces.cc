@@ -33,9 +33,9 @@ class SurfacePiece {
   }
   const Checksum128& checksum() const { return checksum_; }
 
-  void copy(SurfaceWriter& writer, std::span<BinContent> contents) {
+  void copy(ChunkWriter& writer, std::span<BinContent> contents) {
     const auto copy_to = [&](size_t bin, const Record& record) {
-      writer.append(bin, bytes_of(record));
+      writer.append(bin, bytes_of(record), 1);
       BinContent& content = contents[bin];
       ++content.surfaces;
       content.sum.low += record.digest.low;
@@ -113,12 +113,12 @@ class SurfacePiece {
 }  // namespace
 
 BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
-                            SurfaceStore& store, const StageContext& context) {
+                            RecordStore& store, const StageContext& context) {
   const CubeTree tree(binning.grid.levels, Cube{}, binning.cubes);
   BinnedSurfaces binned;
   binned.bins.resize(binning.cubes.size());
   binned.contents.resize(binning.cubes.size());
-  SurfaceWriter writer(store, binned.bins, binning.buffer_bytes);
+  ChunkWriter writer = surface_writer(store, binned.bins, binning.buffer_bytes);
   ContentDigest digest(binning.grid);
   uint64_t position = 0;
   context.build.progress.begin_stage("surfaces", scene.declared_triangles(), "triangles");

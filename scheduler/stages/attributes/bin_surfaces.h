@@ -1,5 +1,5 @@
-// Reads what the triangles of a scene look like, and puts each into the bins of all cubes of the
-// color grid that it touches.
+// Reads the surfaces of a scene's triangles and puts each into the bins of all cubes of the color
+// grid that it touches.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 #include "scene/triangle_source.h"
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/stages/attributes/color_keys.h"
-#include "scheduler/triangles/surface_store.h"
+#include "scheduler/triangles/surface_record.h"
 
 namespace voxdag {
 
@@ -28,13 +28,13 @@ struct SurfaceBinning {
 };
 
 struct BinnedSurfaces {
-  std::vector<SurfaceStore::Bin> bins;  // one for each cube, in their order
-  std::vector<BinContent> contents;     // and what is in it
+  std::vector<ChunkList> bins;       // one for each cube, in their order
+  std::vector<BinContent> contents;  // contents of each bin
 };
 
 // Throws Error{kInvalidInput} if the triangles are not those that ingest read: the scene was
 // changed during the build.
 BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
-                            SurfaceStore& store, const StageContext& context);
+                            RecordStore& store, const StageContext& context);
 
 }  // namespace voxdag

@@ -5,8 +5,8 @@
 namespace voxdag {
 namespace {
 
-// Of the rule, the decoders, the blocks and the records of regions: raised with any change of one,
-// so that what an earlier version has baked is not used.
+// Version of the color rule, the decoders, the blocks and the region records. Any change increases
+// it, so that colors baked by an earlier version are not reused.
 constexpr uint32_t kColorVersion = 1;
 
 }  // namespace

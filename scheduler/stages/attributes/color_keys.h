@@ -32,8 +32,8 @@ struct StoredAttribute {
   uint32_t value_bytes = 0;  // of a cell; 0 for colors
 };
 
-// Digests of what each material adds to the attributes, its name left out. `images`: of the
-// contents of each image.
+// Returns a digest of each material's contribution to the attributes, without its name. `images`
+// are digests of the image contents.
 std::vector<Checksum128> look_digests(std::span<const Material> materials,
                                       std::span<const std::string> images,
                                       const AttributeSet& attributes);
@@ -41,7 +41,7 @@ std::vector<Checksum128> look_digests(std::span<const Material> materials,
 // Digest of a surface, of its record (surface_record.h) and the look of its material.
 Checksum128 surface_digest(std::span<const std::byte> record, const Checksum128& look);
 
-// Of the colors, or another attribute, of a cube in which surfaces are `content`.
+// Key of one attribute of a cube whose surfaces have the digest `content`.
 Checksum128 attribute_key(const StoredAttribute& attribute, const ColorGrid& grid, const Cube& cube,
                           const BinContent& content);
 

@@ -51,8 +51,8 @@ T number_at(const ReadableFile& file, uint64_t offset) {
   return ByteSource(bytes).get<T>();
 }
 
-// The cells with attributes of a sound global file, those of the finest level: all its sections
-// have the same ones.
+// Counts the cells with attributes on the finest level of a valid global file. All its sections
+// have the same cells.
 uint64_t count_finest_cells(const ReadableFile& file) {
   namespace layout = global_layout;
   if (number_at<uint64_t>(file, layout::kAttributeCountAt) == 0) return 0;
@@ -71,7 +71,7 @@ void check_list(std::span<const std::string> materials) {
                                        " bytes; leave out --attributes material");
 }
 
-// What bakes, and what one cube became.
+// A baker and the records of one cube.
 struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;
@@ -102,7 +102,7 @@ struct ColorStage::State {
   std::vector<std::string> images;  // their digests
   // Once the surfaces are read:
   std::optional<MemoryBudget> share;
-  std::optional<SurfaceStore> store;
+  std::optional<RecordStore> store;
   BinnedSurfaces surfaces;
   template <class T>
   using ByAttributeAndCube = std::vector<std::vector<T>>;
@@ -121,7 +121,7 @@ struct ColorStage::State {
   std::unique_ptr<TextureSet> decode_images(const ColorStore& artifacts);
   bool is_stored(const ColorStore& artifacts, size_t cube) const;
   void store_parts(ColorStore& artifacts, size_t cube, const CubeBaker::Records& records,
-                   bool are_last);
+                   bool is_last_batch);
   void bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
             ColorReport& report);
   void add_stored(const ColorStore& artifacts, size_t attribute, GlobalFileWriter& out,
@@ -150,7 +150,7 @@ void ColorStage::State::open() {
 void ColorStage::State::read_surfaces() {
   if (store) return;
   share.emplace(context.budget.available() / 3, &context.budget);
-  store.emplace(context.build.files, source.work_folder + "/surfaces.vdspill", *share);
+  store.emplace(context.build.files, source.work_folder + "/surfaces.vdspill", *share, "surfaces");
   const std::vector<Checksum128> looks =
       look_digests(materials.materials, images, source.options.attributes);
   const SurfaceBinning binning{
@@ -205,10 +205,10 @@ std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& a
 }
 
 void ColorStage::State::store_parts(ColorStore& artifacts, size_t cube,
-                                    const CubeBaker::Records& records, bool are_last) {
+                                    const CubeBaker::Records& records, bool is_last_batch) {
   for (size_t i = 0; i < attributes.size(); ++i) {
     std::vector<ColorStore::Place>& stored = parts[i][cube];
-    stored.push_back(artifacts.add(keys[i][cube], stored.size(), are_last, records[i]));
+    stored.push_back(artifacts.add(keys[i][cube], stored.size(), is_last_batch, records[i]));
   }
 }
 
@@ -268,7 +268,7 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
   if (report.cells > 0) section.finish();
 }
 
-// Sections are written one after the other: what the others become is read from the work folder.
+// Sections are contiguous, so the records of the other attributes are read from the work folder.
 void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute,
                                    GlobalFileWriter& out, const ColorReport& report) {
   const BuildContext& build = context.build;

@@ -1,11 +1,10 @@
-// The colors of a scene, and other attributes of its cells (docs/color.md): its surfaces are read
-// once more and binned by cubes of the color grid; the cubes are baked on all threads, and written
-// in Morton order behind the levels of the global file, a section for each attribute.
-//
-// A cube is a task: what it became is stored in the work folder (color_store.h) under a key of all
-// that it depends on (color_keys.h), and used again by a later run for which the key is the same.
-// So a run that is stopped loses the cubes that it was baking, and a changed texture those that
-// show it. Images that no missing cube shows are not decoded.
+// Bakes the colors of a scene and other attributes of its cells (docs/color.md). Reads the surfaces
+// again and bins them by cubes of the color grid. All threads bake cubes, which are written in
+// Morton order behind the levels of the global file, one section for each attribute.
+//  Resume rule: a baked cube is stored in the work folder (color_store.h) under a key of all its
+// inputs (color_keys.h), and a later run with an equal key reuses it. A stopped run loses only
+// unfinished cubes; a changed texture loses only the cubes that show it. Images that no missing
+// cube shows are not decoded.
 #pragma once
 
 #include <cstdint>
@@ -40,11 +39,12 @@ class ColorStage {
   // SHA-256 of the keys of all cubes: equal where the colors are equal. Reads the scene and its
   // images.
   std::string digest();
-  // The same, and what is to be reported if `output`, a sound file that an earlier run has
-  // finished, has the colors of that digest.
+  // Returns digest(). If `output`, a valid file of an earlier run, has the colors of that digest,
+  // also fills in `report`.
   std::string digest_of(FileSystem& files, const std::string& output,
                         std::optional<ColorReport>& report);
-  // `out` has all its levels, and is not sealed; it stays as it is if there are none. Once.
+  // Adds the sections to `out`, which has all its levels and is not sealed. Does nothing for a file
+  // without levels. Call it once.
   ColorReport add_to(GlobalFileWriter& out);
 
  private:

@@ -38,7 +38,7 @@ void append_header(const Header& header, std::vector<std::byte>& out) {
   sink.put(checksum64(std::span(out).subspan(at)));
 }
 
-// False for what is no header.
+// False if `bytes` are not a header.
 bool parse_header(std::span<const std::byte> bytes, Header& header) {
   ByteSource in(bytes);
   const bool is_ours =
@@ -137,7 +137,7 @@ ColorStore::Place ColorStore::add(const Checksum128& key, uint64_t number, bool 
     reader_ = files_.open_read(path_);
   }
   const Place place{end_ + kHeaderBytes, part.size(), checksum};
-  // The header last: what it names is there, unless the power is cut.
+  // The header is written last, so that its data exists unless the power was cut.
   writer_->write_at(place.offset, part);
   writer_->write_at(end_, header);
   end_ = place.offset + place.bytes;
@@ -171,7 +171,7 @@ void ColorStore::keep_only(std::span<const Checksum128> keys, const CancelToken&
   end_ = end;
 }
 
-// Returns the bytes of the file; `artifacts` become what is in it.
+// Copies `artifacts` to `file` and updates their places. Returns the size of the file.
 uint64_t ColorStore::copy(Artifacts& artifacts, WritableFile& file,
                           const CancelToken& cancel) const {
   uint64_t end = 0;

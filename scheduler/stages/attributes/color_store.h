@@ -1,11 +1,9 @@
-// The artifacts of the color stage: the colors of cubes, each under a key that names all that they
-// depend on, in one file of the work folder that outlives the process. A cube that has more than
-// memory should hold is stored in parts. docs/format.md, "Stored colors", is the byte layout.
-//
-// Nothing refers to the file: an artifact counts if all its parts are there, whole, and under the
-// key that is asked for. So what a stopped run wrote last may be half there, and what is damaged is
-// missing; either way it is baked again. Now and then the file is synced, in the background, for
-// power cuts.
+// The durable artifacts of the color stage: the colors of cubes in one file of the work folder,
+// each under a digest of all its inputs. A large cube is stored in parts. docs/format.md, "Stored
+// colors", documents the byte layout.
+//  No row refers to the file. An artifact is valid if all its parts are complete and have the
+// requested key. Incomplete and damaged artifacts are baked again. A background thread syncs the
+// file regularly, which limits the loss after a power cut.
 //
 // All but keep_only() may be called by several threads.
 #pragma once
@@ -30,14 +28,15 @@ namespace voxdag {
 
 class ColorStore {
  public:
-  // Reads all of the file, if there is one; warns of what is damaged in it. add() syncs it after
-  // `sync_interval_s`; 0: each time, before it returns. `files` must outlive the store.
+  // Reads the file if it exists, and warns about damaged parts. add() syncs it every
+  // `sync_interval_s`; with 0 every add() syncs it before it returns. `files` must outlive the
+  // store.
   ColorStore(FileSystem& files, std::string path, double sync_interval_s, Progress& progress,
              const CancelToken& cancel);
   // Waits for the disk.
   ~ColorStore();
 
-  // Where a part lies.
+  // The position of a part in the file.
   struct Place {
     uint64_t offset = 0, bytes = 0, checksum = 0;
   };
@@ -48,13 +47,13 @@ class ColorStore {
   const std::vector<Place>& parts(const Checksum128& key) const {
     return found_.at({key.low, key.high});
   }
-  // One of them, or one that was added. Throws Error{kCorrupt} if it is damaged by now.
+  // Reads a part. Throws Error{kCorrupt} if it is damaged.
   void read(const Place& place, std::vector<std::byte>& out) const;
   // Adds the part of this number, from 0. Throws what went wrong when an earlier one was synced,
   // too.
   Place add(const Checksum128& key, uint64_t number, bool is_last, std::span<const std::byte> part);
-  // Frees the space of what has none of these keys, if it is more than what has; before any add().
-  // A stop leaves the file as it was or as it is to be.
+  // Removes artifacts with other keys if they take more space than artifacts with these keys. Call
+  // it before add(). An interruption leaves the old or the new file, both complete.
   void keep_only(std::span<const Checksum128> keys, const CancelToken& cancel);
   // Bytes of the file.
   uint64_t file_bytes() const;

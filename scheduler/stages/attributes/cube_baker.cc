@@ -13,14 +13,14 @@
 namespace voxdag {
 namespace {
 
-// Of a surface in memory: itself, once more for its region, and in the lists of up to 14 cubes in
-// each other its number, and which children it touches.
+// Memory of a surface: itself, a copy for its region, and its number and touched children in the
+// lists of up to 14 nested cubes.
 constexpr uint64_t kSurfaceBytes =
     2 * sizeof(FixedSurface) + 14 * (sizeof(uint32_t) + sizeof(uint8_t));
 // Records for a child cube that are collected before they go to the store.
 constexpr size_t kPartBytes = 16 << 10;
 
-// Of a cell that is baked: its sum, the same in order, and colors.
+// Memory of a baked cell: its sum, a sorted copy of the sum, and its colors.
 constexpr uint64_t kCellBytes = sizeof(ColorSum) + sizeof(ColoredCell) + 8;
 // Aside from those: places of cells, the next coarser level, and two parts of the records.
 constexpr uint64_t kFixedBytes = uint64_t{6} << 20;
@@ -44,7 +44,7 @@ AttributeSet set_of(std::span<const StoredAttribute> attributes) {
 
 CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
                      std::span<const Material> materials, TextureReader& textures,
-                     SurfaceStore& store, uint64_t region_bytes, uint64_t surface_bytes,
+                     RecordStore& store, uint64_t region_bytes, uint64_t surface_bytes,
                      MemoryBudget& budget, const CancelToken& cancel)
     : grid_(grid),
       attributes_(attributes),
@@ -57,19 +57,18 @@ CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> att
       sum_charge_(budget, 0, "normals and materials of a region"),
       baker_(grid, materials, textures, set_of(attributes)) {}
 
-void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, Records& records,
-                     const TakeRecords& take) {
+void CubeBaker::bake(const Cube& cube, ChunkList& bin, Records& records, const TakeRecords& take) {
   bake(cube, bin, {records, take});
 }
 
-void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, const Sink& sink) {
-  if (bin.surfaces == 0) return;
-  const uint64_t bytes = bin.surfaces * kSurfaceBytes;
+void CubeBaker::bake(const Cube& cube, ChunkList& bin, const Sink& sink) {
+  if (bin.records == 0) return;
+  const uint64_t bytes = bin.records * kSurfaceBytes;
   if (bytes > surface_bytes_) return divide(cube, bin, sink);
   const MemoryCharge charge(budget_, bytes, "surfaces to be baked");
   surfaces_.clear();
-  surfaces_.reserve(bin.surfaces);
-  store_.for_each(bin, [&](const FixedSurface& surface) { surfaces_.push_back(surface); });
+  surfaces_.reserve(bin.records);
+  for_each_surface(store_, bin, [&](const FixedSurface& surface) { surfaces_.push_back(surface); });
   store_.clear(bin);
   std::vector<uint32_t> all(surfaces_.size());
   std::iota(all.begin(), all.end(), 0u);
@@ -78,20 +77,20 @@ void CubeBaker::bake(const Cube& cube, SurfaceStore::Bin& bin, const Sink& sink)
   touching_ = {};
 }
 
-// Too many surfaces for the memory: those of the eight children are stored apart.
-void CubeBaker::divide(const Cube& cube, SurfaceStore::Bin& bin, const Sink& sink) {
+// Bakes a cube with too many surfaces for the memory: distributes them to the eight children.
+void CubeBaker::divide(const Cube& cube, ChunkList& bin, const Sink& sink) {
   if (cube.level == grid_.region_level()) return bake_in_parts(cube, bin, sink);
-  std::array<SurfaceStore::Bin, 8> children;
+  std::array<ChunkList, 8> children;
   {
-    SurfaceWriter writer(store_, children, kPartBytes * children.size());
+    ChunkWriter writer = surface_writer(store_, children, kPartBytes * children.size());
     std::vector<std::byte> record;
     const int64_t units = cube.edge_voxels(grid_.levels) * kUnitsPerVoxel;
-    store_.for_each(bin, [&](const FixedSurface& surface) {
+    for_each_surface(store_, bin, [&](const FixedSurface& surface) {
       record.clear();
-      // Whether it has an image does not matter for what was stored without coordinates.
+      // The has_image argument has no effect: a surface stored without coordinates has none here.
       append_surface(surface, true, record);
       for (uint32_t mask = touched_children(surface.position, cube, units); mask; mask &= mask - 1)
-        writer.append(static_cast<size_t>(lowest_bit(mask)), record);
+        writer.append(static_cast<size_t>(lowest_bit(mask)), record, 1);
     });
     store_.clear(bin);
     writer.flush();
@@ -125,7 +124,7 @@ void CubeBaker::descend(const Cube& cube, std::span<const uint32_t> touching, co
 }
 
 // The surfaces of a region that do not fit the memory come one part after the other.
-void CubeBaker::bake_in_parts(const Cube& region, SurfaceStore::Bin& bin, const Sink& sink) {
+void CubeBaker::bake_in_parts(const Cube& region, ChunkList& bin, const Sink& sink) {
   const size_t most = std::max<size_t>(surface_bytes_ / sizeof(FixedSurface), 1);
   const MemoryCharge charge(budget_, most * sizeof(FixedSurface), "surfaces to be baked");
   touching_.clear();
@@ -135,7 +134,7 @@ void CubeBaker::bake_in_parts(const Cube& region, SurfaceStore::Bin& bin, const 
       add(touching_);
       touching_.clear();
     };
-    store_.for_each(bin, [&](const FixedSurface& surface) {
+    for_each_surface(store_, bin, [&](const FixedSurface& surface) {
       touching_.push_back(surface);
       if (touching_.size() == most) add_part();
     });
@@ -179,18 +178,19 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
 // False: they are more than `max_cells`, or their sums of other attributes do not fit the memory.
 template <class AddSurfaces>
 bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces) {
-  bool are_all = true;
+  bool is_complete = true;
   baker_.begin(cube, max_cells);
   add_surfaces([&](std::span<const FixedSurface> surfaces) {
     cancel_.check();
-    are_all = are_all && baker_.add(surfaces, [&](uint64_t bytes) { return charge_sums(bytes); });
+    is_complete =
+        is_complete && baker_.add(surfaces, [&](uint64_t bytes) { return charge_sums(bytes); });
   });
   baker_.finish(cells_, values_);
-  return are_all;
+  return is_complete;
 }
 
-// False if the sums of normals and materials do not fit. What was allocated stays for the next
-// region, but for large lists of materials.
+// False if the sums of normals and materials do not fit. The allocation is kept for the next
+// region, except for large lists of materials.
 bool CubeBaker::charge_sums(uint64_t bytes) {
   constexpr uint64_t kSlackBytes = uint64_t{4} << 20;
   const uint64_t more = bytes - std::min(bytes, ColorMemory::kValueSumBytes);

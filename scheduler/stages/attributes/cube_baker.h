@@ -12,7 +12,7 @@
 #include "core/color/rule/bake_region.h"
 #include "scene/textures/texture_set.h"
 #include "scheduler/stages/attributes/color_keys.h"
-#include "scheduler/triangles/surface_store.h"
+#include "scheduler/triangles/surface_record.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag {
@@ -23,10 +23,10 @@ class CubeBaker {
   using Records = std::vector<std::vector<std::byte>>;
 
   // Charges `region_bytes`, at least ColorMemory::kRegionBytes, and ColorMemory::value_bytes():
-  // with more, more cells of a region are baked at once. Surfaces in memory take up to
+  // with more memory, regions are baked in fewer pieces. Surfaces in memory take up to
   // `surface_bytes`. The references must outlive it.
   CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
-            std::span<const Material> materials, TextureReader& textures, SurfaceStore& store,
+            std::span<const Material> materials, TextureReader& textures, RecordStore& store,
             uint64_t region_bytes, uint64_t surface_bytes, MemoryBudget& budget,
             const CancelToken& cancel);
 
@@ -35,7 +35,7 @@ class CubeBaker {
   // Appends the records of the regions with surfaces in Morton order, and clears the bin, which has
   // all surfaces that touch the cube. `records`: in the order of the attributes. Whenever there are
   // kManyRecordBytes of one of them, take(records) follows.
-  void bake(const Cube& cube, SurfaceStore::Bin& bin, Records& records, const TakeRecords& take);
+  void bake(const Cube& cube, ChunkList& bin, Records& records, const TakeRecords& take);
 
   static constexpr size_t kManyRecordBytes = 256 << 10;
 
@@ -46,10 +46,10 @@ class CubeBaker {
     const TakeRecords& take;
   };
 
-  void bake(const Cube& cube, SurfaceStore::Bin& bin, const Sink& sink);
-  void divide(const Cube& cube, SurfaceStore::Bin& bin, const Sink& sink);
+  void bake(const Cube& cube, ChunkList& bin, const Sink& sink);
+  void divide(const Cube& cube, ChunkList& bin, const Sink& sink);
   void descend(const Cube& cube, std::span<const uint32_t> touching, const Sink& sink);
-  void bake_in_parts(const Cube& region, SurfaceStore::Bin& bin, const Sink& sink);
+  void bake_in_parts(const Cube& region, ChunkList& bin, const Sink& sink);
   template <class AddSurfaces>
   void bake_region(const Cube& region, const AddSurfaces& add_surfaces, const Sink& sink);
   template <class AddSurfaces>
@@ -59,13 +59,13 @@ class CubeBaker {
 
   const ColorGrid grid_;
   const std::span<const StoredAttribute> attributes_;
-  SurfaceStore& store_;
+  RecordStore& store_;
   const uint64_t surface_bytes_;
-  const uint32_t max_cells_;  // of a region, at once
+  const uint32_t max_cells_;  // of a region per piece
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   const MemoryCharge charge_;
-  MemoryCharge sum_charge_;  // of what is more than ColorMemory::kValueSumBytes
+  MemoryCharge sum_charge_;  // for sums beyond ColorMemory::kValueSumBytes
   RegionBaker<TextureReader> baker_;
   std::vector<FixedSurface> surfaces_;  // of the cube
   std::vector<FixedSurface> touching_;  // of a region, or a part of them

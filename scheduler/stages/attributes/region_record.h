@@ -14,8 +14,8 @@ namespace voxdag {
 
 void append_region(const EncodedRegion& region, std::vector<std::byte>& out);
 
-// Takes records from the front of bytes, which append_region() wrote. What they were read from has
-// a checksum; what is wrong nevertheless is reported.
+// Reads records that append_region() wrote from the front of `bytes`. The bytes have passed a
+// checksum; remaining defects throw.
 class RegionRecords {
  public:
   explicit RegionRecords(std::span<const std::byte> bytes) : in_(bytes) {}

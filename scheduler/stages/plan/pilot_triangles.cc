@@ -17,7 +17,7 @@ constexpr uint64_t kPilotPiece = 1 << 16;
 constexpr size_t kPilotBatch = 1024;
 constexpr size_t kPilotChunk = 1024;
 
-// The same triangles on a grid that is 2^shift times coarser; coordinates stay odd.
+// Streams triangles on a grid that is 2^shift times coarser. Coordinates remain odd.
 class CoarserStream : public TriangleStream {
  public:
   CoarserStream(std::unique_ptr<TriangleStream> fine, uint32_t shift)
@@ -92,7 +92,7 @@ PilotTriangles::PilotTriangles(const TriangleStore& scene, uint32_t shift, Memor
       return;
     }
     list_.add({.memory = thread.records,
-               .triangles = static_cast<uint32_t>(thread.records.size() / record_bytes_)});
+               .records = static_cast<uint32_t>(thread.records.size() / record_bytes_)});
     thread.records.clear();
   };
   context.build.progress.begin_stage("estimate", triangles, "triangles");

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/geometry/fixed_triangle.h"
-#include "scheduler/triangles/surface_store.h"
 #include "scheduler/triangles/triangle_file.h"
 #include "tests/support/temporary_folder.h"
 
@@ -84,11 +83,11 @@ TEST(SurfaceRecord, RefusesWhatIsNoRecord) {
 }
 
 // What was in memory comes from the file afterwards, and the memory is free.
-TEST(SurfaceStore, MovesToItsFile) {
+TEST(RecordStore, MovesToItsFile) {
   const TemporaryFolder folder;
   MemoryBudget budget(1 << 20);
-  SurfaceStore store(system_files(), folder.file("surfaces"), budget);
-  std::vector<SurfaceStore::Bin> bins(3);
+  RecordStore store(system_files(), folder.file("surfaces"), budget, "surfaces");
+  std::vector<ChunkList> bins(3);
   std::vector<FixedSurface> expected;
   for (int64_t i = 0; i < 9; ++i) {
     expected.push_back(numbered_surface(1, i, 60000));
@@ -103,7 +102,7 @@ TEST(SurfaceStore, MovesToItsFile) {
     EXPECT_EQ(budget.used(), 0u);
     std::vector<FixedSurface> found;
     for (const auto& bin : bins)
-      store.for_each(bin, [&](const FixedSurface& surface) { found.push_back(surface); });
+      for_each_surface(store, bin, [&](const FixedSurface& surface) { found.push_back(surface); });
     ASSERT_EQ(found.size(), 9u);
     for (size_t i = 0; i < 3; ++i) expect_equal(found[i], expected[3 * i]);
     expect_equal(found[8], expected[8]);

@@ -40,8 +40,8 @@ class CubeBaking : public testing::Test {
                                               folder_.file("images"), 1, budget, progress, cancel);
     const auto reader = textures->open(1 << 20);
     MemoryBudget share(surface_bytes, &budget);
-    SurfaceStore store(system_files(), folder_.file("surfaces"), share);
-    SurfaceStore::Bin bin;
+    RecordStore store(system_files(), folder_.file("surfaces"), share, "surfaces");
+    ChunkList bin;
     std::vector<std::byte> record;
     for (const FixedSurface& surface : surfaces_) {
       record.clear();
@@ -73,7 +73,7 @@ class CubeBaking : public testing::Test {
       ++baked.parts;
     });
     append();
-    EXPECT_EQ(bin.surfaces, 0u);
+    EXPECT_EQ(bin.records, 0u);
     EXPECT_LE(budget.peak(),
               region_bytes + 2 * ColorMemory::kValueBytes + (2 << 20) + 2 * surface_bytes);
     return baked;

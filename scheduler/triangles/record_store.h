@@ -1,0 +1,90 @@
+// Records of triangles or surfaces in chunks: in memory within a share of the memory budget, the
+// rest in a spill file. Not durable.
+//
+// Threads may use a store concurrently if they use different lists. A complete list may be read by
+// several threads.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scheduler/triangles/chunk.h"
+#include "scheduler/triangles/triangle_file.h"
+
+namespace voxdag {
+
+class RecordStore {
+ public:
+  // Charges chunks to `share` as `what`. Chunks that exceed it are written to a file at
+  // `spill_path`, which is created by the first of them.
+  RecordStore(FileSystem& files, std::string spill_path, MemoryBudget& share,
+              const std::string& what);
+  // Removes the file.
+  ~RecordStore();
+  RecordStore(const RecordStore&) = delete;
+
+  // Adds a chunk of `count` records to the list.
+  void add(ChunkList& list, std::span<const std::byte> records, uint32_t count);
+  // Returns the chunk's records, which are read to `buffer` if they are in the file. Throws
+  // DamagedTriangles.
+  std::span<const std::byte> read(const Chunk& chunk, std::vector<std::byte>& buffer) const;
+  // Writes the lists' records in memory to the file.
+  void move_to_file(std::span<ChunkList> lists);
+  // Frees the list's records and empties it.
+  void clear(ChunkList& list);
+
+  // The spill file; null before the first chunk is written to it.
+  const TriangleFile* file() const;
+  // Bytes that were written to the file.
+  uint64_t file_bytes() const;
+
+ private:
+  Extent append_to_file(std::span<const std::byte> records);
+  void free_memory(uint64_t bytes);
+
+  FileSystem& files_;
+  const std::string spill_path_;
+  mutable std::mutex mutex_;  // guards all below
+  MemoryCharge charge_;
+  uint64_t memory_bytes_ = 0;  // of records in memory and their chunks
+  std::unique_ptr<TriangleFile> spill_;
+};
+
+// Collects records for several targets into chunks. Used by one thread.
+class ChunkWriter {
+ public:
+  using AddChunk =
+      std::function<void(size_t target, std::span<const std::byte> records, uint32_t count)>;
+
+  // Passes a target's records to `add_chunk` as soon as they have `chunk_bytes` or more.
+  ChunkWriter(size_t targets, size_t chunk_bytes, AddChunk add_chunk);
+  void append(size_t target, std::span<const std::byte> records, uint32_t count);
+  // Bytes that complete the target's chunk.
+  size_t missing_bytes(size_t target) const {
+    return chunk_bytes_ - buffers_[target].records.size();
+  }
+  // Passes the incomplete chunks.
+  void flush();
+
+ private:
+  struct Buffer {
+    std::vector<std::byte> records;
+    uint32_t count = 0;
+  };
+
+  void pass_chunk(size_t target);
+
+  const size_t chunk_bytes_;
+  const AddChunk add_chunk_;
+  std::vector<Buffer> buffers_;
+};
+
+}  // namespace voxdag
