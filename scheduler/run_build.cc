@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "core/base/clock.h"
@@ -10,11 +11,14 @@
 #include "scheduler/check_spec.h"
 #include "scheduler/slurm/cluster_builder.h"
 #include "scheduler/slurm/merge_job.h"
+#include "scheduler/slurm/stop_tasks.h"
 #include "scheduler/stages/attributes/attribute_sections.h"
 #include "scheduler/stages/build/thread_builder.h"
 #include "scheduler/stages/ingest/ingest_stage.h"
+#include "scheduler/stages/merge/damaged_artifacts.h"
 #include "scheduler/stages/merge/merge_stage.h"
 #include "scheduler/stages/plan/estimate.h"
+#include "scheduler/stages/publish/publish_stage.h"
 #include "scheduler/state/full_disk_advice.h"
 #include "scheduler/state/job/build_job.h"
 
@@ -23,8 +27,7 @@ namespace {
 
 // Version of artifacts, job store and digests of scenes; a job of another version is refused.
 constexpr int64_t kWorkFormatVersion = 4;
-// How often the scene is read, and the merge is run, before triangles and artifacts may not be
-// damaged again.
+// Maximum number of reads of the scene and of merges; damaged triangles or artifacts repeat them.
 constexpr int kMaxReads = 3, kMaxMerges = 3;
 
 // Refuses a job with other geometry options before the scene is read.
@@ -39,8 +42,8 @@ void refuse_other_options(const BuildJob& job) {
     job.refuse("its geometry options are " + stored->geometry + ", requested are " + requested);
 }
 
-// Removes what does not belong to this job.
-void begin(BuildJob& job) {
+// Removes temporary files of other jobs.
+void prepare_work_folder(BuildJob& job) {
   if (job.start_over) {
     job.checkpoint.forget();
     job.work.remove_colors();
@@ -62,7 +65,8 @@ void report_scene(BuildJob& job, const IngestState& state) {
         "the scene has no triangles in the grid: the file will have no nodes");
 }
 
-// Plan: the subvolumes go to the job store. A stored job keeps its own, if the scene is the same.
+// Plan: records the subvolumes in the job store. Resume rule: a stored job keeps its subvolumes; a
+// scene with another digest is refused.
 void plan(BuildJob& job, const PreparedScene& scene) {
   if (const auto stored = job.start_over ? std::nullopt : job.store->job()) {
     if (stored->scene_digest != scene.digest())
@@ -82,8 +86,8 @@ void plan(BuildJob& job, const PreparedScene& scene) {
   job.start_over = false;
 }
 
-// Takes over what earlier runs have built, then removes what no row of the job store names.
-void take_over(BuildJob& job, SubvolumeBuilder& builder, const std::string& scene_digest) {
+// Accepts subvolumes built by earlier runs, then removes segments without a row in the job store.
+void resume_subvolumes(BuildJob& job, SubvolumeBuilder& builder, const std::string& scene_digest) {
   builder.resume(scene_digest);
   if (!job.spec.run.cluster) {
     accept_earlier_tasks(job, scene_digest);
@@ -113,7 +117,7 @@ void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
   report_scene(job, scene.state);
   plan(job, scene);
   job.scene.close();  // its memory is for the subvolumes
-  take_over(job, builder, scene.digest());
+  resume_subvolumes(job, builder, scene.digest());
   job.context.progress.set_grid(job.report.grid.origin, job.report.grid.edge);
   const std::vector<StoredSubvolume> leaves = job.store->leaves();
   report_subvolumes(leaves, job.report.grid.levels, job.context.progress);
@@ -125,7 +129,7 @@ void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
   report_artifacts(job);
 }
 
-// Before subvolumes are queued again: what is not recorded by now never will be.
+// Called before subvolumes are queued again. Artifacts that are not recorded by then are discarded.
 void close_segments(BuildJob& job) {
   job.scene.close();
   job.commit_best_effort();
@@ -133,8 +137,8 @@ void close_segments(BuildJob& job) {
   job.store->forget_built_in_memory();
 }
 
-// Builds what is missing. If stored triangles turn out damaged, the scene is read again; so it is
-// if the disk is full and memory can hold the triangles instead.
+// Builds the planned subvolumes. Reads the scene again if stored triangles are damaged, or if the
+// disk is full and memory can hold the triangles.
 void build_artifacts(BuildJob& job, SubvolumeBuilder& builder) {
   for (int read = 1;; ++read) {
     try {
@@ -153,18 +157,51 @@ void build_artifacts(BuildJob& job, SubvolumeBuilder& builder) {
   }
 }
 
-// Merge, attributes and publish: from the artifacts to the global file under its name. Subvolumes
-// whose artifacts turn out damaged are built again.
-void merge_artifacts(BuildJob& job, SubvolumeBuilder& builder) {
-  MergeStage merge(*job.store, job.commits, job.work, job.budget, job.clock, job.context);
+// Recovers from damage: plans subvolumes with damaged artifacts again. If no artifact is
+// damaged, a file of the merge is, and the merge restarts, once. Returns false if it has restarted
+// before.
+bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
+  if (replan_damaged(job) > 0) return true;
+  if (std::exchange(has_restarted, true)) return false;
+  job.store->forget_merge();
+  job.context.progress.warn("the merge restarts: " + damage.message());
+  return true;
+}
+
+// Merge, attributes and publish: from the artifacts to the output file. Returns false if something
+// is damaged; the planned subvolumes must be built before the next call.
+bool merge_and_publish(BuildJob& job, bool& has_restarted) {
   AttributeSections attributes(job);
-  const MergeStage::Sections sections{[&](GlobalFileWriter& out) { attributes.add_to(out); },
-                                      [&] { return attributes.digest(); }};
-  for (int run = 1; !merge.run(job.spec.run, sections, job.report); ++run) {
+  if (is_published(job, attributes)) return true;
+  bool reads_scene = false;  // errors in the scene are not damage of the work folder
+  try {
+    GlobalFileWriter out(job.context.files, job.report.output, job.report.grid,
+                         job.report.hash_bits);
+    merge_artifacts(job, out);
+    reads_scene = true;
+    attributes.add_to(out);
+    reads_scene = false;
+    publish(job, out, attributes);
+    return true;
+  } catch (const Error& error) {
+    // Also the scratch file of the colors is rebuilt.
+    const bool is_scratch = dynamic_cast<const DamagedTriangles*>(&error) != nullptr;
+    if ((reads_scene && !is_scratch) || !error.is_corruption() ||
+        !recover(job, error, has_restarted))
+      throw;
+    return false;
+  }
+}
+
+// Repeats merge_and_publish() until the output is written. Builds subvolumes with damaged artifacts
+// again.
+void write_output(BuildJob& job, SubvolumeBuilder& builder) {
+  bool has_restarted = false;
+  for (int run = 1; !merge_and_publish(job, has_restarted); ++run) {
     if (run == kMaxMerges)
       throw Error(ErrorCode::kCorrupt, job.work.path() +
                                            ": artifacts are damaged repeatedly: expected a disk "
-                                           "that returns what was written");
+                                           "that returns the written data");
     if (!job.planned().empty()) build_artifacts(job, builder);
   }
 }
@@ -192,10 +229,10 @@ void remove_finished_work(BuildJob& job) {
 
 // All stages of a build.
 void run_stages(BuildJob& job, SubvolumeBuilder& builder, double start_s) {
-  begin(job);
+  prepare_work_folder(job);
   build_artifacts(job, builder);
   if (job.spec.run.keep_work) job.commits.commit_in_background();
-  merge_artifacts(job, builder);
+  write_output(job, builder);
   if (job.spec.run.keep_work) job.commits.commit();
   write_report(job, start_s);
   remove_finished_work(job);
@@ -265,15 +302,14 @@ BuildReport run_here(BuildJob& job) {
   return job.report;
 }
 
-// Leaves the merge, and what tasks have yet to build, to a job of the cluster: returns its id, or
-// "" if there is such a job, or its result, by now.
-std::string hand_over(BuildJob& job, MergeJob& merge_job) {
+// Submits the tasks and the merge job. Returns the job's id, "" if the job or its result exists.
+std::string submit_merge_job(BuildJob& job, MergeJob& merge_job) {
   std::string id;
   resumable(job, [&] {
     if (!job.start_over && merge_job.finished()) return remove_finished_work(job);
     if (!job.start_over && merge_job.is_alive()) return;
     merge_job.forget_finished();
-    begin(job);
+    prepare_work_folder(job);
     ClusterBuilder builder(job);
     build_artifacts(job, builder);
     id = builder.submit_merge_job();
@@ -284,7 +320,7 @@ std::string hand_over(BuildJob& job, MergeJob& merge_job) {
 // A build that is restarted stops the job that merges: it may hold the locks.
 void stop_earlier_merge_job(const BuildSpec& spec, const BuildContext& context) {
   try {
-    ClusterBuild::stop_merge_job(context.files, work_folder_of(spec.run), commands_of(spec));
+    stop_merge_job(context.files, work_folder_of(spec.run), commands_of(spec));
   } catch (const Error& error) {
     context.progress.warn(error.message() + "; tasks of it may still run");
   }
@@ -298,7 +334,7 @@ BuildReport run_build(const BuildSpec& requested, const BuildContext& context) {
   MemoryBudget budget(spec.run.memory_bytes);
   BuildScene scene(spec.geometry, work, budget, context);
   check_places(spec, scene, context);
-  if (spec.run.cluster) ClusterBuild::check(spec, commands_of(spec), context);
+  if (spec.run.cluster) check_cluster(spec, context);
   if (spec.run.restart) stop_earlier_merge_job(spec, context);
   if (!spec.run.cluster || !spec.run.cluster->merge_job) {
     BuildJob job(spec, scene, budget, context);
@@ -306,10 +342,10 @@ BuildReport run_build(const BuildSpec& requested, const BuildContext& context) {
   }
   MergeJob merge_job(spec, scene.open(), work, context, commands_of(spec));
   std::string id;
-  const bool is_over = merge_job.finished() && !merge_job.has_left_work();
+  const bool is_over = merge_job.finished() && !merge_job.has_remaining_work();
   if (spec.run.restart || !(is_over || merge_job.is_alive())) {
     BuildJob job(spec, scene, budget, context);
-    id = hand_over(job, merge_job);
+    id = submit_merge_job(job, merge_job);
   }
   scene.close();
   return merge_job.follow(id);

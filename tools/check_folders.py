@@ -73,6 +73,7 @@ LAYERS = {
         "scheduler/slurm",
         "scheduler/slurm/files",
         "scheduler/slurm/commands",
+        "scheduler/stages/publish",
         "scheduler/stages/attributes",
         "scheduler/stages/merge",
         "scheduler/stages/build",

@@ -22,8 +22,8 @@ bool lighter(const QueuedSubvolume& a, const QueuedSubvolume& b) {
   return a.subvolume.weight < b.subvolume.weight;
 }
 
-// The subvolumes that are left, heaviest first, for all workers. It ends when none is left and none
-// is being built, since one that is built may be split.
+// The remaining subvolumes of all workers, heaviest first. It ends when it is empty and no worker
+// builds a subvolume, which could still be split.
 class Queue {
  public:
   explicit Queue(std::vector<QueuedSubvolume> heap) : heap_(std::move(heap)) {
@@ -40,7 +40,7 @@ class Queue {
     ++in_flight_;
     return next;
   }
-  // `parts` replace a subvolume that was popped; there are none if it was built.
+  // Replaces a popped subvolume by `parts`; a built subvolume has none.
   void done(const std::vector<QueuedSubvolume>& parts) {
     std::lock_guard lock(mutex_);
     --in_flight_;
@@ -216,7 +216,7 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options,
     if (!queue.has_failed()) queue.guard([&] { commits->finish(); });
     unfinished.add(std::move(commits));
   }
-  // A failure does not lose what is finished.
+  // A failure does not lose finished subvolumes.
   if (queue.has_failed()) queue.guard([&] { unfinished.commit(); });
   queue.rethrow_failure();
   return counts;

@@ -28,7 +28,7 @@ struct ExecutorOptions {
   DagShape shape;
   unsigned threads = 1;
   uint64_t built = 0;  // subvolumes that need not be built, for the progress
-  // Subvolumes with longer edges are split before they are tried.
+  // Subvolumes with longer edges are split without an attempt to build them.
   int64_t longest_edge = INT64_MAX;
   std::function<std::unique_ptr<Backend>()> open_backend;
   std::string segment_folder;
@@ -42,9 +42,9 @@ struct ExecutorCounts {
   uint64_t cached = 0;  // copied from the cache instead of built
 };
 
-// Builds all of `subvolumes` and uses up their bins. The results are recorded in `jobs`, those of
-// the last groups once `unfinished`, to which the workers' queues are added, is committed. Throws
-// the first Error of any worker after all have stopped and what was finished is recorded.
+// Builds `subvolumes` and releases their bins. Records the results in `jobs`; the last groups are
+// recorded when the caller commits `unfinished`, which receives the workers' queues. Throws the
+// first Error of any worker after all workers have stopped and finished subvolumes are recorded.
 ExecutorCounts build_subvolumes(const ExecutorOptions& options,
                                 std::vector<QueuedSubvolume> subvolumes, TriangleStore& triangles,
                                 JobStore& jobs, CommitQueues& unfinished, MemoryBudget& budget,

@@ -1,5 +1,5 @@
-// Where the subvolumes of a build are built: by threads of this process (ThreadBuilder) or by tasks
-// of a cluster (ClusterBuilder). The stages before and after do not ask which.
+// The strategy that decides where subvolumes are built: on threads of this process (ThreadBuilder)
+// or in tasks of a cluster (ClusterBuilder). Other stages do not depend on it.
 #pragma once
 
 #include <span>
@@ -15,13 +15,13 @@ class SubvolumeBuilder {
  public:
   virtual ~SubvolumeBuilder() = default;
 
-  // Records in the job store what an earlier run had built elsewhere, for the scene of that digest.
-  // Called once the plan is in the job store, before build().
+  // Records subvolumes that an earlier run built outside this process, for the scene with that
+  // digest. Called after the plan is in the job store and before build().
   virtual void resume(const std::string& scene_digest) = 0;
   // The partition and build stages: fills bins from the scene's triangles and builds `planned`.
   // Frees the triangles.
   virtual void build(PreparedScene& scene, std::span<const StoredSubvolume> planned) = 0;
-  // Adds what only the builder knows, also if there was nothing to build.
+  // Adds the builder's totals. Called even if there was nothing to build.
   virtual void add_to(BuildReport& report) const = 0;
 };
 

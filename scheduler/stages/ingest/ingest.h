@@ -1,10 +1,9 @@
-// The two passes over a scene: the scan finds its bounds; ingest snaps its triangles to the grid,
-// counts them into the top tree and stores them in the scene's bin. Both continue from the state
-// that they are given, which may be that of an earlier run.
-//
-// Several threads read pieces of the scene, of 16384 declared triangles each, and hand on what they
-// made of them in the order of the pieces: the state, and so the plan, does not depend on the
-// number of threads.
+// The two passes over a scene. The scan finds its bounds. Ingest snaps its triangles to the grid,
+// counts them into the top tree and stores them in the scene's bin. Resume rule: both continue from
+// the given state, which an earlier run may have saved.
+//  Several threads read pieces of the scene, of 16384 declared triangles each. Their results are
+// processed in the order of the pieces, so the state and the plan do not depend on the number of
+// threads.
 #pragma once
 
 #include <functional>

@@ -13,14 +13,14 @@
 namespace voxdag {
 namespace {
 
-// Expected bricks of a subvolume: a fraction of a second of work, and tables that stay in the
+// Expected bricks of a subvolume: a fraction of a second of work, with tables that fit the
 // processor's caches.
 constexpr double kMaxBricksPerSubvolume = 4e6;
 // A small build has about this many subvolumes at least, of at least this many expected bricks.
 constexpr double kMinSubvolumes = 64;
 constexpr double kMinBricksPerSubvolume = 131072;
-// How long a build waits until the times of the scene's files can be trusted.
-constexpr int64_t kMaxWait_ns = 200'000'000;
+// Maximum wait until the times of the scene's files can be trusted.
+constexpr int64_t kMaxWaitNs = 200'000'000;
 // More bins than this would make their buffers too small; large subvolumes are split later.
 constexpr size_t kMaxBins = 8192;
 
@@ -75,7 +75,7 @@ class Preparation {
     checkpoint_.forget();
     if (!checkpoint_.is_worthwhile(scene_.open())) return;
     const int64_t wait_ns = trusted_from_ns(scene_.open().files()) - scene_.opened_ns();
-    if (wait_ns > 0 && wait_ns <= kMaxWait_ns) {
+    if (wait_ns > 0 && wait_ns <= kMaxWaitNs) {
       std::this_thread::sleep_for(std::chrono::nanoseconds(wait_ns));
       scene_.close();
     }

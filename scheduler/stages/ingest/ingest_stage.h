@@ -24,7 +24,7 @@ struct PreparedScene {
   std::vector<SubvolumePlan> plan;  // empty if an earlier run partitioned the triangles
   double max_durable_bytes = 0;     // of disk that the triangles take in a build
 
-  // Of the grid and the snapped triangles: names the content.
+  // Digest of the grid and the snapped triangles; identifies the content.
   std::string digest() const { return state.digest.hex(); }
 };
 

@@ -1,4 +1,4 @@
-// Reads a scene by pieces, several at a time, and hands on what was made of them in their order.
+// Reads pieces of a scene on several threads and processes the results in the order of the pieces.
 #pragma once
 
 #include <algorithm>

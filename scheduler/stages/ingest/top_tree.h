@@ -1,6 +1,6 @@
 // The dense top tree: for every cell of a coarse level, how many triangles touch it and how much
-// work they are expected to be. It decides which cubes of the grid become subvolumes. Several
-// threads can each fill a tally, which are then added to the tree one at a time.
+// work they are expected to be. It decides which cubes of the grid become subvolumes. Threads fill
+// separate tallies, which are added to the tree serially.
 #pragma once
 
 #include <array>

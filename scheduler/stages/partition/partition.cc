@@ -47,7 +47,7 @@ class TouchedPiece {
     batch_size_ = next_ = 0;
     fill();
   }
-  // The leaves of the next triangles, as many as there is room for; false if there are none left.
+  // Finds the leaves of the next triangles that fit the buffer. False at the end.
   bool fill() {
     runs_.clear();
     used_ = 0;
@@ -76,7 +76,7 @@ class TouchedPiece {
     size_t leaf, records;
   };
 
-  // Makes batch_[next_] the next triangle; false if there is none.
+  // Makes batch_[next_] the next triangle. False at the end.
   bool read() {
     if (next_ < batch_size_) return true;
     const size_t n = std::min(left_, batch_.size());

@@ -16,7 +16,7 @@ namespace voxdag {
 // The tree above a set of disjoint cubes, to find which of them a triangle touches.
 class CubeTree {
  public:
-  // All of `leaves` lie in `root`.
+  // `root` contains all `leaves`.
   CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube> leaves);
   // A leaf that a triangle was inside of.
   struct Hint {
@@ -78,16 +78,16 @@ void partition(TriangleStore& store, BinId from, const CubeTree& tree,
 // are in the bins after writer.flush().
 using AfterPartitionPiece = std::function<void(uint64_t copied, BinWriter& writer)>;
 
-// Copies the scene's triangles, from number `first` on, into the store's cube bins, created for
-// `cubes` if there are none yet; several threads find the cubes that pieces of them touch, and the
-// pieces are copied in their order. The scene's bin is dropped.
+// Copies the scene's triangles, from number `first` on, to the store's cube bins. Creates the bins
+// for `cubes` unless an earlier run has created them. Several threads find the cubes that pieces of
+// the scene touch; the pieces are copied in their order. Drops the scene's bin.
 void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const Cube> cubes,
                      size_t buffer_bytes, uint64_t first, const StageContext& context,
                      const AfterPartitionPiece& after_piece);
 
-// For each of `cubes` a bin with its triangles, in the same order: that of the cube, or else a part
-// filled from the bin of the nearest cube around it. Each has one reference; cube bins that none of
-// them needs are released. Throws DamagedTriangles for a cube without any cube bin around it.
+// Returns for each of `cubes`, in the same order, a bin with its triangles: the cube's bin, or a
+// part filled from the bin of the smallest enclosing cube. Each returned bin has one reference.
+// Releases the other cube bins. Throws DamagedTriangles for a cube without an enclosing cube bin.
 std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
                                std::span<const Cube> cubes, size_t buffer_bytes,
                                const StageContext& context);

@@ -24,8 +24,8 @@ constexpr double kSpreadPerDoubling = 1.12;
 // Bytes per node of the global file: a pilot has fewer, since coarse levels repeat more.
 constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;
-// Measured on real scenes: nodes of all artifacts over unique ones, their compressed bytes, and CPU
-// time of a whole build over that of a pilot's nodes.
+// Measured on real scenes: artifact nodes per unique node, compressed bytes per node, and the CPU
+// time of a build relative to its pilot.
 constexpr double kArtifactNodesPerUnique = 1.5;
 constexpr double kArtifactBytesPerNode = 16;
 // More than an uncompressed node takes, in an artifact or in the global file.
@@ -39,7 +39,7 @@ constexpr double kBaseMemoryBytes = 24e6;
 
 // Below this resolution a build fits any disk that can hold its scene: no estimate is made.
 constexpr uint32_t kMinLevelsToEstimate = 12;
-// The pilot of this estimate is so much coarser than the build that it costs next to nothing.
+// This estimate's pilot is much coarser than the build, so its cost is negligible.
 constexpr uint32_t kPilotLevelsBelow = 5;
 
 // A pilot build: the whole scene as one subvolume on a coarser grid, counted and thrown away.
@@ -83,8 +83,8 @@ std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t
   return counts;
 }
 
-// Pilots at two resolutions, a doubling apart, the coarser first: the finest of which triangles and
-// tables fit the budget. Fewer if those of a few resolutions do not fit.
+// Runs pilots at two consecutive resolutions, the coarser first: the finest whose triangles and
+// tables fit the budget. Returns fewer pilots if several resolutions do not fit.
 std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
                                       const StageContext& context) {
   const auto backend = make_cpu_backend();
@@ -150,8 +150,8 @@ void add_colors(const ColorEstimate& colors, Estimate& estimate) {
   estimate.cpu_s = estimate.cpu_s + colors.cpu_s;
 }
 
-// An upper bound for the disk that a build of the scene needs, computed without pilots: several
-// times what it will need.
+// Returns an upper bound of the disk space of a build, without pilots. It is several times the
+// actual size.
 double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
                       BuildScene& source, const StageContext& context) {
   // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
@@ -187,8 +187,8 @@ void check_disk(const char* what, const EstimateRange& bytes, const std::string&
   if (bytes.high > free_bytes) progress.warn(need);
 }
 
-// Throws Error{kNoSpace} with the estimate if not even its low end fits on the disk of the work
-// folder, or the file's on that of the output's folder; warns if the high end may not fit.
+// Throws Error{kNoSpace} with the estimate if even its low end does not fit on the disk of the work
+// folder, or the output file on the output folder's disk. Warns if the high end may not fit.
 void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
                     const std::string& output_folder, Progress& progress) {
   const uint64_t work_free = files.free_space(work_folder);

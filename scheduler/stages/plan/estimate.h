@@ -26,16 +26,16 @@ struct Estimate {
   uint64_t pilot_resolution = 0;
   EstimateRange voxels, svo_nodes, dag_nodes;
   EstimateRange file_bytes;    // of the global file
-  EstimateRange disk_bytes;    // at the peak: what is spilled, artifacts and the file
+  EstimateRange disk_bytes;    // peak: spilled triangles, artifacts and the file
   EstimateRange memory_bytes;  // peak resident memory within the budget
   EstimateRange cpu_s;
   EstimateRange wall_s;
-  std::optional<ColorEstimate> colors;  // of a build with colors: a part of what is above
+  std::optional<ColorEstimate> colors;  // of a build with colors; included above
   uint64_t free_disk = 0;               // on the disk of the work folder; 0 if unknown
   uint64_t free_memory = 0;             // the budget
 };
 
-// Estimates the build of a prepared scene (its triangles stay where they are). The pilots have at
+// Estimates the build of a prepared scene without changing it. The pilots have at
 // most 2^pilot_levels voxels per edge: the finer, the better the estimate and the longer it takes.
 // The pilots run on this thread, within the budget.
 Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,

@@ -1,6 +1,6 @@
-// The triangles of a scene as the coarser grid of a pilot sees them: equal ones that lie near each
-// other in the scene's order once. Of a scene whose triangles are much smaller than the pilot's
-// voxels few are left, and what is left has the same voxels.
+// The triangles of a scene on the coarser grid of a pilot. Triangles that become equal and are
+// close in the scene's order are kept once. If the scene's triangles are much smaller than the
+// pilot's voxels, few remain, and they have the same voxels.
 #pragma once
 
 #include <cstdint>

@@ -1,0 +1,19 @@
+// The publish stage: from a complete partial file to the output file under its name.
+//
+// Resume rule: the job store records the file's SHA-256 before the rename. A later run verifies the
+// output by this digest and does not write it again.
+#pragma once
+
+#include "core/format/global/global_writer.h"
+#include "scheduler/stages/attributes/attribute_sections.h"
+#include "scheduler/state/job/build_job.h"
+
+namespace voxdag {
+
+// True if an earlier run was stopped after it had published the file. Fills in the report.
+bool is_published(BuildJob& job, AttributeSections& attributes);
+
+// Writes checksums, syncs and renames the file, and fills in the report.
+void publish(BuildJob& job, GlobalFileWriter& out, AttributeSections& attributes);
+
+}  // namespace voxdag
