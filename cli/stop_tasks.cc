@@ -1,8 +1,10 @@
+#include "scheduler/slurm/stop_tasks.h"
+
 #include <cstdio>
 
 #include "cli/command.h"
 #include "core/base/error.h"
-#include "scheduler/slurm/cluster_build.h"
+#include "scheduler/slurm/files/cluster_state.h"
 
 namespace voxdag::cli {
 namespace {
@@ -16,8 +18,9 @@ void run(const StopTasksCommand& command, CommandContext& context) {
   if (!state)
     throw Error(ErrorCode::kNotFound,
                 command.work_folder + ": expected the work folder of a build on a cluster");
-  ClusterBuild::stop_tasks(context.files, command.work_folder, system_commands());
-  std::printf("stopped the tasks %s; finished subvolumes are kept\n", state->task_name().c_str());
+  stop_cluster_tasks(context.files, command.work_folder, system_commands());
+  std::printf("stopped the tasks %s; finished subvolumes are kept
+", state->task_name().c_str());
 }
 
 void declare(Command& command, StopTasksCommand& state) {

@@ -1,12 +1,18 @@
-// Builds subvolumes by the tasks of a cluster, and what a build without a cluster does about tasks
-// that an earlier run of the same job has started.
+// Builds subvolumes in tasks of a cluster. The submitting process cuts the planned subvolumes into
+// batches (BatchTable), submits a task for each (TaskPoller) and records the tasks' results in the
+// job store (RecordCollector). The merge then runs as in any build.
+//
+// Also here: how a build without a cluster treats tasks that an earlier run of its job started.
 #pragma once
 
 #include <memory>
 #include <span>
 #include <string>
 
-#include "scheduler/slurm/cluster_build.h"
+#include "scheduler/slurm/batch_table.h"
+#include "scheduler/slurm/cluster_context.h"
+#include "scheduler/slurm/record_collector.h"
+#include "scheduler/slurm/task_poller.h"
 #include "scheduler/stages/build/subvolume_builder.h"
 #include "scheduler/state/job/build_job.h"
 
@@ -14,30 +20,40 @@ namespace voxdag {
 
 class ClusterBuilder : public SubvolumeBuilder {
  public:
-  explicit ClusterBuilder(BuildJob& job) : job_(job) {}
+  explicit ClusterBuilder(BuildJob& job) : job_(job), cluster_(job) {}
 
+  // Resume rule: open batches of an earlier run remain open, and records that its tasks have
+  // written since then are accepted.
   void resume(const std::string& scene_digest) override;
-  // Cuts the triangles of `planned` into batches. Unless a job of the cluster merges, follows their
-  // tasks until all are built.
+  // Cuts the triangles of `planned` into batches. Then waits until all batches are built, unless a
+  // merge job does. Throws Error with the last reason if a batch has failed too often; other tasks
+  // continue to run.
   void build(PreparedScene& scene, std::span<const StoredSubvolume> planned) override;
   void add_to(BuildReport& report) const override;
-  // ClusterBuild::submit_merge_job().
-  std::string submit_merge_job() { return cluster_->submit_merge_job(); }
+  // Submits all batches that Slurm accepts now, and a job that merges when their tasks have ended.
+  // Returns the job's id. The job resubmits failed batches.
+  std::string submit_merge_job();
 
  private:
+  void add_batches(PreparedScene& scene, std::span<const StoredSubvolume> planned);
+  void wait_for_batches();
+
   BuildJob& job_;
-  std::unique_ptr<ClusterBuild> cluster_;
+  ClusterContext cluster_;
+  BatchTable batches_{cluster_};
+  RecordCollector records_{cluster_, batches_};
+  TaskPoller tasks_{cluster_, batches_};
 };
 
-// Records what tasks of an earlier run have built for the scene of that digest.
+// Throws Error{kInvalidInput} if Slurm is not installed, or if it would refuse the tasks of a build
+// with cluster options.
+void check_cluster(const BuildSpec& spec, const BuildContext& context);
+// Records the results of an earlier run's tasks for the scene with that digest.
 void accept_earlier_tasks(BuildJob& job, const std::string& scene_digest);
-// Stops tasks that may still run for the work folder, and removes their files. A task that cannot
-// be stopped is a warning: without its batch it fails.
+// Stops running tasks of the work folder and removes their files. A task that cannot be stopped is
+// only a warning: it fails without its batch.
 void remove_tasks(BuildJob& job);
-
-// Runs Slurm's commands for a build.
-CommandRunner& commands_of(const BuildSpec& spec);
-// True if this process is the job of the cluster that merges.
+// True if this process is the merge job.
 bool is_merge_job(const BuildSpec& spec);
 
 }  // namespace voxdag

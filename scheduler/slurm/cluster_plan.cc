@@ -8,13 +8,13 @@
 namespace voxdag {
 namespace {
 
-// Of the CPU time of a whole build, measured (docs/performance.md): the rest is the tasks'.
+// The merge's share of a build's CPU time, as measured (docs/performance.md).
 constexpr double kMergeShare = 0.2;
-// A task reads its batch and merges what it built: both are repeated by the final merge.
+// A task also reads its batch and merges its artifacts. The final merge repeats both.
 constexpr double kTaskOverhead = 1.15;
-// Of a triangle's records: those near borders lie in several subvolumes.
+// Records per triangle: triangles near borders are in several subvolumes.
 constexpr double kTaskCopies = 1.2;
-// Enough for the largest subvolumes that a plan makes, on two threads.
+// Enough for the largest planned subvolumes on two threads.
 constexpr uint64_t kTaskMemory = uint64_t{2} << 30;
 
 EstimateRange scaled(double factor, const EstimateRange& range) {

@@ -1,4 +1,4 @@
-// What a cluster build would take, for `voxdag plan --cluster`.
+// The estimated cost of a cluster build, for `voxdag plan --cluster`.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct ClusterPlan {
   EstimateRange merge_s;       // CPU time of the merge, on the machine that submits
 };
 
-// `tasks`: as many as asked for, 0 for the build's own choice.
+// `tasks` is the number of tasks; 0 lets the build choose.
 ClusterPlan plan_cluster(const Estimate& estimate, uint64_t tasks);
 
 // The estimate and the plan as one JSON object.

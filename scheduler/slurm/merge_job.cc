@@ -16,16 +16,16 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMaxReportBytes = uint64_t{1} << 24;
-// Between two looks at the files.
-constexpr double kFilesPause_s = 0.5;
-// How long an NFS client may believe that a file is not there which it has looked for before
-// (acdirmax, nfs(5)), and some more.
-constexpr double kShown_s = 75;
-// Of the end of a log, for a message.
+// Pause between two looks at the files.
+constexpr double kFilesPauseS = 0.5;
+// Time after which an NFS client sees a new file that it has looked for before (acdirmax, nfs(5)),
+// with a margin.
+constexpr double kMaxDelayS = 75;
+// Bytes from the end of a log that are quoted in a message.
 constexpr uint64_t kMaxTailBytes = 600;
 
-// The last lines of a file; "" if it cannot be read.
-std::string tail(FileSystem& files, const std::string& path) {
+// Returns the last lines of a file; "" if it cannot be read.
+std::string last_lines(FileSystem& files, const std::string& path) {
   try {
     const auto file = files.open_read(path);
     const uint64_t bytes = std::min(file->size(), kMaxTailBytes);
@@ -39,7 +39,7 @@ std::string tail(FileSystem& files, const std::string& path) {
   }
 }
 
-// The code whose exit status Slurm has seen, in STATUS:SIGNAL.
+// Returns the error code of Slurm's exit status, STATUS:SIGNAL.
 ErrorCode code_of(const SlurmEnd& end) {
   if (end.state != "FAILED") return ErrorCode::kIo;
   for (int code = 0; code <= static_cast<int>(ErrorCode::kLimit); ++code)
@@ -48,7 +48,7 @@ ErrorCode code_of(const SlurmEnd& end) {
   return ErrorCode::kIo;
 }
 
-std::string merge_request_of(const BuildSpec& spec, const TriangleSource& scene) {
+std::string request_digest(const BuildSpec& spec, const TriangleSource& scene) {
   std::string text = geometry_json(spec.geometry);
   std::vector<SourceFile> files = scene.files();
   if (spec.geometry.attributes.any())
@@ -69,7 +69,7 @@ MergeJob::MergeJob(const BuildSpec& spec, const TriangleSource& scene,
       context_(context),
       folder_(work_folder),
       slurm_(commands, context.cancel),
-      request_(merge_request_of(spec, scene)) {}
+      request_(request_digest(spec, scene)) {}
 
 std::optional<BuildReport> MergeJob::finished() const {
   const std::string path = report_path(spec_.run.output);
@@ -81,7 +81,7 @@ std::optional<BuildReport> MergeJob::finished() const {
         context_.files.open_read(spec_.run.output)->size() == report.bytes)
       return report;
   } catch (const Error&) {
-    // Whatever it is, it is no report of such a job.
+    // The file is not a report of such a job.
   }
   return std::nullopt;
 }
@@ -90,7 +90,7 @@ void MergeJob::forget_finished() {
   if (finished()) context_.files.remove(report_path(spec_.run.output));
 }
 
-std::optional<std::vector<SlurmJob>> MergeJob::ask() {
+std::optional<std::vector<SlurmJob>> MergeJob::query_jobs() {
   const auto jobs = slurm_.jobs(name_);
   if (!jobs && is_answering_)
     context_.progress.warn("Slurm does not answer (squeue): waiting for it");
@@ -101,50 +101,51 @@ std::optional<std::vector<SlurmJob>> MergeJob::ask() {
 bool MergeJob::is_alive() {
   const auto state = read_cluster_state(context_.files, folder_.work_folder());
   if (!state) return false;
-  take_names(*state);
+  set_names(*state);
   for (;;) {
-    if (const auto jobs = ask()) return !jobs->empty();
+    if (const auto jobs = query_jobs()) return !jobs->empty();
     std::this_thread::sleep_for(std::chrono::duration<double>(options_.slurm_interval_s));
     context_.cancel.check();
   }
 }
 
-bool MergeJob::has_left_work() const {
+bool MergeJob::has_remaining_work() const {
   return !spec_.run.keep_work &&
          context_.files.exists(WorkFolder::store_path(folder_.work_folder()));
 }
 
-void MergeJob::take_names(const ClusterState& state) {
+void MergeJob::set_names(const ClusterState& state) {
   name_ = state.merge_job_name();
   task_name_ = state.task_name();
 }
 
 BuildReport MergeJob::follow(const std::string& submitted) {
   std::string id = submitted;
-  double asked_s = -options_.slurm_interval_s, gone_since_s = 0;
+  double queried_s = -options_.slurm_interval_s, gone_since_s = 0;
   context_.progress.begin_stage("build", 0, "batches");
   std::optional<BuildReport> report;
   for (;;) {
     report = finished();
-    if (report && !has_left_work()) break;
+    if (report && !has_remaining_work()) break;
     show_progress();
     const double now_s = wall_seconds();
-    if (now_s - asked_s >= options_.slurm_interval_s) {
-      asked_s = now_s;
-      const auto jobs = ask();
+    if (now_s - queried_s >= options_.slurm_interval_s) {
+      queried_s = now_s;
+      const auto jobs = query_jobs();
       if (jobs && !jobs->empty()) {
         id = jobs->front().id;
-        take_state(jobs->front());
-        cancel_given_up(jobs->front());
+        report_state(jobs->front());
+        cancel_held(jobs->front());
         gone_since_s = 0;
       } else if (jobs) {
-        // The shared disk may show what the job wrote later than Slurm its end.
+        // On a shared file system the job's files can become visible after Slurm reports that it
+        // ended.
         if (gone_since_s == 0) gone_since_s = now_s;
         const double gone_s = now_s - gone_since_s;
         if (gone_s >= options_.grace_s) {
           if (report) break;
           const auto end = id.empty() ? std::nullopt : slurm_.end_of(id);
-          if (!end || end->state != "COMPLETED" || gone_s >= options_.grace_s + kShown_s)
+          if (!end || end->state != "COMPLETED" || gone_s >= options_.grace_s + kMaxDelayS)
             fail(id, end);
         }
       }
@@ -155,47 +156,47 @@ BuildReport MergeJob::follow(const std::string& submitted) {
                       " and its tasks run on: run the same command again to follow them, or stop "
                       "them with voxdag stop-tasks");
     std::this_thread::sleep_for(
-        std::chrono::duration<double>(std::min(kFilesPause_s, options_.slurm_interval_s)));
+        std::chrono::duration<double>(std::min(kFilesPauseS, options_.slurm_interval_s)));
   }
   context_.progress.end_stage();
   return *report;
 }
 
-// Slurm holds what it could not start. A batch is submitted again by the job that merges, which
-// waits until the batch's task has ended; that job itself by the next command.
-void MergeJob::cancel_given_up(const SlurmJob& job) {
+// Cancels tasks that Slurm could not start and holds. The merge job starts when these tasks have
+// ended and resubmits their batches. A canceled merge job is resubmitted by the next command.
+void MergeJob::cancel_held(const SlurmJob& job) {
   std::vector<std::string> given_up;
-  if (job.is_given_up()) given_up.push_back(job.id);
+  if (job.is_held()) given_up.push_back(job.id);
   if (job.state == "PENDING") {
     const auto tasks = slurm_.active(task_name_);
     for (const SlurmTask& task : tasks.value_or(std::vector<SlurmTask>{}))
-      if (task.is_given_up()) given_up.push_back(task.name());
+      if (task.is_held()) given_up.push_back(task.name());
   }
   if (!given_up.empty() && slurm_.cancel_tasks(given_up))
     context_.progress.warn("Slurm could not start and holds " + std::to_string(given_up.size()) +
                            " tasks, " + given_up[0] + " for one: canceled");
 }
 
-// Says once that the job runs, or why it does not.
-void MergeJob::take_state(const SlurmJob& job) {
+// Reports once that the job runs, or why it does not.
+void MergeJob::report_state(const SlurmJob& job) {
   if (job.state == "PENDING" && !waits_for_its_turn(job.reason) &&
-      noted_reasons_.insert(job.reason).second)
+      warned_reasons_.insert(job.reason).second)
     context_.progress.warn("job " + job.id + ", which merges, waits: " + job.reason);
   if (job.state == "RUNNING" && !is_running_)
     context_.progress.warn("job " + job.id + " merges: see its log in " + folder_.path());
   is_running_ = job.state == "RUNNING";
 }
 
-// Batches that are built, by the records of tasks and, once it runs, by what the job has accepted.
+// Shows the number of built batches: completion records, plus batches the merge job has accepted.
 void MergeJob::show_progress() {
   std::optional<ClusterState> state;
   try {
     state = read_cluster_state(context_.files, folder_.work_folder());
   } catch (const Error&) {
-    // The job itself says so, if it lasts.
+    // The merge job reports a permanent error.
   }
   if (!state) return;
-  take_names(*state);
+  set_names(*state);
   std::set<uint32_t> recorded;
   for (const ClusterFolder::Entry& entry : folder_.list(context_.files))
     if (entry.kind == ClusterFolder::Kind::kRecord) recorded.insert(entry.batch);
@@ -209,11 +210,11 @@ void MergeJob::show_progress() {
 
 void MergeJob::fail(const std::string& id, const std::optional<SlurmEnd>& end) const {
   const std::string log = folder_.path() + "/log-" + id + ".txt";
-  const std::string said = tail(context_.files, log);
+  const std::string log_end = last_lines(context_.files, log);
   throw Error(end ? code_of(*end) : ErrorCode::kIo,
               "the job " + id + " that merges has ended without a result: " +
                   (end ? end->text() : "Slurm does not say how") +
-                  (said.empty() ? "" : "; its log " + log + " ends with:\n" + said) +
+                  (log_end.empty() ? "" : "; its log " + log + " ends with:\n" + log_end) +
                   "\nthe same command submits it again");
 }
 

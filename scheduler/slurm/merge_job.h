@@ -1,11 +1,10 @@
-// A cluster build whose merge is a job of the cluster as well (`--cluster-merge`): the submitting
-// process submits the tasks, and a job that depends on them, unlocks the work folder and follows.
-// The job is the same command: it takes the work folder over as any later run would, submits again
-// what failed, waits for that and merges. So whoever follows may go away and come back, and if the
-// job itself is lost the same command submits it again.
-//
-// What is known of the job is its name, which follows from the state of the build, and, once it is
-// done, the report next to the output, which says what it was asked for.
+// A cluster build whose merge is also a job of the cluster (`--cluster-merge`). The submitting
+// process submits the tasks and a job that depends on them, unlocks the work folder and follows the
+// job. The job is the same command: it resumes the work folder as any later run does, resubmits
+// failed batches, waits for them and merges. The following process may end and come back. If the
+// job is lost, the same command submits it again.
+//  The job is known by its name, which depends only on the state of the build. When it has ended,
+// it is known by the report next to the output, which contains the job's request.
 #pragma once
 
 #include <optional>
@@ -27,28 +26,27 @@ class MergeJob {
   MergeJob(const BuildSpec& spec, const TriangleSource& scene, const std::string& work_folder,
            const BuildContext& context, CommandRunner& commands);
 
-  // The geometry options and the scene's files, those of its images too if there are to be colors,
-  // with their sizes and times, as a digest; of the time when this was made.
+  // Digest of the geometry options and of the scene's files with their sizes and times, taken by
+  // the constructor. Image files are included if the build has attributes.
   const std::string& request() const { return request_; }
-  // The report of a merge job that did the same, if its output is there.
+  // Returns the report of a finished merge job with the same request whose output exists.
   std::optional<BuildReport> finished() const;
-  // Whether a job that was stopped while it cleaned up, or is cleaning up, has left its work
-  // folder.
-  bool has_left_work() const;
-  // Forgets what an earlier one has done.
+  // True if the work folder remains: the job is still removing it, or was stopped before.
+  bool has_remaining_work() const;
+  // Removes the report of an earlier merge job.
   void forget_finished();
-  // Whether such a job of the work folder's build waits or runs. Asks until Slurm answers.
+  // True if the work folder's merge job waits or runs. Repeats the query until Slurm answers.
   bool is_alive();
-  // Shows how far the job `id`, "" if unknown, is, until it is done, and returns its report. Throws
-  // Error with the job's own code if it fails, Error{kCanceled} if `context` is canceled: the job
-  // runs on.
+  // Shows the progress of job `id` ("" if unknown) until it has ended, and returns its report.
+  // Throws Error with the job's error code if it fails. Throws Error{kCanceled} if `context` is
+  // canceled; the job continues to run.
   BuildReport follow(const std::string& id);
 
  private:
-  std::optional<std::vector<SlurmJob>> ask();
-  void take_names(const ClusterState& state);
-  void take_state(const SlurmJob& job);
-  void cancel_given_up(const SlurmJob& job);
+  std::optional<std::vector<SlurmJob>> query_jobs();
+  void set_names(const ClusterState& state);
+  void report_state(const SlurmJob& job);
+  void cancel_held(const SlurmJob& job);
   void show_progress();
   [[noreturn]] void fail(const std::string& id, const std::optional<SlurmEnd>& end) const;
 
@@ -61,8 +59,8 @@ class MergeJob {
   bool is_answering_ = true;
   bool is_running_ = false;
   uint64_t shown_built_ = 0;
-  std::set<std::string> noted_reasons_;  // why the job waits
-  // As last known: the state is removed when the job is done.
+  std::set<std::string> warned_reasons_;  // why the job waits
+  // Names from the last state that was read: a finished job removes the state.
   std::string name_, task_name_;
 };
 

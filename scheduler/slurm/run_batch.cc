@@ -25,7 +25,7 @@
 namespace voxdag {
 namespace {
 
-// Of this node: its own name for it, else the machine's.
+// Returns Slurm's name of this node, else the host name.
 std::string node_name() {
   const char* const node = std::getenv("SLURMD_NODENAME");
   return node ? node : host_name();
@@ -40,13 +40,13 @@ constexpr uint64_t kProgramBytes = uint64_t{96} << 20;
 constexpr std::string_view kTemporaryName = "voxdag-batch-";
 constexpr const char* kTemporaryLock = "/lock";
 
-// A folder of this machine that is removed with all that the task put there. Those of tasks that
-// were killed are removed by the next task of the same user: nobody holds their locks.
+// A temporary folder on this machine. Folders of killed tasks are removed by the next task of the
+// same user, because their locks are free.
 class TemporaryFolder {
  public:
   TemporaryFolder(FileSystem& files, const std::string& parent) : files_(files) {
     remove_abandoned(parent);
-    // Another task may take the folder for an abandoned one before it is locked.
+    // Until the folder is locked, another task may consider it abandoned and remove it.
     for (int attempt = 0; !lock_ && attempt < 100; ++attempt) {
       path_ = make_temporary_folder(parent + "/" + std::string(kTemporaryName));
       try {
@@ -61,14 +61,14 @@ class TemporaryFolder {
     try {
       remove_tree(files_, path_);
     } catch (const Error&) {
-      // What is left costs space only.
+      // Remaining files cost only space.
     }
   }
   TemporaryFolder(const TemporaryFolder&) = delete;
   const std::string& path() const { return path_; }
 
  private:
-  // A folder of this user that nobody else can change.
+  // True for a folder of this user that nobody else can change.
   static bool is_private(const std::string& path) {
     struct stat found {};
     return lstat(path.c_str(), &found) == 0 && S_ISDIR(found.st_mode) &&
@@ -82,7 +82,7 @@ class TemporaryFolder {
         if (!files_.exists(path + kTemporaryLock)) continue;
         if (const auto lock = files_.try_lock(path + kTemporaryLock)) remove_tree(files_, path);
       } catch (const Error&) {
-        // It is another user's.
+        // The folder belongs to another user.
       }
     }
   }
@@ -106,7 +106,7 @@ class Task {
     try {
       return build_and_record();
     } catch (const Error& error) {
-      // Whoever stopped the task knows why.
+      // Cancellation needs no failure record.
       if (error.code() == ErrorCode::kCanceled)
         folder_.remove_attempt(context_.files, run_.batch, attempt_);
       else
@@ -122,12 +122,13 @@ class Task {
       try {
         const CompletionRecord record =
             decode_record(read_small_file(context_.files, entry.path, kMaxRecordBytes));
-        const bool is_whole = record.artifact.bytes == 0 || context_.files.exists(segment_of_record(
-                                                                context_.files, folder_, record));
-        if (record.build == batch.build && record.program == batch.program && is_whole)
+        const bool is_complete =
+            record.artifact.bytes == 0 ||
+            context_.files.exists(segment_of_record(context_.files, folder_, record));
+        if (record.build == batch.build && record.program == batch.program && is_complete)
           return record;
       } catch (const Error&) {
-        // Whoever waits for records decides about it.
+        // The submitting process reports invalid records.
       }
     }
     return std::nullopt;
@@ -199,7 +200,7 @@ class Task {
     options.longest_edge = batch.longest_edge;
     options.open_backend = backend.open;
     options.segment_folder = temporary;
-    // Nothing here needs to survive this process.
+    // The temporary folder does not outlive this process.
     options.checkpoint_interval_s = 1e9;
     context_.progress.begin_stage("build", queue.size(), "subvolumes");
     CommitQueues commits;
@@ -211,8 +212,8 @@ class Task {
       record.subvolumes.push_back({batch.subvolumes[i].id, {}});
   }
 
-  // What was built becomes one artifact on the shared disk; the record names it, and sums up the
-  // parts of each subvolume.
+  // Merges the artifacts into one on the shared disk. The record refers to it and contains the sums
+  // over the parts of each subvolume.
   void merge_artifacts(const Batch& batch, JobStore& jobs, const std::string& temporary,
                        unsigned threads, MemoryBudget& budget, CompletionRecord& record) {
     const std::vector<StoredSubvolume> leaves = jobs.leaves();
@@ -226,11 +227,11 @@ class Task {
       Cube cube = leaf.cube;
       while (!index_of.contains(cube)) cube = cube.parent();
       SubDagSummary& summary = record.subvolumes[index_of.at(cube)].summary;
-      const bool is_whole = cube == leaf.cube;
+      const bool is_complete = cube == leaf.cube;
       summary.voxels += leaf.summary.voxels;
       summary.svo_nodes += leaf.summary.svo_nodes;
       summary.dag_nodes += leaf.summary.dag_nodes;
-      summary.root_hash = is_whole ? leaf.summary.root_hash : 0;
+      summary.root_hash = is_complete ? leaf.summary.root_hash : 0;
     }
     if (inputs.artifacts.empty()) return;
     std::map<uint32_t, std::shared_ptr<ReadableFile>> segments;
@@ -241,7 +242,7 @@ class Task {
     };
     inputs.scratch_folder = temporary + "/merge";
     const std::string folder = folder_.attempt_folder(run_.batch, attempt_);
-    // A work folder that is gone was removed with the build: nobody waits for this task.
+    // A missing folder was removed with the build, which no longer needs this task.
     if (!context_.files.exists(folder_.path()))
       throw Error(ErrorCode::kNotFound, folder_.path() + ": expected the folder of the build");
     context_.files.make_directories(folder);
@@ -271,7 +272,7 @@ class Task {
           context_.files, folder_.failure_path(run_.batch, attempt_),
           encode_failure({run_.batch, attempt_, node_name(), slurm_allocation().task, message}));
     } catch (const Error&) {
-      // The log has the message, and Slurm the exit status.
+      // The log contains the message, and Slurm knows the exit status.
     }
   }
 

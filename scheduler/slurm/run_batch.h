@@ -1,6 +1,6 @@
-// One task of a cluster build: builds the subvolumes of a batch, merges their artifacts into one,
-// and writes a segment and a completion record to the shared disk. Everything else is temporary and
-// on this machine. Any number of attempts at the same batch may run at once.
+// One task of a cluster build. It builds the subvolumes of a batch, merges their artifacts into
+// one, and writes a segment and a completion record to the shared disk. All other files are
+// temporary and on this machine. Several attempts at the same batch may run concurrently.
 #pragma once
 
 #include <cstdint>
@@ -16,17 +16,17 @@ struct BatchRun {
   uint32_t batch = 0;
   std::string program;           // this program's version
   std::string temporary_folder;  // on this machine; "" for $TMPDIR or /tmp
-  uint64_t memory_bytes = 0;     // 0 for what Slurm has given to the task, else half of the RAM
-  unsigned threads = 0;          // 0 for the CPUs that Slurm has given to the task, else all
+  uint64_t memory_bytes = 0;     // 0 for the task's Slurm allocation, else half of the RAM
+  unsigned threads = 0;          // 0 for the CPUs of the Slurm allocation, else all
   std::string attempt;           // tells this attempt from all others; "" for a new one
 };
 
-// Returns the record; one that an earlier attempt wrote if there is one. A failure is recorded too,
-// so that whoever waits learns its reason, and thrown. Throws Error{kUnsupportedVersion} naming
-// both versions for a batch that another version of voxdag wrote.
+// Returns the completion record, or the valid record of an earlier attempt. On failure writes the
+// reason for the submitting process and throws it. Throws Error{kUnsupportedVersion} with both
+// versions if another version of voxdag wrote the batch.
 CompletionRecord run_batch(const BatchRun& run, const BuildContext& context);
 
-// What Slurm's environment gives to a task; 0 for what it does not say.
+// A task's allocation according to Slurm's environment variables; 0 if unknown.
 struct Allocation {
   unsigned cpus = 0;
   uint64_t memory_bytes = 0;
@@ -34,10 +34,10 @@ struct Allocation {
 };
 Allocation slurm_allocation();
 
-// The build of a batch may take this much of what a task was given: the rest is for the program
-// itself, buffers and the page tables.
+// Memory budget for a batch within an allocation of `given_bytes`. The rest is for the program
+// itself, buffers and page tables.
 uint64_t batch_budget(uint64_t given_bytes);
-// What a task has to be given for this budget.
+// Allocation that a task needs for this budget.
 uint64_t allocation_for(uint64_t budget_bytes);
 
 }  // namespace voxdag

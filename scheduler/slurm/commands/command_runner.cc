@@ -69,7 +69,7 @@ class Attributes {
     sigaddset(&defaults, SIGINT);
     posix_spawnattr_setsigdefault(&attributes_, &defaults);
     posix_spawnattr_setpgroup(&attributes_, 0);
-    // A group of its own: Ctrl-C is for this process, which lets the command end.
+    // A separate process group, so that Ctrl-C does not kill the command.
     posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
   }
   ~Attributes() { posix_spawnattr_destroy(&attributes_); }
@@ -79,7 +79,7 @@ class Attributes {
   posix_spawnattr_t attributes_;
 };
 
-// Reads what is there; false at the end.
+// Appends the available bytes to `out`. Returns false at the end of the file.
 bool read_some(int fd, std::string& out) {
   std::array<char, 65536> buffer;
   const ssize_t n = ::read(fd, buffer.data(), buffer.size());
@@ -87,7 +87,8 @@ bool read_some(int fd, std::string& out) {
   return n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
 }
 
-// Writes what the pipe takes; false once all is written or nobody reads.
+// Writes as much as the pipe accepts. Returns false if `text` is complete or the reader has closed
+// the pipe.
 bool write_some(int fd, const std::string& text, size_t& written) {
   if (written < text.size()) {
     const ssize_t n = ::write(fd, text.data() + written, text.size() - written);

@@ -1,5 +1,4 @@
-// Runs the commands of another program, such as Slurm's, and returns what they print. No shell is
-// involved.
+// Runs commands, such as Slurm's, without a shell and returns their output.
 #pragma once
 
 #include <string>
@@ -18,19 +17,18 @@ struct CommandResult {
 class CommandRunner {
  public:
   virtual ~CommandRunner() = default;
-  // Runs a program of the PATH with `input` as its standard input; one that takes longer than
-  // `timeout_s` is killed, which is an exit status of 128 + 9. It gets this process's environment
-  // but for what a Slurm job around it, or settings of other commands, would change
-  // (is_hidden_variable()). Throws Error{kIo} if no process can be started, Error{kCanceled} once
-  // `cancel` is canceled; the program is killed then.
+  // Runs a program of the PATH with `input` as its standard input. A program that takes longer than
+  // `timeout_s` is killed; its exit status is 128 + 9. The program gets this process's environment
+  // except for hidden variables (is_hidden_variable()). Throws Error{kIo} if no process can be
+  // started. Kills the program and throws Error{kCanceled} when `cancel` is canceled.
   virtual CommandResult run(const std::vector<std::string>& command, const std::string& input,
                             double timeout_s, const CancelToken& cancel) = 0;
 };
 
 CommandRunner& system_commands();
 
-// A variable, NAME=value, that would make Slurm's commands do something else than they were asked
-// to, or that describes a job around this process to the tasks that it submits.
+// True if a variable NAME=value changes the behavior of Slurm's commands, or describes the Slurm
+// job around this process, which submitted tasks must not inherit.
 bool is_hidden_variable(std::string_view variable);
 
 }  // namespace voxdag

@@ -67,7 +67,7 @@ std::string script_line(const std::vector<std::string>& command) {
   return line;
 }
 
-// sbatch replaces what follows a percent sign: in the name of the log only.
+// sbatch replaces patterns such as %A; only the log's name may contain them.
 std::string output_option(const std::string& log_folder, const std::string& name) {
   std::string option = "--output=";
   for (const char c : log_folder) option += c == '%' ? "%%" : std::string(1, c);
@@ -99,7 +99,7 @@ bool is_unreachable(const CommandResult& result) {
   return result.exit_status >= 128;
 }
 
-// Whether the array, or all jobs of the user, are more than Slurm takes at a time.
+// True if the array, or the user's jobs together, exceed a limit of Slurm.
 bool is_too_much(const CommandResult& result) {
   for (const char* sign : {"MaxJobCount", "MaxSubmitJob", "MaxSubmitPU", "job submit limit"})
     if (result.error.find(sign) != std::string::npos) return true;
@@ -115,9 +115,9 @@ bool is_held_for_ever(const std::string& state, std::string reason) {
 
 }  // namespace
 
-bool SlurmTask::is_given_up() const { return is_held_for_ever(state, reason); }
+bool SlurmTask::is_held() const { return is_held_for_ever(state, reason); }
 
-bool SlurmJob::is_given_up() const { return is_held_for_ever(state, reason); }
+bool SlurmJob::is_held() const { return is_held_for_ever(state, reason); }
 
 std::string SlurmEnd::text() const {
   if (state.empty()) return "ended, and Slurm has forgotten how";
@@ -136,7 +136,7 @@ bool SlurmEnd::is_active() const {
 
 CommandResult Slurm::run(const std::vector<std::string>& command, const std::string& input) {
   ++requests_;
-  return commands_.run(command, input, kTimeout_s, cancel_);
+  return commands_.run(command, input, kTimeoutS, cancel_);
 }
 
 bool Slurm::may_be_starting(const CommandResult& refused) {
@@ -199,7 +199,7 @@ std::string Slurm::setting(const std::string& name) {
   return "";
 }
 
-void Slurm::submit(const ArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks) {
+void Slurm::submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks) {
   const uint32_t size =
       std::max<uint32_t>(number(setting("MaxArraySize")).value_or(kDefaultMaxArraySize), 1);
   std::map<uint32_t, std::vector<uint32_t>> arrays;  // indexes, by the first batch
@@ -253,7 +253,7 @@ std::string Slurm::accepted_job(const CommandResult& submitted) {
   return job;
 }
 
-std::string Slurm::submit_job(const JobRequest& request) {
+std::string Slurm::submit_job(const SlurmJobRequest& request) {
   std::vector<std::string> command{"sbatch", output_option(request.log_folder, "log-%j.txt"),
                                    "--open-mode=append", "--requeue"};
   command.insert(command.end(), request.options.begin(), request.options.end());

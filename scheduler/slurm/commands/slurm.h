@@ -1,5 +1,5 @@
-// What a cluster build asks of Slurm, through its commands: sbatch, squeue, scontrol, scancel and,
-// where there is accounting, sacct. Used by one thread.
+// Requests of a cluster build to Slurm through its commands: sbatch, squeue, scontrol, scancel and,
+// if accounting is enabled, sacct. Used by one thread.
 #pragma once
 
 #include <cstdint>
@@ -13,9 +13,9 @@
 
 namespace voxdag {
 
-// A task or job is_given_up() if Slurm could not start it and holds it until an operator releases
-// it: it waits for ever. After a crash slurmctld may give new tasks the ids of tasks that nodes
-// still know; these refuse them.
+// A task or job is_held() if Slurm could not start it and holds it until an operator releases it.
+// One cause: after a crash slurmctld may reuse the ids of tasks that nodes still know, and these
+// nodes refuse the new tasks.
 
 // A task of an array is JOB_INDEX, for the user and for Slurm.
 struct SlurmTask {
@@ -28,7 +28,7 @@ struct SlurmTask {
 
   uint32_t batch() const { return first_batch + index; }
   std::string name() const { return job + "_" + std::to_string(index); }
-  bool is_given_up() const;
+  bool is_held() const;
   bool operator==(const SlurmTask&) const = default;
 };
 
@@ -40,22 +40,22 @@ struct SlurmEnd {
   std::string exit_code;  // STATUS:SIGNAL
 
   std::string text() const;
-  // Whether the task has not ended: it waits, runs or ends just now.
+  // True if the task has not ended: it waits, runs or is completing.
   bool is_active() const;
 };
 
-struct ArrayRequest {
+struct SlurmArrayRequest {
   std::string name;  // by which its tasks are found again
   // Each task runs `command` followed by the number of its batch.
   std::vector<std::string> command;
   std::vector<uint32_t> batches;
   std::string log_folder;
   std::vector<std::string> options;  // of sbatch, the user's
-  uint64_t max_running = 0;          // tasks at a time; 0 for no limit
+  uint64_t max_running = 0;          // max concurrent tasks; 0 for no limit
 };
 
-// A job of its own, no array.
-struct JobRequest {
+// A single job, not an array.
+struct SlurmJobRequest {
   std::string name;
   std::vector<std::string> command;
   std::vector<std::string> after;  // jobs that have to end first
@@ -68,48 +68,48 @@ struct SlurmJob {
   std::string id;
   std::string state;
   std::string reason;  // why it waits
-  bool is_given_up() const;
+  bool is_held() const;
 };
 
 class Slurm {
  public:
-  // `cancel` ends a command that runs. For some seconds after its start Slurm knows no nodes, and
-  // says that no node is like those asked for: that is believed after `start_s` only.
+  // `cancel` ends a running command. For some seconds after its start Slurm knows no nodes and
+  // refuses all requests, so such refusals are retried for `start_s`.
   Slurm(CommandRunner& commands, const CancelToken& cancel, double start_s = 0)
       : commands_(commands), cancel_(cancel), start_s_(start_s) {}
 
-  // Throws Error{kInvalidInput} if there is no Slurm here, or if sbatch would refuse these options.
-  // Asks again every `pause_s` while Slurm may not know its nodes yet, with a warning.
+  // Throws Error{kInvalidInput} if Slurm is not installed, or if sbatch would refuse these options.
+  // Repeats the request every `pause_s`, with a warning, while Slurm may not know its nodes yet.
   void check(const std::vector<std::string>& options, double pause_s, Progress& progress);
-  // Submits arrays, several if the numbers of the batches differ by more than Slurm's MaxArraySize,
-  // and adds the task of each batch to `tasks` as soon as its array is accepted. Throws
-  // Error{kInvalidInput} with sbatch's message if it refuses, Error{kIo} if Slurm does not answer
-  // or cannot take it now: then the array may be there or not.
-  void submit(const ArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks);
-  // All tasks of that name that wait or run; nothing if Slurm does not answer now.
+  // Submits one array, or several if the batch numbers differ by more than Slurm's MaxArraySize.
+  // Adds each batch's task to `tasks` as soon as its array is accepted. Throws Error{kInvalidInput}
+  // with sbatch's message if it refuses. Throws Error{kIo} if Slurm does not answer or cannot
+  // accept the array now; the array may exist nevertheless.
+  void submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks);
+  // Returns the waiting and running tasks of that name; nullopt if Slurm does not answer.
   std::optional<std::vector<SlurmTask>> active(const std::string& name);
   // Submits a job and returns its id. Throws as submit() does.
-  std::string submit_job(const JobRequest& request);
-  // All jobs of that name that wait or run; nothing if Slurm does not answer now.
+  std::string submit_job(const SlurmJobRequest& request);
+  // Returns the waiting and running jobs of that name; nullopt if Slurm does not answer.
   std::optional<std::vector<SlurmJob>> jobs(const std::string& name);
-  // How a task JOB_INDEX or a job ended; nothing if Slurm does not answer now.
+  // Returns how a task JOB_INDEX or a job ended; nullopt if Slurm does not answer.
   std::optional<SlurmEnd> end_of(const std::string& task);
-  // Cancels all tasks and jobs of that name. Returns whether Slurm has taken it.
+  // Cancels all tasks and jobs of that name. Returns true if Slurm accepts the request.
   bool cancel(const std::string& name);
   // Cancels tasks JOB_INDEX and jobs.
   bool cancel_tasks(const std::vector<std::string>& tasks);
-  // Commands so far.
+  // Number of commands run.
   uint64_t requests() const { return requests_; }
 
  private:
-  static constexpr double kTimeout_s = 60;
+  static constexpr double kTimeoutS = 60;
 
   CommandResult run(const std::vector<std::string>& command, const std::string& input = "");
   // The job's id that sbatch printed, JOB or JOB;CLUSTER.
   std::string accepted_job(const CommandResult& submitted);
   // A setting of slurm.conf, "" if unknown.
   std::string setting(const std::string& name);
-  // Whether Slurm refused for want of nodes that it may not know yet.
+  // True if Slurm refused because of missing nodes that it may not know yet.
   bool may_be_starting(const CommandResult& refused);
 
   CommandRunner& commands_;
@@ -120,11 +120,11 @@ class Slurm {
   std::optional<std::string> configuration_;
 };
 
-// Whether what waits for this reason need only wait; not so if a person has to do something.
+// True if waiting for this reason ends by itself; false if a person has to act.
 bool waits_for_its_turn(const std::string& reason);
 
-// The words of a text as a shell would split it: at blanks, but not within quotes; a backslash
-// takes the next character as it is. Throws Error{kInvalidInput} for a quote that is not closed.
+// Splits a text into words as a shell does: at blanks outside of quotes; a backslash escapes the
+// next character. Throws Error{kInvalidInput} for an unterminated quote.
 std::vector<std::string> split_words(const std::string& text);
 
 }  // namespace voxdag

@@ -1,11 +1,9 @@
-// The input of a cluster task: all that it needs to build its subvolumes, their triangles included,
-// in one file that is written once and then only read.
+// The input of a cluster task: its subvolumes and their triangles, in one write-once file.
 //
 //   "vdbatch2"  u64 bytes of the header  u64 its XXH64  header (JSON)
 //   chunks of records: u64 XXH64 of the records  up to kBatchChunkRecords records (chunk.h)
-//
-// Chunks lie one after the other, those of the first subvolume first; all but the last of a
-// subvolume are full.
+//  Chunks are contiguous, in the order of the subvolumes. All chunks of a subvolume but the last
+// are full.
 #pragma once
 
 #include <cstdint>

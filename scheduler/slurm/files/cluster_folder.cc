@@ -11,7 +11,7 @@ namespace voxdag {
 namespace {
 
 // The number that `text` begins with, which is removed from it.
-std::optional<uint32_t> take_number(std::string_view& text) {
+std::optional<uint32_t> parse_number(std::string_view& text) {
   uint32_t number = 0;
   const auto [rest, failure] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (failure != std::errc{} || number >= kMaxBatches) return std::nullopt;
@@ -19,14 +19,14 @@ std::optional<uint32_t> take_number(std::string_view& text) {
   return number;
 }
 
-bool take_prefix(std::string_view& text, std::string_view prefix) {
+bool consume_prefix(std::string_view& text, std::string_view prefix) {
   if (!text.starts_with(prefix)) return false;
   text.remove_prefix(prefix.size());
   return true;
 }
 
-// Calls `remove` for what another process may have removed already, or may still write to: what is
-// left costs space only.
+// Calls `remove` and ignores errors: another process may have removed the file already, or may
+// still write to it. A remaining file costs only space.
 template <class Remove>
 void try_to_remove(const Remove& remove) {
   try {
@@ -46,13 +46,13 @@ ClusterFolder::Entry parse_cluster_name(const std::string& name) {
   using Kind = ClusterFolder::Kind;
   ClusterFolder::Entry entry;
   std::string_view rest = name;
-  const bool is_attempt = take_prefix(rest, "attempt-");
-  if (!is_attempt && !take_prefix(rest, "batch-")) return entry;
-  const auto batch = take_number(rest);
+  const bool is_attempt = consume_prefix(rest, "attempt-");
+  if (!is_attempt && !consume_prefix(rest, "batch-")) return entry;
+  const auto batch = parse_number(rest);
   if (!batch) return entry;
   entry.batch = *batch;
   if (is_attempt) {
-    if (!take_prefix(rest, "-") || rest.empty()) return entry;
+    if (!consume_prefix(rest, "-") || rest.empty()) return entry;
     entry.kind = Kind::kAttempt;
     entry.attempt = rest;
     return entry;
@@ -61,9 +61,9 @@ ClusterFolder::Entry parse_cluster_name(const std::string& name) {
     entry.kind = Kind::kBatch;
     return entry;
   }
-  const Kind kind = take_prefix(rest, ".record-")    ? Kind::kRecord
-                    : take_prefix(rest, ".failure-") ? Kind::kFailure
-                                                     : Kind::kOther;
+  const Kind kind = consume_prefix(rest, ".record-")    ? Kind::kRecord
+                    : consume_prefix(rest, ".failure-") ? Kind::kFailure
+                                                        : Kind::kOther;
   if (kind == Kind::kOther || !rest.ends_with(".json")) return entry;
   entry.kind = kind;
   entry.attempt = rest.substr(0, rest.size() - 5);
@@ -78,7 +78,7 @@ std::vector<ClusterFolder::Entry> ClusterFolder::list(FileSystem& files) const {
       entries.back().path = path_ + "/" + found.name;
     }
   } catch (const Error& error) {
-    // There is none, or the build that ends removes it.
+    // The folder does not exist, or a finished build removes it.
     if (error.code() != ErrorCode::kNotFound) throw;
   }
   std::ranges::sort(entries, {}, &Entry::path);

@@ -1,11 +1,11 @@
 // The files of a cluster build, in the folder `cluster` of its work folder on the shared disk, and
 // their names. Only names that are listed here are ever removed.
 //
-//   cluster.json                       what the submitting process knows (cluster_state.h)
+//   cluster.json                       state of the submitting process (cluster_state.h)
 //   batch-7.vdbatch                    input of batch 7 (batch_file.h)
 //   batch-7.record-ATTEMPT.json        a batch that is built (completion_record.h)
 //   batch-7.failure-ATTEMPT.json       why an attempt ended
-//   attempt-7-ATTEMPT/segment-N.vdseg  what the attempt writes
+//   attempt-7-ATTEMPT/segment-N.vdseg  output of the attempt
 //   log-JOB_INDEX.txt                  standard error of a task
 //
 // The segment of the first valid record is moved to the work folder, where the merge reads it.
@@ -43,7 +43,7 @@ class ClusterFolder {
     return path_ + "/attempt-" + std::to_string(batch) + "-" + attempt;
   }
   static uint32_t segment_of(uint32_t batch) { return kFirstClusterSegment + batch; }
-  // Where the segment of a batch lies once its record was accepted.
+  // Path of a batch's segment after its record was accepted.
   std::string accepted_segment_path(uint32_t batch) const;
 
   enum class Kind { kBatch, kRecord, kFailure, kAttempt, kOther };
@@ -53,10 +53,10 @@ class ClusterFolder {
     std::string attempt;
     std::string path;
   };
-  // All that the folder has, by name; nothing if there is no folder.
+  // Returns the folder's entries by name; none if the folder does not exist.
   std::vector<Entry> list(FileSystem& files) const;
 
-  // Removes what an attempt left, as far as that can be removed.
+  // Removes the files of an attempt. Errors are ignored.
   void remove_attempt(FileSystem& files, uint32_t batch, const std::string& attempt) const;
 
  private:
@@ -68,7 +68,7 @@ class ClusterFolder {
   std::string path_;
 };
 
-// What a name in the folder stands for.
+// Parses the name of an entry.
 ClusterFolder::Entry parse_cluster_name(const std::string& name);
 
 }  // namespace voxdag

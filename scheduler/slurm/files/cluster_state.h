@@ -1,7 +1,7 @@
-// What the submitting process of a cluster build knows, in cluster.json: the batches that are not
-// built, their tasks and what went wrong with them, and totals. Written by that process only, whole
-// or not at all; read by `voxdag status`. Which batch a record belongs to stands here only: without
-// a state, what tasks have built and no run has accepted is built again.
+// The state of the submitting process of a cluster build, in cluster.json: open batches with their
+// tasks and failures, and totals. Only that process writes it, by an atomic rename; `voxdag status`
+// reads it. Only this file maps records to batches: without it, results of tasks that no run has
+// accepted are built again.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,13 @@ struct ExpectedSubvolume {
 
 struct AttemptEnd {
   std::string task, node;
-  std::string reason;  // Slurm's, or the task's own error
+  std::string reason;  // Slurm's reason, or the task's error
+};
+
+// Why the current attempt of a batch fails, as reported before Slurm reports its end.
+struct AttemptError {
+  std::string text;
+  bool has_ended = false;  // the task has ended, even if Slurm still lists it
 };
 
 struct OpenBatch {
@@ -36,6 +42,7 @@ struct OpenBatch {
   double weight = 0;
   std::optional<SlurmTask> task;  // as last seen; none before it is submitted
   std::vector<AttemptEnd> failures;
+  std::optional<AttemptError> error;  // not stored in cluster.json
 };
 
 struct ClusterState {
@@ -49,7 +56,7 @@ struct ClusterState {
   ClusterTotals totals;
 
   std::string task_name() const { return "voxdag-" + build; }
-  // Of the job that merges (merge_job.h).
+  // Name of the merge job (merge_job.h).
   std::string merge_job_name() const { return task_name() + "-merge"; }
   OpenBatch* find(uint32_t batch);
 };
@@ -57,8 +64,8 @@ struct ClusterState {
 std::string encode_state(const ClusterState& state);
 // Throws Error{kCorrupt} for a text that encode_state() did not make.
 ClusterState decode_state(const std::string& text);
-// The state of the build in a work folder; nothing if there is none. Throws Error that names the
-// file if it cannot be read, or is damaged.
+// Reads the state in a work folder; nullopt without a cluster build. Throws Error with the file's
+// name if it cannot be read or is damaged.
 std::optional<ClusterState> read_cluster_state(FileSystem& files, const std::string& work_folder);
 
 }  // namespace voxdag

@@ -1,6 +1,6 @@
-// What a cluster task says when it is done: one small file, written whole or not at all, after all
-// that it names is durable. A text line of JSON and one with its XXH64, so that a torn or damaged
-// record is known.
+// The completion record of a cluster task: one small file, created by an atomic rename after the
+// task's segment is durable. It has a line of JSON and a line with its XXH64, which detects a torn
+// or damaged record.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace voxdag {
 
-// Of a record's file.
+// Maximum size of a record's file.
 inline constexpr uint64_t kMaxRecordBytes = uint64_t{1} << 30;
 
 struct BuiltSubvolume {
@@ -43,7 +43,7 @@ std::string encode_record(const CompletionRecord& record);
 // Throws Error{kCorrupt} for a text that encode_record() did not make.
 CompletionRecord decode_record(const std::string& text);
 
-// Why an attempt ended without a record, as far as the task itself could say.
+// Why an attempt ended without a record, as reported by the task.
 struct AttemptFailure {
   uint32_t batch = 0;
   std::string attempt, node, task;

@@ -1,4 +1,4 @@
-// Whether a completion record counts: whether it is of this build, and what it names is there.
+// Checks that a completion record belongs to this build and that its segment exists.
 #pragma once
 
 #include <span>
@@ -11,14 +11,14 @@
 
 namespace voxdag {
 
-// Reads the record of `entry`, of a batch with these subvolumes, and checks it and its artifact's
-// roots. Throws Error{kCorrupt}, {kNotFound} or {kUnsupportedVersion} if it does not count.
+// Reads the record of `entry` for a batch with these subvolumes. Checks the record and the roots of
+// its artifact. Throws Error{kCorrupt}, {kNotFound} or {kUnsupportedVersion} if it is invalid.
 CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folder,
                                    const ClusterFolder::Entry& entry, const ClusterState& state,
                                    std::span<const ExpectedSubvolume> subvolumes);
 
-// Where the segment of a record lies: in the folder of its attempt or, if the process that accepted
-// it was killed before it had recorded that, already in the work folder.
+// Path of a record's segment: in the attempt's folder, or in the work folder if the accepting
+// process was killed before it recorded the batch.
 std::string segment_of_record(FileSystem& files, const ClusterFolder& folder,
                               const CompletionRecord& record);
 

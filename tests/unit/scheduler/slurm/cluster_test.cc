@@ -7,7 +7,7 @@
 #include "core/base/error.h"
 #include "scheduler/run_build.h"
 #include "scheduler/slurm/batches.h"
-#include "scheduler/slurm/cluster_build.h"
+#include "scheduler/slurm/cluster_builder.h"
 #include "scheduler/slurm/files/batch_file.h"
 #include "scheduler/slurm/run_batch.h"
 #include "tests/support/error_of.h"
@@ -136,7 +136,7 @@ TEST_F(Cluster, WaitsForASlurmThatTakesNoTasksNow) {
   slurm_.refusal = "Batch job submission failed: Unable to contact slurm controller";
   slurm_.refusals = 3;
   build(spec(2));
-  EXPECT_NE(warnings_.text.find("Slurm takes no tasks now"), std::string::npos) << warnings_.text;
+  EXPECT_NE(warnings_.text.find("Slurm accepts no tasks now"), std::string::npos) << warnings_.text;
 }
 
 // For some seconds after its start Slurm knows no nodes, and refuses tasks that it will accept
@@ -149,7 +149,7 @@ TEST_F(Cluster, WaitsForASlurmThatHasJustBeenStarted) {
   EXPECT_NE(warnings_.text.find("Slurm has no nodes for the tasks (allocation failure"),
             std::string::npos)
       << warnings_.text;
-  EXPECT_NE(warnings_.text.find("Slurm takes no tasks now"), std::string::npos);
+  EXPECT_NE(warnings_.text.find("Slurm accepts no tasks now"), std::string::npos);
   for (int* refusals : {&slurm_.test_refusals, &slurm_.refusals}) {
     *refusals = INT_MAX;
     BuildSpec never = spec(2);
@@ -345,7 +345,7 @@ TEST_F(Cluster, DamagedBatchesAndRecordsDoNotCount) {
   };
   const BuildReport report = build(spec(2));
   EXPECT_EQ(report.cluster->batches, 2u);
-  EXPECT_NE(warnings_.text.find("batch-1.record-+torn.json does not count: it fails its checksum"),
+  EXPECT_NE(warnings_.text.find("batch-1.record-+torn.json is rejected: it fails its checksum"),
             std::string::npos)
       << warnings_.text;
 }

@@ -1,0 +1,86 @@
+// The open batches of a cluster build and their accounting: which subvolumes they contain, which
+// attempts failed, and the totals of built batches. The table is stored in cluster.json
+// (cluster_state.h), which is written by one process only. Used by one thread.
+//
+// A lost table is harmless: its subvolumes are still planned in the job store, so the next run
+// makes new batches of them. Building a batch twice is harmless too, because bytes are canonical
+// and only the first valid record is accepted.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "scheduler/slurm/batches.h"
+#include "scheduler/slurm/cluster_context.h"
+#include "scheduler/slurm/files/cluster_state.h"
+#include "scheduler/slurm/files/completion_record.h"
+#include "scheduler/state/job_store.h"
+#include "scheduler/triangles/triangle_store.h"
+
+namespace voxdag {
+
+class BatchTable {
+ public:
+  explicit BatchTable(ClusterContext& cluster) : cluster_(cluster) {}
+
+  // Loads the table that an earlier run stored for the same scene. Discards the table of another
+  // build or program version and cancels its tasks.
+  void resume(const std::string& scene_digest, const DagShape& shape);
+
+  const ClusterState& state() const { return state_; }
+  std::vector<OpenBatch>& open() { return state_.open; }
+  OpenBatch* find(uint32_t batch) { return state_.find(batch); }
+  // The subvolumes of all open batches.
+  std::set<SubvolumeId> subvolumes() const;
+  bool is_changed() const { return is_changed_; }
+  void mark_changed() { is_changed_ = true; }
+
+  // Cuts subvolumes, whose triangles are in `bins`, into new batches and writes their files.
+  void add(std::span<const StoredSubvolume> subvolumes, std::span<const BinId> bins,
+           const TriangleStore& triangles);
+  // Replaces a batch by two halves, or by the octants of its only subvolume. Returns the numbers of
+  // the new batches.
+  std::vector<uint32_t> split(uint32_t batch);
+  bool can_be_split(const OpenBatch& batch) const;
+  // Records a built batch in the job store and closes it. Its segment is already in the work
+  // folder.
+  void record_built(const CompletionRecord& record);
+  void record_submission(double now_s);
+  void record_failed_attempt() { ++state_.totals.attempts; }
+  // Forgets earlier failures: a new run of the command has the full number of retries.
+  void forget_failures();
+  // Removes a batch and throws Error. The next run makes a new batch of its subvolumes, from the
+  // scene, because the batch file may be at fault.
+  [[noreturn]] void give_up(uint32_t batch, ErrorCode code, const std::string& why);
+
+  void save();
+  // Like save(), but a failure is only a warning: the table is written again later.
+  void try_save();
+  // Shows the numbers of running, waiting and built tasks.
+  void show_tasks() const;
+
+ private:
+  bool is_valid(const OpenBatch& batch) const;
+  void start_new(const std::string& scene_digest, const DagShape& shape);
+  uint64_t tasks_for(double weight, uint64_t subvolumes) const;
+  void open_batches(CutBatches cut, std::span<const BinId> bins, const TriangleStore& triangles,
+                    unsigned threads, const std::function<void()>& after_each);
+  std::vector<uint32_t> split_file(uint32_t batch);
+  void close(uint32_t batch);
+  void add_to_totals(const CompletionRecord& record);
+
+  ClusterContext& cluster_;
+  ClusterState state_;
+  std::map<SubvolumeId, StoredSubvolume> rows_;  // of the subvolumes of open batches
+  uint64_t earlier_requests_ = 0;                // requests to Slurm by earlier runs
+  bool is_saved_ = true;                         // the last try_save() succeeded
+  bool is_changed_ = false;
+};
+
+}  // namespace voxdag

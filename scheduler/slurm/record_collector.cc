@@ -1,0 +1,103 @@
+#include "scheduler/slurm/record_collector.h"
+
+#include <vector>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "scheduler/slurm/files/record_check.h"
+
+namespace voxdag {
+namespace {
+
+std::string replace_all(std::string text, const std::string& from, const std::string& to) {
+  for (size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+  return text;
+}
+
+}  // namespace
+
+void RecordCollector::collect() {
+  const std::vector<ClusterFolder::Entry> entries = cluster_.folder.list(cluster_.files());
+  for (const ClusterFolder::Entry& entry : entries) {
+    if (entry.kind == ClusterFolder::Kind::kRecord) read_record(entry);
+    if (entry.kind == ClusterFolder::Kind::kFailure) read_failure(entry);
+  }
+  // Killed attempts leave a folder behind.
+  for (const ClusterFolder::Entry& entry : entries)
+    if (entry.kind == ClusterFolder::Kind::kAttempt && !batches_.find(entry.batch))
+      remove_attempt(entry);
+}
+
+void RecordCollector::remove_unused_batches() {
+  for (const ClusterFolder::Entry& entry : cluster_.folder.list(cluster_.files()))
+    if (entry.kind == ClusterFolder::Kind::kBatch && !batches_.find(entry.batch))
+      cluster_.files().remove(entry.path);
+}
+
+void RecordCollector::read_failure(const ClusterFolder::Entry& entry) {
+  if (OpenBatch* const batch = batches_.find(entry.batch)) {
+    try {
+      const AttemptFailure failure =
+          decode_failure(read_small_file(cluster_.files(), entry.path, kMaxRecordBytes));
+      // On a shared file system the failure of an earlier task can become visible later.
+      const bool is_earlier =
+          batch->task && !failure.task.empty() && failure.task != batch->task->name();
+      // Tasks use the absolute path of the work folder; the message shows the user's path.
+      const std::string& work = cluster_.job.work.path();
+      if (!is_earlier)
+        batch->error = {replace_all(failure.message, absolute_path(work), work) +
+                            (failure.node.empty() ? "" : " (on " + failure.node + ")"),
+                        true};
+    } catch (const Error&) {
+      // Slurm will report that the task ended.
+    }
+  }
+  remove_attempt(entry);
+}
+
+void RecordCollector::read_record(const ClusterFolder::Entry& entry) {
+  OpenBatch* const batch = batches_.find(entry.batch);
+  // Without an open batch, the record of another attempt was accepted.
+  if (!batch) return remove_attempt(entry);
+  try {
+    accept(read_valid_record(cluster_.files(), cluster_.folder, entry, batches_.state(),
+                             batch->subvolumes));
+  } catch (const Error& error) {
+    const bool is_missing = error.code() == ErrorCode::kNotFound;
+    if (is_missing && may_appear_later(entry.path)) return;
+    if (!error.is_corruption() && !is_missing && error.code() != ErrorCode::kUnsupportedVersion)
+      throw;
+    cluster_.progress().warn("the record " + entry.path + " is rejected: " + error.message());
+    // The record may be an earlier attempt's, so the current task may still run.
+    if (!batch->error) batch->error = {error.message(), false};
+    remove_attempt(entry);
+  }
+}
+
+// On a shared file system a segment can become visible later than its record.
+bool RecordCollector::may_appear_later(const std::string& record_path) {
+  const double now_s = wall_seconds();
+  const Seconds since_s = incomplete_since_.try_emplace(record_path, now_s).first->second;
+  return now_s - since_s < cluster_.options.grace_s;
+}
+
+void RecordCollector::accept(const CompletionRecord& record) {
+  FileSystem& files = cluster_.files();
+  const std::string accepted = cluster_.folder.accepted_segment_path(record.batch);
+  const std::string segment = segment_of_record(files, cluster_.folder, record);
+  if (record.artifact.bytes > 0 && segment != accepted) {
+    files.rename(segment, accepted);
+    files.sync_directory(cluster_.job.work.path());
+  }
+  batches_.record_built(record);
+  cluster_.folder.remove_attempt(files, record.batch, record.attempt);
+  if (const std::string batch = cluster_.folder.batch_path(record.batch); files.exists(batch))
+    files.remove(batch);
+}
+
+void RecordCollector::remove_attempt(const ClusterFolder::Entry& entry) {
+  cluster_.folder.remove_attempt(cluster_.files(), entry.batch, entry.attempt);
+}
+
+}  // namespace voxdag

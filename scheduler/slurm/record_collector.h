@@ -1,0 +1,41 @@
+// Accepts the results of a cluster build's tasks: completion records, and the reasons of failed
+// attempts. The first valid record of a batch is accepted; later ones are removed. Used by one
+// thread.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "scheduler/slurm/batch_table.h"
+#include "scheduler/slurm/cluster_context.h"
+#include "scheduler/slurm/files/cluster_folder.h"
+#include "scheduler/slurm/files/completion_record.h"
+
+namespace voxdag {
+
+class RecordCollector {
+ public:
+  RecordCollector(ClusterContext& cluster, BatchTable& batches)
+      : cluster_(cluster), batches_(batches) {}
+
+  // Reads the cluster folder: records built batches in `batches`, notes the errors of failed
+  // attempts, and removes the files of attempts at built batches.
+  void collect();
+  // Removes batch files without an open batch.
+  void remove_unused_batches();
+
+ private:
+  using Seconds = double;
+
+  void read_failure(const ClusterFolder::Entry& entry);
+  void read_record(const ClusterFolder::Entry& entry);
+  bool may_appear_later(const std::string& record_path);
+  void accept(const CompletionRecord& record);
+  void remove_attempt(const ClusterFolder::Entry& entry);
+
+  ClusterContext& cluster_;
+  BatchTable& batches_;
+  std::map<std::string, Seconds> incomplete_since_;  // records without a visible segment
+};
+
+}  // namespace voxdag

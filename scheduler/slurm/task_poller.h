@@ -1,0 +1,58 @@
+// Submits the tasks of open batches to Slurm and polls Slurm for their states. Resubmits batches
+// whose task has ended without a record, and splits batches that ran out of time. Used by one
+// thread.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "scheduler/slurm/batch_table.h"
+#include "scheduler/slurm/cluster_context.h"
+
+namespace voxdag {
+
+class TaskPoller {
+ public:
+  TaskPoller(ClusterContext& cluster, BatchTable& batches) : cluster_(cluster), batches_(batches) {}
+
+  // Forgets earlier failures. Tasks of an earlier run get one failure that is not counted.
+  void begin_run();
+  // Queries Slurm once for all tasks, then submits batches without a task. A batch has failed if it
+  // has neither a task nor, after a grace period for the shared file system, a record. Throws Error
+  // with the last reason if a batch has failed too often; other tasks continue to run.
+  void poll();
+  // Submits a job that starts when all tasks have ended. Waits until Slurm accepts a task or there
+  // are no open batches, so that the job has something to wait for. Returns "" if Slurm does not
+  // accept the job now.
+  std::string try_submit_merge_job();
+
+ private:
+  using Seconds = double;
+
+  void submit(const std::vector<uint32_t>& batches);
+  void warn_refusal(const std::string& refusal);
+  void warn_waiting(const SlurmTask& task);
+  // Stores the task's state in its batch.
+  void update(const SlurmTask& task);
+  std::vector<uint32_t> end_missing(const std::set<uint32_t>& listed);
+  bool is_over(const OpenBatch& batch);
+  void cancel_held(const std::vector<SlurmTask>& tasks, std::set<uint32_t>& listed);
+  // Result of ending an attempt.
+  enum class Next { kWait, kStop, kResubmit, kSplit };
+  Next end_attempt(OpenBatch& batch);
+  void fail_attempt(OpenBatch& batch, const SlurmEnd& end, bool is_split);
+  std::string find_job(const std::string& name);
+
+  ClusterContext& cluster_;
+  BatchTable& batches_;
+  std::map<uint32_t, Seconds> missing_since_;  // batches whose tasks Slurm does not list
+  std::set<uint32_t> inherited_;               // batches with tasks of an earlier run
+  std::set<std::string> warned_reasons_;       // why tasks wait
+  bool is_answering_ = true;                   // Slurm answered the last query
+  bool is_accepting_ = true;                   // Slurm accepted the last submission
+};
+
+}  // namespace voxdag
