@@ -78,7 +78,7 @@ void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& 
                                  OutputLock::path_of(output)};
   refuse_own_files(spec, scene, work, outputs, context);
   refuse_foreign_file(files, output, is_global_file, " (-o)");
-  // If a job is in the work folder, the file is ours even if its first bytes are damaged.
+  // A partial file next to a job was created by voxdag, even if its first bytes are damaged.
   if (!files.exists(WorkFolder::store_path(work)))
     refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
   refuse_foreign_file(files, report, is_report, " (-o)");

@@ -19,8 +19,8 @@ BuildSpec checked(const BuildSpec& spec);
 void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
                       std::span<const std::string> outputs, const BuildContext& context);
 
-// Refuses now an output that could not be written once all is built, and folders and files whose
-// writing would destroy a scene or a file that is not ours.
+// Throws Error{kInvalidInput} if the output could not be written at the end of the build, or if the
+// build would overwrite a scene or a file that voxdag did not create.
 void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& context);
 
 }  // namespace voxdag

@@ -26,7 +26,7 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   BuildScene source(full.geometry, folder, budget, context);
   refuse_own_files(full, source, folder, {}, context);
   WorkFolder work(context, folder, full.run.lock_wait_s);
-  // Removes spilled triangles; a job in the given work folder stays as it is.
+  // Removes spilled triangles. A job in the work folder is left unchanged.
   struct Cleanup {
     WorkFolder& work;
     const bool own_folder;

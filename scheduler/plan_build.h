@@ -1,4 +1,5 @@
-// plan_build(): what a build will need, without building. The one entry of `voxdag plan`.
+// plan_build() estimates the time, memory and disk of a build without building. It implements
+// `voxdag plan`.
 #pragma once
 
 #include "scheduler/spec/build_spec.h"

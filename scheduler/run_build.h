@@ -6,8 +6,9 @@
 
 namespace voxdag {
 
-// Builds, or resumes the build that the work folder holds, or throws Error. Nothing is left under
-// the final name unless it is whole. The report is also written to output + ".report.json".
+// Runs or resumes the build in the work folder. Throws Error. The output path is created only by
+// the final rename, so it never holds a partial file. The report is also written to output +
+// ".report.json".
 BuildReport run_build(const BuildSpec& spec, const BuildContext& context);
 
 }  // namespace voxdag

@@ -27,7 +27,7 @@ ScratchPath::~ScratchPath() {
 
 ScratchFile::ScratchFile(ScratchFolder& folder)
     : folder_(folder),
-      state_{folder.take_id(), 0, {}},
+      state_{folder.next_id(), 0, {}},
       path_(std::make_shared<ScratchPath>(folder, name_of(state_.id))),
       out_(folder.files().create(path_->path())),
       in_(folder.files().open_read(path_->path())) {}

@@ -32,7 +32,7 @@ class ScratchFolder {
   uint64_t bytes_written() const { return bytes_written_; }
   void count_written(uint64_t bytes) { bytes_written_ += bytes; }
   // Returns every id once.
-  uint32_t take_id() { return next_id_++; }
+  uint32_t next_id() { return next_id_++; }
   uint32_t next_id() const { return next_id_; }
   void set_next_id(uint32_t id) { next_id_ = id; }
   // Removes the files that an earlier merge left, except `names`. Files with names that a merge

@@ -16,7 +16,7 @@ inline bool is_pass_segment(uint32_t id) { return id >= kFirstPassSegment; }
 class PassSegment {
  public:
   PassSegment(ScratchFolder& scratch, MemoryBudget& budget)
-      : PassSegment(scratch, kFirstPassSegment + scratch.take_id()) {
+      : PassSegment(scratch, kFirstPassSegment + scratch.next_id()) {
     writer_.emplace(scratch.files(), scratch.path(), id_, budget);
   }
   // The segment that an earlier merge left.

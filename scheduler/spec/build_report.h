@@ -32,7 +32,7 @@ struct BuildReport {
   uint64_t spill_bytes = 0;
   uint64_t memory_bytes = 0;
   unsigned threads = 0;
-  std::string backend;  // that built what was not reused
+  std::string backend;  // that built the subvolumes of this run
   std::vector<StageTime> stages;
   double wall_s = 0;
   double cpu_s = 0;
@@ -42,7 +42,7 @@ struct BuildReport {
   std::string merge_request;  // of a build that a job of the cluster merged (MergeJob::request())
 };
 
-// Where the report of the build of this file lies.
+// Path of the build report of an output file.
 inline std::string report_path(const std::string& output) { return output + ".report.json"; }
 
 // One JSON object; docs/cli.md lists its names.

@@ -1,4 +1,4 @@
-// What a build is asked to do, and what it needs of its surroundings.
+// The options of a build, and the interfaces through which it reaches its environment.
 #pragma once
 
 #include <array>
@@ -51,7 +51,7 @@ std::string geometry_json(const GeometryOptions& options);
 struct ClusterOptions {
   ClusterEngine engine = ClusterEngine::kNone;
   uint64_t tasks = 0;          // 0 for a choice by expected work
-  uint64_t max_running = 0;    // tasks at a time; 0 for as many as the cluster runs
+  uint64_t max_running = 0;    // max concurrent tasks; 0 for no limit
   std::string submit_options;  // further options of sbatch, as a shell would split them
   std::string program_path;    // of voxdag, the same on all machines; "" for this program's
   std::string program_version;
@@ -61,7 +61,7 @@ struct ClusterOptions {
   double slurm_interval_s = 5;  // between two questions to Slurm
   // How long Slurm may lack the nodes that tasks ask for: after its start it knows none.
   double slurm_start_s = 15;
-  // Of the job of the cluster that merges (slurm/merge_job.h); none: this process merges.
+  // Options of the merge job (slurm/merge_job.h). Without them this process merges.
   struct MergeJobOptions {
     std::vector<std::string> arguments;  // this program's, for the same build as that job
     std::string folder;                  // in which it runs
@@ -84,7 +84,7 @@ struct RunOptions {
   MethodName method = MethodName::kDefault;
   std::string cache_folder;  // "" for none
   uint64_t cache_bytes = uint64_t{16} << 30;
-  // Time that is worth a checkpoint: CPU time of the merge, wall time of what comes before it.
+  // Interval between checkpoints: CPU time in the merge, wall time before it.
   double checkpoint_interval_s = 2;
   // Triangles of a scene whose ingest, then about two CPU seconds, is worth checkpoints.
   uint64_t durable_min_triangles = uint64_t{4} << 20;

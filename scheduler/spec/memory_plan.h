@@ -1,44 +1,43 @@
-// How a build divides the memory that it is given (--memory): the page where every fraction of the
-// budget stands, or the struct of the layer that it belongs to.
+// How a build divides its memory budget (--memory). This page lists every fraction of the budget,
+// or the struct that defines it.
 //
 //   stage         part                              size                         charged by
 //   ------------  --------------------------------  ---------------------------  -------------
-//   scan, ingest  vertices of an indexed mesh       up to 1/4 of what is free    VertexCache
+//   scan, ingest  vertices of an indexed mesh       up to 1/4 of free            VertexCache
 //                 top tree                          up to 1/16                   TopTree
 //   ingest until  triangles; the rest is spilled    up to 1/3                    TriangleStore
 //   built
-//                 cursors and pieces of the scene   1/2 of what is free          each part
+//                 cursors and pieces of the scene   1/2 of free                  each part
 //                   their cells and leaves          up to 3 MiB each             nobody
 //   partition     half-filled chunks of triangles   1/8                          nobody
-//   estimate      pilot build, one at a time        3/4 of what is free          Backend
-//   build         WorkerMemory, for every worker    what is free / workers
+//   estimate      pilot builds, consecutive         3/4 of free                  Backend
+//   build         WorkerMemory, for every worker    free / workers
 //                   segment writer                  1.5 MiB                      SegmentWriter
 //                   pages that a backend retains    8 MiB                        nobody
 //                   half-filled chunks of a split   512 KiB                      nobody
 //                   share: Backend::build()         the rest                     Backend
-//                     tables made in advance        1/4 of what is free of it    BackendMemory
-//                     each table of the plane memo  1/16, 1/8 of what is free    BackendMemory
-//                     block memo                    1/16 of what is free         BackendMemory
+//                     tables made in advance        1/4 of its free part         BackendMemory
+//                     each table of the plane memo  1/16, 1/8 of free            BackendMemory
+//                     block memo                    1/16 of free                 BackendMemory
 //                     more pages that it retains    1/8, up to 128 MiB           nobody
-//                     or: key for the cache         what those pages leave       ArtifactCache
-//   color         surfaces; the rest is spilled     up to 1/3 of what is free    SurfaceStore
+//                     or: key for the cache         rest after those pages       ArtifactCache
+//   color         surfaces; the rest is spilled     up to 1/3 of free            RecordStore
 //                 textures, if they take no more    up to 1/2 of the rest        TextureSet
 //                   those on their way there        1/8                          nobody
-//                 ColorMemory, for every worker     what is free / workers
+//                 ColorMemory, for every worker     free / workers
 //                   a region, encoded ones of       1/2, 12 to 46 MiB            CubeBaker
 //                     a cube among it
 //                   its other attributes            16 MiB, if any; or more      CubeBaker
 //                   surfaces of a cube              2/3 of the rest              CubeBaker
 //                   pages of textures               1/3 of the rest              TextureReader
-//   merge         MergeMemory, of what is free
+//   merge         MergeMemory, of free
 //                   workers, together               1/4                          merge
 //                   positions of two levels         1/6 for each; then spilled   merge
 //                   hash partition                  the rest, less 1/16          merge
-//
-// "What is free" is what the budget could still give when the part is taken. Uncharged are, besides
-// the parts above, lists that grow with the number of subvolumes and frames: the indexes of the
-// artifacts that one merge pass reads (56 bytes per frame, for which the hash partition leaves its
-// 1/16) and the chunk lists of spilled triangles where the share of the triangles is full.
+//  "Free" is the part of the budget still available when a stage allocates. Two kinds of memory are
+// not charged: the parts marked "nobody" above, and lists that grow with the number of subvolumes
+// and frames. These lists are the artifact indexes of one merge pass (56 bytes per frame; the hash
+// partition leaves 1/16 of the budget for them) and the chunk lists of spilled triangles.
 #pragma once
 
 #include <algorithm>
@@ -52,8 +51,8 @@
 namespace voxdag {
 
 struct MemoryPlan {
-  // Of a thread that reads the scene: windows, batches and a piece with what it counts into the top
-  // tree, its share of the vertices not counted.
+  // Memory of one thread that reads the scene: windows, batches, a piece and its counts for the top
+  // tree. Does not include its share of the vertices.
   static constexpr uint64_t kIngestWorkerBytes = uint64_t{6} << 20;
   static constexpr uint64_t kSplitBufferBytes = uint64_t{512} << 10;
 
@@ -79,10 +78,10 @@ struct MemoryPlan {
 
 // What the workers of the color stage get.
 struct ColorMemory {
-  // For the least cells of a region that are baked at once, and for all of them.
+  // Minimum for baking a region in pieces, and enough for baking it in one piece.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
   static constexpr uint64_t kSolidRegionBytes = uint64_t{46} << 20;
-  // Of what is not color, and the share of the sums in it, which may take more.
+  // Memory for attributes other than color, and the share of their sums, which may grow beyond it.
   static constexpr uint64_t kValueBytes = uint64_t{16} << 20;
   static constexpr uint64_t kValueSumBytes = uint64_t{4} << 20;
 
@@ -113,14 +112,13 @@ struct ColorMemory {
 struct WorkerMemory {
   // Every worker has a segment file open.
   static constexpr uint64_t kMaxWorkers = 256;
-  // What a worker needs besides its share.
+  // Memory one worker needs outside its share.
   static constexpr uint64_t kOutsideShareBytes = kSegmentWriterBytes + BackendMemory::kMinPageBytes;
 
   unsigned workers = 1;
   uint64_t share_bytes = 0;  // of each, for Backend::build()
 
-  // As many workers as are wanted, unless their shares would be too small for the smallest
-  // subvolume.
+  // Returns `wanted` workers, or fewer if their shares could not hold the smallest subvolume.
   static constexpr WorkerMemory divide(uint64_t free_bytes, unsigned wanted) {
     constexpr uint64_t kMinBytes = kSmallestBudget + kOutsideShareBytes;
     const uint64_t workers =
@@ -128,7 +126,8 @@ struct WorkerMemory {
     const uint64_t each = free_bytes / workers;
     return {static_cast<unsigned>(workers), each - std::min(each, kOutsideShareBytes)};
   }
-  // Of its share, what a worker may take for an artifact's key: the backend's pages stay.
+  // The part of a worker's share for an artifact's key; the rest holds the backend's retained
+  // pages.
   static constexpr uint64_t key_bytes(uint64_t share_bytes) { return share_bytes / 8 * 7; }
 };
 

@@ -24,7 +24,7 @@ struct ClusterTotals {
 struct ColorReport {
   uint64_t resolution = 0;               // of the color grid; 0 for a file without colors
   uint64_t cells = 0;                    // of that grid, that have a color
-  uint64_t images = 0, image_bytes = 0;  // and pyramids of those that were decoded
+  uint64_t images = 0, image_bytes = 0;  // decoded images, and their pyramids
   uint64_t cubes = 0, cubes_reused = 0;  // with surfaces, and those that an earlier run baked
   uint64_t spill_bytes = 0;
 };

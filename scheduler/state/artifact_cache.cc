@@ -37,7 +37,7 @@ bool is_partial(const DirectoryEntry& entry) {
 }
 
 // An entry is written in seconds: a partial one of this age has lost its writer.
-constexpr double kAbandonedAfter_s = 3600;
+constexpr double kAbandonedAfterS = 3600;
 
 }  // namespace
 
@@ -47,7 +47,7 @@ ArtifactCache::ArtifactCache(FileSystem& files, std::string folder, uint64_t lim
   const double now_s = clock_seconds(CLOCK_REALTIME);
   for (const DirectoryEntry& entry : files_.list(folder_)) {
     if (is_entry(entry)) known_bytes_ += entry.bytes;
-    if (is_partial(entry) && now_s - entry.modified_s > kAbandonedAfter_s) remove(entry);
+    if (is_partial(entry) && now_s - entry.modified_s > kAbandonedAfterS) remove(entry);
   }
 }
 

@@ -33,7 +33,7 @@ class ArtifactCache {
   // damaged.
   bool find(const std::string& key, uint32_t grid_levels, StoredSubvolume& subvolume,
             SegmentWriter& segment);
-  // Adds the artifact, which lies flushed in `segment`. Fails silently, since no build needs it.
+  // Adds a flushed artifact of `segment`. Errors are ignored, because the cache is optional.
   void add(const std::string& key, const ReadableFile& segment, const ArtifactRef& artifact);
 
  private:
@@ -49,7 +49,7 @@ class ArtifactCache {
   const std::string folder_;
   const uint64_t limit_bytes_;
   std::mutex mutex_;          // guards known_bytes_
-  uint64_t known_bytes_ = 0;  // when the folder was last listed, plus what was added since
+  uint64_t known_bytes_ = 0;  // bytes at the last listing plus added bytes
   std::atomic<uint64_t> partials_{0};
 };
 

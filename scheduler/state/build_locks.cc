@@ -10,7 +10,7 @@ namespace voxdag {
 namespace {
 
 // `voxdag status` locks a work folder for an instant.
-constexpr double kQuiet_s = 0.3;
+constexpr double kQuietS = 0.3;
 constexpr auto kPause = std::chrono::milliseconds(20);
 
 }  // namespace
@@ -24,7 +24,7 @@ std::unique_ptr<FileLock> wait_for_lock(const std::function<std::unique_ptr<File
     if (auto lock = try_lock()) return lock;
     const double waited_s = wall_seconds() - begin_s;
     if (waited_s >= max_s) return nullptr;
-    if (quiet && waited_s >= kQuiet_s) {
+    if (quiet && waited_s >= kQuietS) {
       context.progress.warn(what + " is in use by another build: waiting up to " +
                             std::to_string(std::lround(max_s)) + " s in case that one is ending");
       quiet = false;

@@ -22,7 +22,7 @@ void CommitQueue::commit() {
 }
 
 void CommitQueue::finish() {
-  // Triangles that a later run could read stay until their subvolumes are durable.
+  // Durable triangles are kept until their subvolumes are durable.
   if (!next_group_.bins.empty()) commit();
   wait();
   segment_->complete();

@@ -1,7 +1,6 @@
-// A worker's segment, and the record of what is in it: artifacts are made durable in groups, and
-// only then named in the job store. A thread of its own does that, so that the worker does not wait
-// for the disk. The last group is made durable only when commit() asks for it: a short build ends
-// before its artifacts are worth a sync. Used by one thread at a time.
+// A worker's segment. Artifacts become durable in groups and are then recorded in the job store, on
+// a separate thread, so that the worker does not wait for the disk. The last group becomes durable
+// only by commit(): a short build ends before its artifacts are worth a sync. Not thread-safe.
 #pragma once
 
 #include <future>
@@ -36,10 +35,10 @@ class CommitQueue {
   // segment. Drops the bin now, and releases it once the subvolume is recorded. Waits for a disk
   // that is a whole group behind. Throws what went wrong with an earlier group.
   void add_built(const StoredSubvolume& subvolume, BinId bin);
-  // Begins to make durable all that was built so far.
+  // Starts to make all built artifacts durable.
   void commit_in_background();
-  // Makes durable all that was built so far. An error is thrown once; what the disk could store is
-  // tried again by the next call.
+  // Makes all built artifacts durable. Throws an error once; the next call tries the remaining
+  // artifacts again.
   void commit();
   // Nothing more is built: completes the segment and shows the last group in the job store, durable
   // only after commit(). The triangle store is not used any more.
@@ -56,7 +55,8 @@ class CommitQueue {
   void commit_pending();
   // Waits for commit_pending() on the other thread, and throws what went wrong there.
   void wait();
-  // After a failure: makes durable and records what the disk could store of both groups.
+  // Called after a failure: makes the artifacts of both groups durable and records them, as far as
+  // the disk accepts them.
   void recover();
 
   JobStore& jobs_;

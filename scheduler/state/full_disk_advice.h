@@ -8,9 +8,9 @@
 
 namespace voxdag {
 
-// What to do about a full disk, as the end of an error message. The artifacts of all subvolumes,
-// estimated from those that are built, and a global file of about the same size must fit.
-// Colors come on top.
+// Advice about a full disk for the end of an error message. The artifacts of all subvolumes,
+// estimated from the built subvolumes, and a global file of about the same size must fit. Colors
+// need additional space.
 inline std::string full_disk_advice(std::span<const StoredSubvolume> leaves, bool has_colors) {
   double built = 0, planned = 0, bytes = 0;
   for (const StoredSubvolume& subvolume : leaves) {

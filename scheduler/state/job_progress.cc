@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-constexpr double kWriteInterval_s = 1;
+constexpr double kWriteIntervalS = 1;
 
 }  // namespace
 
@@ -18,7 +18,7 @@ void JobProgress::update(bool at_once, const Change& change) {
   std::unique_lock lock(mutex_);
   change(snapshot_);
   const double now = wall_seconds();
-  if (!at_once && now - last_written_s_ < kWriteInterval_s) return;
+  if (!at_once && now - last_written_s_ < kWriteIntervalS) return;
   last_written_s_ = now;
   lock.unlock();
   write();

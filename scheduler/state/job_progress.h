@@ -2,7 +2,7 @@
 // `voxdag status` can show it from another process. Thread-safe.
 //
 // The thread whose call is due lists the work folder and writes the row; no other thread waits for
-// it. That is little enough not to need a thread of its own.
+// it. This is too little work for a separate thread.
 #pragma once
 
 #include <mutex>

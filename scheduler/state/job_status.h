@@ -29,9 +29,8 @@ struct JobStatus {
 // Throws Error{kNotFound} if the folder has no job store.
 JobStatus read_job_status(FileSystem& files, const std::string& work_folder);
 
-// One JSON object, names as in docs/cli.md.
-// `cluster`: that of a cluster build as JSON, if it
-// is one.
+// One JSON object, names as in docs/cli.md. `cluster` is the JSON status of a cluster build, else
+// "".
 std::string status_json(const JobStatus& status, const std::string& cluster = "");
 
 }  // namespace voxdag

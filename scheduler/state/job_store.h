@@ -1,18 +1,17 @@
-// The durable state of a build in one SQLite file of the work folder (WAL, synchronous = FULL where
-// it matters, foreign keys): the progress of ingest, the job, its subvolumes and their artifacts,
-// the unfinished merge, timings and progress.
+// The durable state of a build in one SQLite file of the work folder (WAL, synchronous = FULL for
+// results, foreign keys): the progress of ingest, the job, its subvolumes and their artifacts, the
+// unfinished merge, timings and progress.
 //
 // Invariants:
 //   1. A row names an artifact only after the artifact's bytes were synced.
-//   2. Subvolumes form a forest: a split one has its eight parts (those with triangles) as
-//      children; the leaves are what is built.
-//   3. Every row that decides the result carries a checksum; one that fails it is Error{kCorrupt}.
-//      Subvolumes are numbered from 1, and the job's row has their number: so is one that is
-//      missing.
-//   4. All rows of one call are committed together or not at all.
-// Thread-safe. One process writes, which the work folder's lock ensures; readers (`voxdag status`)
-// may open the same file at any time. Only the writer's leaves() include what is built but not yet
-// durable.
+//   2. Subvolumes form a forest: a split subvolume has its octants with triangles as children. Only
+//      leaves are built.
+//   3. Every row that decides the result has a checksum; a mismatch is Error{kCorrupt}. Subvolumes
+//      are numbered from 1, and the job's row has their number, so a missing row is also
+//      Error{kCorrupt}.
+//   4. All rows of one call are committed together or not at all. Thread-safe. One process writes,
+//      which the work folder's lock ensures; readers (`voxdag status`) may open the same file at
+//      any time. Only the writer's leaves() include subvolumes that are built but not yet durable.
 #pragma once
 
 #include <cstddef>
@@ -50,7 +49,7 @@ struct StoredSubvolume {
   Cube cube;
   double weight = 0;
   SubvolumeState state = SubvolumeState::kPlanned;
-  // Of the built ones; no artifact if `summary` is empty.
+  // The artifact of a built subvolume; none if `summary` is empty.
   ArtifactRef artifact;
   SubDagSummary summary;
 };
@@ -67,7 +66,7 @@ struct JobResult {
   std::string sha256;
   uint64_t bytes = 0;
   MergeReport merge;     // without input_nodes and scratch_bytes
-  std::string sections;  // digest of what is behind the levels; "" if nothing is
+  std::string sections;  // digest of the sections behind the levels; "" without any
 };
 
 // The progress of a build as other processes see it.
@@ -96,22 +95,22 @@ class JobStore {
   std::optional<JobIdentity> job();
   // Replaces all that the store has by a new job whose subvolumes are all planned.
   void start(const JobIdentity& job, std::span<const StoredSubvolume> plan);
-  // All that are not split, in the order of their ids.
+  // Returns the subvolumes that are not split, by id.
   std::vector<StoredSubvolume> leaves();
   void record_built(std::span<const StoredSubvolume> built);
   // Makes leaves() of this object return these subvolumes as built, although they become durable
   // only with record_built().
   void mark_built_in_memory(std::span<const StoredSubvolume> built);
-  // Makes leaves() return as planned again what is not recorded.
+  // Makes leaves() return unrecorded subvolumes as planned again.
   void forget_built_in_memory();
   // Returns the ids of the parts, in their order.
   std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
-  // Plans a subvolume again whose artifact turned out to be damaged. The progress of ingest is
-  // forgotten too, since the triangles of built subvolumes are gone.
+  // Plans a subvolume with a damaged artifact again. Also removes the progress of ingest, because
+  // the triangles of built subvolumes were released.
   void mark_for_rebuild(const StoredSubvolume& lost);
 
-  // The progress of scan, ingest and partition as save_ingest() stored it, of the present job or of
-  // one that is about to start. Throws Error{kCorrupt} if it fails its checksum.
+  // Returns the progress of scan, ingest and partition that save_ingest() stored, for the present
+  // or the next job. Throws Error{kCorrupt} if it fails its checksum.
   std::optional<std::vector<std::byte>> ingest();
   void save_ingest(std::span<const std::byte> record);
   // Writes nothing if none is stored.

@@ -73,7 +73,7 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
   const auto try_lock = [&]() -> std::unique_ptr<FileLock> {
     files_.make_directories(path_);
     check_is_ours();
-    was_there_ = files_.exists(lock_path);
+    existed_before_ = files_.exists(lock_path);
     try {
       return files_.try_lock(lock_path);
     } catch (const Error& error) {
@@ -169,7 +169,7 @@ void WorkFolder::remove_cluster_files() {
       remove_silently(path);
       continue;
     }
-    // The attempt may remove it, too.
+    // The attempt may also remove it.
     try {
       for (const DirectoryEntry& inner : files_.list(path))
         if (segment_id(inner.name)) remove_silently(path + "/" + inner.name);
@@ -204,7 +204,7 @@ void WorkFolder::remove_if_empty(const std::string& folder) {
   try {
     files_.remove_directory(folder);
   } catch (const Error&) {
-    // What is not ours, or was added just now, stays.
+    // Other programs' files and new files are kept.
   }
 }
 

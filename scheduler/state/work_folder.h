@@ -1,6 +1,5 @@
-// The folder of a build's job store and temporary files, locked by one process at a time. Only
-// files that voxdag made, known by their names, are ever removed from it; the folder itself is
-// removed when nothing else is left.
+// The folder of a build's job store and temporary files, with an exclusive lock. Only files with
+// names that voxdag uses are removed from it. The folder itself is removed when it is empty.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +15,7 @@
 
 namespace voxdag {
 
-// Segments that tasks of a cluster wrote have ids from here on, those of this process below.
+// First segment id of cluster tasks. Segments of this process have smaller ids.
 inline constexpr uint32_t kFirstClusterSegment = uint32_t{1} << 24;
 
 class WorkFolder {
@@ -27,12 +26,13 @@ class WorkFolder {
 
   const std::string& path() const { return path_; }
   // Whether an earlier build used the folder.
-  bool was_there() const { return was_there_; }
+  bool existed_before() const { return existed_before_; }
   std::string store_path() const { return store_path(path_); }
   static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
   // The process that has locked the folder: "process 17 on box"; "" if none has.
   static std::string holder(FileSystem& files, const std::string& folder);
-  // The files in a folder that have names of ours: a build there may remove or change them.
+  // Returns the files in a folder with names that voxdag uses: a build there may remove or change
+  // them.
   static std::vector<std::string> files_in(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
   // What a scene's compressed geometry is decoded to.
@@ -45,12 +45,12 @@ class WorkFolder {
   // What a cluster build shares with its tasks.
   std::string cluster_path() const { return path_ + "/cluster"; }
   std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;
-  // One more than the largest id of a segment that is there.
+  // Returns the largest id of an existing segment plus one.
   uint32_t next_segment_id() const;
   // Bytes of all files in the folder, for reports.
   uint64_t bytes() const;
 
-  // Frees the space of bytes of a segment that are no longer read. One call at a time.
+  // Frees the disk space of bytes of a segment that are no longer read. Not thread-safe.
   void release(const SegmentRange& range);
 
   // Removes the segments for which `is_named` is false: an interrupted build left them, and no row
@@ -58,7 +58,7 @@ class WorkFolder {
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
   // Removes merge data.
   void empty_scratch();
-  // Removes what a cluster build has here. Silent, like remove().
+  // Removes the files of a cluster build. Errors are ignored.
   void remove_cluster_files();
   // Removes spilled triangles. Silent, like remove().
   void remove_spilled() { remove_silently(spill_path()); }
@@ -66,8 +66,8 @@ class WorkFolder {
   void remove_durable() { remove_silently(durable_path()); }
   // Removes colors. Silent, like remove().
   void remove_colors() { remove_silently(colors_path()); }
-  // Removes all files of voxdag, and the folder if it is empty then. Silent: what cannot be removed
-  // costs space, not correctness.
+  // Removes all files of voxdag, and the folder if it is empty then. Errors are ignored: remaining
+  // files cost only space.
   void remove();
 
  private:
@@ -78,7 +78,7 @@ class WorkFolder {
 
   FileSystem& files_;
   const std::string path_;
-  bool was_there_ = false;
+  bool existed_before_ = false;
   std::unique_ptr<FileLock> lock_;
   std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments that lost some bytes
 };

@@ -13,12 +13,12 @@
 namespace voxdag {
 namespace {
 
-// The clock of a file system's times advances in steps of up to 10 ms; where times are whole
-// seconds, in steps of up to two.
-constexpr int64_t kSecond_ns = 1'000'000'000;
-constexpr int64_t kTick_ns = kSecond_ns / 10;
-constexpr int64_t kCoarseTick_ns = 2 * kSecond_ns;
-// At the end of the partition each triangle lies in the file twice, some more often.
+// The clock of file times advances in steps of up to 10 ms. Times without a fraction of a second
+// may have steps of up to two seconds.
+constexpr int64_t kSecondNs = 1'000'000'000;
+constexpr int64_t kTickNs = kSecondNs / 10;
+constexpr int64_t kCoarseTickNs = 2 * kSecondNs;
+// After the partition the file contains each triangle twice, some more often.
 constexpr double kDurableCopies = 2.2;
 // Free disk that a scene's triangles need, relative to their copies: the build needs as much again.
 constexpr double kFreePerCopy = 2;
@@ -52,9 +52,9 @@ int64_t trusted_from_ns(const std::vector<SourceFile>& files) {
   for (const auto& [path, identity] : files) {
     if (identity == FileIdentity{}) return INT64_MAX;
     const bool whole_seconds =
-        identity.modified_ns % kSecond_ns == 0 && identity.changed_ns % kSecond_ns == 0;
+        identity.modified_ns % kSecondNs == 0 && identity.changed_ns % kSecondNs == 0;
     trusted = std::max(trusted, std::max(identity.modified_ns, identity.changed_ns) +
-                                    (whole_seconds ? kCoarseTick_ns : kTick_ns));
+                                    (whole_seconds ? kCoarseTickNs : kTickNs));
   }
   return trusted;
 }
@@ -85,7 +85,8 @@ std::optional<IngestState> IngestCheckpoint::resume() {
   if (record_->request == request_of(spec_) && files_are_unchanged() &&
       (record_->state.stage != IngestStage::kReady || jobs_->job()))
     return record_->state;
-  // The saved checkpoint stays until another scene replaces it: this one may only be out of reach.
+  // Keep the saved checkpoint until another scene replaces it: this scene may be temporarily
+  // unreachable.
   record_.reset();
   return std::nullopt;
 }
@@ -251,7 +252,7 @@ bool IngestCheckpoint::files_are_unchanged() const {
       return context_.files.open_read(file.path)->identity() == file.identity;
     });
   } catch (const Error&) {
-    return false;  // Whoever reads the scene reports what is wrong.
+    return false;  // Reading the scene reports the error.
   }
 }
 

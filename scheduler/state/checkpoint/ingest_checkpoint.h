@@ -1,13 +1,13 @@
-// Lets scan, ingest and partition of a large scene survive the process: about every two seconds
-// what was done is made durable, in the file of a DurableStore and a row of the job store that
-// refers to it, so that the next run resumes there. It decides which triangle store a build uses.
+// Checkpoints of scan, ingest and partition of a large scene. About every two seconds the progress
+// becomes durable, in the file of a DurableStore and a row of the job store that refers to it. The
+// next run resumes there. The checkpoint also chooses the build's triangle store.
 //
 // Invariants:
 //   1. The row refers to no bytes of the file that were not synced before.
-//   2. A row counts only for the same request, and if every file of the scene is the one that was
-//      read, unchanged: same inode, size and times, and these so old when the file was opened that
-//      any later change shows in them.
-//   3. A row that does not count, or is damaged, is forgotten: the scene is read again.
+//   2. A row is valid only for the same request, and if every file of the scene is unchanged: same
+//      inode, size and times. The times must have been old enough when the file was opened that any
+//      later change shows in them.
+//   3. An invalid or damaged row is removed, and the scene is read again.
 // Used by one thread.
 #pragma once
 
@@ -44,8 +44,8 @@ class IngestCheckpoint {
   // Throws Error{kNoSpace} if the scene's triangles fit neither memory nor disk, unless forced: it
   // may have billions of them in a few bytes.
   void check_disk_space(const TriangleSource& scene) const;
-  // Enables checkpoints for a scene that was opened at that Unix time, and forgets those of others.
-  // Does not enable them if a change of a file since then might not show in its times.
+  // Enables checkpoints for a scene opened at that Unix time, and removes checkpoints of other
+  // scenes. Does nothing if a later change of a file might not show in its times.
   void enable(const TriangleSource& scene, int64_t opened_ns);
   // Whether checkpoints are enabled, and for a scene of exactly these files.
   bool matches(const std::vector<SourceFile>& files) const;
@@ -64,8 +64,8 @@ class IngestCheckpoint {
   // `top` if given; sets the extents in `state`. Does nothing where checkpoints are not enabled,
   // and disables them if a file of the scene has changed.
   void save(IngestState& state, std::optional<TopTreeCells> top = {});
-  // The same on another thread, so that ingest does not wait for the disk. The next call throws
-  // what goes wrong there.
+  // Saves on another thread, so that ingest does not wait for the disk. The next call throws the
+  // thread's error.
   void save_in_background(IngestState& state, std::optional<TopTreeCells> top = {});
   // All subvolumes are built and recorded: removes the triangles. What remains is the record that
   // lets a later run know the scene without reading it.

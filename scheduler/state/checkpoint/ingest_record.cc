@@ -10,7 +10,7 @@
 namespace voxdag {
 namespace {
 
-// Increased with every change of what follows it.
+// Version of the record's layout.
 constexpr uint64_t kRecordVersion = 5;
 
 template <class Plain>

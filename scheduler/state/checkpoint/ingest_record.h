@@ -1,5 +1,5 @@
-// What a checkpoint of scan, ingest and partition records: which scene they read and how far they
-// are. One row of the job store holds it; the triangles themselves lie in the durable store.
+// The record of a checkpoint of scan, ingest and partition: the scene and the progress. It is one
+// row of the job store; the triangles are in the durable store.
 #pragma once
 
 #include <cstddef>
@@ -25,8 +25,8 @@ struct IngestCounts {
 enum class IngestStage : uint32_t {
   kScan,       // the bounds of the triangles up to `position` are known
   kIngest,     // the grid is known, and the triangles up to `position` are in the scene's bin
-  kPartition,  // all are, and the first `position` of them are in the cube bins, too
-  kReady,      // all are in the cube bins; the scene's bin is gone
+  kPartition,  // all are; the first `position` of them are also in cube bins
+  kReady,      // all are in the cube bins; the scene's bin is released
 };
 
 // A plain value. What is not known yet has its default.
@@ -52,7 +52,7 @@ struct IngestRecord {
 
 std::vector<std::byte> encode(const IngestRecord& record);
 // Throws Error{kCorrupt} for bytes that encode() did not write, Error{kUnsupportedVersion} for
-// those of another version of it.
+// bytes of another version.
 IngestRecord decode_ingest_record(std::span<const std::byte> bytes);
 
 }  // namespace voxdag
