@@ -317,7 +317,7 @@ std::string submit_merge_job(BuildJob& job, MergeJob& merge_job) {
   return id;
 }
 
-// A build that is restarted stops the job that merges: it may hold the locks.
+// Stops the merge job of an earlier build, which may hold the locks.
 void stop_earlier_merge_job(const BuildSpec& spec, const BuildContext& context) {
   try {
     stop_merge_job(context.files, work_folder_of(spec.run), commands_of(spec));

@@ -36,7 +36,7 @@ class StateSaver {
   // Discards the durable state and its files.
   void forget();
 
-  // Whether the last save has finished and enough CPU time has passed since it began. Throws what
+  // True if the last save has finished and enough CPU time has passed since it began. Throws what
   // that save threw.
   bool due();
   // Saves a state in the background. `named` are the scratch files that it names, which `sync`

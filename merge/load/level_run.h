@@ -33,7 +33,7 @@ class LevelRun {
   uint64_t rows() const { return rows_; }
   const RowFormat& format() const { return format_; }
   bool bricks() const { return format_.bricks; }
-  // Whether children are positions already, not indices into the run's own level below.
+  // True if children are positions, not indices into the run's level below.
   bool rewired() const { return rewired_; }
 
   // Rows before frame `index`, which may be the end.

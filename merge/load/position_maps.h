@@ -29,7 +29,7 @@ class PositionMaps {
   PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<ScratchFile> file,
                uint64_t resident_bytes, MemoryBudget& budget);
 
-  // Whether the maps are in memory.
+  // True if the maps are in memory.
   bool resident() const { return file_ == nullptr; }
   bool wide() const { return wide_; }
   // Words of a position.

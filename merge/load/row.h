@@ -28,7 +28,7 @@ inline constexpr uint8_t kBrickRowMask = 3;
 inline constexpr uint32_t kBrickWords = 2;
 inline constexpr uint32_t kMaxRowWords = 16;
 
-// How the rows of a level are held.
+// The representation of a level's rows.
 struct RowFormat {
   bool bricks = false;
   bool wide = false;  // children take two words
@@ -47,7 +47,7 @@ inline uint64_t get_position(const uint32_t* from, bool wide) {
   return wide ? uint64_t{from[0]} << 32 | from[1] : from[0];
 }
 
-// How many rows, and how many words they have in all.
+// Number of rows and their total number of words.
 struct RowCount {
   uint64_t rows = 0;
   uint64_t words = 0;

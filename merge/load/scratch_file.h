@@ -66,7 +66,7 @@ class ScratchPath {
   bool retained_ = false;
 };
 
-// What is needed to open a scratch file again.
+// State from which a scratch file is opened again.
 struct ScratchFileState {
   uint32_t id = 0;
   uint64_t words = 0;

@@ -34,9 +34,9 @@ struct LevelExtent {
 class LevelOutput {
  public:
   virtual ~LevelOutput() = default;
-  // Whether positions count words; otherwise they count rows.
+  // True if positions count words; otherwise they count rows.
   virtual bool in_words() const = 0;
-  // Whether the children of parents of a level with so many positions are wide.
+  // True if a level with that many positions needs wide child indices in its parents.
   virtual bool is_wide(uint64_t positions) const = 0;
   virtual void begin_level(uint32_t level) = 0;
   // Receives all rows of the level in order. Calls do not overlap.

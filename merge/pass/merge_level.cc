@@ -78,7 +78,7 @@ class PartitionMerge {
     return size;
   }
 
-  // Whether a worker can sort a bucket of this size.
+  // True if a worker can sort a bucket of this size.
   bool fits(const RowCount& size) const {
     return size.rows <= BucketSorter::kMaxRows &&
            BucketSorter::bytes_for(size) <= context_.plan.worker_bytes;
@@ -141,7 +141,7 @@ class PartitionMerge {
     turns_.end();
   }
 
-  // Where the positions of the rows of a slice in a bucket are stored.
+  // Returns the place for the positions of a slice's rows in a bucket.
   uint32_t* positions_of(size_t bucket, size_t s) {
     const RunSlice& slice = partition_.slices()[s];
     const uint64_t row = partition_.bucket_begin(bucket, s).row;

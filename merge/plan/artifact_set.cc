@@ -73,7 +73,7 @@ uint64_t content_checksum(const ArtifactReader& reader) {
   return checksum64(std::as_bytes(std::span(words)));
 }
 
-// What a hash partition needs to hold any two neighboring frames.
+// Memory a hash partition needs to hold any two neighboring frames.
 uint64_t min_partition_bytes(const ArtifactReader& reader, bool wide) {
   uint64_t max = 0;
   for (const ArtifactLevel& level : reader.levels()) {

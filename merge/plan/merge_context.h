@@ -1,4 +1,4 @@
-// What all steps of a merge share: the context of the whole merge, and the task of one level.
+// The shared state of a merge's steps: the context of the merge, and the task of one level.
 #pragma once
 
 #include <cstdint>

@@ -34,7 +34,7 @@ class BucketSorter {
   // The position of every row, relative to the first position of the bucket: slice after slice, in
   // the order of each slice.
   std::span<const uint32_t> positions() const { return {positions_.data(), row_count_}; }
-  // How many positions the unique rows take.
+  // Returns the number of positions of the unique rows.
   uint64_t extent() const { return extent_; }
 
  private:

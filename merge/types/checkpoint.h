@@ -11,7 +11,7 @@
 
 namespace voxdag {
 
-// Where the state of an unfinished merge is stored, so that it can be resumed.
+// Stores the state of an unfinished merge, so that it can be resumed.
 //
 // A state is some hundred KB that only the merge understands. It names files of the scratch folder
 // and the partial global file, all of which are synced before save(). It identifies the inputs by

@@ -1,4 +1,4 @@
-// How subvolumes are cut into batches. Pure functions.
+// Cuts subvolumes into batches. Pure functions.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +29,7 @@ struct CutBatches {
 CutBatches make_batches(const Batch& like, std::span<const BatchSubvolume> subvolumes,
                         uint64_t most, uint32_t first_number);
 
-// How many tasks a build is worth, when the user does not say: about kTaskSeconds of one CPU each.
+// Returns the default number of tasks: about kTaskSeconds of one CPU each.
 uint64_t default_tasks(double expected_bricks, uint64_t subvolumes);
 
 // CPU time per expected brick: 3 ns where the scene repeats itself, 150 ns where nothing does.

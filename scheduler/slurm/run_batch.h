@@ -18,7 +18,7 @@ struct BatchRun {
   std::string temporary_folder;  // on this machine; "" for $TMPDIR or /tmp
   uint64_t memory_bytes = 0;     // 0 for the task's Slurm allocation, else half of the RAM
   unsigned threads = 0;          // 0 for the CPUs of the Slurm allocation, else all
-  std::string attempt;           // tells this attempt from all others; "" for a new one
+  std::string attempt;           // unique id of the attempt; "" for a new one
 };
 
 // Returns the completion record, or the valid record of an earlier attempt. On failure writes the

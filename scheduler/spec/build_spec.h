@@ -56,10 +56,10 @@ struct ClusterOptions {
   std::string program_path;    // of voxdag, the same on all machines; "" for this program's
   std::string program_version;
   uint64_t max_retries = 3;  // of a batch that fails
-  // How long the shared disk may take to show the record of a task that ended.
+  // Time within which the record of an ended task becomes visible on the shared disk.
   double grace_s = 15;
   double slurm_interval_s = 5;  // between two questions to Slurm
-  // How long Slurm may lack the nodes that tasks ask for: after its start it knows none.
+  // Time for which Slurm may not know the requested nodes after its start.
   double slurm_start_s = 15;
   // Options of the merge job (slurm/merge_job.h). Without them this process merges.
   struct MergeJobOptions {
@@ -88,11 +88,11 @@ struct RunOptions {
   double checkpoint_interval_s = 2;
   // Triangles of a scene whose ingest, then about two CPU seconds, is worth checkpoints.
   uint64_t durable_min_triangles = uint64_t{4} << 20;
-  // How long a build waits for the locks of another one, which may be dying.
+  // Maximum wait for the locks of another build, which may be ending.
   double lock_wait_s = 30;
   bool keep_work = false;
   bool restart = false;  // start over, whatever the work folder holds
-  bool force = false;    // build though the estimate says that it cannot fit
+  bool force = false;    // build even if the estimate does not fit
   std::optional<ClusterOptions> cluster;
 };
 
@@ -101,7 +101,7 @@ struct BuildSpec {
   RunOptions run;
 };
 
-// Refuses a build whose estimate says that it cannot fit; RunOptions::force builds it anyway.
+// Refuses a build whose estimate does not fit; RunOptions::force builds it anyway.
 struct DoesNotFit : Error {
   explicit DoesNotFit(std::string message) : Error(ErrorCode::kNoSpace, std::move(message)) {}
 };
@@ -113,7 +113,7 @@ struct BuildContext {
   const CancelToken& cancel;
 };
 
-// What a stage of a build works with.
+// The context, threads and memory of a stage.
 struct StageContext {
   const BuildContext& build;
   unsigned threads = 1;

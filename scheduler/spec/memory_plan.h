@@ -63,11 +63,11 @@ struct MemoryPlan {
   static constexpr MemoryPlan divide(uint64_t budget_bytes) {
     return {budget_bytes / 16, budget_bytes / 3, budget_bytes / 8};
   }
-  // How many threads can read the scene, `free_bytes` being free.
+  // Returns the number of threads that can read the scene with `free_bytes` of memory.
   static constexpr uint64_t ingest_workers(uint64_t free_bytes) {
     return std::max<uint64_t>(free_bytes / 2 / kIngestWorkerBytes, 1);
   }
-  // How many of `threads` have one of `pieces` to read and the memory for it.
+  // Returns the number of `threads` that have one of `pieces` to read and the memory for it.
   static constexpr unsigned ingest_threads(uint64_t pieces, uint64_t free_bytes, unsigned threads) {
     return static_cast<unsigned>(
         std::clamp<uint64_t>(std::min(pieces, ingest_workers(free_bytes)), 1, threads));
@@ -76,7 +76,7 @@ struct MemoryPlan {
   static constexpr uint64_t pilot_bytes(uint64_t free_bytes) { return free_bytes * 3 / 4; }
 };
 
-// What the workers of the color stage get.
+// Memory of the workers of the color stage.
 struct ColorMemory {
   // Minimum for baking a region in pieces, and enough for baking it in one piece.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
@@ -108,7 +108,7 @@ struct ColorMemory {
   }
 };
 
-// What the workers of the build stage get.
+// Memory of the workers of the build stage.
 struct WorkerMemory {
   // Every worker has a segment file open.
   static constexpr uint64_t kMaxWorkers = 256;

@@ -1,4 +1,4 @@
-// What single stages add to the report of a build. Plain values.
+// Totals of single stages in the build report. Plain values.
 #pragma once
 
 #include <cstdint>

@@ -4,7 +4,7 @@
 // The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube (each
 // with its corners sorted, all sorted, duplicates removed), the cube's edge, hash-bits and the
 // format's version. The cache is a folder with one file per entry; the least recently used are
-// removed when the limit is exceeded. Any number of builds may share it: entries appear whole, by
+// removed when the limit is exceeded. Several builds may share it: entries appear atomically, by
 // renaming, and an entry that vanishes or is damaged is a miss. Thread-safe.
 #pragma once
 

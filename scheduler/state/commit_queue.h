@@ -33,7 +33,7 @@ class CommitQueue {
 
   // The subvolume is built from the triangles in `bin`; its artifact, if it has one, is in the
   // segment. Drops the bin now, and releases it once the subvolume is recorded. Waits for a disk
-  // that is a whole group behind. Throws what went wrong with an earlier group.
+  // that is a whole group behind. Throws the error of an earlier group.
   void add_built(const StoredSubvolume& subvolume, BinId bin);
   // Starts to make all built artifacts durable.
   void commit_in_background();

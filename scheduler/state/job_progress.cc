@@ -106,7 +106,7 @@ void report_subvolumes(std::span<const StoredSubvolume> all, uint32_t grid_level
   std::set<std::pair<uint32_t, uint64_t>> artifacts;
   for (const StoredSubvolume& subvolume : all) {
     statuses.push_back(status_of(subvolume, grid_levels));
-    // Those of a batch of a cluster share one, which counts once.
+    // The subvolumes of a cluster batch share one artifact, which is counted once.
     if (!artifacts.emplace(subvolume.artifact.segment, subvolume.artifact.offset).second)
       statuses.back().bytes = 0;
   }

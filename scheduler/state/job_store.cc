@@ -11,7 +11,7 @@ namespace voxdag {
 namespace {
 
 // SQLite does not check its pages: every row that decides the result has a checksum, and the job's
-// row the number of subvolumes. What another row says that is missing is done again.
+// row the number of subvolumes. The content of a missing other row is computed again.
 template <class Record>
 struct Sealed {
   Record record;

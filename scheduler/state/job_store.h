@@ -32,7 +32,7 @@
 
 namespace voxdag {
 
-// What must be the same for a build to be resumed.
+// Properties that must be equal to resume a build.
 struct JobIdentity {
   std::string scene_digest;  // of the grid and the snapped triangles
   std::string geometry;      // geometry options as JSON, for messages

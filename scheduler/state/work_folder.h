@@ -25,7 +25,7 @@ class WorkFolder {
   WorkFolder(const BuildContext& context, std::string path, double max_wait_s);
 
   const std::string& path() const { return path_; }
-  // Whether an earlier build used the folder.
+  // True if an earlier build used the folder.
   bool existed_before() const { return existed_before_; }
   std::string store_path() const { return store_path(path_); }
   static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
@@ -35,14 +35,14 @@ class WorkFolder {
   // them.
   static std::vector<std::string> files_in(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
-  // What a scene's compressed geometry is decoded to.
+  // File for the decoded geometry of a compressed scene.
   static std::string decoded_path(const std::string& folder) { return folder + "/decoded.vdspill"; }
   // Triangles that outlive a run.
   std::string durable_path() const { return path_ + "/triangles.vddurable"; }
   // Colors of cubes that outlive a run.
   std::string colors_path() const { return path_ + "/colors.vddurable"; }
   std::string scratch_path() const { return path_ + "/merge"; }
-  // What a cluster build shares with its tasks.
+  // Folder that a cluster build shares with its tasks.
   std::string cluster_path() const { return path_ + "/cluster"; }
   std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;
   // Returns the largest id of an existing segment plus one.

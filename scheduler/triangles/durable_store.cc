@@ -86,7 +86,7 @@ void DurableStore::add_chunk(BinId bin, std::span<const std::byte> records) {
   std::lock_guard lock(mutex_);
   bins_[bin]->list.add({.extent = extent, .records = triangles});
   unnamed_.push_back({bin, triangles, extent});
-  // Where the list does not fit, it goes uncharged: it is small compared to the triangles.
+  // If the list does not fit, it is not charged: it is small compared to the triangles.
   charge_.try_resize(list_bytes_ += kChunkListBytes);
 }
 

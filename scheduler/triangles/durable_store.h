@@ -20,7 +20,7 @@
 
 namespace voxdag {
 
-// What a store is opened with again. A plain value; all zeros for an empty store.
+// State from which a store is opened again. A plain value; all zeros for an empty store.
 struct DurableStoreState {
   Extent cubes;   // of the cube bins, which follow the scene's bin in this order
   Extent chunks;  // the last link of the chain
@@ -48,7 +48,7 @@ class DurableStore : public TriangleStore {
   void release(BinId bin) override;
   uint64_t file_bytes() const override;
 
-  // Names all chunks so far. What it returns counts once file() is synced.
+  // Lists all chunks in the file. The returned state is valid after a sync of file().
   DurableStoreState checkpoint();
   // The file, for syncs in the background and for other data that belongs to a checkpoint.
   const std::shared_ptr<TriangleFile>& file() const { return file_; }

@@ -38,7 +38,7 @@ class TriangleFile {
   Extent append(std::span<const std::byte> bytes);
   // Reads a piece. Throws DamagedTriangles if its checksum differs.
   void read(const Extent& extent, std::span<std::byte> out) const;
-  // Frees the disk space of a piece that nobody reads again.
+  // Frees the disk space of a piece that is no longer read.
   void release(const Extent& extent);
   // Makes all appended pieces and the file's name durable.
   void sync();

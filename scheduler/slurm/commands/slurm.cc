@@ -85,13 +85,13 @@ std::string field(const std::string& text, const std::string& name) {
   return value == "(null)" ? "" : trimmed(value);
 }
 
-// Whether the value of an option may be the word after it.
+// True if the value of an option may be the next word.
 bool takes_next_word(const std::string& option) {
   return option.starts_with("--") ? option.find('=') == std::string::npos
                                   : option.starts_with('-') && option.size() == 2;
 }
 
-// Whether a later try may succeed.
+// True if a later attempt may succeed.
 bool is_unreachable(const CommandResult& result) {
   for (const char* sign : {"Unable to contact", "Connection refused", "timed out", "Socket timed",
                            "Zero Bytes", "communications", "temporarily", "try again"})

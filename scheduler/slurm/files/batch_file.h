@@ -36,7 +36,7 @@ struct BatchSubvolume {
 struct Batch {
   uint32_t number = 0;
   std::string program;  // the version of voxdag that wrote it, and the only one that may build it
-  std::string build;    // tells this build from others
+  std::string build;    // random id of the build
   DagShape shape;
   bool wide = false;  // records have 64 bits per coordinate
   BackendName backend = BackendName::kAuto;

@@ -1,4 +1,4 @@
-// What names the colors of a cube, or another attribute: a digest of all that they depend on. Equal
+// Keys of the colors of a cube, or another attribute: digests of all inputs. Equal
 // keys mean equal colors, whichever order the scene has its triangles in, and whatever else it has.
 #pragma once
 
@@ -19,7 +19,7 @@ namespace voxdag {
 // Images by their numbers modulo its size: a few more than are meant where there are very many.
 using ImageClasses = std::bitset<256>;
 
-// What is known of the surfaces in a bin.
+// Summary of the surfaces in a bin.
 struct BinContent {
   uint64_t surfaces = 0;
   Checksum128 sum;  // over the surfaces, of digests of each with its material's look

@@ -107,7 +107,7 @@ struct ColorStage::State {
   template <class T>
   using ByAttributeAndCube = std::vector<std::vector<T>>;
   ByAttributeAndCube<Checksum128> keys;
-  // Where they are stored, once they are baked.
+  // Positions of the baked records.
   ByAttributeAndCube<std::vector<ColorStore::Place>> parts;
 
   State(const ColorSource& s, const StageContext& c)
@@ -172,7 +172,7 @@ void ColorStage::State::read_surfaces() {
   parts.resize(attributes.size(), std::vector<std::vector<ColorStore::Place>>(cubes.size()));
 }
 
-// Those that cubes show which are to be baked.
+// Decodes the images that the cubes to be baked show.
 std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& artifacts) {
   ImageClasses needed;
   for (size_t i = 0; i < cubes.size(); ++i)

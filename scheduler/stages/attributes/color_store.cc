@@ -70,7 +70,7 @@ void ColorStore::find_artifacts(Progress& progress, const CancelToken& cancel) {
   std::array<std::byte, kHeaderBytes> bytes;
   for (Header header; size - end_ >= kHeaderBytes;) {
     reader_->read_at(end_, bytes);
-    // What follows the last whole part was being written when a run was stopped.
+    // Bytes behind the last complete part belong to an interrupted write.
     if (!parse_header(bytes, header) || header.bytes > size - end_ - kHeaderBytes) break;
     const Key key(header.key.low, header.key.high);
     const Place place{end_ + kHeaderBytes, header.bytes, header.checksum};
@@ -96,7 +96,7 @@ ColorStore::~ColorStore() {
   try {
     if (pending_.valid()) pending_.get();
   } catch (const std::exception&) {
-    // What is not durable is baked again.
+    // Cubes that are not durable are baked again.
   }
 }
 

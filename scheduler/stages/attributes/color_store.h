@@ -41,7 +41,7 @@ class ColorStore {
     uint64_t offset = 0, bytes = 0, checksum = 0;
   };
 
-  // Whether the file had an artifact with this key when it was opened.
+  // True if the file had an artifact with this key when it was opened.
   bool has(const Checksum128& key) const { return found_.contains({key.low, key.high}); }
   // Its parts, in their order.
   const std::vector<Place>& parts(const Checksum128& key) const {

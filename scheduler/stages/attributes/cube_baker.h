@@ -30,7 +30,7 @@ class CubeBaker {
             uint64_t region_bytes, uint64_t surface_bytes, MemoryBudget& budget,
             const CancelToken& cancel);
 
-  // Records that are more than memory should hold, and whole. It takes them and leaves none.
+  // Receives complete records when they exceed the memory limit, and empties them.
   using TakeRecords = std::function<void(Records& records)>;
   // Appends the records of the regions with surfaces in Morton order, and clears the bin, which has
   // all surfaces that touch the cube. `records`: in the order of the attributes. Whenever there are
@@ -40,7 +40,7 @@ class CubeBaker {
   static constexpr size_t kManyRecordBytes = 256 << 10;
 
  private:
-  // Where records go.
+  // The receiver of records.
   struct Sink {
     Records& records;
     const TakeRecords& take;

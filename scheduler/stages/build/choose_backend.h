@@ -1,4 +1,4 @@
-// Which backend a build's workers open. Thread-safe.
+// Chooses the backend of a build's workers. Thread-safe.
 #pragma once
 
 #include <functional>

@@ -42,7 +42,7 @@ class TopTree {
   // The deepest tree whose counters take at most `bytes`.
   static uint32_t depth_within(uint32_t grid_levels, uint64_t bytes);
 
-  // What some triangles add to the cells of a tree. Not thread-safe.
+  // The contributions of some triangles to the cells of a tree. Not thread-safe.
   class Tally {
    public:
     explicit Tally(const TopTree& top) : grid_levels_(top.grid_levels_), depth_(top.depth_) {}

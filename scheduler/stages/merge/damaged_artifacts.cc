@@ -41,7 +41,7 @@ void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
 }
 
 // Reads the artifacts of all built subvolumes, the levels above `level` (of smaller number): the
-// others are not needed any more and may be gone.
+// others are no longer needed and may be released.
 std::vector<DamagedSubvolume> find_damaged(std::span<const StoredSubvolume> subvolumes,
                                            uint32_t level, const WorkFolder& work,
                                            const CancelToken& cancel) {

@@ -217,7 +217,7 @@ std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
     partition(store, by_cube.at(whole).bin, CubeTree(grid_levels, whole, leaves), targets,
               buffer_bytes / threads, context.build.cancel);
   });
-  // What was made of the others may be durable already.
+  // The artifacts of the others may already be durable.
   for (const CubeBin& bin : store.cube_bins()) store.release(bin.bin);
   return assigned;
 }

@@ -1,4 +1,4 @@
-// What the colors of a build, and other attributes, will take, its geometry not counted.
+// Estimates the cost of a build's colors and other attributes, without its geometry.
 #pragma once
 
 #include <cstdint>

@@ -62,7 +62,7 @@ class CountingSink : public SubDagSink {
 };
 
 // Builds triangles that are snapped to 2^levels, or finer ones by `shift`, on a grid of 2^levels.
-// Nothing if that does not fit the budget.
+// nullopt if it does not fit the budget.
 std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t shift,
                                        uint32_t levels, Backend& backend, MemoryBudget& budget,
                                        const CancelToken& cancel) {

@@ -1,4 +1,4 @@
-// What a build will need, estimated before it is built: pilot builds of the same scene at coarser
+// Estimates the resources of a build: pilot builds of the same scene at coarser
 // resolutions, extrapolated to the requested one.
 //
 // Voxels and octree nodes grow as a R^2 + b R (surfaces and their borders): two pilots give a and
@@ -41,7 +41,7 @@ struct Estimate {
 Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
                         BuildScene& source, uint32_t pilot_levels, const StageContext& context);
 
-// Whether the disk has space for a build, before anything is built: throws Error{kNoSpace} if it
+// Checks before a build that the disk has space for it. Throws Error{kNoSpace} if it
 // cannot fit, unless it is forced; warns if it may not. Returns whether that took an estimate,
 // which runs a pilot build.
 bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,

@@ -59,7 +59,7 @@ class RecentTriangles {
   std::vector<FixedTriangle> slots_;
 };
 
-// What one thread has found.
+// The unique triangles found by one thread.
 struct Found {
   RecentTriangles recent;
   std::vector<std::byte> records;

@@ -165,7 +165,7 @@ void IngestCheckpoint::wait_ignoring_errors() {
   try {
     wait();
   } catch (const Error&) {
-    // The checkpoint before counts.
+    // The previous checkpoint remains valid.
   }
 }
 

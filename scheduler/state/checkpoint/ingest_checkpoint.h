@@ -39,7 +39,7 @@ class IngestCheckpoint {
 
   // The state of an earlier run with this scene, if there is one; enables checkpoints then.
   std::optional<IngestState> resume();
-  // Whether the scene is large enough for checkpoints, and the disk has space for its triangles.
+  // True if the scene is large enough for checkpoints and the disk has space for its triangles.
   bool is_worthwhile(const TriangleSource& scene) const;
   // Throws Error{kNoSpace} if the scene's triangles fit neither memory nor disk, unless forced: it
   // may have billions of them in a few bytes.
@@ -47,7 +47,7 @@ class IngestCheckpoint {
   // Enables checkpoints for a scene opened at that Unix time, and removes checkpoints of other
   // scenes. Does nothing if a later change of a file might not show in its times.
   void enable(const TriangleSource& scene, int64_t opened_ns);
-  // Whether checkpoints are enabled, and for a scene of exactly these files.
+  // True if checkpoints are enabled for a scene of exactly these files.
   bool matches(const std::vector<SourceFile>& files) const;
 
   // Opens the store for the triangles: as it was at the state's checkpoint if checkpoints are
@@ -58,7 +58,7 @@ class IngestCheckpoint {
   bool has_top_tree(const IngestState& state) const;
   void load_top_tree(const IngestState& state, std::span<std::byte> cells) const;
 
-  // Whether it is time for a checkpoint, and the last one is durable.
+  // True if a checkpoint is due and the last one is durable.
   bool is_due();
   // Makes the triangles in the store durable, and then that they are as `state` says, along with
   // `top` if given; sets the extents in `state`. Does nothing where checkpoints are not enabled,
@@ -71,13 +71,13 @@ class IngestCheckpoint {
   // lets a later run know the scene without reading it.
   void finish();
 
-  // Whether the job store has a checkpoint, of whatever scene.
+  // True if the job store has a checkpoint of any scene.
   bool has_saved();
   // Removes all checkpoints, and disables them until the next enable().
   void forget();
   // The same for the rest of this run.
   void disable();
-  // Whether checkpoints are enabled for triangles that memory could hold as well.
+  // True if checkpoints are enabled for triangles that would also fit in memory.
   bool is_optional();
 
  private:

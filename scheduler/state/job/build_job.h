@@ -1,5 +1,5 @@
-// What the stages of one build share: its spec, its locks, its durable state and its report. While
-// it exists no other build has the output or the work folder.
+// The shared state of a build's stages: its spec, locks, durable state and report. While it exists,
+// no other build can use the output or the work folder.
 #pragma once
 
 #include <memory>
