@@ -19,8 +19,7 @@ void run(const StopTasksCommand& command, CommandContext& context) {
     throw Error(ErrorCode::kNotFound,
                 command.work_folder + ": expected the work folder of a build on a cluster");
   stop_cluster_tasks(context.files, command.work_folder, system_commands());
-  std::printf("stopped the tasks %s; finished subvolumes are kept
-", state->task_name().c_str());
+  std::printf("stopped the tasks %s; finished subvolumes are kept\n", state->task_name().c_str());
 }
 
 void declare(Command& command, StopTasksCommand& state) {
