@@ -43,7 +43,7 @@ TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
   };
 }
 
-// Has a cursor of one part at a time, which takes the memory of all.
+// Reads the parts one after the other. Only one part's cursor is open, with the memory for all.
 class ChainedCursor : public TriangleCursor {
  public:
   ChainedCursor(const std::vector<Part>& parts, unsigned cursors)

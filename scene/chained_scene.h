@@ -1,4 +1,4 @@
-// Several scenes as one: the triangles of the first, then those of the next.
+// Joins scenes: the triangles of the first scene, then the triangles of the next.
 #pragma once
 
 #include <memory>

@@ -66,7 +66,7 @@ class MeshFile : public ReadableFile {
   }
 
  private:
-  // Reads at least one byte, at most to the end of what lies together in memory.
+  // Reads at least one byte, at most to the end of the contiguous memory at `offset`.
   size_t read_some(uint64_t offset, std::span<std::byte> out) const {
     if (offset < header_.size()) return copy(std::as_bytes(std::span(header_)), offset, out);
     if (offset < faces_begin_) return read_vertices(offset - header_.size(), out);

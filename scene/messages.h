@@ -7,9 +7,9 @@
 
 namespace voxdag {
 
-// A text from the file as messages show it: control characters (those of one byte and those
-// of U+0080 to U+009F, which terminals obey too) and quotes replaced, and shortened
-// to `max_bytes`, so that it can forge no line of a log.
+// Returns a text from the file for use in a message: control characters (one byte, or U+0080 to
+// U+009F, which terminals also obey) and quotes are replaced, and the text is shortened to
+// `max_bytes`. So the text cannot forge a line of a log.
 std::string printable(std::string_view text, size_t max_bytes = 64);
 
 // The message of an exception of the JSON library, without the "[json.exception...] " that it

@@ -9,7 +9,7 @@
 
 namespace voxdag {
 
-// A texture coordinate on the lattice of SurfaceCorner: to the nearest, 0 for what is no number.
+// Rounds a texture coordinate to the lattice of SurfaceCorner. Returns 0 for NaN.
 inline int64_t texture_lattice(double coordinate) {
   constexpr double kOne = int64_t{1} << kTextureBits;
   constexpr double kLimit = int64_t{1} << 40;
@@ -17,7 +17,7 @@ inline int64_t texture_lattice(double coordinate) {
   return static_cast<int64_t>(std::clamp(std::floor(coordinate * kOne + 0.5), -kLimit, kLimit));
 }
 
-// A value from 0 to 1 in 16 bits: to the nearest, 0 for what is no number.
+// Rounds a value from 0 to 1 to 16 bits. Returns 0 for NaN.
 inline uint16_t intensity_of(double value) {
   if (!(value > 0)) return 0;
   return static_cast<uint16_t>(std::floor(std::min(value, 1.0) * kFullIntensity + 0.5));

@@ -39,7 +39,7 @@ class TriangleCursor {
   virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
   // Does the same with each vertex snapped to `grid`.
   virtual void read_snapped(uint64_t first, uint64_t count, const Grid& grid, const Visitor& visit);
-  // Does the same with what the triangles look like. The default: white, of material 0.
+  // Visits the triangles with their surfaces. The default: white, material 0.
   virtual void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
   // The bounds of the triangles that read() visits.
   virtual WorldBounds read_bounds(uint64_t first, uint64_t count);
@@ -62,7 +62,7 @@ struct ImageSource {
 struct SceneMaterials {
   std::vector<Material> materials = {Material{}};  // at least one
   std::vector<ImageSource> images;                 // those that materials use
-  std::vector<std::string> warnings;               // as those of the source, but about looks alone
+  std::vector<std::string> warnings;               // about materials and images only
   std::vector<std::string> names;  // of the materials that the scene's files list, in their order
 
   // Leaves the factors of materials alone.
@@ -88,8 +88,8 @@ class TriangleSource {
   virtual std::unique_ptr<TriangleCursor> open(unsigned cursors) = 0;
   // Calls `visit` with all triangles, by batches as TriangleCursor::read() does.
   void for_each_batch(const Visitor& visit) { open(1)->read(0, declared_triangles(), visit); }
-  // The triangles that the scene declares, instances counted: those that are visited and those that
-  // skip_invalid drops.
+  // Number of triangles that the scene declares, instances included: visited triangles and
+  // triangles that skip_invalid drops.
   virtual uint64_t declared_triangles() const = 0;
   // What TriangleCursor::read_surfaces() refers to. Opens image files, but reads no image; one that
   // cannot be opened is no error.
@@ -108,8 +108,8 @@ struct SceneOptions {
   // Drop and count invalid triangles (non-finite vertices, indices out of range) instead of
   // refusing the scene.
   bool skip_invalid = false;
-  // Where compressed geometry is decoded to: a file in a folder that exists, which never has this
-  // name for long. "": in a folder of its own in temporary_parent().
+  // File for decoded geometry, in an existing folder. The file has this name only for a moment. "":
+  // in a new folder in temporary_parent().
   std::string scratch_path = {};
 };
 

@@ -1,5 +1,5 @@
-// The table of scene formats. A new format is a reader in a folder of its own and one row in
-// formats.cc; messages, help, the HTTP API and the web pages list the endings of this table.
+// The table of scene formats. A new format is a folder with its reader, and one row in formats.cc.
+// Messages, help, the HTTP API and the web pages list the endings of this table.
 #pragma once
 
 #include <memory>

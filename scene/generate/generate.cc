@@ -51,8 +51,8 @@ void check(const GenerateOptions& options) {
     throw Error(ErrorCode::kInvalidInput, name + " has no colors; expected city");
   if (options.colors && options.instances)
     throw Error(ErrorCode::kInvalidInput,
-                "instances of a part have the same color, those of a city with colors have not: "
-                "expected colors or instances");
+                "colors and instances were both given, but instances of a part share one color: "
+                "expected one of them");
   if (options.kind == SceneKind::kMenger && options.triangles != 0)
     throw Error(ErrorCode::kInvalidInput, "menger is sized by its level, not by triangles");
   check_size(options);

@@ -10,7 +10,7 @@ namespace voxdag {
 namespace {
 
 static_assert(std::endian::native == std::endian::little,
-              "arrays are written as they lie in memory");
+              "arrays are written as they are in memory");
 
 constexpr size_t kBufferBytes = 1 << 20;
 constexpr uint64_t kHeaderBytes = 12, kChunkHeadBytes = 8;

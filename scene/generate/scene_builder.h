@@ -32,7 +32,7 @@ class SceneBuilder {
   SceneBuilder(BlockSink& sink, bool instances, bool colors);
   bool has_colors() const { return colors_; }
 
-  // What is added from now on looks like; of no effect without colors.
+  // Material of the following additions. Has no effect without colors.
   void paint(uint32_t material, const Rgba8& color) { paint_ = {material, color}; }
 
   // A mesh of the current paint that `vertices` and `triangles` more fit into: the current one, or

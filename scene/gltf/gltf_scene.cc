@@ -9,8 +9,8 @@
 #include "core/base/integers.h"
 #include "scene/gltf/document/check_document.h"
 #include "scene/gltf/document/read_document.h"
-#include "scene/gltf/looks/image_sources.h"
-#include "scene/gltf/looks/looks.h"
+#include "scene/gltf/materials/document_materials.h"
+#include "scene/gltf/materials/image_sources.h"
 #include "scene/gltf/triangle_reader.h"
 
 namespace voxdag::gltf {
@@ -19,7 +19,7 @@ namespace {
 Document read_checked(ReadableFile& file, MemoryBudget& budget, const CancelToken& cancel) {
   Document document = read_document(file, budget, cancel);
   check_document(document);
-  resolve_looks(document);
+  resolve_materials(document);
   return document;
 }
 
@@ -87,16 +87,16 @@ class GltfScene : public TriangleSource {
   }
   uint64_t declared_triangles() const override { return declared_; }
   SceneMaterials materials() const override {
-    const Looks& looks = *document_.looks;
-    SceneMaterials out{looks.materials, {}, looks.warnings, {}};
-    for (const Material& material : looks.materials)  // those that the file lists come first
+    const DocumentMaterials& listed = *document_.materials;
+    SceneMaterials out{listed.materials, {}, listed.warnings, {}};
+    for (const Material& material : listed.materials)  // the file lists these first
       if (material.number == out.names.size()) out.names.push_back(material.name);
-    for (int image : looks.images)
+    for (int image : listed.images)
       out.images.push_back(find_image(files_, *file_, document_, image));
     return out;
   }
   uint32_t material_count() const override {
-    return static_cast<uint32_t>(document_.looks->materials.size());
+    return static_cast<uint32_t>(document_.materials->materials.size());
   }
   std::vector<SourceFile> files() const override {
     std::vector<SourceFile> all{{file_->path(), file_->identity()}};

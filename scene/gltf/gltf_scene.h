@@ -10,8 +10,8 @@
 
 namespace voxdag::gltf {
 
-// Opens the default scene of an open .glb or .gltf file. Memory, errors and lifetimes are those of
-// open_scene(); the messages name node, mesh, primitive or accessor.
+// Opens the default scene of an open .glb or .gltf file. See open_scene() for memory, errors and
+// lifetimes. Messages name the node, mesh, primitive or accessor.
 std::unique_ptr<TriangleSource> open_gltf(FileSystem& files, std::unique_ptr<ReadableFile> file,
                                           const SceneOptions& options, MemoryBudget& budget,
                                           const CancelToken& cancel);

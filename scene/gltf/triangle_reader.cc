@@ -51,9 +51,9 @@ void TriangleReader::read(uint64_t first, uint64_t count, const Grid* grid, cons
 }
 
 void TriangleReader::read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit) {
-  if (!looks_) {
+  if (!surface_reader_) {
     surfaces_ = PageBuffer<SurfaceTriangle>(budget_, kBatchTriangles, "a batch of triangles");
-    looks_.emplace(document_, buffers_, largest_vertex_count(document_), readers_);
+    surface_reader_.emplace(document_, buffers_, largest_vertex_count(document_), readers_);
     draw_.is_bound = false;
     binding_ = {};
   }
@@ -173,7 +173,7 @@ void TriangleReader::bind(const Node& node, size_t primitive_index) {
   cache_.bind(*vertices_);
   vertex_count_ = vertices_->count();
   window_count_ = 0;
-  if (looks_) looks_->bind(primitive);
+  if (surface_reader_) surface_reader_->bind(primitive);
   binding_ = next;
 }
 
@@ -189,8 +189,8 @@ void TriangleReader::for_each_window(uint64_t first, uint64_t count, const Body&
   }
 }
 
-// The corners of triangle `first` of the primitive, and of more behind it, `count` of which are
-// wanted. A primitive that fits the window is read as a whole.
+// Returns the corners of triangle `first` and its successors. Loads at most `count` triangles, or
+// the complete primitive if it fits the window.
 const uint32_t* TriangleReader::load_corners(uint64_t first, uint64_t count) {
   if (first < window_first_ || first >= window_first_ + window_count_) {
     window_count_ = 0;
@@ -231,7 +231,7 @@ void TriangleReader::place_all_surfaces(const uint32_t* corners, uint64_t count)
   for (; count > 0; --count, corners += 3) {
     SurfaceTriangle& surface = surfaces_[batch_size_];
     if (place(corners, surface.position)) {
-      looks_->read(corners, surface);
+      surface_reader_->read(corners, surface);
       const uint64_t number = window_first_ + static_cast<uint64_t>(corners - corners_.data()) / 3;
       surface.is_flipped = is_mirrored != (is_strip && number % 2 == 1);
       ++batch_size_;

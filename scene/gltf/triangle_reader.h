@@ -10,7 +10,7 @@
 
 #include "core/base/page_buffer.h"
 #include "core/geometry/grid.h"
-#include "scene/gltf/looks/look_reader.h"
+#include "scene/gltf/materials/surface_reader.h"
 #include "scene/gltf/mesh_data/corner_reader.h"
 #include "scene/gltf/mesh_data/instance_reader.h"
 #include "scene/gltf/mesh_data/node_walk.h"
@@ -39,7 +39,7 @@ class TriangleReader {
   // Throws Error{kInvalidInput} naming node, mesh and primitive of an invalid triangle, unless
   // `skip_invalid` drops it.
   void read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit);
-  // Visits the same triangles in world space with what they look like, in such batches.
+  // Visits the same triangles in world space with their surfaces, in equal batches.
   void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
   // The bounds of those triangles in world space.
   WorldBounds read_bounds(uint64_t first, uint64_t count);
@@ -110,8 +110,8 @@ class TriangleReader {
   size_t batch_size_ = 0;
   const Visitor* visit_ = nullptr;
 
-  std::optional<LookReader> looks_;       // once surfaces were asked for
-  PageBuffer<SurfaceTriangle> surfaces_;  // a batch of them
+  std::optional<SurfaceReader> surface_reader_;  // set by the first read_surfaces()
+  PageBuffer<SurfaceTriangle> surfaces_;         // a batch of them
 };
 
 }  // namespace voxdag::gltf

@@ -13,7 +13,7 @@ class AsciiText {
   // The file must outlive the text.
   AsciiText(const ReadableFile& file, MemoryBudget& budget) : window_(file, budget) {}
 
-  // Goes to the line that begins at `offset` or, if it is blank, to the next one that is not.
+  // Moves to the line at `offset` or, if it is blank, to the next line with text.
   void begin_row(uint64_t offset);
   // The next word of the line, valid until the next call; empty at the end of the line.
   std::string_view word();

@@ -50,7 +50,7 @@ void FaceReader::load() {
   is_loaded_ = true;
 }
 
-// The number of the triangle behind those of the face.
+// Returns the number of the first triangle of the next face.
 uint64_t FaceReader::face_end() const {
   const size_t corners = rows_->entries().size();
   return first_triangle_ + (corners < 3 ? 0 : corners - 2);

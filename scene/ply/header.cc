@@ -104,7 +104,7 @@ class HeaderParser {
     if (parsed.ec != std::errc() || parsed.ptr != end)
       refuse("has the count " + printable(words[2]) + ", expected a number below 2^64");
     for (const Element& other : header_.elements)
-      if (other.name == element.name) refuse("names an element that was there before");
+      if (other.name == element.name) refuse("names an element again");
     header_.elements.push_back(std::move(element));
   }
 
@@ -119,7 +119,7 @@ class HeaderParser {
     property.name = words.back();
     if (!is_integer(property.count_type)) refuse("counts the entries of a list by a float");
     for (const Property& other : header_.elements.back().properties)
-      if (other.name == property.name) refuse("names a property that was there before");
+      if (other.name == property.name) refuse("names a property again");
     header_.elements.back().properties.push_back(std::move(property));
   }
 

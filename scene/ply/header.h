@@ -39,8 +39,8 @@ struct Header {
   uint64_t data_begin = 0;  // offset of the first element
 };
 
-// The header of an open file. Throws Error{kInvalidInput} naming the line for one that is broken,
-// Error{kLimit} for one of over 64 KiB.
+// Reads the header of an open file. Throws Error{kInvalidInput} with the number of a broken line,
+// Error{kLimit} for a header of over 64 KiB.
 Header read_header(const ReadableFile& file, MemoryBudget& budget);
 
 }  // namespace voxdag::ply

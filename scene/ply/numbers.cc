@@ -26,7 +26,7 @@ std::optional<double> parse_as(std::string_view text) {
   const char* const end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data(), end, value);
   if (parsed.ptr != end || parsed.ec == std::errc::invalid_argument) return std::nullopt;
-  // Too large, or too close to zero: strtod says which.
+  // Too large, or too close to zero: strtod tells them apart.
   if (parsed.ec == std::errc::result_out_of_range)
     return static_cast<T>(strtod_l(std::string(text).c_str(), nullptr, c_locale()));
   return value;

@@ -14,7 +14,7 @@
 
 namespace voxdag::ply {
 
-// An index that no vertex has: what a negative one, or one beyond 32 bits, is read as.
+// Stands for an index that is negative or needs more than 32 bits. No vertex has it.
 constexpr uint32_t kNoVertex = std::numeric_limits<uint32_t>::max();
 
 // Calls body(T{}) with the C++ type of that name.
@@ -55,8 +55,8 @@ uint32_t as_index(T value) {
   return value < 0 ? kNoVertex : static_cast<uint32_t>(value);
 }
 
-// All of the text as an integer, or as a number of a real type: to the nearest, "nan" and "inf" as
-// such, too large ones as infinity.
+// Parses the complete text as an integer, or as a number of a real type, rounded to nearest. "nan"
+// and "inf" are accepted; a number that is too large becomes infinity.
 std::optional<int64_t> parse_integer(std::string_view text);
 std::optional<double> parse_real(std::string_view text, Type type);
 

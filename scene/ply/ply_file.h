@@ -1,8 +1,9 @@
-// An open PLY file: where its vertices and faces lie, and how many triangles these make. A polygon
-// of n corners is the fan of n - 2 triangles around its first one; fewer than three make none.
+// An open PLY file: the positions of its vertices and faces in the file, and the number of
+// triangles. A polygon of n corners is the fan of n - 2 triangles around its first corner; fewer
+// than three corners make no triangle.
 //
-// Rows of faces, and those of ASCII files, have no fixed size. So the file is passed over once to
-// find every 1024th of them, which any other is found from.
+// Rows of faces and all rows of ASCII files have no fixed size. So one pass over the file finds
+// every 1024th row, and any other row is found from there.
 #pragma once
 
 #include <array>
@@ -25,8 +26,8 @@ class PlyFile {
  public:
   static constexpr uint64_t kBlockRows = 1024;
 
-  // Throws Error{kInvalidInput} naming line, element or row of what is broken, Error{kLimit} for
-  // 2^32 vertices and more, Error{kOutOfMemory}.
+  // Throws Error{kInvalidInput} with the line, element or row of damage, Error{kLimit} for 2^32 or
+  // more vertices, Error{kOutOfMemory}.
   PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
   // The first row of so many, and the number of its first triangle.
@@ -42,11 +43,11 @@ class PlyFile {
 
   const Element& vertex_element() const { return header_.elements[vertex_]; }
   uint64_t vertices_begin() const { return vertices_begin_; }
-  // Of an ASCII file: the offset of every kBlockRows-th vertex.
+  // Offsets of every kBlockRows-th vertex of an ASCII file.
   const std::deque<uint64_t>& vertex_blocks() const { return vertex_blocks_; }
   // The properties x, y and z.
   const std::array<size_t, 3>& axes() const { return axes_; }
-  // The properties red, green, blue and, if it is there, alpha; none if one of the three lacks.
+  // Properties red, green, blue and, if present, alpha. Empty unless all three colors exist.
   const std::vector<size_t>& colors() const { return colors_; }
 
   const std::deque<FaceBlock>& face_blocks() const { return face_blocks_; }
@@ -63,7 +64,7 @@ class PlyFile {
 
   const std::unique_ptr<ReadableFile> file_;
   Header header_;
-  size_t vertex_, face_;  // elements; one that is not there is the number of elements
+  size_t vertex_, face_;  // indices of elements; the number of elements if absent
   std::array<size_t, 3> axes_{};
   std::vector<size_t> colors_;
   size_t face_list_ = Rows::kNoList;

@@ -20,7 +20,7 @@ namespace voxdag::ply {
 namespace {
 
 constexpr size_t kBatchTriangles = 1024;
-// Bounds are found of so many at a time, to see each vertex once.
+// Triangles per window when bounds are computed. Each vertex of a window is read once.
 constexpr size_t kWindowTriangles = 4096;
 
 class PlyCursor : public TriangleCursor {
@@ -71,7 +71,7 @@ class PlyCursor : public TriangleCursor {
   }
 
  private:
-  // Of RealTriangle or SurfaceTriangle.
+  // T: RealTriangle or SurfaceTriangle.
   template <class T, class VisitBatch>
   void read_placed(uint64_t first, uint64_t count, const Grid* grid, PageBuffer<T>& batch,
                    const VisitBatch& visit) {

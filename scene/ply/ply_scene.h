@@ -13,8 +13,8 @@ namespace voxdag::ply {
 // True if the file begins with "ply" and an end of line.
 bool is_ply(const ReadableFile& file);
 
-// The triangles of an open file, its axes and units unchanged. Memory, errors and lifetimes are
-// those of open_scene(); the messages name face or vertex.
+// Opens the triangles of an open file, with axes and units unchanged. See open_scene() for memory,
+// errors and lifetimes. Messages name the face or vertex.
 std::unique_ptr<TriangleSource> open_ply(FileSystem& files, std::unique_ptr<ReadableFile> file,
                                          const SceneOptions& options, MemoryBudget& budget,
                                          const CancelToken& cancel);

@@ -75,8 +75,8 @@ class BinaryRows : public Rows {
     Decode decode;
   };
 
-  // Reads a row of a count of one byte, its entries and what is behind them, as most files have it,
-  // if all of it is in the window; returns `offset` if not.
+  // Reads a row of the usual form: a count of one byte, its entries, and the following properties.
+  // Returns `offset` if the window does not contain the complete row.
   uint64_t read_plain(uint64_t offset) {
     const auto bytes = window_.at(offset, 1);
     if (bytes.empty()) return offset;

@@ -16,7 +16,7 @@ namespace voxdag::ply {
 
 class Rows {
  public:
-  // Of the wanted list.
+  // Maximum number of entries in the requested list.
   static constexpr uint64_t kMaxEntries = 32768;
   static constexpr size_t kNoList = ~size_t{0};
 

@@ -42,7 +42,7 @@ void VertexColors::load(uint64_t block, size_t slot) {
     Color color{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
     for (size_t c = 0; c < channels; ++c) {
       const double number = numbers_[channels * i + c];
-      const double value = number > 0 ? std::min(number, full_[c]) : 0;  // 0 for what is no number
+      const double value = number > 0 ? std::min(number, full_[c]) : 0;  // 0 for NaN
       color[c] = c == 3            ? intensity_of(value / full_[c])
                  : full_[c] == 255 ? light_of_byte_[static_cast<size_t>(value)]
                                    : linear_light(value / full_[c]);

@@ -2,8 +2,7 @@
 // vertices, each cached in the one slot that its number maps to. Not thread-safe.
 //
 // Red, green and blue are sRGB and become linear light; alpha is linear. Reals are from 0 to 1,
-// ushort numbers from 0 to 65535 and all other integers from 0 to 255; what lies outside is
-// clamped.
+// ushort numbers from 0 to 65535 and all other integers from 0 to 255. Values outside are clamped.
 #pragma once
 
 #include <array>
@@ -19,7 +18,7 @@ class VertexColors {
  public:
   using Color = std::array<uint16_t, 4>;
 
-  // All of `readers` together take at most one part in so many of what the budget has free.
+  // The caches of all `readers` take at most 1/kShareOfFree of the free budget.
   static constexpr uint64_t kShareOfFree = 8;
 
   // The file has colors; it and the budget must outlive this.
@@ -40,7 +39,7 @@ class VertexColors {
   void load(uint64_t block, size_t slot);
 
   VertexReader reader_;
-  std::vector<double> full_;  // what each channel calls 1
+  std::vector<double> full_;  // maximum value of each channel
   std::array<uint16_t, 256> light_of_byte_;
   std::vector<double> numbers_;
   PageBuffer<Color> colors_;

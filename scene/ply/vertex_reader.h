@@ -16,12 +16,12 @@ namespace voxdag::ply {
 
 class VertexReader : public PositionSource {
  public:
-  // Of the vertex element's properties with these indices. The file must outlive the reader.
+  // Reads the vertex properties with these indices. The file must outlive the reader.
   VertexReader(const PlyFile& ply, std::span<const size_t> properties, MemoryBudget& budget);
 
   uint64_t count() const override { return ply_.vertex_element().count; }
-  // As many numbers for each vertex as there are properties. Throws Error{kInvalidInput} naming the
-  // vertex for text that is no number.
+  // Writes one number per property for each vertex. Throws Error{kInvalidInput} with the vertex for
+  // text that is not a number.
   void read(uint64_t first, size_t count, double* out) override;
 
  private:

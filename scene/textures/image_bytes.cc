@@ -23,7 +23,7 @@ ImageBytes::ImageBytes(FileSystem& files, const ImageSource& source)
       before.modified_ns != now.modified_ns)
     throw Error(ErrorCode::kInvalidInput, source.name +
                                               ": its file changed while the scene was read: "
-                                              "expected files that stay as they are");
+                                              "expected files that do not change");
   end_ = std::min(end_, file_->size());
   if (!is_base64_) {
     at_ = std::min(end_, at_ + std::min(source.skip, end_ - std::min(at_, end_)));

@@ -1,4 +1,4 @@
-// The bytes of an image where it lies in a scene file or a file of its own, read by windows.
+// Reads the bytes of an image in windows, from a scene file or from an image file.
 #pragma once
 
 #include <array>
@@ -14,9 +14,9 @@ namespace voxdag {
 
 class ImageBytes : public EncodedBytes {
  public:
-  // Throws Error{kInvalidInput} if the file is another one than when the scene was opened.
+  // Throws Error{kInvalidInput} if the file has changed since the scene was opened.
   ImageBytes(FileSystem& files, const ImageSource& source);
-  // Throws BrokenImage for what is not base64.
+  // Throws BrokenImage for text that is not base64.
   size_t read(std::span<std::byte> out) override;
 
  private:

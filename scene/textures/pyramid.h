@@ -1,6 +1,7 @@
-// Builds the levels of one image from its rows. A texel of a coarser level is the mean of what it
-// covers of the level below: two texels along an even edge; along one of 2n + 1, three of them,
-// weighted (n - i), n and (i + 1) of 2n + 1, so that no column or row is dropped.
+// Builds the levels of one image from its rows. A texel of a coarser level is the mean of the
+// texels it covers in the level below. Along an even edge these are two texels. Along an edge of 2n
+// + 1 these are three, weighted (n - i), n and (i + 1) of 2n + 1, so that no column or row is
+// dropped.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,8 @@
-// Texels of the pyramids of a TextureSet, for one thread: straight from memory where all of them
-// are there, and otherwise by pages of the scratch file, of which the reader caches as many as its
-// memory holds. Not thread-safe; any number of readers may be open.
+// Texels of the pyramids of a TextureSet, for one thread. They are read from memory if the pyramids
+// fit, and otherwise in pages of the scratch file. A reader caches as many pages as its memory
+// holds. Not thread-safe; any number of readers may be open.
 //
-// A level is cut into tiles of 32 x 32 texels, row by row, those at its right and lower border
+// A level is cut into tiles of 32 x 32 texels, row by row. Tiles at the right and lower border are
 // padded. A tile is a page: its texels are stored row by row, eight bytes each.
 #pragma once
 
@@ -22,7 +22,7 @@ inline constexpr uint32_t kTileEdge = 1u << kTileShift;
 inline constexpr size_t kPageTexels = size_t{kTileEdge} * kTileEdge;
 inline constexpr size_t kPageBytes = kPageTexels * sizeof(uint64_t);
 
-// Of a page in the scratch file, so that a damaged one gives no colors.
+// Returns the checksum of a page, which detects damage in the scratch file.
 uint32_t page_checksum(std::span<const uint64_t> texels);
 
 // A level of a pyramid.
@@ -36,7 +36,7 @@ struct TextureLevel {
   }
 };
 
-// The levels of all images, those of image i from first_level[i] on.
+// The levels of all images. The levels of image i begin at first_level[i].
 struct TextureLayout {
   std::vector<TextureLevel> levels;
   std::vector<uint32_t> first_level;  // one more than there are images
@@ -44,11 +44,11 @@ struct TextureLayout {
 
 class TextureReader {
  public:
-  // Of pyramids in memory, which must outlive the reader, as the layout must.
+  // Reads pyramids in memory. They and the layout must outlive the reader.
   TextureReader(const TextureLayout& layout, const uint64_t* pages)
       : layout_(layout), all_(pages) {}
-  // Of pyramids in a file; caches pages of about `memory_bytes`, at least one. `checksums`: of all
-  // pages, which must outlive the reader.
+  // Reads pyramids in a file. Caches pages of about `memory_bytes`, at least one. `checksums` has
+  // one value per page. The references must outlive the reader.
   TextureReader(const TextureLayout& layout, const ReadableFile& file, const uint32_t* checksums,
                 uint64_t memory_bytes, MemoryBudget& budget);
 
@@ -65,9 +65,9 @@ class TextureReader {
    public:
     uint32_t width() const { return width_; }
     uint32_t height() const { return height_; }
-    // Four linear channels of 16 bits: red in the lowest, then green, blue and alpha.
+    // Returns four linear channels of 16 bits: red in the lowest, then green, blue and alpha.
     // 0 <= x < width, 0 <= y < height, counted from the upper left. Throws Error{kIo}, and
-    // Error{kCorrupt} for a page that is not what was written.
+    // Error{kCorrupt} for a page that fails its checksum.
     uint64_t texel(uint32_t x, uint32_t y) const {
       const uint64_t place = place_of(x, y);
       return texels_ ? texels_[place] : reader_.cached_texel(first_ + place);
@@ -88,7 +88,7 @@ class TextureReader {
           height_(level.height) {}
 
     uint64_t place_of(uint32_t x, uint32_t y) const {
-      // Of the tile and in it, along y and along x.
+      // The offsets of the tile and within it, along y and along x.
       const uint64_t row = (y >> kTileShift) * row_of_tiles_ + ((y % kTileEdge) << kTileShift);
       const uint64_t column = (uint64_t{x >> kTileShift} << 2 * kTileShift) + x % kTileEdge;
       return row + column;

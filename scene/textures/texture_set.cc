@@ -62,7 +62,7 @@ std::string user_of(const SceneMaterials& materials, uint32_t image) {
   return ", the base color of material " + numbered(index, found->name) + ",";
 }
 
-// What fails for want of memory while others decode may fit alone.
+// Runs `body` next to others and, if memory is short, again without others.
 template <class Body>
 void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const Body& body) {
   try {
@@ -91,7 +91,7 @@ std::string image_digest(FileSystem& files, const ImageSource& source, const Can
       hash.add(std::span(buffer).first(size));
     }
   } catch (const BrokenImage&) {
-    hash.add(buffer);  // a decoder may not need what is broken
+    hash.add(buffer);  // a decoder may ignore the damaged part
     return "broken " + hash.finish();
   }
   return hash.finish();

@@ -1,14 +1,14 @@
 // The materials of a scene with their images, decoded once into pyramids (docs/color.md): linear
-// light, 16 bits, RGBA, and an integer box filter that drops no column of sizes that are no powers
-// of two. What they are depends on the scene alone, never on memory or threads.
+// light, 16 bits, RGBA, and an integer box filter that drops no column, for any image size. Their
+// contents depend on the scene alone, never on memory or threads.
 //
-// The pyramids stay in memory if they take at most half of what the budget has free, and are in a
-// scratch file otherwise. Images are decoded row by row.
+// The pyramids are kept in memory if they take at most half of the free budget. Otherwise they are
+// in a scratch file. Images are decoded row by row.
 //
-// An image that is missing, broken, too large (over kMaxTexels) or of another format than PNG and
-// JPEG (WebP, KTX2) costs one warning that names it and a material; its materials have their
-// factors alone. One that is fine but takes more memory to decode than the budget has (progressive
-// JPEG, interlaced PNG) is an error, since memory must not decide the colors.
+// An image can be missing, broken, too large (over kMaxTexels), or neither PNG nor JPEG (WebP,
+// KTX2). It costs one warning that names the image and a material; its materials keep their factors
+// alone. A valid image whose decoder exceeds the budget (progressive JPEG, interlaced PNG) is an
+// error, because memory must not decide the colors.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ namespace voxdag {
 
 class TextureSet {
  public:
-  // Of one image: 16384 x 16384.
+  // Texels of one image: 16384 x 16384.
   static constexpr uint64_t kMaxTexels = uint64_t{1} << 28;
 
   // Decodes the images that materials refer to, on up to `threads` threads, and warns of those that
@@ -70,9 +70,9 @@ class TextureSet {
 uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
                        const CancelToken& cancel);
 
-// SHA-256 of what each image contains as it is stored, as lower-case hex digits; another text for
-// one that cannot be read to its end. Reads all images, decodes none. Throws as
-// TextureSet::prepare() does.
+// Returns the SHA-256 of each image's stored bytes, as lower-case hex digits, or another text for
+// an image that cannot be read to its end. Reads all images, decodes none. Throws the same errors
+// as TextureSet::prepare().
 std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
                                        unsigned threads, const CancelToken& cancel);
 

@@ -1,4 +1,4 @@
-// The vertex positions of a mesh as its file has them: what a VertexCache reads.
+// The stored vertex positions of a mesh, the input of a VertexCache.
 #pragma once
 
 #include <cstddef>

@@ -24,7 +24,7 @@ inline Transform multiply(const Transform& outer, const Transform& inner) {
   return product;
 }
 
-// Whether it turns what is clockwise into what is counterclockwise.
+// True if the transform reverses the order of a triangle's corners.
 inline bool mirrors(const Transform& transform) {
   const auto& m = transform.m;
   return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -

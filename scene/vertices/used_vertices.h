@@ -1,5 +1,5 @@
-// The vertices that some triangles use, each once if they lie near each other, as those of a mesh
-// mostly do: what bounds are found from. Not thread-safe.
+// Collects the vertices that some triangles use, to find their bounds. Each vertex occurs once if
+// the indices are close together, as in most meshes. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace voxdag {
 
 class UsedVertices {
  public:
-  // Of at least one corner.
+  // Finds the vertices of at least one corner.
   void find(std::span<const uint32_t> corners);
   void clear() { vertices_.clear(); }
   bool is_empty() const { return vertices_.empty(); }
@@ -23,7 +23,7 @@ class UsedVertices {
   bool add_to(WorldBounds& bounds, VertexCache& positions, uint64_t count) const;
 
  private:
-  // Of vertices whose indices differ by less, duplicates are found.
+  // Duplicates are removed among indices that differ by less than this.
   static constexpr uint32_t kMaxRange = 65536;
 
   std::vector<uint32_t> vertices_;

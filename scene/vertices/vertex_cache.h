@@ -1,8 +1,8 @@
 // Random access to the vertex positions of an instance of a primitive, in world space or snapped to
 // a grid, within a fixed amount of memory: blocks of consecutive vertices, each cached in the one
-// slot that its number maps to. An instance that fits is read once; so is, about, a larger one
-// whose indices stay near each other. A primitive of up to 262144 vertices is decoded once for all
-// its instances.
+// slot that its number maps to. An instance that fits is read once. A larger instance is read about
+// once if its indices are close together. A primitive of up to 262144 vertices is decoded once for
+// all its instances.
 #pragma once
 
 #include <bit>
@@ -20,7 +20,7 @@ namespace voxdag {
 
 class VertexCache {
  public:
-  // All caches of a scene together take at most one part in so many of what the budget has free.
+  // The caches of all readers of a scene take at most 1/kShareOfFree of the free budget.
   static constexpr uint64_t kShareOfFree = 4;
 
   // One of `caches`. Room for `vertices`, or for as many as fit its part of that share.
@@ -52,7 +52,7 @@ class VertexCache {
   void read(uint64_t block, std::span<double> out);
 
   PageBuffer<double> positions_;  // as they are served
-  // Of a source of few blocks, as it gives them, and which blocks were read.
+  // The untransformed blocks of a small source, and which of them were read.
   PageBuffer<double> untransformed_;
   std::vector<bool> is_read_;
   Transform world_;

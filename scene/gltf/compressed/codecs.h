@@ -1,5 +1,5 @@
-// The two decoders of compressed geometry. Each is there if voxdag was built with its library;
-// otherwise documents that need it are refused before anything is decoded.
+// The two decoders of compressed geometry. If voxdag was built without a decoder's library,
+// documents that need it are refused before anything is decoded.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +20,9 @@ struct BrokenData {
 void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compressed,
                     std::span<std::byte> out);
 
-// Hands the decoded bytes of a part to `write`, from the first to the last. The decoder's memory is
-// charged to `charge` before it is allocated, and what it frees stays charged. `compressed` is
-// overwritten. Throws BrokenData, or Error{kOutOfMemory} for a part that does not fit the budget.
+// Passes the decoded bytes of a part to `write`, from the first to the last. Charges the decoder's
+// memory to `charge` before it is allocated, and keeps the charge. Overwrites `compressed`. Throws
+// BrokenData, or Error{kOutOfMemory} for a part that does not fit the budget.
 void decode_draco(const DracoPart& part, std::span<std::byte> compressed, MemoryCharge& charge,
                   const std::function<void(std::span<const std::byte>)>& write);
 

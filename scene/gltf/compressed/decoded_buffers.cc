@@ -11,7 +11,7 @@
 namespace voxdag::gltf {
 namespace {
 
-// Of what a decoder allocates, this much may stay with the heap.
+// Memory that a decoder may leave in the heap without a trim.
 constexpr uint64_t kTrimBytes = uint64_t{4} << 20;
 
 std::string name_of(const BufferSource& buffer) {
@@ -120,7 +120,7 @@ void DecodedBuffers::open_scratch() {
   const std::string path = is_own ? folder + "/decoded" : scratch_path_;
   writer_ = files.create(path);
   reader_ = files.open_read(path);
-  // Without a name it is gone when the process ends, however it ends.
+  // A file without a name disappears when the process ends, even after a crash.
   files.remove(path);
   if (is_own) files.remove_directory(folder);
 }

@@ -1,7 +1,6 @@
-// What the compressed buffers of a document decode to. Each is decoded once, when some reader first
-// needs it, into one temporary file that has no name, and read from there by windows: so memory
-// holds one primitive or view of each reader while it is decoded, and nothing afterwards.
-// Thread-safe.
+// The decoded contents of a document's compressed buffers. The first reader that needs a buffer
+// decodes it into a temporary file without a name; windows are then read from this file. Memory
+// holds one primitive or view per reader during decoding, and nothing afterwards. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -27,8 +26,8 @@ class DecodedBuffers {
   // Reads bytes [offset, offset + out.size()) of one of the file's own buffers.
   using ReadFile = std::function<void(int buffer, uint64_t offset, std::span<std::byte> out)>;
 
-  // `scratch_path` is where the file is made, in a folder that exists; "": in a folder of its own
-  // in temporary_parent(). The references must outlive this.
+  // `scratch_path`: the temporary file, in an existing folder. "": in a new folder in
+  // temporary_parent(). The references must outlive this.
   DecodedBuffers(FileSystem& files, std::string scratch_path, const Document& document,
                  MemoryBudget& budget);
 
@@ -59,7 +58,7 @@ class DecodedBuffers {
 
   // Held shared by all that decode; alone by one that did not fit next to others.
   std::shared_mutex decoding_;
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // guards the members below
   std::unique_ptr<WritableFile> writer_;
   std::unique_ptr<ReadableFile> reader_;
   uint64_t end_ = 0;

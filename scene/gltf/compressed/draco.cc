@@ -1,6 +1,5 @@
-// The only place that calls Draco, but for its tables (draco_tables.h). Its decoders are used
-// through a class of ours, which learns the attributes of a mesh before memory is allocated for
-// them.
+// Calls Draco's decoders, through a class derived from them that checks the memory of each step
+// before Draco allocates it. Only this file and draco_tables.cc include Draco.
 #include "scene/gltf/compressed/codecs.h"
 
 #ifdef VOXDAG_HAS_DRACO
@@ -30,53 +29,52 @@ namespace voxdag::gltf {
 
 namespace {
 
-// Upper bounds of what Draco 1.5 allocates, from its code and from measurements (which are about
-// half of them): tables of corners and vertices, smaller ones for each attribute that has its own,
-// and per vertex of an attribute its value, as integers and finally, and its places in two maps.
+// Upper bounds of Draco 1.5's allocations, from its code; measurements give about half. They cover
+// the tables of corners and vertices, a smaller table for each attribute with its own connectivity,
+// and for each vertex of an attribute the value (as integers and final) and two map entries.
 constexpr uint64_t kBytesPerFace = 128;
 constexpr uint64_t kBytesPerFaceOfTable = 64;
 constexpr uint64_t kMapBytesPerValue = 16;
 
-// A strip of n triangles has n + 2 indices; those that join its pieces repeat, but not more often.
+// Triangles of a strip per Draco face: degenerate triangles join the pieces of a strip.
 constexpr uint64_t kMaxStripTrianglesPerFace = 8;
 
 constexpr size_t kWriteElements = 16384;
 
-[[noreturn]] void refuse_memory(uint64_t bytes) {
-  throw Error(ErrorCode::kOutOfMemory, "decoding its Draco data takes " +
-                                           std::to_string(bytes >> 20) + " MiB, more than " +
-                                           "the memory budget leaves");
-}
-
 void charge_up_to(MemoryCharge& charge, uint64_t bytes) {
-  if (bytes > charge.bytes() && !charge.try_resize(bytes)) refuse_memory(bytes);
+  if (bytes > charge.bytes() && !charge.try_resize(bytes))
+    throw Error(ErrorCode::kOutOfMemory, "decoding its Draco data takes " +
+                                             std::to_string(bytes >> 20) + " MiB, more than " +
+                                             "the memory budget leaves");
 }
 
-// Throws nothing through Draco: what admit() found is thrown by whoever called Decode().
+// A decoder of Draco that checks its memory before each step. No exception passes through Draco:
+// whoever calls Decode() throws `refusal`.
 template <class Decoder>
 class BoundedDecoder : public Decoder {
  public:
-  BoundedDecoder(uint64_t vertices, MemoryCharge& charge) : vertices_(vertices), charge_(charge) {}
+  BoundedDecoder(const DracoHeader& header, uint64_t vertices, MemoryCharge& charge)
+      : header_(header), vertices_(vertices), charge_(charge) {}
 
   std::exception_ptr refusal;
 
  protected:
-  bool DecodeAllAttributes() override { return admit() && Decoder::DecodeAllAttributes(); }
+  bool DecodeConnectivity() override {
+    return admit([&] { check_connectivity(); }) && Decoder::DecodeConnectivity();
+  }
+  bool DecodePointAttributes() override {
+    attributes_ = *this->buffer();
+    return Decoder::DecodePointAttributes();
+  }
+  bool DecodeAllAttributes() override {
+    return admit([&] { check_attributes(); }) && Decoder::DecodeAllAttributes();
+  }
 
  private:
-  bool admit() {
+  template <class Check>
+  bool admit(const Check& check) {
     try {
-      const draco::PointCloud& mesh = *this->point_cloud();
-      if (mesh.num_points() != vertices_)
-        throw BrokenData{"its Draco data have " + std::to_string(mesh.num_points()) +
-                         " vertices, its accessors " + std::to_string(vertices_)};
-      uint64_t bytes_per_vertex = 0;
-      for (int i = 0; i < mesh.num_attributes(); ++i) {
-        const draco::PointAttribute& a = *mesh.attribute(i);
-        bytes_per_vertex += 2 * static_cast<uint64_t>(a.byte_stride()) + kMapBytesPerValue +
-                            sizeof(int32_t) * static_cast<uint64_t>(a.num_components());
-      }
-      charge_up_to(charge_, charge_.bytes() + vertices_ * bytes_per_vertex);
+      check();
       return true;
     } catch (...) {
       refusal = std::current_exception();
@@ -84,24 +82,52 @@ class BoundedDecoder : public Decoder {
     }
   }
 
+  void check_connectivity() {
+    if (!header_.is_edgebreaker)
+      check_index_tables(*this->buffer(), admit_table_);
+    else if (header_.has_valences)
+      check_valence_tables(*this->buffer(), admit_table_);
+  }
+
+  void check_attributes() {
+    const draco::PointCloud& mesh = *this->point_cloud();
+    if (mesh.num_points() != vertices_)
+      throw BrokenData{"its Draco data have " + std::to_string(mesh.num_points()) +
+                       " vertices, its accessors " + std::to_string(vertices_)};
+    check_attribute_tables(attributes_, *this, admit_table_);
+    uint64_t bytes_per_vertex = 0;
+    for (int i = 0; i < mesh.num_attributes(); ++i) {
+      const draco::PointAttribute& a = *mesh.attribute(i);
+      bytes_per_vertex += 2 * static_cast<uint64_t>(a.byte_stride()) + kMapBytesPerValue +
+                          sizeof(int32_t) * static_cast<uint64_t>(a.num_components());
+    }
+    charge_up_to(charge_, charge_.bytes() + vertices_ * bytes_per_vertex);
+  }
+
+  const DracoHeader& header_;
   const uint64_t vertices_;
   MemoryCharge& charge_;
+  uint64_t table_bytes_ = 0;  // charged for the largest table
+  const AdmitTable admit_table_ = [this](uint64_t bytes) {
+    if (bytes <= table_bytes_) return;
+    charge_up_to(charge_, charge_.bytes() + bytes - table_bytes_);
+    table_bytes_ = bytes;
+  };
+  draco::DecoderBuffer attributes_;  // the start of the attribute section
 };
 
 template <class Decoder>
-void decode_mesh(const DracoPart& part, std::span<const std::byte> data, MemoryCharge& charge,
-                 draco::Mesh& mesh) {
+void decode_mesh(const DracoPart& part, const DracoHeader& header, std::span<const std::byte> data,
+                 MemoryCharge& charge, draco::Mesh& mesh) {
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char*>(data.data()), data.size());
-  // Quantized values stay integers; they become positions here, by operations that are the same on
-  // every machine.
+  // Quantized values remain integers. write_dequantized() computes the positions, with operations
+  // that give the same result on every machine.
   draco::DecoderOptions options;
   for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::GENERIC})
     options.SetAttributeBool(type, "skip_attribute_transform", true);
-  BoundedDecoder<Decoder> decoder(part.vertices, charge);
-  DracoTables tables(charge);
+  BoundedDecoder<Decoder> decoder(header, part.vertices, charge);
   const draco::Status status = decoder.Decode(options, &buffer, &mesh);
-  if (tables.refused_bytes() > 0) refuse_memory(tables.refused_bytes());
   if (decoder.refusal) std::rethrow_exception(decoder.refusal);
   if (!status.ok())
     throw BrokenData{"its Draco data are damaged" +
@@ -135,7 +161,7 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
                  const Writer<uint32_t>::Write& write) {
   Writer<uint32_t> out(write);
   const uint64_t faces = mesh.num_faces(), triangles = part.corners / 3;
-  // A strip is padded by its last face: its degenerate triangles lie on faces too.
+  // The last face pads a strip: degenerate triangles also have a face.
   for (uint64_t i = 0; i < triangles; ++i) {
     const draco::Mesh::Face& face =
         mesh.face(draco::FaceIndex(static_cast<uint32_t>(std::min(i, faces - 1))));
@@ -150,7 +176,7 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
   out.flush();
 }
 
-// The values of all vertices, each of `components` numbers of type T.
+// Writes the values of all vertices, each `wanted.components` numbers of type T.
 template <class T>
 void write_values(const DracoPart& part, const DracoPart::Attribute& wanted,
                   const draco::PointAttribute& found, const typename Writer<T>::Write& write) {
@@ -168,7 +194,7 @@ void write_values(const DracoPart& part, const DracoPart::Attribute& wanted,
   out.flush();
 }
 
-// value = integer * (range / largest integer) + minimum, in floats, as Draco's own decoders do it.
+// Writes integer * (range / max integer) + minimum, in floats, as Draco's decoders compute it.
 void write_dequantized(const DracoPart& part, const DracoPart::Attribute& wanted,
                        const draco::PointAttribute& found,
                        const draco::AttributeQuantizationTransform& transform,
@@ -245,9 +271,9 @@ void decode_draco(const DracoPart& part, std::span<std::byte> compressed, Memory
     draco::Mesh mesh;
     const std::span<const std::byte> data = compressed.subspan(header.begin);
     if (header.is_edgebreaker)
-      decode_mesh<draco::MeshEdgebreakerDecoder>(part, data, charge, mesh);
+      decode_mesh<draco::MeshEdgebreakerDecoder>(part, header, data, charge, mesh);
     else
-      decode_mesh<draco::MeshSequentialDecoder>(part, data, charge, mesh);
+      decode_mesh<draco::MeshSequentialDecoder>(part, header, data, charge, mesh);
     check_faces(part, mesh.num_faces());
     if (part.has_indices) write_faces(part, mesh, write);
     for (const DracoPart::Attribute& attribute : part.attributes)

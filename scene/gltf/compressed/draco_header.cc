@@ -12,7 +12,8 @@ namespace {
 constexpr size_t kDracoHeaderBytes = 11;
 constexpr uint8_t kMesh = 1;
 constexpr uint8_t kSequential = 0, kEdgebreaker = 1;
-constexpr uint8_t kMetadataFlag = 0x80;  // of the high byte of the flags
+constexpr uint8_t kValenceConnectivity = 2;
+constexpr uint8_t kMetadataFlag = 0x80;  // in the high byte of the flags
 
 class Bytes {
  public:
@@ -27,7 +28,7 @@ class Bytes {
     if (count > data_.size() - at_) throw BrokenData{"its Draco data are cut off"};
     at_ += static_cast<size_t>(count);
   }
-  // Seven bits per byte, the lowest first; the last byte is below 128.
+  // Reads seven bits per byte, the lowest first; the last byte is below 128.
   uint32_t varint() {
     uint64_t value = 0;
     for (unsigned shift = 0; shift < 35; shift += 7) {
@@ -43,8 +44,8 @@ class Bytes {
   size_t at_;
 };
 
-// One block of metadata of each attribute that has some, then one of the mesh. A block may have
-// blocks inside, each behind its name, so that `open` of them are still to come.
+// Skips the metadata blocks of the attributes, and the mesh's block. A block can have named blocks
+// inside; `open` of them remain to be read.
 void skip_metadata(Bytes& bytes) {
   const auto skip_block = [&]() -> uint64_t {
     for (uint32_t entries = bytes.varint(); entries > 0; --entries) {
@@ -79,7 +80,7 @@ DracoHeader read_draco_header(std::span<std::byte> data) {
     throw BrokenData{"its data have Draco version " + std::to_string(major) + "." +
                      std::to_string(minor) + ", expected 2.2"};
   const uint8_t type = bytes.next(), method = bytes.next();
-  if (type != kMesh) throw BrokenData{"its Draco data are no mesh"};
+  if (type != kMesh) throw BrokenData{"its Draco data are not a mesh"};
   if (method != kSequential && method != kEdgebreaker)
     throw BrokenData{"its Draco data have the unknown method " + std::to_string(method)};
   bytes.next();
@@ -93,8 +94,8 @@ DracoHeader read_draco_header(std::span<std::byte> data) {
   }
   header.is_edgebreaker = method == kEdgebreaker;
   if (header.is_edgebreaker) {
-    bytes.next();    // how the connectivity is coded
-    bytes.varint();  // vertices of the connectivity
+    header.has_valences = bytes.next() == kValenceConnectivity;
+    bytes.varint();  // number of vertices
   }
   header.faces = bytes.varint();
   if (header.is_edgebreaker) header.attribute_tables = bytes.next();

@@ -1,5 +1,5 @@
-// The head of Draco data of a mesh (Draco bitstream 2.2): what says how much memory the decoder
-// will take, read before it is called.
+// The header of Draco mesh data (bitstream 2.2): the counts that decide the decoder's memory, read
+// before the decoder runs.
 #pragma once
 
 #include <cstddef>
@@ -9,16 +9,17 @@
 namespace voxdag::gltf {
 
 struct DracoHeader {
-  bool is_edgebreaker = false;  // else the faces are stored one after the other
+  bool is_edgebreaker = false;  // false: the faces are stored one after the other
+  bool has_valences = false;    // edgebreaker with a context for each valence of a vertex
   uint64_t faces = 0;
-  // Attributes whose values are shared by fewer corners than positions are, each with a table of
-  // its own; edgebreaker only.
+  // Number of attributes with a separate connectivity table, because fewer corners share a value
+  // than share a position. Edgebreaker only.
   uint64_t attribute_tables = 0;
-  // Where data without metadata begin: the header was moved there, past the metadata.
+  // First byte of the data without metadata. read_draco_header() moves the header there.
   size_t begin = 0;
 };
 
-// Throws BrokenData. Moves the header of data that have metadata, which no vertex depends on.
+// Reads the header, and removes metadata, which no vertex depends on. Throws BrokenData.
 DracoHeader read_draco_header(std::span<std::byte> data);
 
 }  // namespace voxdag::gltf

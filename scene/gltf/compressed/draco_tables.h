@@ -1,34 +1,36 @@
-// The tables of Draco's entropy decoder, 12 bytes for each symbol of an alphabet and up to 4 MiB in
-// addition. A byte of compressed data can declare 64 symbols, so that a file of 1 MiB can ask for
-// 768 MiB in the middle of being decoded, which no header says. While a DracoTables exists, what
-// this thread decodes charges its tables before they are allocated; the linker puts our function
-// before Draco's (--wrap in CMakeLists.txt).
+// Bounds the memory of Draco's entropy decoder before it runs.
+//
+// The decoder allocates 12 bytes per symbol of an alphabet, and up to 4 MiB in addition. One byte
+// of compressed data can declare 64 symbols, so a file of 1 MiB can request 768 MiB in the middle
+// of the decoding, and no header states it. The functions below follow the data as Draco 1.5 reads
+// them (bitstream 2.2), with Draco's public classes, and skip everything but the tables. They throw
+// BrokenData for data that Draco would refuse.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 
-#include "core/base/memory_budget.h"
+namespace draco {
+class DecoderBuffer;
+class MeshDecoder;
+}  // namespace draco
 
 namespace voxdag::gltf {
 
-class DracoTables {
- public:
-  explicit DracoTables(MemoryCharge& charge);
-  DracoTables(const DracoTables&) = delete;
-  DracoTables& operator=(const DracoTables&) = delete;
-  ~DracoTables();
+// Called with the memory of each table before it is built; throws to refuse it. Draco holds only
+// one table in memory.
+using AdmitTable = std::function<void(uint64_t bytes)>;
 
-  // What the charge would have had to be for tables that did not fit the budget, with which
-  // decoding has failed; 0 if all did.
-  uint64_t refused_bytes() const { return refused_bytes_; }
-  // Whether `bytes` fit the budget in addition to what is charged. They are charged until
-  // release().
-  bool admit(uint64_t bytes);
-  void release();
+// Checks the table of a sequential mesh's indices. `at` is the start of its connectivity.
+void check_index_tables(const draco::DecoderBuffer& at, const AdmitTable& admit);
 
- private:
-  MemoryCharge& charge_;
-  uint64_t bytes_before_ = 0, refused_bytes_ = 0;
-};
+// Checks the tables of an edgebreaker mesh with valence coding. `at` is the start of its
+// connectivity.
+void check_valence_tables(const draco::DecoderBuffer& at, const AdmitTable& admit);
+
+// Checks the tables of all attributes. `at` is the start of the attribute section; `decoder` has
+// decoded the connectivity and the attributes' headers.
+void check_attribute_tables(const draco::DecoderBuffer& at, draco::MeshDecoder& decoder,
+                            const AdmitTable& admit);
 
 }  // namespace voxdag::gltf

@@ -1,5 +1,4 @@
-// The only place that calls meshoptimizer, whose decoders allocate nothing and check what they
-// read.
+// The only file that calls meshoptimizer. Its decoders allocate no memory and check their input.
 #include "scene/gltf/compressed/codecs.h"
 
 #ifdef VOXDAG_HAS_MESHOPT

@@ -55,8 +55,8 @@ void link_parents(Document& d) {
   check_for_cycles(d);
 }
 
-// Sets the roots: those of the default scene, else of the first scene, else all nodes that have no
-// parent.
+// Sets the roots to the nodes of the default scene, or of the first scene if the file names none.
+// Without scenes, the roots are all nodes without a parent.
 void choose_scene(Document& d) {
   if (d.scenes.empty()) {
     for (int i = 0; i < static_cast<int>(d.nodes.size()); ++i)

@@ -23,7 +23,7 @@ struct AccessorUse {
 };
 
 // Checks that accessor `index`, unless it is -1, exists and has a type of the use, and that its
-// bytes lie inside its view and the length that its buffer claims. Throws Error{kInvalidInput}.
+// bytes are inside its view and the length that its buffer claims. Throws Error{kInvalidInput}.
 void check_accessor(const Document& document, int index, const AccessorUse& use);
 // Checks that an accessor that exists, or -1, has `count` elements.
 void check_count(const Document& document, int index, uint64_t count, const std::string& where);

@@ -45,7 +45,7 @@ void check_layout(const MeshoptView& view, const std::string& path) {
   if (is_vertices && (view.stride == 0 || view.stride > 256 || view.stride % 4 != 0))
     violate(".byteStride is not a multiple of 4 up to 256");
   if (!is_vertices && view.stride != 2 && view.stride != 4)
-    violate(".byteStride is not 2 or 4, as that of indices");
+    violate(".byteStride is not 2 or 4, the sizes of indices");
   if (view.mode == MeshoptView::Mode::kTriangles && view.count % 3 != 0)
     violate(".count is no multiple of three, as TRIANGLES need");
   if (view.count > uint64_t{1} << 32) violate(".count is over the limit of 2^32");
@@ -120,7 +120,7 @@ CompressedBytes bytes_of_view(const Document& d, int view, const std::string& wh
   return {v.buffer, v.byte_offset, v.byte_length};
 }
 
-// The view must be that of the decoded bytes.
+// Checks that the view describes the decoded bytes.
 void check_parent(const Document& d, const BufferView& view, size_t index) {
   const std::string where =
       "bufferView " + std::to_string(index) + ": its EXT_meshopt_compression makes ";
@@ -221,7 +221,7 @@ void add_attribute(const Document& d, const Replaced& r, DracoPart& part) {
       {r.id, r.name, accessor.component_type, accessor.components, accessor.normalized});
 }
 
-// A buffer of what the part is decoded to; returns its index.
+// Adds a buffer for the part's decoded bytes, and returns its index.
 int add_part(Document& d, const std::shared_ptr<const DracoPart>& part) {
   BufferSource decoded;
   decoded.kind = BufferSource::Kind::kDecoded;
@@ -279,19 +279,19 @@ void place_draco_primitive(Document& d, Primitive& primitive, const std::string&
   for (const Replaced& r : replaced) offset += move_accessor(d, *r.accessor, buffer, offset);
 }
 
-void place_draco_look(Document& d, Primitive& primitive, int set) {
+void place_draco_surface(Document& d, Primitive& primitive, int set) {
   const int view = at(d, primitive.position).view;
   if (!primitive.draco || view < 0) return;
   const BufferView& positions = d.views[static_cast<size_t>(view)];
   const std::shared_ptr<const DracoPart> geometry =
       d.buffers[static_cast<size_t>(positions.buffer)].draco;
   if (!geometry) return;  // the fallback is read
-  PrimitiveLook& look = primitive.look;
+  PrimitiveSurface& surface = primitive.surface;
   const std::vector<int>& ids = primitive.draco->texture_coordinates;
   const auto n = static_cast<size_t>(set);
-  std::vector<Replaced> replaced{
-      {primitive.draco->color, &look.color, "COLOR_0"},
-      {n < ids.size() ? ids[n] : -1, &look.texture_coordinates, "TEXCOORD_" + std::to_string(set)}};
+  std::vector<Replaced> replaced{{primitive.draco->color, &surface.color, "COLOR_0"},
+                                 {n < ids.size() ? ids[n] : -1, &surface.texture_coordinates,
+                                  "TEXCOORD_" + std::to_string(set)}};
   std::erase_if(replaced, [&](const Replaced& r) {
     return r.id < 0 || !exists(d, *r.accessor) || at(d, *r.accessor).count != geometry->vertices;
   });

@@ -1,8 +1,8 @@
-// Geometry that a file has compressed: EXT_meshopt_compression compresses buffer views,
-// KHR_draco_mesh_compression primitives. Each becomes a buffer of the document of its own, so that
-// all else reads it as if the file had stored it decoded. Where a file has the same geometry
-// uncompressed too (a fallback), that is read: the result does not depend on what voxdag was built
-// with.
+// Compressed geometry: EXT_meshopt_compression compresses buffer views, KHR_draco_mesh_compression
+// compresses primitives. Each becomes an additional buffer of the document, and all other code
+// reads this buffer like stored bytes. If a file also stores the geometry uncompressed (a
+// fallback), the fallback is read. So the result does not depend on the libraries that voxdag was
+// built with.
 #pragma once
 
 #include <cstdint>
@@ -40,8 +40,8 @@ struct MeshoptView {
   uint64_t decoded_bytes() const { return count * stride; }
 };
 
-// KHR_draco_mesh_compression of a primitive, as the file has it: the ids of attributes that
-// positions depend on, -1 for those that are not compressed.
+// KHR_draco_mesh_compression of a primitive: the Draco ids of the attributes that voxdag reads, -1
+// for an attribute that is not compressed.
 struct DracoExtension {
   struct JointSet {
     int joints = -1;
@@ -54,9 +54,9 @@ struct DracoExtension {
   std::vector<JointSet> joint_sets;
 };
 
-// What a Draco primitive decodes to: `corners` indices of 32 bits, then the attributes one after
-// the other, each packed. What positions do not depend on is a part of its own, without indices:
-// who reads the geometry alone does not decode it.
+// The decoded form of a Draco primitive: `corners` indices of 32 bits, then the attributes one
+// after the other, each packed. Attributes that positions do not depend on form a second part
+// without indices, so that reading geometry alone does not decode them.
 struct DracoPart {
   struct Attribute {
     int id = -1;  // in the Draco data
@@ -83,14 +83,14 @@ std::shared_ptr<const DracoExtension> read_draco(const JsonElement& extension);
 
 uint64_t heap_bytes(const DracoExtension& draco);
 
-// Points every compressed view that has no uncompressed bytes at a buffer of its own.
+// Adds a buffer for every compressed view without uncompressed bytes, and points the view at it.
 void place_meshopt_views(Document& document);
-// Does so with the accessors of a compressed primitive, which refer to copies of their own then.
+// Does the same for a compressed primitive, whose accessors become copies that point at the buffer.
 // Call it before the primitive's accessors are checked. Throws Error{kInvalidInput}.
 void place_draco_primitive(Document& document, Primitive& primitive, const std::string& where);
-// Does so with the accessors of the primitive's look, if its positions were placed by the function
-// above. `set` is the n of the TEXCOORD_n that the look has, unless it has none.
-void place_draco_look(Document& document, Primitive& primitive, int set);
+// Does the same for the accessors of the primitive's surface, if the function above placed its
+// positions. `set` is the n of the surface's TEXCOORD_n, if it has one.
+void place_draco_surface(Document& document, Primitive& primitive, int set);
 // Checks a buffer that was made by one of these. Throws Error{kInvalidInput}, also where voxdag was
 // built without the library.
 void check_compressed(const Document& document, const BufferSource& buffer,

@@ -1,9 +1,9 @@
-// A glTF 2.0 file without its geometry. The arrays that can have an element per node or mesh of a
-// large scene are compact structs, each charged to the memory budget; tinygltf's model holds what
-// else is used. Filled by read_document() and then checked once by check_document(); after that:
+// A glTF 2.0 file without its geometry. Arrays that can have an element per node or mesh of a large
+// scene are compact structs, each charged to the memory budget; tinygltf's model holds the rest.
+// read_document() fills a document and check_document() checks it once. After that:
 //   1. every index is in range, or -1 if the file gives none;
-//   2. every accessor that is read has the type its use requires, and its bytes lie inside its
-//      buffer view, its view inside its buffer, and its buffer inside the existing bytes;
+//   2. every accessor that is read has the type its use requires. Its bytes are inside its buffer
+//      view, the view is inside its buffer, and the buffer is inside the existing bytes;
 //   3. nodes form trees, and `roots` have no parents.
 #pragma once
 
@@ -26,7 +26,7 @@ class Model;
 
 namespace voxdag::gltf {
 
-struct Looks;
+struct DocumentMaterials;
 
 // Where the bytes of a buffer come from.
 struct BufferSource {
@@ -98,9 +98,9 @@ struct JointSet {
 // Primitive modes that make triangles; smaller ones are points and lines.
 enum Mode : int { kTriangleList = 4, kTriangleStrip = 5, kTriangleFan = 6 };
 
-// How the triangles of a primitive look. Set by resolve_looks().
-struct PrimitiveLook {
-  uint32_t material = 0;         // of Looks
+// Material and attributes of a primitive's triangles. Set by resolve_materials().
+struct PrimitiveSurface {
+  uint32_t material = 0;         // index in DocumentMaterials
   int texture_coordinates = -1;  // accessor; -1: not needed
   int color = -1;                // accessor; -1: white
 };
@@ -114,7 +114,7 @@ struct Primitive {
   int material = -1;                     // as the file has it, unchecked like the next two
   int color = -1;                        // COLOR_0
   std::vector<int> texture_coordinates;  // TEXCOORD_n
-  PrimitiveLook look;
+  PrimitiveSurface surface;
   std::shared_ptr<const DracoExtension> draco;  // null: not compressed
 
   bool makes_triangles() const { return mode >= kTriangleList; }
@@ -172,11 +172,11 @@ struct Document {
   std::deque<Mesh> meshes;
   std::deque<Skin> skins;
   std::deque<Node> nodes;
-  std::deque<std::vector<int>> scenes;  // the root nodes of each
-  std::shared_ptr<const Looks> looks;   // set by resolve_looks()
-  int scene = -1;                       // the default scene
-  std::vector<int> roots;               // of the scene to draw, set by check_document()
-  std::vector<std::string> warnings;    // the first few
+  std::deque<std::vector<int>> scenes;                 // the root nodes of each
+  std::shared_ptr<const DocumentMaterials> materials;  // set by resolve_materials()
+  int scene = -1;                                      // the default scene
+  std::vector<int> roots;             // of the scene to draw, set by check_document()
+  std::vector<std::string> warnings;  // the first few
   uint64_t further_warnings = 0;
 
   // Adds "<path>: <what>" to the warnings.

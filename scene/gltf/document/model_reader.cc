@@ -17,7 +17,7 @@ using Json = JsonElement::Json;
 
 constexpr size_t kMaxReasonBytes = 200;
 
-// A place in a std::map, and the allocations of what is there.
+// Memory of an entry of a std::map, with the allocations of its key and value.
 constexpr uint64_t kBytesPerMember = 112;
 // The text grows by doubling; the strings of tinygltf's JSON tree are copies of it.
 constexpr uint64_t kTextCopies = 4;
@@ -40,7 +40,7 @@ uint64_t model_bytes(const Json& value, bool is_in_extensions, uint64_t& values)
   return bytes;
 }
 
-// Of an element in the model's own arrays; a growing vector needs its memory twice.
+// Memory of an element in the model's arrays. A growing vector needs it twice.
 uint64_t element_bytes(std::string_view section) {
   if (section == "materials") return 2 * sizeof(tinygltf::Material);
   if (section == "textures") return 2 * sizeof(tinygltf::Texture);

@@ -19,8 +19,8 @@ namespace {
 constexpr std::string_view kRead[] = {"EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
                                       "KHR_draco_mesh_compression", "KHR_mesh_quantization"};
 
-// Beginnings of the names of extensions for looks, lights, motion and metadata, which no vertex
-// depends on.
+// Prefixes of extension names for materials, lights, motion and metadata. No vertex depends on
+// them.
 constexpr std::string_view kHarmless[] = {
     "KHR_materials_",      "KHR_texture_",          "EXT_texture_", "MSFT_texture_",
     "KHR_lights_punctual", "EXT_lights_",           "KHR_xmp",      "KHR_animation_pointer",

@@ -14,7 +14,7 @@ int index_or_none(const JsonElement& object, const char* key) {
   return member ? member->as_index() : -1;
 }
 
-// What does not affect the geometry is no error: -1 for what is no index.
+// Returns -1 for a value that is not an index. For members that do not affect the geometry.
 int index_if_any(const JsonElement& element) {
   const auto& value = element.value();
   const bool is_index = value.is_number_unsigned() && value.get<uint64_t>() <= INT32_MAX;
@@ -129,7 +129,7 @@ std::array<double, N> numbers_or(const std::vector<double>& given, std::array<do
   return absent;
 }
 
-// A quaternion far from unit length is no rotation, and readers disagree on what it does.
+// A quaternion far from unit length is not a rotation, and readers disagree on its effect.
 bool is_unit(const std::vector<double>& q) {
   const double norm = ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3];
   return norm > 0.99 && norm < 1.01;

@@ -30,7 +30,7 @@ struct Chunk {
   FileRange content;
 };
 
-// The chunk whose header lies at `offset`; `end` is where the GLB ends.
+// Reads the chunk header at `offset` of a GLB that ends at `end`.
 Chunk read_chunk(const ReadableFile& file, uint64_t offset, uint64_t end) {
   if (end - offset < kChunkHeaderBytes)
     refuse(file.path(), "the GLB ends inside the header of a chunk");

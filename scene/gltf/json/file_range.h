@@ -11,7 +11,7 @@ struct FileRange {
   uint64_t size = 0;
 };
 
-// A string of the JSON where it lies in the scene file.
+// Position of a JSON string in the scene file.
 struct RawString {
   FileRange characters;     // between the quotes
   bool is_escaped = false;  // has JSON escapes

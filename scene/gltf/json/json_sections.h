@@ -1,7 +1,6 @@
 // Reads the JSON of a scene file once, from beginning to end. The root's members ("nodes",
-// "asset", ...) are its sections. Whoever reads the file names the sections that it wants; their
-// elements are passed on one at a time, so that only one of them is in memory. Other sections and
-// all members "extras" are skipped.
+// "asset", ...) are its sections. The caller names the sections to read, and receives one element
+// after the other; memory holds one element. Other sections and all members "extras" are skipped.
 #pragma once
 
 #include <functional>

@@ -1,12 +1,12 @@
-// The JSON of a scene file, read through a small window: a stream buffer for the parser, which
-// takes one character at a time.
+// The JSON of a scene file, read through a small window: a stream buffer that gives the parser
+// single characters.
 //
-// Strings can be long: a data: URI, of geometry or of an image, may be most of the file. The plain
-// characters of a string past the first few thousand are withheld from the parser, which would
-// collect them in memory. The place of the string in the file is recorded instead, so that a buffer
-// can be decoded from there by windows. Of several blanks between values the parser sees one, and a
-// number of more digits than any needs is refused. The characters that the parser collects are
-// charged to the budget. Not thread-safe.
+// Strings can be long: a data: URI of geometry or of an image may be most of the file. The parser
+// would collect them in memory. So the window withholds the plain characters of a string past the
+// first few thousand, and records the string's position in the file, from which a buffer is decoded
+// in windows. The parser receives one of several blanks between values. A number with more digits
+// than any value needs is refused. The parser's characters are charged to the budget. Not
+// thread-safe.
 #pragma once
 
 #include <cstddef>

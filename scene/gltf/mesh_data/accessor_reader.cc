@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint64_t kSparseWindow = 1024;
 
-// How elements lie in a window of bytes.
+// Layout of elements in a window of bytes.
 struct Layout {
   int component_type;
   int components;

@@ -1,6 +1,6 @@
-// Elements of one accessor, decoded by windows: interleaved or packed, integers normalized or not,
-// sparse replacements applied. Of a sparse accessor, every 1024th index is in memory, to find the
-// replacements of a range. Not thread-safe.
+// Decodes the elements of one accessor in windows: interleaved or packed, integers normalized or
+// not, with sparse replacements. Every 1024th index of a sparse accessor is kept in memory, to find
+// the replacements of a range. Not thread-safe.
 #pragma once
 
 #include <cstddef>

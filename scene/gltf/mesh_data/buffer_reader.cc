@@ -11,7 +11,7 @@
 namespace voxdag::gltf {
 namespace {
 
-// Of all readers of a scene together, unless these are more.
+// Open files of all readers of a scene, at least one per reader.
 constexpr unsigned kMaxOpenFiles = 32;
 constexpr uint64_t kMapNodeBytes = 48;
 // A window that begins inside a group of three bytes and ends inside another.
@@ -62,7 +62,7 @@ void ExternalFiles::add(int buffer, const SourceFile& file) {
       before.modified_ns != now.modified_ns)
     throw Error(ErrorCode::kInvalidInput,
                 printable(file.path) +
-                    " changed while the scene was read: expected files that stay as they are");
+                    " changed while the scene was read: expected files that do not change");
 }
 
 std::vector<SourceFile> ExternalFiles::all() const {
@@ -140,7 +140,7 @@ void BufferReader::check_length(int index) {
   if (there < buffer.byte_length)
     refuse(document_.path, "buffer " + std::to_string(index) + " claims " +
                                std::to_string(buffer.byte_length) + " bytes, " +
-                               std::to_string(there) + " are there" +
+                               std::to_string(there) + " are present" +
                                (buffer.uri.empty() ? "" : " in " + printable(buffer.uri)));
 }
 

@@ -1,5 +1,5 @@
-// The bytes of the buffers of a scene, read by windows: from the scene file, from an external file,
-// out of base64 characters, or decoded from one of these. Not thread-safe.
+// Reads the bytes of a scene's buffers in windows: from the scene file, from an external file, from
+// base64 characters, or from decoded geometry. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +25,7 @@ class ExternalFiles {
  public:
   ExternalFiles(const std::string& scene_path, MemoryBudget& budget)
       : charge_(budget, "the list of external files of " + scene_path) {}
-  // The buffer's file was opened. Throws Error{kInvalidInput} if it is another one than before.
+  // Records the opened file of a buffer. Throws Error{kInvalidInput} if the file has changed.
   void add(int buffer, const SourceFile& file);
   std::vector<SourceFile> all() const;
 

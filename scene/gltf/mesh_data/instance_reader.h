@@ -1,5 +1,5 @@
-// The transforms of a node's instances (EXT_mesh_gpu_instancing), read by windows; a single
-// identity for a node without the extension. Not thread-safe.
+// Reads the transforms of a node's instances (EXT_mesh_gpu_instancing) in windows. A node without
+// the extension has one identity transform. Not thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -12,7 +12,7 @@ class NodeWalk {
  public:
   NodeWalk(const Document& document, MemoryBudget& budget);
 
-  // Moves to the next node with a mesh; false if there is none.
+  // Moves to the next node with a mesh. Returns false at the end.
   bool next();
   int node() const { return path_.back().node; }
   const Transform& global() const { return path_.back().global; }

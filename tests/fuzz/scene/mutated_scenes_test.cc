@@ -50,7 +50,7 @@ struct Outcomes {
 };
 
 // Reads the materials of the triangles. Returns the number of triangles with an image.
-int read_looks(OpenScene& open) {
+int read_surfaces(OpenScene& open) {
   NoProgress progress;
   const auto textures = TextureSet::prepare(open.files, open.source->materials(), "scratch", 1,
                                             open.budget, progress, open.cancel);
@@ -73,7 +73,7 @@ void read(const std::string& file, int i, Outcomes& outcomes) {
     OpenScene open(file, {.skip_invalid = i % 2 == 0}, uint64_t{16} << 20);
     if (open.source->declared_triangles() <= kMaxTriangles) {
       open.triangles();
-      if (read_looks(open) > 0) ++outcomes.with_image;
+      if (read_surfaces(open) > 0) ++outcomes.with_image;
     }
     ++outcomes.worked;
   } catch (const Error& e) {
@@ -112,10 +112,10 @@ TEST(FuzzScene, MutatedGltfWithDataUri) {
 }
 
 // Materials, images and their buffers.
-TEST(FuzzScene, MutatedLooks) {
+TEST(FuzzScene, MutatedMaterials) {
   const SceneBuilder scene = rich_painted_scene();
   OpenScene open(scene.glb());
-  ASSERT_GT(read_looks(open), 1);
+  ASSERT_GT(read_surfaces(open), 1);
   Outcomes outcomes;
   run(scene.glb(), 1500, 4, outcomes);
   run(scene.gltf("data:application/octet-stream;base64," + base64(scene.bin)), 1500, 5, outcomes);
@@ -165,7 +165,7 @@ TEST(FuzzScene, MutatedNumbers) {
   EXPECT_GT(outcomes.refused, 100);
 }
 
-TEST(FuzzScene, MutatedNumbersOfLooks) {
+TEST(FuzzScene, MutatedNumbersOfMaterials) {
   Outcomes outcomes;
   run_with_numbers(rich_painted_scene(), 6, outcomes);
   EXPECT_GT(outcomes.with_image, 100);

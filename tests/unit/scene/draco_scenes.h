@@ -22,7 +22,7 @@ inline Json draco_extension(int view, Json attributes) {
            {{"bufferView", view}, {"attributes", std::move(attributes)}}}};
 }
 
-// A scene whose only primitive is compressed.
+// A scene with one compressed primitive.
 inline SceneBuilder compressed_scene(const std::vector<char>& data, uint64_t vertices,
                                      uint64_t indices, Json attributes = {{"POSITION", 0}}) {
   SceneBuilder scene;
@@ -42,7 +42,7 @@ inline SceneBuilder compressed_scene(const std::vector<char>& data, uint64_t ver
 
 #ifdef VOXDAG_HAS_DRACO
 
-// A bumpy grid of 2 * n * n triangles, with normals that differ from face to face if wanted.
+// A bumpy grid of 2 * n * n triangles, optionally with normals that differ from face to face.
 inline std::unique_ptr<draco::Mesh> bumpy_grid(uint32_t n, bool with_normals) {
   auto mesh = std::make_unique<draco::Mesh>();
   const uint32_t points = with_normals ? 6 * n * n : (n + 1) * (n + 1);
@@ -88,10 +88,15 @@ inline std::unique_ptr<draco::Mesh> bumpy_grid(uint32_t n, bool with_normals) {
   return mesh;
 }
 
-inline std::vector<char> encode_draco(const draco::Mesh& mesh, int method, int quantization_bits) {
+// `speed`: 0 to 10; slower encoders use more kinds of prediction.
+inline std::vector<char> encode_draco(const draco::Mesh& mesh, int method, int quantization_bits,
+                                      int speed = 5) {
   draco::ExpertEncoder encoder(mesh);
   encoder.SetEncodingMethod(method);
-  if (quantization_bits > 0) encoder.SetAttributeQuantization(0, quantization_bits);
+  encoder.SetSpeedOptions(speed, speed);
+  for (int i = 0; quantization_bits > 0 && i < mesh.num_attributes(); ++i)
+    if (i == 0 || mesh.attribute(i)->data_type() == draco::DT_FLOAT32)
+      encoder.SetAttributeQuantization(i, quantization_bits);
   draco::EncoderBuffer buffer;
   EXPECT_TRUE(encoder.EncodeToBuffer(&buffer).ok());
   return {buffer.data(), buffer.data() + buffer.size()};

@@ -47,7 +47,7 @@ TEST(GltfBuffers, ExternalThatIsMissingOrShort) {
   const Error cut =
       error_among({{"folder/scene", scene.gltf("a.bin")}, {"folder/a.bin", scene.bin.substr(1)}});
   EXPECT_EQ(cut.code(), ErrorCode::kInvalidInput);
-  EXPECT_NE(cut.message().find("buffer 0 claims 42 bytes, 41 are there in a.bin"),
+  EXPECT_NE(cut.message().find("buffer 0 claims 42 bytes, 41 are present in a.bin"),
             std::string::npos)
       << cut.message();
 }

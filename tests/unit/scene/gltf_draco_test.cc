@@ -59,6 +59,38 @@ TEST(GltfDraco, EqualsTheDecodedScene) {
   }
 }
 
+// Adds texture coordinates that are continuous, which the encoder predicts from positions.
+void add_texture_coordinates(draco::Mesh& mesh) {
+  draco::GeometryAttribute texture;
+  texture.Init(draco::GeometryAttribute::TEX_COORD, nullptr, 2, draco::DT_FLOAT32, false, 8, 0);
+  const int id = mesh.AddAttribute(texture, true, mesh.num_points());
+  for (uint32_t p = 0; p < mesh.num_points(); ++p) {
+    const draco::PointAttribute& positions = *mesh.attribute(0);
+    float at[3];
+    positions.GetMappedValue(draco::PointIndex(p), at);
+    const float uv[2] = {at[0] / 60, at[1] / 50};
+    mesh.attribute(id)->SetAttributeValue(draco::AttributeValueIndex(p), uv);
+  }
+}
+
+// Every speed of the encoder: with edgebreaker and valences, all predictions, raw and tagged
+// symbols.
+TEST(GltfDraco, AllEncodersAreRead) {
+  for (const uint32_t n : {3u, 40u})
+    for (const bool with_normals : {false, true})
+      for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING})
+        for (const int bits : {5, 12, 20})
+          for (const int speed : {0, 1, 2, 3, 5, 7, 10}) {
+            SCOPED_TRACE(testing::Message() << n << ' ' << with_normals << ' ' << method << ' '
+                                            << bits << ' ' << speed);
+            auto mesh = bumpy_grid(n, with_normals);
+            add_texture_coordinates(*mesh);
+            const auto data = encode_draco(*mesh, method, bits, speed);
+            EXPECT_EQ(triangles_of_file(compressed_scene_of(data).glb()),
+                      triangles_of_file(plain_scene(*decode_draco(data)).glb()));
+          }
+}
+
 TEST(GltfDraco, MetadataArePassedOver) {
   auto mesh = bumpy_grid(5, false);
   auto metadata = std::make_unique<draco::GeometryMetadata>();
@@ -81,7 +113,7 @@ TEST(GltfDraco, MetadataArePassedOver) {
 }
 
 // Texture coordinates and colors as Draco's own decoder gives them.
-TEST(GltfDraco, LooksAreCompressedToo) {
+TEST(GltfDraco, SurfacesAreCompressed) {
   auto mesh = bumpy_grid(6, false);
   const uint32_t points = mesh->num_points();
   draco::GeometryAttribute texture, color;
@@ -98,7 +130,7 @@ TEST(GltfDraco, LooksAreCompressedToo) {
   const auto data = encode_draco(*mesh, draco::MESH_EDGEBREAKER_ENCODING, 12);
   const auto decoded = decode_draco(data);
 
-  const auto add_look = [](SceneBuilder& scene, int uv, int rgba) {
+  const auto add_material = [](SceneBuilder& scene, int uv, int rgba) {
     scene.root["images"] = {{{"uri", "data:image/png;base64,"}}};
     scene.root["textures"] = {{{"source", 0}}};
     scene.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
@@ -114,7 +146,7 @@ TEST(GltfDraco, LooksAreCompressedToo) {
   const int uv = plain.add_accessor("VEC2", kF32, values_of<float>(*decoded, texture_id));
   const int rgba = plain.add_accessor("VEC4", kU8, values_of<uint8_t>(*decoded, color_id),
                                       {{"normalized", true}});
-  const auto expected = add_look(plain, uv, rgba);
+  const auto expected = add_material(plain, uv, rgba);
   SceneBuilder scene =
       compressed_scene(data, points, 3 * mesh->num_faces(),
                        {{"POSITION", 0}, {"TEXCOORD_0", texture_id}, {"COLOR_0", color_id}});
@@ -123,7 +155,7 @@ TEST(GltfDraco, LooksAreCompressedToo) {
   const int own_rgba = scene.add(
       "accessors",
       {{"componentType", kU8}, {"count", points}, {"type", "VEC4"}, {"normalized", true}});
-  const auto found = add_look(scene, own_uv, own_rgba);
+  const auto found = add_material(scene, own_uv, own_rgba);
   ASSERT_EQ(found.size(), 72u);
   ASSERT_EQ(expected.size(), 72u);
   for (size_t i = 0; i < found.size(); ++i)
@@ -134,7 +166,7 @@ TEST(GltfDraco, LooksAreCompressedToo) {
 }
 
 // Joints and weights come from generic attributes, and the skin moves the vertices.
-TEST(GltfDraco, SkinsAreCompressedToo) {
+TEST(GltfDraco, SkinsAreCompressed) {
   auto mesh = bumpy_grid(6, false);
   const uint32_t points = mesh->num_points();
   draco::GeometryAttribute joints, weights;
@@ -286,12 +318,11 @@ TEST(GltfDraco, DamagedDataAreErrors) {
   }
 }
 
-// A byte can declare 64 symbols of the entropy coder, of which each takes 12 bytes of tables: this
-// file of 400 KB would take 293 MiB.
-TEST(GltfDraco, TablesOfSymbolsArePartOfTheBudget) {
-  std::vector<char> data = {'D', 'R', 'A', 'C', 'O', 2, 2, 1, 0, 0, 0};
-  data.insert(data.end(), {1, 3, 0});  // faces, vertices, compressed indices
-  data.insert(data.end(), {1, 18});    // raw symbols of 18 bits
+// One byte can declare 64 symbols of the entropy coder, and each takes 12 bytes of tables: a file
+// of 400 KB would take 293 MiB.
+void expect_tables_in_the_budget(const std::vector<char>& data_before_the_table) {
+  std::vector<char> data = data_before_the_table;
+  data.insert(data.end(), {1, 18});  // raw symbols of 18 bits
   const size_t table_bytes = 400000;
   for (size_t symbols = 64 * table_bytes; symbols > 0; symbols >>= 7)
     data.push_back(static_cast<char>((symbols & 127) | (symbols > 127 ? 128 : 0)));
@@ -311,6 +342,27 @@ TEST(GltfDraco, TablesOfSymbolsArePartOfTheBudget) {
   const Error damaged = error_within(uint64_t{512} << 20);
   EXPECT_EQ(damaged.code(), ErrorCode::kInvalidInput);
   EXPECT_THAT(damaged.message(), testing::HasSubstr("its Draco data are damaged"));
+}
+
+TEST(GltfDraco, TablesOfIndicesArePartOfTheBudget) {
+  expect_tables_in_the_budget({'D', 'R', 'A', 'C', 'O', 2, 2, 1, 0, 0, 0,  // sequential
+                               1, 3, 0});  // faces, vertices, compressed indices
+}
+
+TEST(GltfDraco, TablesOfValencesArePartOfTheBudget) {
+  expect_tables_in_the_budget(
+      {'D',    'R', 'A', 'C', 'O', 2, 2, 1, 1, 0, 0,  // edgebreaker
+       2,      3,   1,   0,   1,   0, 0,              // valences, 3 vertices, 1 face, 1 symbol
+       '\x80', 1,   0,                                // bits of the first faces
+       1});                                           // symbols of a valence
+}
+
+TEST(GltfDraco, TablesOfAttributesArePartOfTheBudget) {
+  expect_tables_in_the_budget(
+      {'D',    'R', 'A', 'C', 'O', 2, 2, 1, 0, 0, 0,  // sequential
+       1,      3,   1,   0,   1,   2,                 // face, vertices, plain indices 0, 1, 2
+       1,      1,   0,   9,   3,   0, 0, 2,           // one attribute: quantized positions
+       '\xfe', 1});                                   // without prediction, compressed
 }
 
 // What a file claims is compared with the budget before memory is allocated for it.

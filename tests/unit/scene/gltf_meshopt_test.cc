@@ -178,7 +178,7 @@ TEST(GltfMeshopt, WhatDoesNotFitIsRefusedByName) {
   EXPECT_THAT(with({{"byteLength", 1 << 20}}, same), HasSubstr("ends past the"));
   EXPECT_THAT(with({{"buffer", 1}}, same), HasSubstr("buffer 1 has no uri"));
   EXPECT_THAT(with({{"byteLength", 1000}}, same), HasSubstr("do not hold 3600 elements"));
-  EXPECT_THAT(with(same, {{"byteStride", 3}}), HasSubstr("not 2 or 4, as that of indices"));
+  EXPECT_THAT(with(same, {{"byteStride", 3}}), HasSubstr("not 2 or 4, the sizes of indices"));
   EXPECT_THAT(with(same, {{"count", 20887}}), HasSubstr("no multiple of three"));
   EXPECT_THAT(with(same, {{"filter", "EXPONENTIAL"}}), HasSubstr("for ATTRIBUTES only"));
   EXPECT_THAT(with(same, {{"mode", "INDICES"}}), HasSubstr("do not hold 20886 elements"));

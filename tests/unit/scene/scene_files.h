@@ -148,7 +148,7 @@ inline SceneBuilder textured(const std::string& image) {
   return scene;
 }
 
-// What all triangles look like.
+// The surfaces of all triangles.
 inline std::vector<SurfaceTriangle> surfaces_of(TriangleSource& source) {
   std::vector<SurfaceTriangle> all;
   source.open(1)->read_surfaces(0, source.declared_triangles(), [&](auto batch) {

@@ -1,4 +1,4 @@
-// What triangles of small glTF scenes made here look like: corners and materials.
+// Surfaces of small glTF scenes: corners and materials.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -140,12 +140,12 @@ TEST(Surfaces, TextureCoordinatesOfOtherTypesAndSets) {
   // A set that the primitive lacks: the factor alone.
   use["extensions"] = {{"KHR_texture_transform", {{"texCoord", 3}}}};
   OpenScene open(scene.glb());
-  const SceneMaterials looks = open.source->materials();
-  ASSERT_EQ(looks.warnings.size(), 1u);
-  EXPECT_THAT(looks.warnings[0], HasSubstr("TEXCOORD_3"));
+  const SceneMaterials scene_materials = open.source->materials();
+  ASSERT_EQ(scene_materials.warnings.size(), 1u);
+  EXPECT_THAT(scene_materials.warnings[0], HasSubstr("TEXCOORD_3"));
   const uint32_t material = surfaces_of(*open.source).at(0).material;
-  ASSERT_LT(material, looks.materials.size());
-  EXPECT_EQ(looks.materials[material].image, Material::kNoImage);
+  ASSERT_LT(material, scene_materials.materials.size());
+  EXPECT_EQ(scene_materials.materials[material].image, Material::kNoImage);
 }
 
 std::vector<Material> materials_of(const SceneBuilder& scene) {
@@ -195,10 +195,10 @@ TEST(Materials, DiffuseTextureOfSpecularGlossiness) {
         {{"KHR_materials_pbrSpecularGlossiness",
           {{"diffuseTexture", {{"index", 0}, {"extensions", transform}}}}}}}}};
   OpenScene open(scene.glb());
-  const SceneMaterials looks = open.source->materials();
-  EXPECT_EQ(looks.materials.at(0).image, 0u);
-  ASSERT_EQ(looks.images.size(), 1u);
-  EXPECT_THAT(looks.images[0].name, HasSubstr("image 0 \"wood\""));
+  const SceneMaterials scene_materials = open.source->materials();
+  EXPECT_EQ(scene_materials.materials.at(0).image, 0u);
+  ASSERT_EQ(scene_materials.images.size(), 1u);
+  EXPECT_THAT(scene_materials.images[0].name, HasSubstr("image 0 \"wood\""));
   EXPECT_EQ(surfaces_of(*open.source).at(0).corners[1].texture[0], 2 * kOneImage);
 }
 
@@ -213,21 +213,23 @@ TEST(Materials, OfSeveralFiles) {
   MemoryBudget budget(uint64_t{64} << 20);
   CancelToken cancel;
   const auto scene = open_scene(files, {"textured", "plain", "textured"}, {}, budget, cancel);
-  const SceneMaterials looks = scene->materials();
-  ASSERT_EQ(looks.materials.size(), scene->material_count());
-  ASSERT_EQ(looks.images.size(), 2u);
+  const SceneMaterials scene_materials = scene->materials();
+  ASSERT_EQ(scene_materials.materials.size(), scene->material_count());
+  ASSERT_EQ(scene_materials.images.size(), 2u);
   const auto triangles = surfaces_of(*scene);
   ASSERT_EQ(triangles.size(), 3u);
-  const auto material = [&](size_t i) { return looks.materials.at(triangles[i].material); };
+  const auto material = [&](size_t i) {
+    return scene_materials.materials.at(triangles[i].material);
+  };
   EXPECT_EQ(material(0).name, "floor");
   EXPECT_EQ(material(0).image, 0u);
   EXPECT_EQ(material(1).name, "second");
   EXPECT_EQ(material(1).image, Material::kNoImage);
   EXPECT_EQ(material(2).name, "floor");
   EXPECT_EQ(material(2).image, 1u);
-  EXPECT_THAT(looks.images[1].name, HasSubstr("textured"));
+  EXPECT_THAT(scene_materials.images[1].name, HasSubstr("textured"));
   // Materials are numbered as the files list them, whether triangles have them or not.
-  EXPECT_EQ(looks.names, (std::vector<std::string>{"floor", "first", "second", "floor"}));
+  EXPECT_EQ(scene_materials.names, (std::vector<std::string>{"floor", "first", "second", "floor"}));
   EXPECT_EQ(material(0).number, 0u);
   EXPECT_EQ(material(1).number, 2u);
   EXPECT_EQ(material(2).number, 3u);
@@ -242,13 +244,13 @@ TEST(Materials, NumbersOfThoseThatAreNotListed) {
   scene.root["meshes"][0]["primitives"][1].erase("material");
   scene.root["meshes"][0]["primitives"][2]["attributes"].erase("TEXCOORD_0");
   OpenScene open(scene.glb());
-  SceneMaterials looks = open.source->materials();
-  EXPECT_EQ(looks.names, std::vector<std::string>{"floor"});
-  looks.name_unlisted();
-  EXPECT_EQ(looks.names, (std::vector<std::string>{"floor", ""}));
+  SceneMaterials scene_materials = open.source->materials();
+  EXPECT_EQ(scene_materials.names, std::vector<std::string>{"floor"});
+  scene_materials.name_unlisted();
+  EXPECT_EQ(scene_materials.names, (std::vector<std::string>{"floor", ""}));
   std::vector<uint32_t> numbers;
   for (const SurfaceTriangle& triangle : surfaces_of(*open.source))
-    numbers.push_back(looks.materials.at(triangle.material).number);
+    numbers.push_back(scene_materials.materials.at(triangle.material).number);
   EXPECT_EQ(numbers, (std::vector<uint32_t>{0, 1, 0}));
 }
 

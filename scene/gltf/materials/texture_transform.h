@@ -9,7 +9,7 @@ namespace voxdag::gltf {
 struct SineCosine {
   double sine = 0, cosine = 1;
 };
-// Of an angle in radians, to about 2^-50; of 0 for what is not finite.
+// Returns sine and cosine of an angle in radians, to about 2^-50; of 0 if it is not finite.
 SineCosine sine_and_cosine(double angle);
 
 // Rows of a 2x3 matrix.

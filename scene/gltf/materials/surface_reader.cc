@@ -1,4 +1,4 @@
-#include "scene/gltf/looks/look_reader.h"
+#include "scene/gltf/materials/surface_reader.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,8 +8,8 @@
 
 namespace voxdag::gltf {
 
-LookReader::LookReader(const Document& document, BufferReader& buffers, uint64_t vertices,
-                       unsigned readers)
+SurfaceReader::SurfaceReader(const Document& document, BufferReader& buffers, uint64_t vertices,
+                             unsigned readers)
     : document_(document), buffers_(buffers) {
   constexpr uint64_t kBlockBytes = kBlockVertices * sizeof(SurfaceCorner);
   const uint64_t wanted = std::bit_ceil((vertices + kBlockVertices - 1) / kBlockVertices);
@@ -22,23 +22,23 @@ LookReader::LookReader(const Document& document, BufferReader& buffers, uint64_t
   slot_mask_ = static_cast<size_t>(slots - 1);
 }
 
-void LookReader::bind(const Primitive& primitive) {
-  const PrimitiveLook& look = primitive.look;
+void SurfaceReader::bind(const Primitive& primitive) {
+  const PrimitiveSurface& surface = primitive.surface;
   std::ranges::fill(block_in_slot_, kNoBlock);
-  material_ = look.material;
-  transform_ = document_.looks->transforms[material_];
-  open(look.texture_coordinates, texture_coordinates_);
-  open(look.color, colors_);
+  material_ = surface.material;
+  transform_ = document_.materials->transforms[material_];
+  open(surface.texture_coordinates, texture_coordinates_);
+  open(surface.color, colors_);
   is_plain_ = !texture_coordinates_ && !colors_;
   vertices_ = document_.accessors[static_cast<size_t>(primitive.position)].count;
   if (!colors_) return;
-  const Accessor& color = document_.accessors[static_cast<size_t>(look.color)];
+  const Accessor& color = document_.accessors[static_cast<size_t>(surface.color)];
   color_components_ = static_cast<size_t>(color.components);
   const bool is_scaled = color.normalized || color.component_type == kFloat;
   color_scale_ = is_scaled ? 1 : color.component_type == kUnsignedByte ? 255 : 65535;
 }
 
-void LookReader::open(int accessor, std::optional<AccessorReader>& out) {
+void SurfaceReader::open(int accessor, std::optional<AccessorReader>& out) {
   out.reset();
   if (accessor < 0) return;
   const Accessor& a = document_.accessors[static_cast<size_t>(accessor)];
@@ -46,7 +46,7 @@ void LookReader::open(int accessor, std::optional<AccessorReader>& out) {
   out.emplace(document_, buffers_, accessor);
 }
 
-void LookReader::load(uint64_t block, size_t slot) {
+void SurfaceReader::load(uint64_t block, size_t slot) {
   block_in_slot_[slot] = kNoBlock;
   const uint64_t first = block * kBlockVertices;
   const auto count = static_cast<size_t>(std::min(kBlockVertices, vertices_ - first));
@@ -57,7 +57,7 @@ void LookReader::load(uint64_t block, size_t slot) {
   block_in_slot_[slot] = block;
 }
 
-void LookReader::load_texture_coordinates(uint64_t first, size_t count, SurfaceCorner* out) {
+void SurfaceReader::load_texture_coordinates(uint64_t first, size_t count, SurfaceCorner* out) {
   numbers_.resize(2 * count);
   texture_coordinates_->read(first, count, numbers_.data());
   for (size_t i = 0; i < count; ++i) {
@@ -67,7 +67,7 @@ void LookReader::load_texture_coordinates(uint64_t first, size_t count, SurfaceC
   }
 }
 
-void LookReader::load_colors(uint64_t first, size_t count, SurfaceCorner* out) {
+void SurfaceReader::load_colors(uint64_t first, size_t count, SurfaceCorner* out) {
   numbers_.resize(color_components_ * count);
   colors_->read(first, count, numbers_.data());
   for (size_t i = 0; i < count; ++i)

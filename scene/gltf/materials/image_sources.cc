@@ -1,4 +1,4 @@
-#include "scene/gltf/looks/image_sources.h"
+#include "scene/gltf/materials/image_sources.h"
 
 #include <tiny_gltf.h>
 
@@ -26,17 +26,17 @@ void set_external(FileSystem& files, const std::string& scene_path, const std::s
   set_file(*file, {0, file->size()}, out);
 }
 
-// [begin, begin + bytes) of what a buffer of the file holds.
+// Sets the source to bytes [begin, begin + bytes) of a buffer.
 void set_buffer(FileSystem& files, const ReadableFile& scene_file, const Document& d,
                 const BufferView& view, ImageSource& out) {
   const BufferSource& buffer = d.buffers[static_cast<size_t>(view.buffer)];
   const std::string where = "buffer " + std::to_string(view.buffer);
   switch (buffer.kind) {
     case BufferSource::Kind::kNone:
-      out.problem = "lies in " + where + ", which is not in the file";
+      out.problem = "is in " + where + ", which is not in the file";
       return;
     case BufferSource::Kind::kDecoded:
-      out.problem = "lies in compressed geometry";
+      out.problem = "is in compressed geometry";
       return;
     case BufferSource::Kind::kBinChunk:
       set_file(scene_file, buffer.range, out);
@@ -71,12 +71,11 @@ void find(FileSystem& files, const ReadableFile& scene_file, const Document& d, 
   } else if (image.bufferView < 0) {
     out.problem = "has neither uri nor bufferView";
   } else if (static_cast<size_t>(image.bufferView) >= d.views.size()) {
-    out.problem =
-        "lies in bufferView " + std::to_string(image.bufferView) + ", which does not exist";
+    out.problem = "is in bufferView " + std::to_string(image.bufferView) + ", which does not exist";
   } else {
     const BufferView& view = d.views[static_cast<size_t>(image.bufferView)];
     if (static_cast<size_t>(view.buffer) >= d.buffers.size())
-      out.problem = "lies in buffer " + std::to_string(view.buffer) + ", which does not exist";
+      out.problem = "is in buffer " + std::to_string(view.buffer) + ", which does not exist";
     else
       set_buffer(files, scene_file, d, view, out);
   }

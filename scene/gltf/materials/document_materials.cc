@@ -1,4 +1,4 @@
-#include "scene/gltf/looks/looks.h"
+#include "scene/gltf/materials/document_materials.h"
 
 #include <tiny_gltf.h>
 
@@ -9,17 +9,17 @@
 
 #include "core/base/error.h"
 #include "scene/gltf/document/check_document.h"
-#include "scene/gltf/looks/material_reader.h"
+#include "scene/gltf/materials/material_reader.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {
 
-constexpr size_t kMaxLookWarnings = 20;
+constexpr size_t kMaxMaterialWarnings = 20;
 
-class LookResolver {
+class MaterialResolver {
  public:
-  explicit LookResolver(Document& document) : document_(document) {
+  explicit MaterialResolver(Document& document) : document_(document) {
     const auto count = static_cast<int>(document.model->materials.size());
     for (int i = 0; i < count; ++i) add_material(i);
   }
@@ -33,11 +33,11 @@ class LookResolver {
         resolve(primitives[p]);
       }
     }
-    if (looks_.materials.empty()) plain_material();
+    if (result_.materials.empty()) plain_material();
     if (further_warnings_ > 0)
-      looks_.warnings.push_back(document_.path + ": " + std::to_string(further_warnings_) +
-                                " further warnings about materials");
-    document_.looks = std::make_shared<Looks>(std::move(looks_));
+      result_.warnings.push_back(document_.path + ": " + std::to_string(further_warnings_) +
+                                 " further warnings about materials");
+    document_.materials = std::make_shared<DocumentMaterials>(std::move(result_));
   }
 
  private:
@@ -48,9 +48,9 @@ class LookResolver {
       warn("material " + numbered(index, source.material.name) + ": " + source.problem +
            "; its base color factor is used alone");
     if (source.image >= 0) {
-      const auto found = std::ranges::find(looks_.images, source.image);
-      source.material.image = static_cast<uint32_t>(found - looks_.images.begin());
-      if (found == looks_.images.end()) looks_.images.push_back(source.image);
+      const auto found = std::ranges::find(result_.images, source.image);
+      source.material.image = static_cast<uint32_t>(found - result_.images.begin());
+      if (found == result_.images.end()) result_.images.push_back(source.image);
     }
     append(source.material, source.transform);
     texcoords_.push_back(source.texcoord);
@@ -58,33 +58,34 @@ class LookResolver {
 
   uint32_t append(const Material& material, const TextureTransform& transform) {
     document_.charge.add(2 * (sizeof(Material) + sizeof(TextureTransform)) + material.name.size());
-    looks_.materials.push_back(material);
-    looks_.transforms.push_back(transform);
-    return static_cast<uint32_t>(looks_.materials.size()) - 1;
+    result_.materials.push_back(material);
+    result_.transforms.push_back(transform);
+    return static_cast<uint32_t>(result_.materials.size()) - 1;
   }
 
   void resolve(Primitive& primitive) {
-    PrimitiveLook& look = primitive.look;
-    look.color = primitive.color;
+    PrimitiveSurface& surface = primitive.surface;
+    surface.color = primitive.color;
     int set = 0;
     if (primitive.material >= 0 && static_cast<size_t>(primitive.material) < texcoords_.size()) {
-      look.material = static_cast<uint32_t>(primitive.material);
-      if (looks_.materials[look.material].image != Material::kNoImage) {
-        set = texcoords_[look.material];
-        look.texture_coordinates = texture_coordinates(primitive, set);
+      surface.material = static_cast<uint32_t>(primitive.material);
+      if (result_.materials[surface.material].image != Material::kNoImage) {
+        set = texcoords_[surface.material];
+        surface.texture_coordinates = texture_coordinates(primitive, set);
       }
     } else {
       if (primitive.material >= 0)
         warn(where_ + ": material " + std::to_string(primitive.material) +
              " does not exist, it is white");
-      look.material = plain_material();
+      surface.material = plain_material();
     }
-    place_draco_look(document_, primitive, set);
+    place_draco_surface(document_, primitive, set);
     const uint64_t vertices = accessor(primitive.position).count;
-    check(look.color, color_use(look.color), vertices);
-    check(look.texture_coordinates, texture_coordinate_use(set), vertices);
-    if (look.texture_coordinates < 0 && looks_.materials[look.material].image != Material::kNoImage)
-      look.material = without_image(look.material);
+    check(surface.color, color_use(surface.color), vertices);
+    check(surface.texture_coordinates, texture_coordinate_use(set), vertices);
+    if (surface.texture_coordinates < 0 &&
+        result_.materials[surface.material].image != Material::kNoImage)
+      surface.material = without_image(surface.material);
   }
 
   int texture_coordinates(const Primitive& primitive, int set) {
@@ -92,7 +93,7 @@ class LookResolver {
     if (static_cast<size_t>(set) < sets.size()) return sets[static_cast<size_t>(set)];
     warn(where_ + ": has no TEXCOORD_" + std::to_string(set) + ", which material " +
          numbered(primitive.material,
-                  looks_.materials[static_cast<size_t>(primitive.material)].name) +
+                  result_.materials[static_cast<size_t>(primitive.material)].name) +
          " needs; its base color factor is used alone");
     return -1;
   }
@@ -101,7 +102,7 @@ class LookResolver {
     return document_.accessors[static_cast<size_t>(index)];
   }
 
-  // Of three or four components; the accessor may not exist.
+  // The use of a color accessor, with three or four components. The accessor may not exist.
   AccessorUse color_use(int index) const {
     const bool exists = index >= 0 && static_cast<size_t>(index) < document_.accessors.size();
     return {where_ + ": COLOR_0",
@@ -136,7 +137,7 @@ class LookResolver {
   uint32_t without_image(uint32_t material) {
     const auto [place, is_new] = without_image_.try_emplace(material, 0);
     if (is_new) {
-      Material factor_alone = looks_.materials[material];
+      Material factor_alone = result_.materials[material];
       factor_alone.image = Material::kNoImage;
       place->second = append(factor_alone, {});
     }
@@ -145,14 +146,14 @@ class LookResolver {
 
   void warn(const std::string& what) { warn_as_is(document_.path + ": " + what); }
   void warn_as_is(std::string what) {
-    if (looks_.warnings.size() < kMaxLookWarnings)
-      looks_.warnings.push_back(std::move(what));
+    if (result_.warnings.size() < kMaxMaterialWarnings)
+      result_.warnings.push_back(std::move(what));
     else
       ++further_warnings_;
   }
 
   Document& document_;
-  Looks looks_;
+  DocumentMaterials result_;
   std::vector<int> texcoords_;  // of the file's materials
   std::optional<uint32_t> plain_;
   std::map<uint32_t, uint32_t> without_image_;
@@ -162,6 +163,6 @@ class LookResolver {
 
 }  // namespace
 
-void resolve_looks(Document& document) { LookResolver(document).resolve(); }
+void resolve_materials(Document& document) { MaterialResolver(document).resolve(); }
 
 }  // namespace voxdag::gltf

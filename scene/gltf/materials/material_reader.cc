@@ -1,4 +1,4 @@
-#include "scene/gltf/looks/material_reader.h"
+#include "scene/gltf/materials/material_reader.h"
 
 #include <tiny_gltf.h>
 
@@ -73,7 +73,7 @@ Wrap wrap_of(int mode) {
   return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::kMirroredRepeat : Wrap::kRepeat;
 }
 
-// The texture's own image or, where it has none, that of an extension, which is of another format.
+// Returns the texture's image or, if it has none, the image of an extension in another file format.
 int image_of(const tinygltf::Texture& texture) {
   if (texture.source >= 0) return texture.source;
   for (const char* name :

@@ -1,4 +1,4 @@
-// Where the images of a document lie: inside of a buffer, in a data: URI or in a file of their own.
+// Finds the images of a document: in a buffer, in a data: URI, or in an external file.
 #pragma once
 
 #include "core/base/memory_budget.h"
@@ -8,7 +8,7 @@ namespace voxdag::gltf {
 
 struct Document;
 
-// Image `index` of the document's model. Opens its file; what is wrong is its `problem`.
+// Finds image `index` of the document's model and opens its file. Errors go to its `problem`.
 ImageSource find_image(FileSystem& files, const ReadableFile& scene_file, const Document& document,
                        int index);
 

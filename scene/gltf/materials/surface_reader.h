@@ -1,6 +1,6 @@
-// What the corners of a primitive's triangles look like, within a fixed amount of memory: blocks of
-// consecutive vertices, each cached in the one slot that its number maps to, as VertexCache does
-// with positions. Not thread-safe.
+// Reads the material, texture coordinates and colors of a primitive's triangles, within a fixed
+// amount of memory: blocks of consecutive vertices, each cached in the one slot that its number
+// maps to, as in VertexCache. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -9,22 +9,23 @@
 
 #include "core/base/page_buffer.h"
 #include "core/color/surface.h"
-#include "scene/gltf/looks/looks.h"
+#include "scene/gltf/materials/document_materials.h"
 #include "scene/gltf/mesh_data/accessor_reader.h"
 
 namespace voxdag::gltf {
 
-class LookReader {
+class SurfaceReader {
  public:
-  // All readers of a scene together take at most one part in so many of what the budget has free.
+  // The caches of all readers of a scene take at most 1/kShareOfFree of the free budget.
   static constexpr uint64_t kShareOfFree = 8;
 
-  // One of `readers`. Room for `vertices`, or for as many as fit its part of that share. The
-  // document has looks; the references must outlive the reader.
-  LookReader(const Document& document, BufferReader& buffers, uint64_t vertices, unsigned readers);
+  // One of `readers`, with room for `vertices` vertices, or fewer if its part of the share is
+  // smaller. The document's materials are resolved; the references must outlive the reader.
+  SurfaceReader(const Document& document, BufferReader& buffers, uint64_t vertices,
+                unsigned readers);
 
-  // Serves a primitive of the document from now on. Throws Error{kInvalidInput} if a buffer of its
-  // look is shorter than it claims.
+  // Changes to another primitive of the document. Throws Error{kInvalidInput} if a buffer of its
+  // surface is shorter than it claims.
   void bind(const Primitive& primitive);
   // Sets material and corners of a triangle of that primitive. Its vertices exist.
   void read(const uint32_t* vertices, SurfaceTriangle& out) {

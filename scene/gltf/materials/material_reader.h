@@ -1,10 +1,10 @@
-// A material of a glTF file as a Material, and where its base color texture lies.
+// Converts a glTF material to a Material, and finds its base color texture.
 #pragma once
 
 #include <string>
 
 #include "core/color/surface.h"
-#include "scene/gltf/looks/texture_transform.h"
+#include "scene/gltf/materials/texture_transform.h"
 
 namespace tinygltf {
 class Model;

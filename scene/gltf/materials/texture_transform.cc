@@ -1,4 +1,4 @@
-#include "scene/gltf/looks/texture_transform.h"
+#include "scene/gltf/materials/texture_transform.h"
 
 #include <cmath>
 

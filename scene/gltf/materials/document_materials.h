@@ -1,0 +1,29 @@
+// The materials of a document, and for each primitive the material and the accessors of its texture
+// coordinates and colors.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/color/surface.h"
+#include "scene/gltf/document/document.h"
+#include "scene/gltf/materials/texture_transform.h"
+
+namespace voxdag::gltf {
+
+struct DocumentMaterials {
+  // The file's materials; one material for primitives without material, if there are any; then
+  // copies of the file's materials without image, for primitives without texture coordinates.
+  // `image` is an index into `images`.
+  std::vector<Material> materials;
+  std::vector<TextureTransform> transforms;  // of each material's texture coordinates
+  std::vector<int> images;                   // indices in the model of the images in use
+  std::vector<std::string> warnings;         // the first few, and a line about the others
+};
+
+// Sets document.materials and the surfaces of its primitives. Call it once, after check_document().
+// Invalid materials and attributes give warnings, not errors.
+void resolve_materials(Document& document);
+
+}  // namespace voxdag::gltf
