@@ -19,8 +19,8 @@ PICTURE = "docs/images/folders.svg"
 BOX_WIDTH, BOX_HEIGHT = 150, 46
 STEP_X, STEP_Y, MARGIN = 175, 96, 16
 
-# Position of a folder's box, in columns and rows from the upper left, and the folder's contents. Folders
-# are above the folders they include.
+# Position of a folder's box, in columns and rows from the upper left, and the folder's contents.
+# Folders are above the folders they include.
 BOXES = {
     "cli": (2.9, 0, "commands"),
     "python": (4.4, 1, "Python package"),

@@ -258,7 +258,7 @@ void check_valence_tables(const draco::DecoderBuffer& at, const AdmitTable& admi
     walker.varint();
   }
   walker.skip((uint64_t{splits} + 7) / 8);
-  for (int i = 0; i < 1 + attributes; ++i) walker.skip_bits();  // first faces, seams
+  for (int i = 0; i < 1 + attributes; ++i) walker.skip_bits();  // first faces, edges of attributes
   for (int i = 0; i < kValenceContexts; ++i) {
     const uint32_t symbols = walker.varint();
     if (symbols > faces) refuse_damaged();

@@ -16,13 +16,10 @@
 #include <vector>
 
 #include "scene/gltf/document/compression.h"
+#include "scene/gltf/document/tinygltf_model.h"
 #include "scene/gltf/json/file_range.h"
 #include "scene/growing_charge.h"
 #include "scene/vertices/transform.h"
-
-namespace tinygltf {
-class Model;
-}
 
 namespace voxdag::gltf {
 

@@ -1,13 +1,12 @@
 // The only place that calls tinygltf.
 #include "scene/gltf/document/model_reader.h"
 
-#include <tiny_gltf.h>
-
 #include <algorithm>
 #include <climits>
 #include <exception>
 #include <new>
 
+#include "scene/gltf/document/tinygltf.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {

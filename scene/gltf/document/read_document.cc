@@ -1,13 +1,12 @@
 #include "scene/gltf/document/read_document.h"
 
-#include <tiny_gltf.h>
-
 #include <algorithm>
 #include <string_view>
 
 #include "core/base/process_limits.h"
 #include "scene/gltf/document/model_reader.h"
 #include "scene/gltf/document/read_elements.h"
+#include "scene/gltf/document/tinygltf.h"
 #include "scene/gltf/json/container.h"
 #include "scene/gltf/json/json_sections.h"
 #include "scene/messages.h"

@@ -1,7 +1,5 @@
 #include "scene/gltf/materials/document_materials.h"
 
-#include <tiny_gltf.h>
-
 #include <algorithm>
 #include <map>
 #include <memory>
@@ -9,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "scene/gltf/document/check_document.h"
+#include "scene/gltf/document/tinygltf.h"
 #include "scene/gltf/materials/material_reader.h"
 #include "scene/messages.h"
 

@@ -1,13 +1,12 @@
 #include "scene/gltf/materials/image_sources.h"
 
-#include <tiny_gltf.h>
-
 #include <algorithm>
 #include <memory>
 #include <utility>
 
 #include "core/base/error.h"
 #include "scene/gltf/document/document.h"
+#include "scene/gltf/document/tinygltf.h"
 #include "scene/gltf/mesh_data/buffer_reader.h"
 #include "scene/messages.h"
 

@@ -1,12 +1,11 @@
 #include "scene/gltf/materials/material_reader.h"
 
-#include <tiny_gltf.h>
-
 #include <algorithm>
 #include <array>
 #include <climits>
 #include <cmath>
 
+#include "scene/gltf/document/tinygltf.h"
 #include "scene/surface_numbers.h"
 
 namespace voxdag::gltf {

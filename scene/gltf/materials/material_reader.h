@@ -4,11 +4,8 @@
 #include <string>
 
 #include "core/color/surface.h"
+#include "scene/gltf/document/tinygltf_model.h"
 #include "scene/gltf/materials/texture_transform.h"
-
-namespace tinygltf {
-class Model;
-}
 
 namespace voxdag::gltf {
 

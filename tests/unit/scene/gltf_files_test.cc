@@ -1,10 +1,10 @@
 // The files of a scene: containers, and reading them in windows within a budget.
 #include <gtest/gtest.h>
-#include <tiny_gltf.h>
 
 #include <random>
 
 #include "scene/gltf/document/read_document.h"
+#include "scene/gltf/document/tinygltf.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {
@@ -259,7 +259,7 @@ TEST(GltfModel, HasTheMaterials) {
   MemoryBudget budget(uint64_t{1} << 20);
   const gltf::Document document =
       gltf::read_document(*files.open_read("scene"), budget, CancelToken());
-  const tinygltf::Model& model = *document.model;
+  const gltf::tinygltf::Model& model = *document.model;
 
   ASSERT_EQ(model.materials.size(), 1u);
   EXPECT_EQ(model.materials[0].name, "red");
