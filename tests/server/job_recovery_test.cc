@@ -108,7 +108,7 @@ TEST_F(JobRecovery, AMarkedFolderTakesNoOtherAlong) {
   EXPECT_EQ(job(id)["state"], "succeeded");
   EXPECT_EQ(http_->get("/api/v1/jobs/" + id + "/dag").status, 200);
   EXPECT_EQ(job(waiting)["state"], "suspended") << "the record of a backup, perhaps";
-  EXPECT_NE(log().find("the job stays"), std::string::npos) << log();
+  EXPECT_NE(log().find("the job is kept"), std::string::npos) << log();
   EXPECT_EQ(delete_job(id).status, 204);
   EXPECT_EQ(act(waiting, "cancel").status, 202);
   EXPECT_EQ(delete_job(waiting).status, 204);
