@@ -135,10 +135,6 @@ INCLUDED_BY = {
     )
 }
 
-# Below these folders a folder and its parent may still include each other. The list may only
-# shrink.
-NESTED_CYCLES_LEFT = ("query/export/",)
-
 # Third-party headers, and the folders where each may be included.
 THIRD_PARTY = {
     "zstd.h": ["core/format"],
@@ -253,18 +249,11 @@ def check_file(path, edges):
             yield number, f"{match.group()} belongs in {' or '.join(CUDA_PLACES)}"
 
 
-def is_exempt(a, b):
-    """True if one folder contains the other, or is it, below a folder of NESTED_CYCLES_LEFT."""
-    inner, outer = max(a, b, key=len), min(a, b, key=len)
-    is_nested = inner.startswith(outer + "/")
-    return a == b or (is_nested and (outer + "/").startswith(NESTED_CYCLES_LEFT))
-
-
 def find_cycles(edges):
     """Yields (place, folders) for every set of folders that include each other."""
     graph = collections.defaultdict(set)
     for source, target in edges:
-        if not is_exempt(source, target):
+        if source != target:
             graph[source].add(target)
 
     def reachable(start):
@@ -278,7 +267,7 @@ def find_cycles(edges):
 
     reach = {folder: reachable(folder) for folder in list(graph)}
     for source, target in sorted(edges):
-        if not is_exempt(source, target) and source in reach.get(target, ()):
+        if source != target and source in reach.get(target, ()):
             yield (
                 edges[source, target],
                 f"{source} and {target} include each other (a folder cycle)",

@@ -7,7 +7,7 @@
 
 #include "core/format/bytes.h"
 #include "core/image/npy_header.h"
-#include "query/export/color/attribute_cursor.h"
+#include "query/export/attribute_cursor.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/lookup/bricks.h"

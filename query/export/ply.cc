@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "query/export/color/attribute_cursor.h"
+#include "query/export/attribute_cursor.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/lookup/bricks.h"
