@@ -26,8 +26,7 @@ bool matches(const std::vector<std::string>& pattern, const std::vector<std::str
 void check_query(const Request& request, const Route& route) {
   if (route.accepts_any_query) return;
   for (const auto& [name, value] : request.target.query)
-    if (std::none_of(route.query.begin(), route.query.end(),
-                     [&](const Parameter& parameter) { return parameter.name == name; }))
+    if (std::ranges::find(route.query, name, &Parameter::name) == route.query.end())
       throw bad_request("unknown query parameter");
 }
 
