@@ -17,7 +17,7 @@
 namespace voxdag {
 namespace {
 
-// Default resolution of the color grid: colors do not repeat as geometry does.
+// Default resolution of the color grid: colors repeat less than geometry.
 constexpr uint64_t kColorResolution = 4096;
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
@@ -31,7 +31,7 @@ BuildSpec checked(const BuildSpec& spec) {
     throw Error(ErrorCode::kInvalidInput,
                 "no scene was given: expected at least one " + list_scene_endings() + " file");
   check_options(spec);
-  choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that makes no grid
+  choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that cannot be a grid
   check_backend(r);
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = default_threads();
@@ -48,7 +48,7 @@ void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::strin
   const bool is_first = !own.empty() && !files.exists(WorkFolder::store_path(work_folder));
   own.insert(own.end(), outputs.begin(), outputs.end());
   refuse_inputs(files, own, spec.geometry.scenes);
-  // Anything may begin with zeros, as an unfinished output does.
+  // An output that begins with zeros may be unfinished, or a file of any other kind.
   const bool is_unknown = std::ranges::any_of(outputs, [&](const std::string& path) {
     const auto file = open_if_there(files, path);
     return file && begins_with(*file, std::string_view("\0", 1));

@@ -8,8 +8,8 @@
 namespace voxdag {
 namespace {
 
-// The finer pilot of a plan: large builds are extrapolated from 8192^3, which costs a second or two
-// and the largest scenes' triangles twice.
+// Levels of the finer pilot of a plan. Large builds are extrapolated from 8192^3, which takes one
+// or two seconds and, for the largest scenes, two reads of the triangles.
 uint32_t plan_pilot_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels - std::min<uint32_t>(grid_levels, 2), 12, 13);
 }

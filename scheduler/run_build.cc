@@ -25,9 +25,9 @@
 namespace voxdag {
 namespace {
 
-// Version of artifacts, job store and digests of scenes; a job of another version is refused.
+// Version of artifacts, job store and digests of scenes. A job with a different version is refused.
 constexpr int64_t kWorkFormatVersion = 4;
-// Maximum number of reads of the scene and of merges; damaged triangles or artifacts repeat them.
+// Maximum number of reads of the scene and of merges. Damaged triangles or artifacts cause repeats.
 constexpr int kMaxReads = 3, kMaxMerges = 3;
 
 // Refuses a job with other geometry options before the scene is read.
@@ -116,7 +116,7 @@ void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
       prepare_scene(job.spec, job.scene, job.budget, job.clock, job.context, job.checkpoint);
   report_scene(job, scene.state);
   plan(job, scene);
-  job.scene.close();  // its memory is for the subvolumes
+  job.scene.close();  // frees its memory for the subvolumes
   resume_subvolumes(job, builder, scene.digest());
   job.context.progress.set_grid(job.report.grid.origin, job.report.grid.edge);
   const std::vector<StoredSubvolume> leaves = job.store->leaves();
@@ -129,7 +129,7 @@ void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
   report_artifacts(job);
 }
 
-// Called before subvolumes are queued again. Artifacts that are not recorded by then are discarded.
+// Called before subvolumes are queued again. Artifacts not recorded by then are discarded.
 void close_segments(BuildJob& job) {
   job.scene.close();
   job.commit_best_effort();
@@ -157,9 +157,9 @@ void build_artifacts(BuildJob& job, SubvolumeBuilder& builder) {
   }
 }
 
-// Recovers from damage: plans subvolumes with damaged artifacts again. If no artifact is
-// damaged, a file of the merge is, and the merge restarts, once. Returns false if it has restarted
-// before.
+// Recovers from damage: plans subvolumes with damaged artifacts again. If no artifact is damaged, a
+// file of the merge must be, and the merge restarts, at most once. Returns false if it has
+// restarted before.
 bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
   if (replan_damaged(job) > 0) return true;
   if (std::exchange(has_restarted, true)) return false;
@@ -184,7 +184,7 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted) {
     publish(job, out, attributes);
     return true;
   } catch (const Error& error) {
-    // Also the scratch file of the colors is rebuilt.
+    // The scratch file of the colors is rebuilt, too.
     const bool is_scratch = dynamic_cast<const DamagedTriangles*>(&error) != nullptr;
     if ((reads_scene && !is_scratch) || !error.is_corruption() ||
         !recover(job, error, has_restarted))
@@ -238,7 +238,7 @@ void run_stages(BuildJob& job, SubvolumeBuilder& builder, double start_s) {
   remove_finished_work(job);
 }
 
-// True if the work folder has a job, or a part of a scene that is not at fault itself.
+// True if the work folder has a job, or a partly read scene and the error is not the scene's fault.
 bool is_worth_resuming(BuildJob& job, const Error& error) {
   const bool scene_is_at_fault =
       error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;
@@ -255,7 +255,7 @@ std::string advice(const BuildJob& job, ErrorCode code) {
   return "";
 }
 
-// Runs stages; if one fails, its finished work remains for the next run.
+// Runs stages. If one fails, its finished work remains for the next run.
 void resumable(BuildJob& job, const std::function<void()>& stages) {
   try {
     stages();
@@ -274,8 +274,8 @@ void resumable(BuildJob& job, const std::function<void()>& stages) {
   }
 }
 
-// The build in the job of the cluster that merges. A job that was submitted twice, or that Slurm
-// has started again, may find the build finished.
+// Runs the build as the cluster's merge job. A job that was submitted twice, or restarted by Slurm,
+// may find the build already finished.
 void run_as_merge_job(BuildJob& job, double start_s) {
   const MergeJob merge_job(job.spec, job.scene.open(), job.work.path(), job.context,
                            commands_of(job.spec));
@@ -302,7 +302,8 @@ BuildReport run_here(BuildJob& job) {
   return job.report;
 }
 
-// Submits the tasks and the merge job. Returns the job's id, "" if the job or its result exists.
+// Submits the tasks and the merge job. Returns the job's id, or "" if the job or its result already
+// exists.
 std::string submit_merge_job(BuildJob& job, MergeJob& merge_job) {
   std::string id;
   resumable(job, [&] {

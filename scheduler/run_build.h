@@ -1,4 +1,5 @@
-// run_build(): scene in, global file out. The one entry for the command line and the service.
+// run_build(): scene in, global file out. The only entry point for the command line and the
+// service.
 #pragma once
 
 #include "scheduler/spec/build_report.h"

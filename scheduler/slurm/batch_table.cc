@@ -37,8 +37,8 @@ void BatchTable::resume(const std::string& scene_digest, const DagShape& shape) 
     if (const uint32_t segment = subvolume.artifact.segment; segment >= kFirstClusterSegment)
       state_.next_batch = std::max(state_.next_batch, segment - kFirstClusterSegment + 1);
   }
-  // An open batch with built subvolumes was accepted just before the earlier process was killed.
-  // Batches that miss their file or contain other subvolumes are cut again.
+  // If an open batch has built subvolumes, it was accepted just before the earlier process was
+  // killed. Batches with such subvolumes, with unknown subvolumes or without a file are dropped.
   std::erase_if(state_.open, [&](const OpenBatch& batch) { return !is_valid(batch); });
   save();
 }

@@ -12,27 +12,30 @@
 
 namespace voxdag {
 
-// The place of a cube along the Morton curve: cubes near each other in it share the most nodes.
+// Position of a cube along the Morton curve. Cubes close together on this curve share the most
+// nodes.
 uint64_t morton_place(const Cube& cube);
 
-// Cuts items in the order given into at most `batches` parts of about equal weight, each with at
-// least one item. Returns where each part ends.
+// Cuts items, in the given order, into at most `batches` parts of about equal weight, each with at
+// least one item. Returns the end index of each part.
 std::vector<size_t> cut_into_batches(std::span<const double> weights, uint64_t batches);
 
-// Batches of subvolumes, in the order given.
+// Batches of subvolumes, in the given order.
 struct CutBatches {
   std::vector<Batch> batches;
-  std::vector<OpenBatch> open;      // of the same batches
-  std::vector<size_t> first_items;  // the index of the first subvolume of each
+  std::vector<OpenBatch> open;      // the state of the same batches
+  std::vector<size_t> first_items;  // index of the first subvolume of each batch
 };
-// At most `most` batches, numbered from `first_number` on, all else as in `like`.
+// Makes at most `most` batches, numbered from `first_number`. All other fields are copied from
+// `like`.
 CutBatches make_batches(const Batch& like, std::span<const BatchSubvolume> subvolumes,
                         uint64_t most, uint32_t first_number);
 
 // Returns the default number of tasks: about kTaskSeconds of one CPU each.
 uint64_t default_tasks(double expected_bricks, uint64_t subvolumes);
 
-// CPU time per expected brick: 3 ns where the scene repeats itself, 150 ns where nothing does.
+// CPU time per expected brick: measured from 3 ns (the scene repeats itself) to 150 ns (no
+// repetition).
 inline constexpr double kSecondsPerBrick = 30e-9;
 inline constexpr double kTaskSeconds = 120;
 inline constexpr uint64_t kMaxDefaultTasks = 1000;

@@ -14,7 +14,7 @@
 namespace voxdag {
 namespace {
 
-// Pause between two looks for records.
+// Pause between two searches for records.
 constexpr double kRecordPauseS = 0.5;
 // Pause between the first two queries to Slurm. It doubles up to ClusterOptions::slurm_interval_s.
 constexpr double kFirstQueryPauseS = 1;

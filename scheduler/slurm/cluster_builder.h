@@ -2,7 +2,8 @@
 // batches (BatchTable), submits a task for each (TaskPoller) and records the tasks' results in the
 // job store (RecordCollector). The merge then runs as in any build.
 //
-// Also here: how a build without a cluster treats tasks that an earlier run of its job started.
+// Builds without a cluster use accept_earlier_tasks() and remove_tasks(), because an earlier run of
+// the same job may have started tasks.
 #pragma once
 
 #include <memory>
@@ -26,12 +27,12 @@ class ClusterBuilder : public SubvolumeBuilder {
   // written since then are accepted.
   void resume(const std::string& scene_digest) override;
   // Cuts the triangles of `planned` into batches. Then waits until all batches are built, unless a
-  // merge job does. Throws Error with the last reason if a batch has failed too often; other tasks
-  // continue to run.
+  // merge job waits instead. Throws Error with the last reason if a batch has failed too often;
+  // other tasks continue to run.
   void build(PreparedScene& scene, std::span<const StoredSubvolume> planned) override;
   void add_to(BuildReport& report) const override;
-  // Submits all batches that Slurm accepts now, and a job that merges when their tasks have ended.
-  // Returns the job's id. The job resubmits failed batches.
+  // Submits all batches that Slurm accepts now, and a merge job that starts when their tasks have
+  // ended. Returns the merge job's id. The merge job resubmits failed batches.
   std::string submit_merge_job();
 
  private:
@@ -48,10 +49,10 @@ class ClusterBuilder : public SubvolumeBuilder {
 // Throws Error{kInvalidInput} if Slurm is not installed, or if it would refuse the tasks of a build
 // with cluster options.
 void check_cluster(const BuildSpec& spec, const BuildContext& context);
-// Records the results of an earlier run's tasks for the scene with that digest.
+// Records the results of tasks that an earlier run started for the scene with this digest.
 void accept_earlier_tasks(BuildJob& job, const std::string& scene_digest);
-// Stops running tasks of the work folder and removes their files. A task that cannot be stopped is
-// only a warning: it fails without its batch.
+// Stops running tasks of the work folder and removes their files. If a task cannot be stopped, this
+// is only a warning: the task will fail because its batch file is missing.
 void remove_tasks(BuildJob& job);
 // True if this process is the merge job.
 bool is_merge_job(const BuildSpec& spec);

@@ -9,7 +9,8 @@
 namespace voxdag {
 
 struct ClusterContext {
-  // A build without cluster options can accept the results of earlier tasks, but submits none.
+  // Works without cluster options. Such a build can accept the results of earlier tasks, but
+  // submits none.
   explicit ClusterContext(BuildJob& build_job);
 
   FileSystem& files() const { return job.context.files; }
@@ -21,9 +22,9 @@ struct ClusterContext {
   Slurm slurm;
 };
 
-// The command runner of a build: the test's, or the system's.
+// Returns the build's command runner: the one from its options (tests), else the system's.
 CommandRunner& commands_of(const BuildSpec& spec);
-// `path` as tasks on other machines need it: absolute and normalized.
+// Returns `path` in the form that tasks on other machines need: absolute and normalized.
 std::string absolute_path(const std::string& path);
 
 }  // namespace voxdag

@@ -10,9 +10,9 @@ namespace voxdag {
 
 struct ClusterPlan {
   uint64_t tasks = 0;
-  uint64_t memory_bytes = 0;   // that a task should have: it works with less, in more passes
+  uint64_t memory_bytes = 0;   // recommended per task; with less, a task needs more passes
   EstimateRange cpu_hours;     // of all tasks
-  EstimateRange task_s;        // of one task with one CPU, if all were equal
+  EstimateRange task_s;        // of one task with one CPU, if all tasks were equal
   EstimateRange shared_bytes;  // of the shared disk at its peak
   EstimateRange merge_s;       // CPU time of the merge, on the machine that submits
 };
@@ -20,7 +20,7 @@ struct ClusterPlan {
 // `tasks` is the number of tasks; 0 lets the build choose.
 ClusterPlan plan_cluster(const Estimate& estimate, uint64_t tasks);
 
-// The estimate and the plan as one JSON object.
+// Returns the estimate and the plan as one JSON object.
 std::string cluster_plan_json(const Estimate& estimate, const ClusterPlan& plan);
 
 }  // namespace voxdag

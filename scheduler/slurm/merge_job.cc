@@ -16,10 +16,10 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMaxReportBytes = uint64_t{1} << 24;
-// Pause between two looks at the files.
+// Pause between two searches for files.
 constexpr double kFilesPauseS = 0.5;
-// Time after which an NFS client sees a new file that it has looked for before (acdirmax, nfs(5)),
-// with a margin.
+// Maximum time until an NFS client sees a new file after it has found it missing (acdirmax,
+// nfs(5)), with a margin.
 constexpr double kMaxDelayS = 75;
 // Bytes from the end of a log that are quoted in a message.
 constexpr uint64_t kMaxTailBytes = 600;

@@ -1,10 +1,10 @@
 // A cluster build whose merge is also a job of the cluster (`--cluster-merge`). The submitting
 // process submits the tasks and a job that depends on them, unlocks the work folder and follows the
 // job. The job is the same command: it resumes the work folder as any later run does, resubmits
-// failed batches, waits for them and merges. The following process may end and come back. If the
-// job is lost, the same command submits it again.
-//  The job is known by its name, which depends only on the state of the build. When it has ended,
-// it is known by the report next to the output, which contains the job's request.
+// failed batches, waits for them and merges. The following process may be stopped and started
+// again. If the job is lost, the same command submits it again. While the job exists, it is found
+// by its name, which depends only on the state of the build. When it has ended, it is found by the
+// report next to the output, which contains the job's request.
 #pragma once
 
 #include <optional>
@@ -31,11 +31,12 @@ class MergeJob {
   const std::string& request() const { return request_; }
   // Returns the report of a finished merge job with the same request whose output exists.
   std::optional<BuildReport> finished() const;
-  // True if the work folder remains: the job is still removing it, or was stopped before.
+  // True if the work folder still exists: the job is still removing it, or was stopped earlier.
   bool has_remaining_work() const;
   // Removes the report of an earlier merge job.
   void forget_finished();
-  // True if the work folder's merge job waits or runs. Repeats the query until Slurm answers.
+  // True if the work folder's merge job is waiting or running. Repeats the query until Slurm
+  // answers.
   bool is_alive();
   // Shows the progress of job `id` ("" if unknown) until it has ended, and returns its report.
   // Throws Error with the job's error code if it fails. Throws Error{kCanceled} if `context` is
@@ -60,7 +61,7 @@ class MergeJob {
   bool is_running_ = false;
   uint64_t shown_built_ = 0;
   std::set<std::string> warned_reasons_;  // why the job waits
-  // Names from the last state that was read: a finished job removes the state.
+  // Names from the last state that was read, because a finished job removes the state.
   std::string name_, task_name_;
 };
 

@@ -58,7 +58,7 @@ void RecordCollector::read_failure(const ClusterFolder::Entry& entry) {
 
 void RecordCollector::read_record(const ClusterFolder::Entry& entry) {
   OpenBatch* const batch = batches_.find(entry.batch);
-  // Without an open batch, the record of another attempt was accepted.
+  // Without an open batch, another attempt's record was already accepted.
   if (!batch) return remove_attempt(entry);
   try {
     accept(read_valid_record(cluster_.files(), cluster_.folder, entry, batches_.state(),
@@ -69,7 +69,7 @@ void RecordCollector::read_record(const ClusterFolder::Entry& entry) {
     if (!error.is_corruption() && !is_missing && error.code() != ErrorCode::kUnsupportedVersion)
       throw;
     cluster_.progress().warn("the record " + entry.path + " is rejected: " + error.message());
-    // The record may be an earlier attempt's, so the current task may still run.
+    // The record may come from an earlier attempt, so the current task may still be running.
     if (!batch->error) batch->error = {error.message(), false};
     remove_attempt(entry);
   }

@@ -19,9 +19,9 @@ class RecordCollector {
       : cluster_(cluster), batches_(batches) {}
 
   // Reads the cluster folder: records built batches in `batches`, notes the errors of failed
-  // attempts, and removes the files of attempts at built batches.
+  // attempts, and removes attempts' files if their batch is already built.
   void collect();
-  // Removes batch files without an open batch.
+  // Removes batch files that belong to no open batch.
   void remove_unused_batches();
 
  private:
@@ -35,7 +35,7 @@ class RecordCollector {
 
   ClusterContext& cluster_;
   BatchTable& batches_;
-  std::map<std::string, Seconds> incomplete_since_;  // records without a visible segment
+  std::map<std::string, Seconds> incomplete_since_;  // records whose segment is not visible yet
 };
 
 }  // namespace voxdag

@@ -40,8 +40,8 @@ constexpr uint64_t kProgramBytes = uint64_t{96} << 20;
 constexpr std::string_view kTemporaryName = "voxdag-batch-";
 constexpr const char* kTemporaryLock = "/lock";
 
-// A temporary folder on this machine. Folders of killed tasks are removed by the next task of the
-// same user, because their locks are free.
+// A temporary folder on this machine. The next task of the same user removes the folders of killed
+// tasks, which it recognizes by their free locks.
 class TemporaryFolder {
  public:
   TemporaryFolder(FileSystem& files, const std::string& parent) : files_(files) {
@@ -106,7 +106,7 @@ class Task {
     try {
       return build_and_record();
     } catch (const Error& error) {
-      // Cancellation needs no failure record.
+      // A canceled task needs no failure record.
       if (error.code() == ErrorCode::kCanceled)
         folder_.remove_attempt(context_.files, run_.batch, attempt_);
       else
@@ -200,7 +200,7 @@ class Task {
     options.longest_edge = batch.longest_edge;
     options.open_backend = backend.open;
     options.segment_folder = temporary;
-    // The temporary folder does not outlive this process.
+    // Checkpoints are useless, because the temporary folder does not outlive this process.
     options.checkpoint_interval_s = 1e9;
     context_.progress.begin_stage("build", queue.size(), "subvolumes");
     CommitQueues commits;

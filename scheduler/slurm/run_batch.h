@@ -16,14 +16,14 @@ struct BatchRun {
   uint32_t batch = 0;
   std::string program;           // this program's version
   std::string temporary_folder;  // on this machine; "" for $TMPDIR or /tmp
-  uint64_t memory_bytes = 0;     // 0 for the task's Slurm allocation, else half of the RAM
-  unsigned threads = 0;          // 0 for the CPUs of the Slurm allocation, else all
+  uint64_t memory_bytes = 0;     // 0: the task's Slurm allocation, else half of the RAM
+  unsigned threads = 0;          // 0: the CPUs of the Slurm allocation, else all CPUs
   std::string attempt;           // unique id of the attempt; "" for a new one
 };
 
-// Returns the completion record, or the valid record of an earlier attempt. On failure writes the
-// reason for the submitting process and throws it. Throws Error{kUnsupportedVersion} with both
-// versions if another version of voxdag wrote the batch.
+// Returns the completion record, or the valid record of an earlier attempt. On failure, writes the
+// error to a file for the submitting process and rethrows it. Throws Error{kUnsupportedVersion}
+// with both versions if another version of voxdag wrote the batch.
 CompletionRecord run_batch(const BatchRun& run, const BuildContext& context);
 
 // A task's allocation according to Slurm's environment variables; 0 if unknown.

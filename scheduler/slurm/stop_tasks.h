@@ -8,9 +8,9 @@
 
 namespace voxdag {
 
-// Stops first the merge job, unless this process is the merge job, then all tasks. Does nothing
-// without a cluster build. Throws Error{kIo} with a command that stops them if Slurm does not
-// accept the request.
+// Stops the merge job (unless this process is the merge job), then all tasks. Does nothing without
+// a cluster build. If Slurm does not accept the request, throws Error{kIo} with a command that the
+// user can run to stop the tasks.
 void stop_cluster_tasks(FileSystem& files, const std::string& work_folder, CommandRunner& commands,
                         bool is_merge_job = false);
 // Stops the merge job only. Returns false if Slurm does not accept the request.

@@ -123,7 +123,7 @@ bool TaskPoller::is_over(const OpenBatch& batch) {
 TaskPoller::Next TaskPoller::end_attempt(OpenBatch& batch) {
   const auto end = cluster_.slurm.end_of(batch.task->name());
   if (!end) return Next::kStop;
-  // An active task was missing from squeue's list only.
+  // Only squeue's list lacked this active task.
   if (end->is_active() && !(batch.error && batch.error->has_ended)) return Next::kWait;
   const bool is_out_of_time = end->state == "TIMEOUT" || end->state == "DEADLINE";
   const bool is_split = is_out_of_time && batches_.can_be_split(batch);
@@ -181,7 +181,8 @@ void TaskPoller::submit(const std::vector<uint32_t>& batches) {
   warn_refusal(refusal);
 }
 
-// Warns once if Slurm accepts no tasks now. An empty `refusal` is an accepted submission.
+// Warns once while Slurm accepts no tasks. An empty `refusal` means that Slurm accepted the
+// submission.
 void TaskPoller::warn_refusal(const std::string& refusal) {
   if (!refusal.empty() && is_accepting_)
     cluster_.progress().warn("Slurm accepts no tasks now (" + refusal + "): waiting for it");
@@ -217,7 +218,7 @@ std::string TaskPoller::try_submit_merge_job() {
   return find_job(request.name);
 }
 
-// Returns the id of a job, "" if it does not exist. Repeats the query until Slurm answers.
+// Returns the id of a job; "" if it does not exist. Repeats the query until Slurm answers.
 std::string TaskPoller::find_job(const std::string& name) {
   for (;;) {
     if (const auto jobs = cluster_.slurm.jobs(name)) return jobs->empty() ? "" : jobs->front().id;

@@ -18,11 +18,11 @@ class TaskPoller {
  public:
   TaskPoller(ClusterContext& cluster, BatchTable& batches) : cluster_(cluster), batches_(batches) {}
 
-  // Forgets earlier failures. Tasks of an earlier run get one failure that is not counted.
+  // Forgets earlier failures. For each task of an earlier run, the next failure is not counted.
   void begin_run();
   // Queries Slurm once for all tasks, then submits batches without a task. A batch has failed if it
-  // has neither a task nor, after a grace period for the shared file system, a record. Throws Error
-  // with the last reason if a batch has failed too often; other tasks continue to run.
+  // has no task and, after a grace period for the shared file system, no record. Throws Error with
+  // the last reason if a batch has failed too often; other tasks continue to run.
   void poll();
   // Submits a job that starts when all tasks have ended. Waits until Slurm accepts a task or there
   // are no open batches, so that the job has something to wait for. Returns "" if Slurm does not
@@ -40,7 +40,7 @@ class TaskPoller {
   std::vector<uint32_t> end_missing(const std::set<uint32_t>& listed);
   bool is_over(const OpenBatch& batch);
   void cancel_held(const std::vector<SlurmTask>& tasks, std::set<uint32_t>& listed);
-  // Result of ending an attempt.
+  // The next step after an attempt has ended.
   enum class Next { kWait, kStop, kResubmit, kSplit };
   Next end_attempt(OpenBatch& batch);
   void fail_attempt(OpenBatch& batch, const SlurmEnd& end, bool is_split);

@@ -1,5 +1,5 @@
-// The description of a build's options (core/fields/field.h). The command line, the job request of
-// the service, its schema, the Python keywords and their checks derive from it;
+// The description of a build's options (core/fields/field.h). The command line, the service's job
+// request and its schema, and the Python keywords and their checks derive from it.
 // docs/architecture.md shows how to add an option. Options that no interface offers are members
 // without a description.
 #pragma once
@@ -164,7 +164,7 @@ void visit_job_options(Visitor& visit, BuildSpec& spec) {
   fields(filter, spec);
 }
 
-// Throws FieldError for the first option that breaks a limit, or that another one excludes.
+// Throws FieldError for the first option that breaks a limit or is excluded by another option.
 void check_options(const BuildSpec& spec);
 
 }  // namespace voxdag

@@ -6,7 +6,7 @@
 namespace voxdag {
 
 std::string report_json(const BuildReport& report) {
-  // A path need not be UTF-8; JSON must be.
+  // Paths may not be UTF-8, but JSON must be.
   return record_json(report).dump(2, ' ', false, FieldJson::error_handler_t::replace);
 }
 

@@ -20,26 +20,26 @@ struct BuildReport {
   uint32_t hash_bits = 64;
   uint64_t bytes = 0;
   MergeReport merge;
-  uint64_t triangles = 0;  // that may touch the grid
+  uint64_t triangles = 0;  // triangles that may touch the grid
   uint64_t dropped_outside = 0;
   uint64_t dropped_invalid = 0;
-  uint64_t subvolumes = 0;  // built, empty ones included
+  uint64_t subvolumes = 0;  // built, including empty ones
   uint64_t subvolumes_split = 0;
   uint64_t subvolumes_reused = 0;  // from an earlier run of this job, or from the cache
-  uint64_t subvolumes_cached = 0;  // those from the cache
+  uint64_t subvolumes_cached = 0;  // those that came from the cache
   uint64_t artifact_bytes = 0;
   uint64_t artifact_nodes = 0;
   uint64_t spill_bytes = 0;
   uint64_t memory_bytes = 0;
   unsigned threads = 0;
-  std::string backend;  // that built the subvolumes of this run
+  std::string backend;  // backend that built the subvolumes of this run
   std::vector<StageTime> stages;
   double wall_s = 0;
   double cpu_s = 0;
   uint64_t peak_rss_bytes = 0;
-  std::optional<ColorReport> colors;     // of a build with colors
-  std::optional<ClusterTotals> cluster;  // of the tasks of a cluster build
-  std::string merge_request;  // of a build that a job of the cluster merged (MergeJob::request())
+  std::optional<ColorReport> colors;     // only for a build with colors
+  std::optional<ClusterTotals> cluster;  // only for a cluster build
+  std::string merge_request;  // only if a merge job wrote the output (MergeJob::request())
 };
 
 // Path of the build report of an output file.
@@ -47,8 +47,8 @@ inline std::string report_path(const std::string& output) { return output + ".re
 
 // One JSON object; docs/cli.md lists its names.
 std::string report_json(const BuildReport& report);
-// Throws Error{kCorrupt} for a text that report_json() did not make. What is not in the text has
-// its default.
+// Throws Error{kCorrupt} for a text not created by report_json(). Fields missing from the text have
+// their defaults.
 BuildReport decode_report(const std::string& text);
 
 }  // namespace voxdag

@@ -8,7 +8,8 @@
 namespace voxdag {
 namespace {
 
-// Calls `action(field, value)` for every field; `value` is the option as JSON, or null without one.
+// Calls `action(field, value)` for every field. `value` is the option as JSON; null if the option
+// is not set.
 template <class Action>
 class JsonVisitor {
  public:
@@ -22,7 +23,7 @@ class JsonVisitor {
   const Action& action_;
 };
 
-// Throws FieldError for values that differ from their defaults and break a limit.
+// Throws FieldError for values that break a limit and differ from their defaults.
 class LimitChecker {
  public:
   explicit LimitChecker(const FieldJson& defaults) : defaults_(defaults) {}

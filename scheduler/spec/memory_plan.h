@@ -19,22 +19,23 @@
 //                     tables made in advance        1/4 of its free part         BackendMemory
 //                     each table of the plane memo  1/16, 1/8 of free            BackendMemory
 //                     block memo                    1/16 of free                 BackendMemory
-//                     more pages that it retains    1/8, up to 128 MiB           nobody
-//                     or: key for the cache         rest after those pages       ArtifactCache
+//                     more retained pages           1/8, up to 128 MiB           nobody
+//                     before it: key for the cache  the share less those pages   ArtifactCache
 //   color         surfaces; the rest is spilled     up to 1/3 of free            RecordStore
-//                 textures, if they take no more    up to 1/2 of the rest        TextureSet
-//                   those on their way there        1/8                          nobody
+//                   incomplete chunks of surfaces   1/8                          nobody
+//                 textures, or else spilled         up to 1/2 of the rest        TextureSet
 //                 ColorMemory, for every worker     free / workers
-//                   a region, encoded ones of       1/2, 12 to 46 MiB            CubeBaker
-//                     a cube among it
-//                   its other attributes            16 MiB, if any; or more      CubeBaker
+//                   a region, and the encoded       1/2, 12 to 46 MiB            CubeBaker
+//                     regions of its cube
+//                   other attributes of a region    16 MiB or more, if any       CubeBaker
 //                   surfaces of a cube              2/3 of the rest              CubeBaker
 //                   pages of textures               1/3 of the rest              TextureReader
 //   merge         MergeMemory, of free
 //                   workers, together               1/4                          merge
 //                   positions of two levels         1/6 for each; then spilled   merge
 //                   hash partition                  the rest, less 1/16          merge
-//  "Free" is the part of the budget still available when a stage allocates. Two kinds of memory are
+//
+// "Free" is the part of the budget still available when a stage allocates. Two kinds of memory are
 // not charged: the parts marked "nobody" above, and lists that grow with the number of subvolumes
 // and frames. These lists are the artifact indexes of one merge pass (56 bytes per frame; the hash
 // partition leaves 1/16 of the budget for them) and the chunk lists of spilled triangles.
@@ -72,7 +73,7 @@ struct MemoryPlan {
     return static_cast<unsigned>(
         std::clamp<uint64_t>(std::min(pieces, ingest_workers(free_bytes)), 1, threads));
   }
-  // The budget of a pilot build, `free_bytes` being free.
+  // Returns the budget of a pilot build when `free_bytes` are free.
   static constexpr uint64_t pilot_bytes(uint64_t free_bytes) { return free_bytes * 3 / 4; }
 };
 
@@ -81,7 +82,8 @@ struct ColorMemory {
   // Minimum for baking a region in pieces, and enough for baking it in one piece.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
   static constexpr uint64_t kSolidRegionBytes = uint64_t{46} << 20;
-  // Memory for attributes other than color, and the share of their sums, which may grow beyond it.
+  // Memory for attributes other than color. Includes kValueSumBytes for their sums, which may need
+  // more.
   static constexpr uint64_t kValueBytes = uint64_t{16} << 20;
   static constexpr uint64_t kValueSumBytes = uint64_t{4} << 20;
 
@@ -90,11 +92,12 @@ struct ColorMemory {
   }
 
   unsigned workers = 1;
-  uint64_t region_bytes = kRegionBytes;  // of each
+  uint64_t region_bytes = kRegionBytes;  // per worker
   uint64_t surface_bytes = 0;
   uint64_t texture_bytes = 0;
 
-  // An eighth is for the directories of the section.
+  // Divides 7/8 of the free memory among the workers; the directories of the sections need the
+  // rest.
   static constexpr ColorMemory divide(uint64_t free_bytes, unsigned wanted,
                                       const AttributeSet& attributes) {
     const uint64_t bytes = free_bytes - free_bytes / 8,
@@ -110,13 +113,13 @@ struct ColorMemory {
 
 // Memory of the workers of the build stage.
 struct WorkerMemory {
-  // Every worker has a segment file open.
+  // The maximum is limited because every worker has a segment file open.
   static constexpr uint64_t kMaxWorkers = 256;
   // Memory one worker needs outside its share.
   static constexpr uint64_t kOutsideShareBytes = kSegmentWriterBytes + BackendMemory::kMinPageBytes;
 
   unsigned workers = 1;
-  uint64_t share_bytes = 0;  // of each, for Backend::build()
+  uint64_t share_bytes = 0;  // per worker, for Backend::build()
 
   // Returns `wanted` workers, or fewer if their shares could not hold the smallest subvolume.
   static constexpr WorkerMemory divide(uint64_t free_bytes, unsigned wanted) {
@@ -126,8 +129,8 @@ struct WorkerMemory {
     const uint64_t each = free_bytes / workers;
     return {static_cast<unsigned>(workers), each - std::min(each, kOutsideShareBytes)};
   }
-  // The part of a worker's share for an artifact's key; the rest holds the backend's retained
-  // pages.
+  // Returns the part of a worker's share for an artifact's key. The backend's retained pages take
+  // the rest.
   static constexpr uint64_t key_bytes(uint64_t share_bytes) { return share_bytes / 8 * 7; }
 };
 

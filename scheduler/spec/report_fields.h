@@ -1,4 +1,5 @@
-// The description of a build's report (core/fields/field.h): its JSON, and the schema of that.
+// The description of a build's report (core/fields/field.h). The report's JSON and the schema of
+// the JSON derive from it.
 #pragma once
 
 #include <bit>
@@ -28,7 +29,7 @@ void fields(Visitor& visit, ColorReport& colors) {
   });
 }
 
-// Without the number of split subvolumes, which the report counts itself.
+// The number of split subvolumes is left out, because the report counts it itself.
 template <class Visitor>
 void fields(Visitor& visit, ClusterTotals& totals) {
   visit("batches", totals.batches);

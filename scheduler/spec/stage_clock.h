@@ -1,4 +1,4 @@
-// Measures the stages of a build, which follow one another. Used by one thread.
+// Measures the stages of a build, which run one after another. Used by one thread.
 #pragma once
 
 #include <algorithm>
@@ -15,17 +15,17 @@ struct StageTime {
   std::string name;
   double wall_s = 0;
   double cpu_s = 0;  // of the whole process
-  // The largest part of cpu_s that one thread took, by ThreadTimes.
+  // The largest part of cpu_s used by a single thread (ThreadTimes).
   double largest_thread_share = 0;
 };
 
 class StageClock {
  public:
-  // `on_finish`, if there is one, is called with every stage that ended.
+  // Calls `on_finish`, if set, with every stage that has ended.
   explicit StageClock(std::function<void(const StageTime&)> on_finish = {})
       : on_finish_(std::move(on_finish)) {}
 
-  // Ends stage `name`, which began when the one before it ended.
+  // Ends stage `name`. The stage began when the previous one ended.
   void finish(const std::string& name) {
     const double wall = wall_seconds(), cpu = process_cpu_seconds();
     const ThreadTimes::Seconds threads = ThreadTimes::now();

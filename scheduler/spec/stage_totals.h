@@ -1,4 +1,4 @@
-// Totals of single stages in the build report. Plain values.
+// Totals of some stages in the build report. Plain values.
 #pragma once
 
 #include <cstdint>
@@ -9,23 +9,23 @@ namespace voxdag {
 
 // Totals of the tasks of a cluster build.
 struct ClusterTotals {
-  uint64_t batches = 0;   // built
-  uint64_t attempts = 0;  // that failed
+  uint64_t batches = 0;   // built batches
+  uint64_t attempts = 0;  // failed attempts
   uint64_t split = 0;     // subvolumes that tasks split
   uint64_t rows_before = 0, rows_after = 0;
-  double cpu_s = 0;         // of all tasks whose records count
-  double longest_s = 0;     // wall time of the longest of them
-  double first_task_s = 0;  // from the first submission to the begin of the first task
-  uint64_t requests = 0;    // to Slurm
+  double cpu_s = 0;         // of all tasks whose records were accepted
+  double longest_s = 0;     // wall time of the longest of these tasks
+  double first_task_s = 0;  // from the first submission to the start of the first task
+  uint64_t requests = 0;    // requests to Slurm
   std::map<std::string, uint64_t> batches_of_node;
 };
 
 // Totals of the attributes stage.
 struct ColorReport {
   uint64_t resolution = 0;               // of the color grid; 0 for a file without colors
-  uint64_t cells = 0;                    // of that grid, that have a color
+  uint64_t cells = 0;                    // cells of the color grid that have a color
   uint64_t images = 0, image_bytes = 0;  // decoded images, and their pyramids
-  uint64_t cubes = 0, cubes_reused = 0;  // with surfaces, and those that an earlier run baked
+  uint64_t cubes = 0, cubes_reused = 0;  // cubes with surfaces; those baked by an earlier run
   uint64_t spill_bytes = 0;
 };
 

@@ -14,7 +14,7 @@
 namespace voxdag {
 namespace {
 
-// Increased with every change that makes other artifacts of the same triangles.
+// Increased with every change that produces different artifacts from the same triangles.
 constexpr uint64_t kContentVersion = 1;
 
 using Corner = std::array<int64_t, 3>;
@@ -36,7 +36,7 @@ bool is_partial(const DirectoryEntry& entry) {
   return !entry.is_directory && entry.name.find(".vdart.partial") != std::string::npos;
 }
 
-// An entry is written in seconds: a partial one of this age has lost its writer.
+// An entry is written in seconds, so the writer of a partial entry of this age no longer exists.
 constexpr double kAbandonedAfterS = 3600;
 
 }  // namespace
@@ -93,7 +93,8 @@ bool ArtifactCache::find(const std::string& key, uint32_t grid_levels, StoredSub
     mark_used(key);
     return true;
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kNoSpace) throw;  // the segment's disk is full, not the cache's
+    if (error.code() == ErrorCode::kNoSpace)
+      throw;  // the segment's disk is full, not the cache's disk
     return false;
   }
 }
@@ -102,7 +103,7 @@ void ArtifactCache::mark_used(const std::string& key) {
   try {
     files_.touch(path_of(key));
   } catch (const Error&) {
-    // The cache is read-only here.
+    // The cache is read-only for this process.
   }
 }
 
@@ -121,7 +122,7 @@ void ArtifactCache::add(const std::string& key, const ReadableFile& segment,
     known_bytes_ += bytes;
     if (known_bytes_ > limit_bytes_) evict();
   } catch (const Error&) {
-    // The build does not need the entry.
+    // The build does not need the cache entry.
   }
 }
 

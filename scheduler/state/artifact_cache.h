@@ -1,11 +1,11 @@
-// Artifacts shared between builds: a subvolume whose content was built before, here or in another
+// Artifacts shared between builds. A subvolume whose content was built before, here or in another
 // place of the grid, is copied instead of built.
 //
 // The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube (each
 // with its corners sorted, all sorted, duplicates removed), the cube's edge, hash-bits and the
-// format's version. The cache is a folder with one file per entry; the least recently used are
-// removed when the limit is exceeded. Several builds may share it: entries appear atomically, by
-// renaming, and an entry that vanishes or is damaged is a miss. Thread-safe.
+// format's version. The cache is a folder with one file per entry. When the limit is exceeded, the
+// least recently used entries are removed. Several builds may share the cache: entries appear
+// atomically, by renaming, and a removed or damaged entry is a miss. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -25,12 +25,12 @@ class ArtifactCache {
  public:
   ArtifactCache(FileSystem& files, std::string folder, uint64_t limit_bytes);
 
-  // The key of a subvolume; nothing if its triangles do not fit `budget`: it is not cached then.
+  // Returns the key of a subvolume; nullopt if its triangles do not fit `budget`. Such a subvolume
+  // is not cached.
   static std::optional<std::string> key(const SubvolumeTask& task, TriangleStream& triangles,
                                         MemoryBudget& budget);
-  // Copies the entry of `key` into `segment` and fills in the subvolume's artifact and summary;
-  // false if there is no entry, or it is
-  // damaged.
+  // Copies the entry of `key` into `segment` and fills in the subvolume's artifact and summary.
+  // Returns false if the entry is missing or damaged.
   bool find(const std::string& key, uint32_t grid_levels, StoredSubvolume& subvolume,
             SegmentWriter& segment);
   // Adds a flushed artifact of `segment`. Errors are ignored, because the cache is optional.
@@ -38,10 +38,10 @@ class ArtifactCache {
 
  private:
   std::string path_of(const std::string& key) const { return folder_ + "/" + key + ".vdart"; }
-  // A name that no other writer uses, in this process or another.
+  // Returns a temporary name that no other writer uses, in this process or another.
   std::string partial_of(const std::string& key);
   void mark_used(const std::string& key);
-  // Removes the least recently used entries until nine tenths of the limit are left.
+  // Removes the least recently used entries until the cache takes at most nine tenths of the limit.
   void evict();
   void remove(const DirectoryEntry& entry);
 

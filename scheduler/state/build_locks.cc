@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// `voxdag status` locks a work folder for an instant.
+// `voxdag status` locks a work folder very briefly.
 constexpr double kQuietS = 0.3;
 constexpr auto kPause = std::chrono::milliseconds(20);
 

@@ -1,6 +1,6 @@
-// The locks that keep two builds apart: one on a file next to the output (OutputLock), one on the
-// work folder (work_folder.h). A killed process holds its locks until the system has freed its
-// memory, which can take seconds. So a build waits for a lock that is taken.
+// The locks that prevent concurrent builds: one on a file next to the output (OutputLock), one on
+// the work folder (work_folder.h). A killed process holds its locks until the system has freed its
+// memory, which can take seconds. So a build waits if another process holds a lock.
 #pragma once
 
 #include <functional>
@@ -12,13 +12,13 @@
 
 namespace voxdag {
 
-// Calls `try_lock` until it returns a lock, for up to `max_s` seconds; null after that. Reports a
-// warning that begins with `what` once it has waited longer than `voxdag status` may hold a lock.
+// Calls `try_lock` until it returns a lock, for up to `max_s` seconds; then returns null. Reports a
+// warning that begins with `what` after waiting longer than `voxdag status` may hold a lock.
 std::unique_ptr<FileLock> wait_for_lock(const std::function<std::unique_ptr<FileLock>()>& try_lock,
                                         const std::string& what, double max_s,
                                         const BuildContext& context);
 
-// Throws Error{kIo} if another process still writes the output after `max_wait_s`.
+// Throws Error{kIo} if another process is still writing the output after `max_wait_s`.
 OutputLock lock_output(const BuildContext& context, const std::string& output, double max_wait_s);
 
 }  // namespace voxdag

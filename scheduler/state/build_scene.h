@@ -14,7 +14,7 @@ namespace voxdag {
 class BuildScene {
  public:
   // Compressed geometry is decoded to a file in `scratch_folder`, which must exist before triangles
-  // are read. The references must outlive this.
+  // are read. The references must outlive this object.
   BuildScene(const GeometryOptions& options, const std::string& scratch_folder,
              MemoryBudget& budget, const BuildContext& context);
 

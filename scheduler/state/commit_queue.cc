@@ -79,7 +79,7 @@ void CommitQueue::recover() {
       return s.artifact.offset + s.artifact.bytes > segment_->written();
     });
   } catch (const std::exception&) {
-    return;  // They are built again.
+    return;  // The subvolumes are built again.
   }
   try {
     jobs_.record_built(group.subvolumes);

@@ -8,9 +8,9 @@
 
 namespace voxdag {
 
-// Advice about a full disk for the end of an error message. The artifacts of all subvolumes,
-// estimated from the built subvolumes, and a global file of about the same size must fit. Colors
-// need additional space.
+// Returns advice about a full disk for the end of an error message. The disk needs space for the
+// artifacts of all subvolumes, estimated from the built subvolumes, and for a global file of about
+// the same size. Colors need additional space.
 inline std::string full_disk_advice(std::span<const StoredSubvolume> leaves, bool has_colors) {
   double built = 0, planned = 0, bytes = 0;
   for (const StoredSubvolume& subvolume : leaves) {

@@ -24,7 +24,8 @@ void JobProgress::update(bool at_once, const Change& change) {
   write();
 }
 
-// Reads the snapshot only in its turn, so that an older one never replaces a newer one.
+// Reads the snapshot while holding the lock of the store, so that an older snapshot never replaces
+// a newer one.
 void JobProgress::write() {
   std::lock_guard lock(store_mutex_);
   if (!store_) return;
@@ -40,7 +41,7 @@ void JobProgress::write() {
   try {
     store_->set_progress(snapshot);
   } catch (const Error&) {
-    // Nothing depends on this row; where the store cannot be written, the build itself will fail.
+    // Nothing depends on this row. If the store cannot be written, the build itself will fail.
   }
 }
 

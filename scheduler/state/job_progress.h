@@ -1,8 +1,8 @@
-// Passes a build's progress on, and writes it to the job store about once per second, so that
+// Forwards a build's progress, and writes it to the job store about once per second, so that
 // `voxdag status` can show it from another process. Thread-safe.
 //
-// The thread whose call is due lists the work folder and writes the row; no other thread waits for
-// it. This is too little work for a separate thread.
+// When a write is due, the calling thread lists the work folder and writes the row; no other thread
+// waits for it. This is too little work for a separate thread.
 #pragma once
 
 #include <mutex>
@@ -38,25 +38,25 @@ class JobProgress : public Progress {
   }
   void set_cluster_tasks(const ClusterTasks& tasks) override { shown_.set_cluster_tasks(tasks); }
   void record_failure(const Error& error);
-  // From here on progress is only passed on: the store is about to close.
+  // After this call progress is only forwarded, because the store is about to close.
   void detach();
 
  private:
-  // Changes the snapshot, and writes it if that is due or `at_once`.
+  // Changes the snapshot. Writes it if a write is due or `at_once` is set.
   template <class Change>
   void update(bool at_once, const Change& change);
   void write();
 
   Progress& shown_;
   const WorkFolder& work_;
-  std::mutex mutex_;  // guards the next two
+  std::mutex mutex_;  // guards the next two members
   ProgressSnapshot snapshot_;
   double last_written_s_ = 0;
   std::mutex store_mutex_;  // guards the store; locked before mutex_, never after it
   JobStore* store_;
 };
 
-// A subvolume as Progress reports it.
+// Returns a subvolume in the form that Progress reports.
 SubvolumeStatus status_of(const StoredSubvolume& subvolume, uint32_t grid_levels);
 // Reports all subvolumes of a build.
 void report_subvolumes(std::span<const StoredSubvolume> all, uint32_t grid_levels,

@@ -1,5 +1,5 @@
-// The state of a build, read from its work folder at any time, even while another process builds
-// there.
+// The state of a build, read from its work folder. It can be read at any time, even while another
+// process builds.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,14 @@ namespace voxdag {
 
 struct JobStatus {
   bool running = false;  // a process has locked the folder
-  std::string holder;    // that process
+  std::string holder;    // the process that has locked the folder
   std::string geometry;  // options as JSON; "" before the job began
   uint64_t subvolumes = 0;
   uint64_t built = 0;
   std::optional<ProgressSnapshot> progress;
   std::vector<StageTime> stages;
 
-  // Units per second in the current stage, and seconds left at that rate; 0 if unknown.
+  // Units per second in the current stage, and remaining seconds at that rate; 0 if unknown.
   double rate() const;
   double eta_s() const;
 };
@@ -29,8 +29,8 @@ struct JobStatus {
 // Throws Error{kNotFound} if the folder has no job store.
 JobStatus read_job_status(FileSystem& files, const std::string& work_folder);
 
-// One JSON object, names as in docs/cli.md. `cluster` is the JSON status of a cluster build, else
-// "".
+// Returns one JSON object with the names in docs/cli.md. `cluster` is the JSON status of a cluster
+// build, else "".
 std::string status_json(const JobStatus& status, const std::string& cluster = "");
 
 }  // namespace voxdag

@@ -10,15 +10,16 @@
 namespace voxdag {
 namespace {
 
-// SQLite does not check its pages: every row that decides the result has a checksum, and the job's
-// row the number of subvolumes. The content of a missing other row is computed again.
+// SQLite has no page checksums. So every row that determines the result has a checksum, and the
+// job's row has the number of subvolumes. Other rows can be missing; their contents are computed
+// again.
 template <class Record>
 struct Sealed {
   Record record;
   uint64_t checksum = 0;
 };
 
-// The bytes of the columns, each with its length, in order.
+// Digest input: the bytes of the columns, each with its length, in order.
 class RowDigest {
  public:
   void fixed(const char*, int64_t) {}
@@ -151,7 +152,7 @@ void put_sealed(SqlDatabase& database, const std::string& table, Record record) 
   put_row(database, table, Sealed<Record>{std::move(record), checksum});
 }
 
-// Throws Error{kCorrupt} naming `what` if the row is not as it was written.
+// Throws Error{kCorrupt} with `what` if the row differs from the written one.
 template <class Record>
 Record unsealed(Sealed<Record> sealed, const std::string& what) {
   if (sealed.checksum != checksum_of(sealed.record))
@@ -216,7 +217,7 @@ void JobStore::start(const JobIdentity& job, std::span<const StoredSubvolume> pl
 
 std::vector<StoredSubvolume> JobStore::leaves() {
   std::lock_guard lock(mutex_);
-  // Both statements see the same state of the database, because the first one is still open.
+  // Both statements see the same state of the database, because the first one remains open.
   auto jobs = select_rows<Sealed<JobRow>>(database_, "job");
   if (!jobs.step()) return {};
   const JobRow job = unsealed(read_row<Sealed<JobRow>>(jobs), "the job");

@@ -6,12 +6,14 @@
 //   1. A row names an artifact only after the artifact's bytes were synced.
 //   2. Subvolumes form a forest: a split subvolume has its octants with triangles as children. Only
 //      leaves are built.
-//   3. Every row that decides the result has a checksum; a mismatch is Error{kCorrupt}. Subvolumes
-//      are numbered from 1, and the job's row has their number, so a missing row is also
+//   3. Every row that determines the result has a checksum; a mismatch is Error{kCorrupt}.
+//      Subvolumes are numbered from 1, and the job's row has their number, so a missing row is also
 //      Error{kCorrupt}.
-//   4. All rows of one call are committed together or not at all. Thread-safe. One process writes,
-//      which the work folder's lock ensures; readers (`voxdag status`) may open the same file at
-//      any time. Only the writer's leaves() include subvolumes that are built but not yet durable.
+//   4. All rows of one call are committed together or not at all.
+//
+// Thread-safe. The work folder's lock ensures that only one process writes. Readers (`voxdag
+// status`) may open the same file at any time. Only the writer's leaves() include subvolumes that
+// are built but not yet durable.
 #pragma once
 
 #include <cstddef>
@@ -54,9 +56,9 @@ struct StoredSubvolume {
   SubDagSummary summary;
 };
 
-// A merge that is not finished; see Checkpoint.
+// An unfinished merge; see Checkpoint.
 struct StoredMerge {
-  uint32_t level = 0;  // only levels of the artifacts above this one are still read
+  uint32_t level = 0;  // the merge reads only artifact levels above this one
   std::vector<std::byte> state;
 };
 
@@ -65,8 +67,8 @@ struct JobResult {
   std::string output;
   std::string sha256;
   uint64_t bytes = 0;
-  MergeReport merge;     // without input_nodes and scratch_bytes
-  std::string sections;  // digest of the sections behind the levels; "" without any
+  MergeReport merge;     // all fields except input_nodes and scratch_bytes
+  std::string sections;  // digest of the sections after the levels; "" if there are none
 };
 
 // The progress of a build as other processes see it.
@@ -75,7 +77,7 @@ struct ProgressSnapshot {
   std::string unit;
   uint64_t done = 0;
   uint64_t total = 0;
-  uint64_t resumed_at = 0;     // units that earlier runs did
+  uint64_t resumed_at = 0;     // units completed by earlier runs
   double stage_started_s = 0;  // Unix time
   double updated_s = 0;
   uint64_t memory_bytes = 0;  // resident
@@ -87,19 +89,18 @@ class JobStore {
  public:
   enum class Access { kBuild, kRead };
 
-  // Opens the store; for kBuild creates it. Throws
-  // Error{kCorrupt} for a damaged one, Error{kInvalidInput} for another kind of database,
-  // Error{kUnsupportedVersion}.
+  // Opens the store; kBuild also creates it. Throws Error{kCorrupt} for a damaged store,
+  // Error{kInvalidInput} for another kind of database, Error{kUnsupportedVersion}.
   JobStore(const std::string& path, Access access);
 
   std::optional<JobIdentity> job();
-  // Replaces all that the store has by a new job whose subvolumes are all planned.
+  // Replaces the store's contents by a new job whose subvolumes are all planned.
   void start(const JobIdentity& job, std::span<const StoredSubvolume> plan);
   // Returns the subvolumes that are not split, by id.
   std::vector<StoredSubvolume> leaves();
   void record_built(std::span<const StoredSubvolume> built);
-  // Makes leaves() of this object return these subvolumes as built, although they become durable
-  // only with record_built().
+  // Makes leaves() of this object return these subvolumes as built. They become durable only with
+  // record_built().
   void mark_built_in_memory(std::span<const StoredSubvolume> built);
   // Makes leaves() return unrecorded subvolumes as planned again.
   void forget_built_in_memory();
@@ -110,10 +111,10 @@ class JobStore {
   void mark_for_rebuild(const StoredSubvolume& lost);
 
   // Returns the progress of scan, ingest and partition that save_ingest() stored, for the present
-  // or the next job. Throws Error{kCorrupt} if it fails its checksum.
+  // or the next job. Throws Error{kCorrupt} if it does not match its checksum.
   std::optional<std::vector<std::byte>> ingest();
   void save_ingest(std::span<const std::byte> record);
-  // Writes nothing if none is stored.
+  // Does not write to the store if it has no progress of ingest.
   void forget_ingest();
 
   std::optional<StoredMerge> merge();
@@ -131,7 +132,7 @@ class JobStore {
  private:
   void update_row(const StoredSubvolume& subvolume);
 
-  std::mutex mutex_;  // guards all below
+  std::mutex mutex_;  // guards all members below
   SqlDatabase database_;
   std::map<SubvolumeId, StoredSubvolume> built_in_memory_;  // not yet recorded
 };

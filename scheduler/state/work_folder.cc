@@ -19,10 +19,10 @@ namespace {
 constexpr std::string_view kLockName = "lock";
 constexpr std::string_view kScratchName = "merge";
 constexpr std::string_view kClusterName = "cluster";
-// Threads that remove files, which takes half a second per GB of a file that is cached.
+// Threads that remove files. Removing a cached file takes half a second per GB.
 constexpr unsigned kRemovers = 4;
 
-// The id in "segment-<id>.vdseg".
+// Returns the id in "segment-<id>.vdseg".
 std::optional<uint32_t> segment_id(std::string_view name) {
   constexpr std::string_view kBefore = "segment-", kAfter = ".vdseg";
   if (!name.starts_with(kBefore) || !name.ends_with(kAfter)) return std::nullopt;
@@ -38,7 +38,7 @@ bool is_scratch(const DirectoryEntry& entry) {
          (segment_id(entry.name) || entry.name.starts_with("merge-"));
 }
 
-// NFS gives such a name to a file that is removed while somebody has it open.
+// NFS gives such a name to a removed file that a process still has open.
 bool is_left_by_nfs(std::string_view name) { return name.starts_with(".nfs"); }
 
 // Files and folders of a cluster build; slurm/files/cluster_folder.h lists them.
@@ -69,7 +69,7 @@ bool is_ours(const DirectoryEntry& entry) {
 WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max_wait_s)
     : files_(context.files), path_(std::move(path)) {
   const std::string lock_path = path_ + "/" + std::string(kLockName);
-  // A build that ends removes the folder, so it may have to be made again.
+  // A build that is ending removes the folder, so it may have to be created again.
   const auto try_lock = [&]() -> std::unique_ptr<FileLock> {
     files_.make_directories(path_);
     check_is_ours();
@@ -87,7 +87,7 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
                                     read_small_file(files_, lock_path, 1 << 12) +
                                     ": expected to be the only build there");
   const std::string holder = "process " + std::to_string(getpid()) + " on " + host_name();
-  // create() empties the file: the last name may have been longer.
+  // create() empties the file, because the previous name may have been longer.
   files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
 }
 
@@ -124,7 +124,7 @@ std::vector<std::string> WorkFolder::files_in(FileSystem& files, const std::stri
         if (from == scratch ? is_scratch(entry) : is_ours(entry) && !entry.is_directory)
           paths.push_back(from + "/" + entry.name);
   } catch (const Error& error) {
-    // A build that ends removes the folder.
+    // A build that is ending removes the folder.
     if (error.code() != ErrorCode::kNotFound) throw;
   }
   return paths;
@@ -159,7 +159,7 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
   }
 }
 
-// A task that still runs may add files at any time: the folder is left then.
+// Tasks that are still running may add files at any time. In this case the folder remains.
 void WorkFolder::remove_cluster_files() {
   if (!files_.exists(cluster_path())) return;
   for (const DirectoryEntry& entry : files_.list(cluster_path())) {
@@ -169,7 +169,7 @@ void WorkFolder::remove_cluster_files() {
       remove_silently(path);
       continue;
     }
-    // The attempt may also remove it.
+    // The attempt itself may also remove it.
     try {
       for (const DirectoryEntry& inner : files_.list(path))
         if (segment_id(inner.name)) remove_silently(path + "/" + inner.name);
@@ -204,7 +204,7 @@ void WorkFolder::remove_if_empty(const std::string& folder) {
   try {
     files_.remove_directory(folder);
   } catch (const Error&) {
-    // Other programs' files and new files are kept.
+    // Files of other programs and new files remain.
   }
 }
 
@@ -212,14 +212,14 @@ void WorkFolder::remove_silently(const std::string& path) {
   try {
     if (files_.exists(path)) files_.remove(path);
   } catch (const Error&) {
-    // A file that is left costs space; the next build in this folder removes it.
+    // A remaining file costs space; the next build in this folder removes it.
   }
 }
 
 void WorkFolder::remove() {
   released_.clear();
   try {
-    // The lock file is removed last: until then no other build may use the folder.
+    // The lock file is removed last, so that no other build uses the folder before.
     std::vector<std::string> others = scratch_files();
     for (const DirectoryEntry& entry : files_.list(path_))
       if (is_ours(entry) && !entry.is_directory && entry.name != kLockName)
@@ -230,7 +230,7 @@ void WorkFolder::remove() {
     files_.remove(path_ + "/" + std::string(kLockName));
     files_.remove_directory(path_);
   } catch (const Error&) {
-    // Files that are left cost only space.
+    // Remaining files only cost space.
   }
 }
 

@@ -15,13 +15,14 @@
 
 namespace voxdag {
 
-// First segment id of cluster tasks. Segments of this process have smaller ids.
+// First segment id for cluster tasks. This process uses smaller ids for its segments.
 inline constexpr uint32_t kFirstClusterSegment = uint32_t{1} << 24;
 
 class WorkFolder {
  public:
-  // Makes the folder and locks it. Throws Error{kIo} if another process still has it locked after
-  // `max_wait_s` (saying which), Error{kInvalidInput} if it has files that are not voxdag's.
+  // Creates the folder and locks it. Throws Error{kIo} with the name of the other process if it
+  // still has the folder locked after `max_wait_s`. Throws Error{kInvalidInput} if the folder has
+  // files that are not voxdag's.
   WorkFolder(const BuildContext& context, std::string path, double max_wait_s);
 
   const std::string& path() const { return path_; }
@@ -29,10 +30,10 @@ class WorkFolder {
   bool existed_before() const { return existed_before_; }
   std::string store_path() const { return store_path(path_); }
   static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
-  // The process that has locked the folder: "process 17 on box"; "" if none has.
+  // Returns the process that has locked the folder, as "process 17 on box"; "" if none has.
   static std::string holder(FileSystem& files, const std::string& folder);
-  // Returns the files in a folder with names that voxdag uses: a build there may remove or change
-  // them.
+  // Returns the files in `folder` whose names voxdag uses. A build in this folder may remove or
+  // change them.
   static std::vector<std::string> files_in(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
   // File for the decoded geometry of a compressed scene.
@@ -50,11 +51,11 @@ class WorkFolder {
   // Bytes of all files in the folder, for reports.
   uint64_t bytes() const;
 
-  // Frees the disk space of bytes of a segment that are no longer read. Not thread-safe.
+  // Frees the disk space of a part of a segment that is no longer needed. Not thread-safe.
   void release(const SegmentRange& range);
 
-  // Removes the segments for which `is_named` is false: an interrupted build left them, and no row
-  // of the store names them.
+  // Removes the segments for which `is_named` returns false. An interrupted build left them, and no
+  // row of the store refers to them.
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
   // Removes merge data.
   void empty_scratch();
@@ -66,8 +67,8 @@ class WorkFolder {
   void remove_durable() { remove_silently(durable_path()); }
   // Removes colors. Silent, like remove().
   void remove_colors() { remove_silently(colors_path()); }
-  // Removes all files of voxdag, and the folder if it is empty then. Errors are ignored: remaining
-  // files cost only space.
+  // Removes all files of voxdag, and the folder if it is empty afterwards. Errors are ignored,
+  // because remaining files only cost space.
   void remove();
 
  private:
@@ -80,7 +81,7 @@ class WorkFolder {
   const std::string path_;
   bool existed_before_ = false;
   std::unique_ptr<FileLock> lock_;
-  std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments that lost some bytes
+  std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments that had a part freed
 };
 
 }  // namespace voxdag

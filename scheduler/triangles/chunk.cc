@@ -61,7 +61,7 @@ class ChunkStream : public TriangleStream {
  private:
   static constexpr size_t kNoChunk = SIZE_MAX;
 
-  // The records of the current chunk.
+  // Returns the records of the current chunk.
   const std::byte* load(const Chunk& chunk) {
     if (!chunk.memory.empty()) return chunk.memory.data();
     if (loaded_ != chunk_) {
@@ -84,8 +84,8 @@ class ChunkStream : public TriangleStream {
   const size_t record_bytes_;
   const uint64_t first_;
   size_t chunk_ = 0;
-  size_t record_ = 0;         // the next one of the chunk
-  size_t loaded_ = kNoChunk;  // the chunk that from_file_ holds
+  size_t record_ = 0;         // next record in the chunk
+  size_t loaded_ = kNoChunk;  // the chunk in from_file_
   std::vector<std::byte> from_file_;
 };
 
@@ -114,7 +114,7 @@ std::unique_ptr<TriangleStream> open_chunks(const ChunkList& list, const Triangl
   return std::make_unique<ChunkStream>(list, file, record_bytes, first);
 }
 
-// Adjacent chunks are released together, since a disk frees whole blocks only.
+// Adjacent chunks are released together, because a disk frees only complete blocks.
 void release_chunks(const ChunkList& list, TriangleFile* file) {
   Extent piece;
   const auto release = [&] {

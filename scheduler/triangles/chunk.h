@@ -1,8 +1,9 @@
-// Triangles as they are stored: records of fixed size in chunks, each chunk in memory or in a
-// TriangleFile. Both triangle stores are made of these. Nothing here locks: a list of chunks is
-// written by one thread, and read by any number once it is complete.
-//  A record has nine coordinates of 32 bits (36 bytes). If the grid is an option of the build,
-// triangles may reach far outside of it, so coordinates have 64 bits ("wide", 72 bytes).
+// Stored triangles: records of fixed size in chunks, each chunk in memory or in a TriangleFile.
+// Both triangle stores use these chunks. Nothing here locks: one thread writes a list of chunks,
+// and any number of threads may read it when it is complete.
+//
+// A record has nine coordinates of 32 bits (36 bytes). If the grid is an option of the build,
+// triangles may extend far beyond it, so coordinates have 64 bits ("wide", 72 bytes).
 #pragma once
 
 #include <cstddef>
@@ -28,7 +29,7 @@ struct Chunk {
   uint64_t first = 0;  // records of the list before this chunk, set by the list
 };
 
-// Bytes that a growing list of chunks takes for each of them.
+// Bytes per chunk in a growing list of chunks.
 inline constexpr uint64_t kChunkListBytes = 2 * sizeof(Chunk);
 
 struct ChunkList {
@@ -40,16 +41,17 @@ struct ChunkList {
     records += chunk.records;
     chunks.push_back(std::move(chunk));
   }
-  // Sorts the chunks, all of which are in a file, by their offsets.
+  // Sorts the chunks by their offsets. All must be in a file.
   void sort_by_offset();
 };
 
-// Streams the triangles of a complete list from number `first` on; chunks that are not in memory
-// are read from `file`, which throws DamagedTriangles. List and file must outlive the stream.
+// Streams the triangles of a complete list, starting at number `first`. Chunks that are not in
+// memory are read from `file`, which throws DamagedTriangles. List and file must outlive the
+// stream.
 std::unique_ptr<TriangleStream> open_chunks(const ChunkList& list, const TriangleFile* file,
                                             size_t record_bytes, uint64_t first);
 
-// Releases the space in `file` of the chunks that are not in memory.
+// Frees the space in `file` of the chunks that are not in memory.
 void release_chunks(const ChunkList& list, TriangleFile* file);
 
 }  // namespace voxdag

@@ -11,7 +11,7 @@ DurableStore::DurableStore(FileSystem& files, std::string path, const DurableSto
       file_(std::make_shared<TriangleFile>(files, std::move(path), state.file_end)),
       charge_(share, 0, "lists of triangle bins"),
       last_link_(state.chunks) {
-  add_bin();  // The scene's.
+  add_bin();  // the scene's bin
   std::vector<Cube> cubes(state.cubes.bytes / sizeof(Cube));
   if (!cubes.empty()) file_->read(state.cubes, std::as_writable_bytes(std::span(cubes)));
   set_cubes(cubes, state.cubes);
@@ -46,12 +46,13 @@ void DurableStore::read_chain() {
       list_bytes_ += kChunkListBytes;
     }
   }
-  // The chain begins with the newest link; chunks are read in the order they were written.
+  // The chain begins with the newest link, but chunks are read in the order in which they were
+  // written.
   for (const auto& bin : bins_) bin->list.sort_by_offset();
   charge_.try_resize(list_bytes_);
 }
 
-// A link is the extent of the link before it and the chunks that are new since then.
+// A link contains the extent of the previous link and the chunks added since then.
 DurableStoreState DurableStore::checkpoint() {
   if (!unnamed_.empty()) {
     std::vector<std::byte> link(sizeof last_link_ + unnamed_.size() * sizeof(NamedChunk));
@@ -86,7 +87,8 @@ void DurableStore::add_chunk(BinId bin, std::span<const std::byte> records) {
   std::lock_guard lock(mutex_);
   bins_[bin]->list.add({.extent = extent, .records = triangles});
   unnamed_.push_back({bin, triangles, extent});
-  // If the list does not fit, it is not charged: it is small compared to the triangles.
+  // If the budget has no space for the list, the list is not charged: it is small compared to the
+  // triangles.
   charge_.try_resize(list_bytes_ += kChunkListBytes);
 }
 

@@ -1,10 +1,13 @@
 // Triangles that outlive the process. The bins of the scene and of the plan's cubes are in a file,
 // so that a later run resumes with them. Parts of split subvolumes are not durable: a later run
 // copies them again from their source bin, which is released after its last part.
-//  The file's table of contents is a chain of links. Each link lists the chunks since the previous
+//
+// The file's table of contents is a chain of links. Each link lists the chunks since the previous
 // link, and the extent of that link. checkpoint() appends a link. A caller that syncs the file and
-// records the returned state can open the store at that point again. Thread-safe as documented at
-// TriangleStore; checkpoint() must be called by the thread that fills the durable bins.
+// records the returned state can open the store at that point again.
+//
+// Thread-safe as documented at TriangleStore. The thread that fills the durable bins must be the
+// one that calls checkpoint().
 #pragma once
 
 #include <memory>
@@ -20,22 +23,22 @@
 
 namespace voxdag {
 
-// State from which a store is opened again. A plain value; all zeros for an empty store.
+// State from which a store is opened again. A plain value; an empty store has all zeros.
 struct DurableStoreState {
-  Extent cubes;   // of the cube bins, which follow the scene's bin in this order
+  Extent cubes;   // list of the cube bins, which are numbered in this order after the scene's bin
   Extent chunks;  // the last link of the chain
   uint64_t file_end = 0;
 };
 
 class DurableStore : public TriangleStore {
  public:
-  // Opens the store at `path` as it was at a checkpoint; throws DamagedTriangles. Parts go to
-  // memory and `spill_path` as in a MemoryStore with that share.
+  // Opens the store at `path` with its contents at a checkpoint; throws DamagedTriangles. Parts go
+  // to memory and `spill_path` as in a MemoryStore with this share.
   DurableStore(FileSystem& files, std::string path, const DurableStoreState& state,
                std::string spill_path, bool wide, MemoryBudget& share);
 
   size_t record_bytes() const override { return parts_.record_bytes(); }
-  // More than in memory: fewer chunks to name, to read and to release.
+  // More than in memory, so that there are fewer chunks to list, read and release.
   size_t max_chunk_records() const override { return 16384; }
   void add_cube_bins(std::span<const Cube> cubes) override;
   const std::vector<CubeBin>& cube_bins() const override { return cube_bins_; }
@@ -54,7 +57,7 @@ class DurableStore : public TriangleStore {
   const std::shared_ptr<TriangleFile>& file() const { return file_; }
 
  private:
-  // A chunk as a link of the chain names it.
+  // A chunk as listed in a link of the chain.
   struct NamedChunk {
     BinId bin = 0;
     uint32_t triangles = 0;
@@ -64,7 +67,7 @@ class DurableStore : public TriangleStore {
     ChunkList list;
     uint64_t references = 1;
   };
-  // A part has its number in parts_ plus this.
+  // A part's bin id is this plus its number in parts_.
   static constexpr BinId kFirstPart = BinId{1} << 31;
 
   static bool is_part(BinId bin) { return bin >= kFirstPart; }
@@ -79,9 +82,10 @@ class DurableStore : public TriangleStore {
   std::vector<CubeBin> cube_bins_;
   Extent cubes_;
   MemoryCharge charge_;       // for the lists of chunks
-  mutable std::mutex mutex_;  // guards all below; the list of a filled bin no longer changes
+  mutable std::mutex mutex_;  // guards all members below; the list of a filled bin needs no lock
+                              // because it is final
   std::vector<std::unique_ptr<Bin>> bins_;
-  std::vector<BinId> sources_;  // of the parts, by their numbers in parts_
+  std::vector<BinId> sources_;  // source bins of the parts, by part number in parts_
   uint64_t list_bytes_ = 0;
   std::vector<NamedChunk> unnamed_;  // chunks since the last link
   Extent last_link_;

@@ -16,8 +16,8 @@ namespace voxdag {
 
 class MemoryStore : public TriangleStore {
  public:
-  // Charges chunks to `share`. Chunks that exceed it are written to a file at `spill_path`, which
-  // is created by the first of them. `wide` as in chunk.h.
+  // Charges chunks to `share`. Chunks that exceed it are written to a file at `spill_path`, created
+  // with the first such chunk. `wide` as in chunk.h.
   MemoryStore(FileSystem& files, std::string spill_path, bool wide, MemoryBudget& share);
 
   size_t record_bytes() const override { return record_bytes_; }
@@ -45,7 +45,8 @@ class MemoryStore : public TriangleStore {
   const size_t record_bytes_;
   std::vector<CubeBin> cube_bins_;
   RecordStore records_;
-  mutable std::mutex mutex_;  // guards bins_ and references; a filled bin's list does not change
+  mutable std::mutex mutex_;  // guards bins_ and references; the list of a filled bin needs no lock
+                              // because it is final
   std::vector<std::unique_ptr<Bin>> bins_;
 };
 

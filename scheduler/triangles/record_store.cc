@@ -15,7 +15,7 @@ RecordStore::~RecordStore() {
   try {
     files_.remove(spill_path_);
   } catch (const std::exception&) {
-    // The file costs space until the work folder is removed.
+    // The remaining file costs space until the work folder is removed.
   }
 }
 

@@ -24,7 +24,7 @@ namespace voxdag {
 class RecordStore {
  public:
   // Charges chunks to `share` as `what`. Chunks that exceed it are written to a file at
-  // `spill_path`, which is created by the first of them.
+  // `spill_path`, created with the first such chunk.
   RecordStore(FileSystem& files, std::string spill_path, MemoryBudget& share,
               const std::string& what);
   // Removes the file.
@@ -33,17 +33,16 @@ class RecordStore {
 
   // Adds a chunk of `count` records to the list.
   void add(ChunkList& list, std::span<const std::byte> records, uint32_t count);
-  // Returns the chunk's records, which are read to `buffer` if they are in the file. Throws
-  // DamagedTriangles.
+  // Returns the chunk's records; those in the file are read into `buffer`. Throws DamagedTriangles.
   std::span<const std::byte> read(const Chunk& chunk, std::vector<std::byte>& buffer) const;
-  // Writes the lists' records in memory to the file.
+  // Moves the lists' records from memory to the file.
   void move_to_file(std::span<ChunkList> lists);
   // Frees the list's records and empties it.
   void clear(ChunkList& list);
 
   // The spill file; null before the first chunk is written to it.
   const TriangleFile* file() const;
-  // Bytes that were written to the file.
+  // Bytes written to the file.
   uint64_t file_bytes() const;
 
  private:
@@ -52,7 +51,7 @@ class RecordStore {
 
   FileSystem& files_;
   const std::string spill_path_;
-  mutable std::mutex mutex_;  // guards all below
+  mutable std::mutex mutex_;  // guards all members below
   MemoryCharge charge_;
   uint64_t memory_bytes_ = 0;  // of records in memory and their chunks
   std::unique_ptr<TriangleFile> spill_;
@@ -67,7 +66,7 @@ class ChunkWriter {
   // Passes a target's records to `add_chunk` as soon as they have `chunk_bytes` or more.
   ChunkWriter(size_t targets, size_t chunk_bytes, AddChunk add_chunk);
   void append(size_t target, std::span<const std::byte> records, uint32_t count);
-  // Bytes that complete the target's chunk.
+  // Number of bytes that complete the target's current chunk.
   size_t missing_bytes(size_t target) const {
     return chunk_bytes_ - buffers_[target].records.size();
   }

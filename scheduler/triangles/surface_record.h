@@ -1,6 +1,6 @@
-// Snapped triangles with their look, as a spill file holds them until they are baked: records of
-// 41 to 149 bytes, one after another. What the color does not depend on is left out: texture
-// coordinates of materials without an image, and COLOR_0 where all corners are white.
+// Snapped triangles with their look, stored in a spill file until they are baked: records of 41 to
+// 149 bytes, one after another. Data without influence on the color is left out: texture
+// coordinates of materials without an image, and COLOR_0 if all corners are white.
 //
 //     u8   flags: 1 wide positions, 2 textured, 4 wide texture coordinates, 8 colored, 16 flipped
 //     u32  material
@@ -26,13 +26,13 @@ inline constexpr size_t kMaxSurfaceRecordBytes = 1 + 4 + 9 * 8 + 6 * 8 + 12 * 2;
 // Appends the record of a surface. `has_image` is true if its material has a readable image.
 void append_surface(const FixedSurface& surface, bool has_image, std::vector<std::byte>& out);
 
-// Reads records that append_surface() wrote from the front of `bytes`. The bytes have passed their
-// checksum; remaining defects are reported as damage of the file.
+// Reads records that append_surface() wrote from the front of `bytes`. The bytes must have passed
+// their checksum; remaining defects are reported as damage of the file.
 class SurfaceRecords {
  public:
   explicit SurfaceRecords(std::span<const std::byte> bytes) : in_(bytes) {}
-  // The next surface, what its record left out being 0 or white; nothing after the last one.
-  // Throws DamagedTriangles for bytes that are no record.
+  // Returns the next surface; nullopt after the last one. Fields omitted from the record are 0 or
+  // white. Throws DamagedTriangles for bytes that are not a record.
   std::optional<FixedSurface> next();
 
  private:

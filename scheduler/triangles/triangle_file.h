@@ -1,4 +1,4 @@
-// A file of appended pieces that are read by offset. Each piece has a checksum. Holds triangles
+// An append-only file of pieces that are read by offset. Each piece has a checksum. Holds triangles
 // that do not fit in memory or that outlive the process.
 //
 // append(), read() and release() are thread-safe.
@@ -15,7 +15,7 @@
 
 namespace voxdag {
 
-// A piece of the file; one of no bytes is no piece.
+// A piece of the file. Zero bytes mean no piece.
 struct Extent {
   uint64_t offset = 0;
   uint64_t bytes = 0;
@@ -31,19 +31,19 @@ class DamagedTriangles : public Error {
 
 class TriangleFile {
  public:
-  // Creates the file for `end` = 0; else opens it to append after its first `end` bytes. Throws
-  // DamagedTriangles for a file that is shorter.
+  // Creates the file if `end` is 0; otherwise opens it to append after its first `end` bytes.
+  // Throws DamagedTriangles for a shorter file.
   TriangleFile(FileSystem& files, std::string path, uint64_t end = 0);
 
   Extent append(std::span<const std::byte> bytes);
   // Reads a piece. Throws DamagedTriangles if its checksum differs.
   void read(const Extent& extent, std::span<std::byte> out) const;
-  // Frees the disk space of a piece that is no longer read.
+  // Frees the disk space of a piece that is no longer needed.
   void release(const Extent& extent);
-  // Makes all appended pieces and the file's name durable.
+  // Makes all appended pieces and the file's directory entry durable.
   void sync();
   uint64_t end() const;
-  // Bytes appended since it was opened.
+  // Bytes appended since the file was opened.
   uint64_t appended_bytes() const { return end() - first_; }
 
  private:

@@ -25,7 +25,7 @@ namespace voxdag {
 
 using BinId = uint32_t;
 
-// The bin of all triangles, in the scene's order. Every store has it.
+// The bin of all triangles, in the scene's order. It exists in every store.
 inline constexpr BinId kSceneBin = 0;
 
 // The bin of the triangles that touch a cube.
@@ -39,10 +39,10 @@ class TriangleStore {
   virtual ~TriangleStore() = default;
 
   virtual size_t record_bytes() const = 0;
-  // Records that a chunk should have at most.
+  // Maximum number of records per chunk that callers should pass.
   virtual size_t max_chunk_records() const = 0;
 
-  // Creates the bins of the plan's cubes; once per store. A store that resumes may have them.
+  // Creates the bins of the plan's cubes, once per store. A resumed store may already have them.
   virtual void add_cube_bins(std::span<const Cube> cubes) = 0;
   virtual const std::vector<CubeBin>& cube_bins() const = 0;
   // Creates a bin for triangles that are copied from `whole`. Retains `whole` until the part is
@@ -51,11 +51,11 @@ class TriangleStore {
 
   virtual void add_chunk(BinId bin, std::span<const std::byte> records) = 0;
   virtual uint64_t count(BinId bin) const = 0;
-  // Reads the bin's triangles from number `first` on. The store must outlive the stream.
+  // Reads the bin's triangles, starting at number `first`. The store must outlive the stream.
   virtual std::unique_ptr<TriangleStream> open(BinId bin, uint64_t first = 0) const = 0;
 
-  // Returns true if references remain, so that release() must be called when the bin's artifact is
-  // durable.
+  // Returns true if references remain. The caller must then call release() when the bin's artifact
+  // is durable.
   virtual bool drop(BinId bin) = 0;
   virtual void retain(BinId bin) = 0;
   // Does nothing for a bin that drop() has freed.
@@ -68,10 +68,11 @@ class TriangleStore {
 // Adds records to a bin, in chunks of the store's size.
 void add_records(TriangleStore& store, BinId bin, std::span<const std::byte> records);
 
-// Fills a set of bins from one thread, collecting triangles into chunks.
+// Fills a set of bins from one thread and collects triangles into chunks.
 class BinWriter {
  public:
-  // Chunks are sized so that the incomplete ones of all bins take at most about `buffer_bytes`.
+  // Chooses the chunk size so that the incomplete chunks of all bins together take at most about
+  // `buffer_bytes`.
   BinWriter(TriangleStore& store, std::vector<BinId> targets, size_t buffer_bytes);
   // `target` is an index into `targets`.
   void append(size_t target, const FixedTriangle& triangle);

@@ -24,7 +24,7 @@ namespace {
   throw Error(ErrorCode::kIo, what + ": " + std::strerror(error));
 }
 
-// A pipe whose ends are closed with it and by exec.
+// A pipe. Its destructor and exec() close both ends.
 class Pipe {
  public:
   Pipe() {
@@ -40,7 +40,7 @@ class Pipe {
     if (fd >= 0) ::close(fd);
     fd = -1;
   }
-  // This process's end does not block.
+  // Makes this process's end nonblocking.
   void unblock(int i) { fcntl(end(i), F_SETFL, O_NONBLOCK); }
 
  private:
@@ -60,7 +60,8 @@ class FileActions {
 
 class Attributes {
  public:
-  // The program gets the default disposition of signals that this process may ignore.
+  // Resets SIGPIPE and SIGINT to their default in the program, because this process may ignore
+  // them.
   Attributes() {
     posix_spawnattr_init(&attributes_);
     sigset_t defaults;
@@ -87,8 +88,8 @@ bool read_some(int fd, std::string& out) {
   return n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
 }
 
-// Writes as much as the pipe accepts. Returns false if `text` is complete or the reader has closed
-// the pipe.
+// Writes as much as the pipe accepts. Returns false if all of `text` is written or the reader has
+// closed the pipe.
 bool write_some(int fd, const std::string& text, size_t& written) {
   if (written < text.size()) {
     const ssize_t n = ::write(fd, text.data() + written, text.size() - written);
@@ -149,7 +150,7 @@ class SystemCommands : public CommandRunner {
       if (waits[1].revents && !read_some(out.end(0), result.output)) out.close_end(0);
       if (waits[2].revents && !read_some(err.end(0), result.error)) err.close_end(0);
       if (wall_seconds() < end_s && !(cancel.canceled() && !is_killed)) continue;
-      if (is_killed) return;  // A child of it has its output open.
+      if (is_killed) return;  // Only a child of the killed program still has the output open.
       kill(-pid, SIGKILL);
       is_killed = true;
       end_s = wall_seconds() + 1;

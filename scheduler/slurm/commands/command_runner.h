@@ -17,7 +17,7 @@ struct CommandResult {
 class CommandRunner {
  public:
   virtual ~CommandRunner() = default;
-  // Runs a program of the PATH with `input` as its standard input. A program that takes longer than
+  // Runs a program from PATH with `input` as its standard input. A program that takes longer than
   // `timeout_s` is killed; its exit status is 128 + 9. The program gets this process's environment
   // except for hidden variables (is_hidden_variable()). Throws Error{kIo} if no process can be
   // started. Kills the program and throws Error{kCanceled} when `cancel` is canceled.
@@ -27,8 +27,9 @@ class CommandRunner {
 
 CommandRunner& system_commands();
 
-// True if a variable NAME=value changes the behavior of Slurm's commands, or describes the Slurm
-// job around this process, which submitted tasks must not inherit.
+// True for variables that change the behavior of Slurm's commands, and for variables that describe
+// the Slurm job of this process. Submitted tasks must not inherit the latter. `variable` is
+// NAME=value.
 bool is_hidden_variable(std::string_view variable);
 
 }  // namespace voxdag

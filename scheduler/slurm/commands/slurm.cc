@@ -60,7 +60,7 @@ std::string quoted(const std::string& word) {
   return text + "'";
 }
 
-// The script that runs a command, without the end of its last line.
+// Returns the line of a script that runs a command, without the newline.
 std::string script_line(const std::vector<std::string>& command) {
   std::string line = "#!/bin/sh\nexec";
   for (const std::string& word : command) line += " " + quoted(word);
@@ -74,7 +74,7 @@ std::string output_option(const std::string& log_folder, const std::string& name
   return option + "/" + name;
 }
 
-// The value in "... NAME=value ...", up to the next blank.
+// Returns the value in "... NAME=value ...", up to the next blank.
 std::string field(const std::string& text, const std::string& name) {
   size_t at = text.find(name + "=");
   while (at != std::string::npos && at > 0 && text[at - 1] != ' ')
@@ -85,7 +85,7 @@ std::string field(const std::string& text, const std::string& name) {
   return value == "(null)" ? "" : trimmed(value);
 }
 
-// True if the value of an option may be the next word.
+// True if the option's value may be the next word.
 bool takes_next_word(const std::string& option) {
   return option.starts_with("--") ? option.find('=') == std::string::npos
                                   : option.starts_with('-') && option.size() == 2;
@@ -106,7 +106,7 @@ bool is_too_much(const CommandResult& result) {
   return false;
 }
 
-// Slurm's commands print such a reason with blanks, or with underscores.
+// Slurm's commands print the reason with blanks or with underscores.
 bool is_held_for_ever(const std::string& state, std::string reason) {
   std::ranges::replace(reason, ' ', '_');
   return state == "PENDING" &&
@@ -147,7 +147,8 @@ bool Slurm::may_be_starting(const CommandResult& refused) {
 }
 
 void Slurm::check(const std::vector<std::string>& options, double pause_s, Progress& progress) {
-  // Our own, without which a task would not be found or would build another batch.
+  // Options that voxdag itself sets: without them a task would not be found or would build another
+  // batch.
   for (const std::string& option : options)
     for (const std::string name :
          {"--array", "--job-name", "--comment", "--wrap", "--wait", "--parsable", "--test-only",
@@ -158,7 +159,7 @@ void Slurm::check(const std::vector<std::string>& options, double pause_s, Progr
                     "--cluster-options: " + option +
                         " is not for the user: expected options such as --partition, --mem, --time "
                         "(--cluster-running limits how many tasks run at a time)");
-  // sbatch takes any other word for a script, and the rest for its arguments.
+  // sbatch takes the first word that is not an option for a script, and the rest for its arguments.
   for (size_t i = 0; i < options.size(); ++i) {
     const bool may_be_value = i > 0 && takes_next_word(options[i - 1]);
     if (!options[i].starts_with('-') && !may_be_value)
@@ -202,7 +203,7 @@ std::string Slurm::setting(const std::string& name) {
 void Slurm::submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks) {
   const uint32_t size =
       std::max<uint32_t>(number(setting("MaxArraySize")).value_or(kDefaultMaxArraySize), 1);
-  std::map<uint32_t, std::vector<uint32_t>> arrays;  // indexes, by the first batch
+  std::map<uint32_t, std::vector<uint32_t>> arrays;  // indexes, keyed by the first batch
   std::vector<uint32_t> batches = request.batches;
   std::ranges::sort(batches);
   for (const uint32_t batch : batches) arrays[batch / size * size].push_back(batch % size);
@@ -222,7 +223,8 @@ void Slurm::submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTas
                     "--comment=" + std::to_string(first), "--array=" + ranges(indexes) + limit});
     const CommandResult submitted =
         run(command, line + " $((" + std::to_string(first) + " + SLURM_ARRAY_TASK_ID))\n");
-    // Half of it may be taken now. If some are, the rest waits until they have ended.
+    // Slurm may accept half of the array now. Once it has accepted some tasks, the rest waits until
+    // they have ended.
     if (submitted.exit_status != 0 && is_too_much(submitted) && indexes.size() > 1 &&
         tasks.empty()) {
       const auto middle = indexes.begin() + static_cast<ptrdiff_t>(indexes.size() / 2);

@@ -17,13 +17,13 @@ namespace voxdag {
 // One cause: after a crash slurmctld may reuse the ids of tasks that nodes still know, and these
 // nodes refuse the new tasks.
 
-// A task of an array is JOB_INDEX, for the user and for Slurm.
+// A task of an array. Its name is JOB_INDEX, for the user and for Slurm.
 struct SlurmTask {
   std::string job;
   uint32_t index = 0;
   std::string state;   // "PENDING", "RUNNING", ...
-  std::string reason;  // why it waits
-  std::string node;    // "" before it runs
+  std::string reason;  // why the task waits
+  std::string node;    // "" before the task runs
   uint32_t first_batch = 0;
 
   uint32_t batch() const { return first_batch + index; }
@@ -45,12 +45,12 @@ struct SlurmEnd {
 };
 
 struct SlurmArrayRequest {
-  std::string name;  // by which its tasks are found again
+  std::string name;  // for finding the tasks later
   // Each task runs `command` followed by the number of its batch.
   std::vector<std::string> command;
   std::vector<uint32_t> batches;
   std::string log_folder;
-  std::vector<std::string> options;  // of sbatch, the user's
+  std::vector<std::string> options;  // sbatch options of the user
   uint64_t max_running = 0;          // max concurrent tasks; 0 for no limit
 };
 
@@ -58,23 +58,23 @@ struct SlurmArrayRequest {
 struct SlurmJobRequest {
   std::string name;
   std::vector<std::string> command;
-  std::vector<std::string> after;  // jobs that have to end first
-  std::string folder;              // in which the command runs
+  std::vector<std::string> after;  // jobs that must end first
+  std::string folder;              // working directory of the command
   std::string log_folder;
-  std::vector<std::string> options;  // of sbatch
+  std::vector<std::string> options;  // sbatch options
 };
 
 struct SlurmJob {
   std::string id;
   std::string state;
-  std::string reason;  // why it waits
+  std::string reason;  // why the job waits
   bool is_held() const;
 };
 
 class Slurm {
  public:
-  // `cancel` ends a running command. For some seconds after its start Slurm knows no nodes and
-  // refuses all requests, so such refusals are retried for `start_s`.
+  // Canceling `cancel` ends a running command. For some seconds after its start Slurm knows no
+  // nodes and refuses all requests, so such refusals are retried for `start_s`.
   Slurm(CommandRunner& commands, const CancelToken& cancel, double start_s = 0)
       : commands_(commands), cancel_(cancel), start_s_(start_s) {}
 
@@ -86,17 +86,17 @@ class Slurm {
   // with sbatch's message if it refuses. Throws Error{kIo} if Slurm does not answer or cannot
   // accept the array now; the array may exist nevertheless.
   void submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks);
-  // Returns the waiting and running tasks of that name; nullopt if Slurm does not answer.
+  // Returns the waiting and running tasks with this name; nullopt if Slurm does not answer.
   std::optional<std::vector<SlurmTask>> active(const std::string& name);
   // Submits a job and returns its id. Throws as submit() does.
   std::string submit_job(const SlurmJobRequest& request);
-  // Returns the waiting and running jobs of that name; nullopt if Slurm does not answer.
+  // Returns the waiting and running jobs with this name; nullopt if Slurm does not answer.
   std::optional<std::vector<SlurmJob>> jobs(const std::string& name);
   // Returns how a task JOB_INDEX or a job ended; nullopt if Slurm does not answer.
   std::optional<SlurmEnd> end_of(const std::string& task);
-  // Cancels all tasks and jobs of that name. Returns true if Slurm accepts the request.
+  // Cancels all tasks and jobs with this name. Returns true if Slurm accepts the request.
   bool cancel(const std::string& name);
-  // Cancels tasks JOB_INDEX and jobs.
+  // Cancels tasks (JOB_INDEX) and jobs.
   bool cancel_tasks(const std::vector<std::string>& tasks);
   // Number of commands run.
   uint64_t requests() const { return requests_; }
@@ -105,25 +105,25 @@ class Slurm {
   static constexpr double kTimeoutS = 60;
 
   CommandResult run(const std::vector<std::string>& command, const std::string& input = "");
-  // The job's id that sbatch printed, JOB or JOB;CLUSTER.
+  // Returns the job's id from sbatch's output, JOB or JOB;CLUSTER.
   std::string accepted_job(const CommandResult& submitted);
-  // A setting of slurm.conf, "" if unknown.
+  // Returns a setting of slurm.conf, "" if unknown.
   std::string setting(const std::string& name);
-  // True if Slurm refused because of missing nodes that it may not know yet.
+  // True if Slurm refused the request because of missing nodes, and may not know its nodes yet.
   bool may_be_starting(const CommandResult& refused);
 
   CommandRunner& commands_;
   const CancelToken& cancel_;
   const double start_s_;
-  std::optional<double> without_nodes_since_s_;  // since Slurm refused so for the first time
+  std::optional<double> without_nodes_since_s_;  // time of the first such refusal
   uint64_t requests_ = 0;
   std::optional<std::string> configuration_;
 };
 
-// True if waiting for this reason ends by itself; false if a person has to act.
+// True if a task that waits for this reason will start without help; false if a person must act.
 bool waits_for_its_turn(const std::string& reason);
 
-// Splits a text into words as a shell does: at blanks outside of quotes; a backslash escapes the
+// Splits a text into words as a shell does: at blanks outside of quotes. A backslash escapes the
 // next character. Throws Error{kInvalidInput} for an unterminated quote.
 std::vector<std::string> split_words(const std::string& text);
 

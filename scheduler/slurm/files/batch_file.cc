@@ -45,7 +45,7 @@ struct Prologue {
 };
 static_assert(sizeof(Prologue) == 24);
 
-// Collects bytes and writes them by large blocks.
+// Collects bytes and writes them in large blocks.
 class BlockWriter {
  public:
   explicit BlockWriter(WritableFile& file) : file_(file) { block_.reserve(kBlockBytes); }

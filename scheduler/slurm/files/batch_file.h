@@ -2,7 +2,8 @@
 //
 //   "vdbatch2"  u64 bytes of the header  u64 its XXH64  header (JSON)
 //   chunks of records: u64 XXH64 of the records  up to kBatchChunkRecords records (chunk.h)
-//  Chunks are contiguous, in the order of the subvolumes. All chunks of a subvolume but the last
+//
+// Chunks are contiguous, in the order of the subvolumes. All chunks of a subvolume but the last
 // are full.
 #pragma once
 
@@ -35,20 +36,20 @@ struct BatchSubvolume {
 
 struct Batch {
   uint32_t number = 0;
-  std::string program;  // the version of voxdag that wrote it, and the only one that may build it
+  std::string program;  // voxdag version that wrote the file; no other version may build it
   std::string build;    // random id of the build
   DagShape shape;
   bool wide = false;  // records have 64 bits per coordinate
   BackendName backend = BackendName::kAuto;
   MethodName method = MethodName::kDefault;
-  int64_t longest_edge = INT64_MAX;        // of a subvolume, in voxels
+  int64_t longest_edge = INT64_MAX;        // max edge of a subvolume, in voxels
   std::vector<BatchSubvolume> subvolumes;  // in Morton order
 
   double weight() const;
 };
 
-// Writes the file, durable under its name on return. `open` gives the triangles of a subvolume, by
-// its index.
+// Writes the file, durable under its name on return. `open` returns the triangles of the subvolume
+// with the given index.
 void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
                  const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,
                  const CancelToken& cancel);
@@ -59,8 +60,8 @@ class BatchFile {
   BatchFile(FileSystem& files, const std::string& path);
 
   const Batch& batch() const { return batch_; }
-  // Adds the triangles to a store, and returns the bin of each subvolume. Throws Error{kCorrupt}
-  // for records that fail their checksum.
+  // Adds the triangles to a store and returns the bin of each subvolume. Throws Error{kCorrupt} if
+  // records do not match their checksum.
   std::vector<BinId> copy_to(TriangleStore& store, const CancelToken& cancel) const;
 
  private:

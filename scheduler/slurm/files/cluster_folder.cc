@@ -10,7 +10,7 @@
 namespace voxdag {
 namespace {
 
-// The number that `text` begins with, which is removed from it.
+// Removes the number at the beginning of `text` and returns it.
 std::optional<uint32_t> parse_number(std::string_view& text) {
   uint32_t number = 0;
   const auto [rest, failure] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -26,7 +26,7 @@ bool consume_prefix(std::string_view& text, std::string_view prefix) {
 }
 
 // Calls `remove` and ignores errors: another process may have removed the file already, or may
-// still write to it. A remaining file costs only space.
+// still be writing it. A remaining file costs only space.
 template <class Remove>
 void try_to_remove(const Remove& remove) {
   try {
@@ -78,7 +78,7 @@ std::vector<ClusterFolder::Entry> ClusterFolder::list(FileSystem& files) const {
       entries.back().path = path_ + "/" + found.name;
     }
   } catch (const Error& error) {
-    // The folder does not exist, or a finished build removes it.
+    // The folder does not exist, or a finished build is removing it.
     if (error.code() != ErrorCode::kNotFound) throw;
   }
   std::ranges::sort(entries, {}, &Entry::path);

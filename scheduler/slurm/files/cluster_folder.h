@@ -1,5 +1,5 @@
-// The files of a cluster build, in the folder `cluster` of its work folder on the shared disk, and
-// their names. Only names that are listed here are ever removed.
+// The files of a cluster build and their names. The files are in the folder `cluster` of the work
+// folder, on the shared disk. Only files with names in this list are ever removed.
 //
 //   cluster.json                       state of the submitting process (cluster_state.h)
 //   batch-7.vdbatch                    input of batch 7 (batch_file.h)
@@ -53,7 +53,7 @@ class ClusterFolder {
     std::string attempt;
     std::string path;
   };
-  // Returns the folder's entries by name; none if the folder does not exist.
+  // Returns the folder's entries, sorted by name; none if the folder does not exist.
   std::vector<Entry> list(FileSystem& files) const;
 
   // Removes the files of an attempt. Errors are ignored.

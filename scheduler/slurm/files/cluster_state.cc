@@ -83,7 +83,7 @@ std::optional<ClusterState> read_cluster_state(FileSystem& files, const std::str
   try {
     return decode_state(read_small_file(files, path, kMaxStateBytes));
   } catch (const Error& error) {
-    // The build that ended just now has removed it.
+    // A build that has just ended removed the file.
     if (error.code() == ErrorCode::kNotFound) return std::nullopt;
     throw Error(error.code(), path + ": " + error.message() +
                                   ": expected the state of the tasks; without that file the "

@@ -1,7 +1,7 @@
 // The state of the submitting process of a cluster build, in cluster.json: open batches with their
-// tasks and failures, and totals. Only that process writes it, by an atomic rename; `voxdag status`
-// reads it. Only this file maps records to batches: without it, results of tasks that no run has
-// accepted are built again.
+// tasks and failures, and totals. Only the submitting process writes the file, by an atomic rename;
+// `voxdag status` reads it. No other file maps records to batches. Without it, batches are built
+// again unless a run has already accepted their records.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ struct AttemptEnd {
   std::string reason;  // Slurm's reason, or the task's error
 };
 
-// Why the current attempt of a batch fails, as reported before Slurm reports its end.
+// Error of a batch's current attempt, reported by the task before Slurm reports the task's end.
 struct AttemptError {
   std::string text;
   bool has_ended = false;  // the task has ended, even if Slurm still lists it
@@ -40,14 +40,14 @@ struct OpenBatch {
   uint32_t number = 0;
   std::vector<ExpectedSubvolume> subvolumes;
   double weight = 0;
-  std::optional<SlurmTask> task;  // as last seen; none before it is submitted
+  std::optional<SlurmTask> task;  // as last seen; none before submission
   std::vector<AttemptEnd> failures;
   std::optional<AttemptError> error;  // not stored in cluster.json
 };
 
 struct ClusterState {
   std::string program;  // the version of voxdag
-  std::string build;    // random, in the name of the tasks
+  std::string build;    // random; part of the tasks' names
   std::string scene_digest;
   DagShape shape;
   double submitted_s = 0;  // Unix time of the first submission
@@ -62,10 +62,10 @@ struct ClusterState {
 };
 
 std::string encode_state(const ClusterState& state);
-// Throws Error{kCorrupt} for a text that encode_state() did not make.
+// Throws Error{kCorrupt} for a text not created by encode_state().
 ClusterState decode_state(const std::string& text);
-// Reads the state in a work folder; nullopt without a cluster build. Throws Error with the file's
-// name if it cannot be read or is damaged.
+// Reads the state in a work folder; nullopt if the folder has no cluster build. Throws Error with
+// the file's name if it cannot be read or is damaged.
 std::optional<ClusterState> read_cluster_state(FileSystem& files, const std::string& work_folder);
 
 }  // namespace voxdag

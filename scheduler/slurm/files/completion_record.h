@@ -1,6 +1,6 @@
 // The completion record of a cluster task: one small file, created by an atomic rename after the
-// task's segment is durable. It has a line of JSON and a line with its XXH64, which detects a torn
-// or damaged record.
+// task's segment is durable. It has a line of JSON and a line with the JSON's XXH64, which detects
+// a torn or damaged record.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ inline constexpr uint64_t kMaxRecordBytes = uint64_t{1} << 30;
 
 struct BuiltSubvolume {
   SubvolumeId id = 0;
-  SubDagSummary summary;  // of all its parts, if it was split
+  SubDagSummary summary;  // of all its parts if it was split
 };
 
 struct CompletionRecord {
@@ -27,12 +27,12 @@ struct CompletionRecord {
   std::string build;
   uint32_t batch = 0;
   std::string attempt;
-  std::string node;      // the machine that built it
-  std::string task;      // Slurm's name of the task, JOB_INDEX
-  ArtifactRef artifact;  // of all subvolumes; of no bytes if none has a voxel
+  std::string node;      // the machine that built the batch
+  std::string task;      // the task's name in Slurm, JOB_INDEX
+  ArtifactRef artifact;  // one artifact for all subvolumes; 0 bytes if none has a voxel
   uint64_t segment_bytes = 0;
   std::vector<BuiltSubvolume> subvolumes;
-  uint64_t rows_before = 0, rows_after = 0;  // of the artifacts, and of the one they became
+  uint64_t rows_before = 0, rows_after = 0;  // before and after merging the subvolumes' artifacts
   uint64_t split = 0;                        // subvolumes that were split
   double started_s = 0;                      // Unix time
   double wall_s = 0, cpu_s = 0;
@@ -40,10 +40,10 @@ struct CompletionRecord {
 };
 
 std::string encode_record(const CompletionRecord& record);
-// Throws Error{kCorrupt} for a text that encode_record() did not make.
+// Throws Error{kCorrupt} for a text not created by encode_record().
 CompletionRecord decode_record(const std::string& text);
 
-// Why an attempt ended without a record, as reported by the task.
+// The reason why an attempt ended without a record, as reported by the task.
 struct AttemptFailure {
   uint32_t batch = 0;
   std::string attempt, node, task;

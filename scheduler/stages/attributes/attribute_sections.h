@@ -13,11 +13,11 @@ class AttributeSections {
  public:
   explicit AttributeSections(BuildJob& job) : job_(job) {}
 
-  // Adds the sections to a file that has all its levels. Does nothing for a build without
+  // Adds the sections to a file that already has all its levels. Does nothing for a build without
   // attributes.
   void add_to(GlobalFileWriter& out);
-  // A digest of all that the sections depend on: as they were added, or else as they are in the
-  // output of an earlier run. "" for a build without attributes.
+  // Returns a digest of all inputs of the sections: as add_to() used them, or else as the output of
+  // an earlier run has them. "" for a build without attributes.
   std::string digest();
 
  private:

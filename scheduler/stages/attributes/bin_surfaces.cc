@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// A piece of the scene as records, with the bins that each belongs to.
+// A piece of the scene as records, with the bins of each record.
 class SurfacePiece {
  public:
   SurfacePiece(const SurfaceBinning& binning, const CubeTree& tree, MemoryBudget& budget)
@@ -53,7 +53,7 @@ class SurfacePiece {
 
  private:
   struct Record {
-    uint32_t offset, bytes;  // in bytes_
+    uint32_t offset, bytes;  // position in bytes_
     uint32_t material;
     Checksum128 digest;
   };
@@ -62,7 +62,8 @@ class SurfacePiece {
     uint32_t bin, record;
   };
   static constexpr size_t kNone = ~size_t{0};
-  // Triangles of a piece that all reach through the grid have more; their bins are found later.
+  // A piece whose triangles all cross the complete grid has more; those bins are found in a second
+  // step.
   static constexpr size_t kMaxPlaces = 4 * kPieceTriangles;
 
   std::span<const std::byte> bytes_of(const Record& record) const {
@@ -104,7 +105,7 @@ class SurfacePiece {
   const MemoryCharge charge_;
   CubeTree::Hint hint_;
   std::vector<std::byte> bytes_, triangles_;
-  std::vector<Record> records_;  // of bytes_
+  std::vector<Record> records_;  // their data is in bytes_
   std::vector<Place> places_;
   size_t late_ = kNone;  // the first record without places
   Checksum128 checksum_;

@@ -20,20 +20,20 @@ namespace voxdag {
 struct SurfaceBinning {
   Grid grid;
   std::span<const Material> materials;
-  std::span<const Checksum128> looks;  // look_digests() of them
-  std::span<const Cube> cubes;         // they cover the grid
-  size_t record_bytes;                 // of a triangle, as ingest digests it (triangles/chunk.h)
-  std::string digest;                  // of what ingest read
-  size_t buffer_bytes;                 // for records on their way to the bins, uncharged
+  std::span<const Checksum128> looks;  // look_digests() of the materials
+  std::span<const Cube> cubes;         // these cubes cover the grid
+  size_t record_bytes;                 // per triangle, as digested by ingest (triangles/chunk.h)
+  std::string digest;                  // digest of the triangles that ingest read
+  size_t buffer_bytes;                 // for records not yet in the bins; uncharged
 };
 
 struct BinnedSurfaces {
-  std::vector<ChunkList> bins;       // one for each cube, in their order
+  std::vector<ChunkList> bins;       // one per cube, in the order of `cubes`
   std::vector<BinContent> contents;  // contents of each bin
 };
 
-// Throws Error{kInvalidInput} if the triangles are not those that ingest read: the scene was
-// changed during the build.
+// Throws Error{kInvalidInput} if the triangles differ from the ones that ingest read, because the
+// scene was changed during the build.
 BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
                             RecordStore& store, const StageContext& context);
 

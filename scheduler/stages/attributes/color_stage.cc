@@ -31,7 +31,7 @@
 namespace voxdag {
 namespace {
 
-// Bins are cubes of this level at most: 16^3 of them.
+// Max level of the cubes that are bins: 16^3 bins.
 constexpr uint32_t kMaxBinLevel = 4;
 
 std::vector<Cube> bins_of(const ColorGrid& grid) {
@@ -59,7 +59,7 @@ uint64_t count_finest_cells(const ReadableFile& file) {
   return number_at<uint64_t>(file, layout::kAttributesAt + layout::kAttributeFinestCellsAt);
 }
 
-// Readers refuse a longer list.
+// Readers refuse a list with more.
 void check_list(std::span<const std::string> materials) {
   const uint64_t bytes = list_bytes(materials) + 2 * color_layout::kUnitBytes;
   if (materials.size() > color_layout::kMaxMaterials || bytes > color_layout::kMaxNamesBytes)
@@ -75,11 +75,11 @@ void check_list(std::span<const std::string> materials) {
 struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;
-  CubeBaker::Records records;  // of the last parts
-  bool is_baked = false;       // now; the others are stored
+  CubeBaker::Records records;  // the cube's last parts
+  bool is_baked = false;       // baked in this run; otherwise the records are stored
 };
 
-// Adds the regions of records to a section. Returns how many cells of the color grid they have.
+// Adds the regions of records to a section. Returns the number of their cells in the color grid.
 uint64_t add_regions(std::span<const std::byte> records, AttributeSectionWriter& section) {
   RegionRecords regions(records);
   uint64_t cells = 0;
@@ -100,7 +100,7 @@ struct ColorStage::State {
   SceneMaterials materials;
   std::vector<StoredAttribute> attributes;
   std::vector<std::string> images;  // their digests
-  // Once the surfaces are read:
+  // Set after the surfaces are read:
   std::optional<MemoryBudget> share;
   std::optional<RecordStore> store;
   BinnedSurfaces surfaces;
@@ -172,7 +172,7 @@ void ColorStage::State::read_surfaces() {
   parts.resize(attributes.size(), std::vector<std::vector<ColorStore::Place>>(cubes.size()));
 }
 
-// Decodes the images that the cubes to be baked show.
+// Decodes the images that the missing cubes show.
 std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& artifacts) {
   ImageClasses needed;
   for (size_t i = 0; i < cubes.size(); ++i)
@@ -198,7 +198,7 @@ std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& a
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kOutOfMemory) throw;
   }
-  // Large images may be decoded in the memory of the surfaces.
+  // Large images may need the memory of the surfaces.
   store->move_to_file(surfaces.bins);
   trim_heap();
   return prepare();
@@ -212,7 +212,7 @@ void ColorStage::State::store_parts(ColorStore& artifacts, size_t cube,
   }
 }
 
-// Bakes all attributes, and adds the first of them.
+// Bakes all attributes, and adds the section of the first one.
 void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
                              ColorReport& report) {
   const BuildContext& build = context.build;
@@ -254,7 +254,7 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
       [&](unsigned number, size_t item) {
         build.cancel.check();
         const BakeWorker& worker = workers[number];
-        // The last part is still in memory if it was baked now.
+        // If the cube was baked in this run, its last part is still in memory.
         std::span<const ColorStore::Place> stored = parts[0][item];
         if (worker.is_baked) stored = stored.first(stored.size() - 1);
         for (const ColorStore::Place& place : stored) {
@@ -268,7 +268,8 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
   if (report.cells > 0) section.finish();
 }
 
-// Sections are contiguous, so the records of the other attributes are read from the work folder.
+// Adds the section of another attribute. Sections are contiguous, so its records are read from the
+// work folder.
 void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute,
                                    GlobalFileWriter& out, const ColorReport& report) {
   const BuildContext& build = context.build;

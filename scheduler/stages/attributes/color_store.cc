@@ -19,7 +19,7 @@ constexpr size_t kHeaderBytes = 56;
 constexpr size_t kReadBytes = 256 << 10;
 // Added to the number of the last part of an artifact.
 constexpr uint64_t kLastPart = uint64_t{1} << 63;
-// Garbage that is not worth the copy of the rest.
+// Less garbage than this is not worth copying the rest.
 constexpr uint64_t kTolerableBytes = 64 << 10;
 
 struct Header {
@@ -65,12 +65,12 @@ ColorStore::ColorStore(FileSystem& files, std::string path, double sync_interval
 void ColorStore::find_artifacts(Progress& progress, const CancelToken& cancel) {
   const uint64_t size = reader_->size();
   std::set<Key> damaged;
-  // Parts of an artifact follow each other in the file, with others between them.
+  // An artifact's parts are in order in the file, with parts of other artifacts between them.
   Artifacts incomplete;
   std::array<std::byte, kHeaderBytes> bytes;
   for (Header header; size - end_ >= kHeaderBytes;) {
     reader_->read_at(end_, bytes);
-    // Bytes behind the last complete part belong to an interrupted write.
+    // Bytes after the last complete part belong to an interrupted write.
     if (!parse_header(bytes, header) || header.bytes > size - end_ - kHeaderBytes) break;
     const Key key(header.key.low, header.key.high);
     const Place place{end_ + kHeaderBytes, header.bytes, header.checksum};
@@ -154,7 +154,7 @@ void ColorStore::keep_only(std::span<const Checksum128> keys, const CancelToken&
     for (const Place& place : found->second) retained_bytes += kHeaderBytes + place.bytes;
   }
   if (end_ <= 2 * retained_bytes + kTolerableBytes) return;
-  // A later run removes files of this kind.
+  // A later run removes files with this ending.
   const std::string copy_path = path_ + ".vdspill";
   uint64_t end = 0;
   try {

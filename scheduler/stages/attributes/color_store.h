@@ -1,11 +1,11 @@
 // The durable artifacts of the color stage: the colors of cubes in one file of the work folder,
 // each under a digest of all its inputs. A large cube is stored in parts. docs/format.md, "Stored
-// colors", documents the byte layout.
-//  No row refers to the file. An artifact is valid if all its parts are complete and have the
-// requested key. Incomplete and damaged artifacts are baked again. A background thread syncs the
-// file regularly, which limits the loss after a power cut.
+// colors", documents the byte layout. No row of the job store refers to the file. An artifact is
+// valid if all its parts are complete and have the requested key. Incomplete and damaged artifacts
+// are baked again. A background thread syncs the file regularly, which limits the loss after a
+// power cut.
 //
-// All but keep_only() may be called by several threads.
+// All functions except keep_only() may be called by several threads.
 #pragma once
 
 #include <cstddef>
@@ -29,11 +29,11 @@ namespace voxdag {
 class ColorStore {
  public:
   // Reads the file if it exists, and warns about damaged parts. add() syncs it every
-  // `sync_interval_s`; with 0 every add() syncs it before it returns. `files` must outlive the
-  // store.
+  // `sync_interval_s`; if that is 0, every add() syncs it before returning. `files` must outlive
+  // the store.
   ColorStore(FileSystem& files, std::string path, double sync_interval_s, Progress& progress,
              const CancelToken& cancel);
-  // Waits for the disk.
+  // Waits for a running sync.
   ~ColorStore();
 
   // The position of a part in the file.
@@ -43,14 +43,13 @@ class ColorStore {
 
   // True if the file had an artifact with this key when it was opened.
   bool has(const Checksum128& key) const { return found_.contains({key.low, key.high}); }
-  // Its parts, in their order.
+  // The artifact's parts, in order.
   const std::vector<Place>& parts(const Checksum128& key) const {
     return found_.at({key.low, key.high});
   }
   // Reads a part. Throws Error{kCorrupt} if it is damaged.
   void read(const Place& place, std::vector<std::byte>& out) const;
-  // Adds the part of this number, from 0. Throws what went wrong when an earlier one was synced,
-  // too.
+  // Adds part `number`, counted from 0. Also throws the error of an earlier background sync.
   Place add(const Checksum128& key, uint64_t number, bool is_last, std::span<const std::byte> part);
   // Removes artifacts with other keys if they take more space than artifacts with these keys. Call
   // it before add(). An interruption leaves the old or the new file, both complete.
@@ -71,11 +70,11 @@ class ColorStore {
   const std::string path_;
   const double sync_interval_s_;
   Artifacts found_;
-  mutable std::mutex mutex_;              // guards all below
-  std::shared_ptr<ReadableFile> reader_;  // null: there is no file
-  uint64_t end_ = 0;                      // of the last part
+  mutable std::mutex mutex_;              // guards all members below
+  std::shared_ptr<ReadableFile> reader_;  // null if there is no file
+  uint64_t end_ = 0;                      // end of the last part
   std::shared_ptr<WritableFile> writer_;  // null before the first add()
-  std::future<void> pending_;             // a sync
+  std::future<void> pending_;             // running sync
   double last_sync_s_;
   bool name_is_durable_ = false;
 };

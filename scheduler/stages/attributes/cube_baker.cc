@@ -13,16 +13,16 @@
 namespace voxdag {
 namespace {
 
-// Memory of a surface: itself, a copy for its region, and its number and touched children in the
-// lists of up to 14 nested cubes.
+// Memory of a surface: the surface, a copy for its region, and its number and touched children in
+// the lists of up to 14 nested cubes.
 constexpr uint64_t kSurfaceBytes =
     2 * sizeof(FixedSurface) + 14 * (sizeof(uint32_t) + sizeof(uint8_t));
-// Records for a child cube that are collected before they go to the store.
+// Bytes of records that are collected for a child cube before they go to the store.
 constexpr size_t kPartBytes = 16 << 10;
 
 // Memory of a baked cell: its sum, a sorted copy of the sum, and its colors.
 constexpr uint64_t kCellBytes = sizeof(ColorSum) + sizeof(ColoredCell) + 8;
-// Aside from those: places of cells, the next coarser level, and two parts of the records.
+// Other memory: positions of cells, the next coarser level, and two parts of the records.
 constexpr uint64_t kFixedBytes = uint64_t{6} << 20;
 
 uint32_t max_cells_of(uint64_t region_bytes) {
@@ -77,7 +77,8 @@ void CubeBaker::bake(const Cube& cube, ChunkList& bin, const Sink& sink) {
   touching_ = {};
 }
 
-// Bakes a cube with too many surfaces for the memory: distributes them to the eight children.
+// Bakes a cube that has too many surfaces for the memory, by distributing them to its eight
+// children.
 void CubeBaker::divide(const Cube& cube, ChunkList& bin, const Sink& sink) {
   if (cube.level == grid_.region_level()) return bake_in_parts(cube, bin, sink);
   std::array<ChunkList, 8> children;
@@ -87,7 +88,8 @@ void CubeBaker::divide(const Cube& cube, ChunkList& bin, const Sink& sink) {
     const int64_t units = cube.edge_voxels(grid_.levels) * kUnitsPerVoxel;
     for_each_surface(store_, bin, [&](const FixedSurface& surface) {
       record.clear();
-      // The has_image argument has no effect: a surface stored without coordinates has none here.
+      // `has_image` has no effect, because a surface stored without texture coordinates has none
+      // here.
       append_surface(surface, true, record);
       for (uint32_t mask = touched_children(surface.position, cube, units); mask; mask &= mask - 1)
         writer.append(static_cast<size_t>(lowest_bit(mask)), record, 1);
@@ -123,7 +125,7 @@ void CubeBaker::descend(const Cube& cube, std::span<const uint32_t> touching, co
   }
 }
 
-// The surfaces of a region that do not fit the memory come one part after the other.
+// Bakes a region whose surfaces do not fit in memory; they are read in several parts.
 void CubeBaker::bake_in_parts(const Cube& region, ChunkList& bin, const Sink& sink) {
   const size_t most = std::max<size_t>(surface_bytes_ / sizeof(FixedSurface), 1);
   const MemoryCharge charge(budget_, most * sizeof(FixedSurface), "surfaces to be baked");
@@ -145,8 +147,8 @@ void CubeBaker::bake_in_parts(const Cube& region, ChunkList& bin, const Sink& si
   touching_ = {};
 }
 
-// add_surfaces(add) calls add() with all surfaces, in one part or several. The cells of a region
-// that has too many for the memory are baked by its eight children.
+// add_surfaces(add) calls add() with all surfaces, in one part or several. If a region has too many
+// cells for the memory, its eight children are baked separately.
 template <class AddSurfaces>
 void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces, const Sink& sink) {
   const uint32_t levels = grid_.color_levels - grid_.region_level();
@@ -175,7 +177,8 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
   if (most >= kManyRecordBytes) sink.take(sink.records);
 }
 
-// False: they are more than `max_cells`, or their sums of other attributes do not fit the memory.
+// Returns false if the cube has more than `max_cells` cells, or if the sums of its other attributes
+// do not fit in memory.
 template <class AddSurfaces>
 bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces) {
   bool is_complete = true;
@@ -189,8 +192,8 @@ bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfac
   return is_complete;
 }
 
-// False if the sums of normals and materials do not fit. The allocation is kept for the next
-// region, except for large lists of materials.
+// Returns false if the sums of normals and materials do not fit. The allocation is kept for the
+// next region, except for large lists of materials.
 bool CubeBaker::charge_sums(uint64_t bytes) {
   constexpr uint64_t kSlackBytes = uint64_t{4} << 20;
   const uint64_t more = bytes - std::min(bytes, ColorMemory::kValueSumBytes);

@@ -19,22 +19,22 @@ namespace voxdag {
 
 class CubeBaker {
  public:
-  // For each attribute the records (region_record.h) of regions.
+  // Records (region_record.h) of regions, for each attribute.
   using Records = std::vector<std::vector<std::byte>>;
 
-  // Charges `region_bytes`, at least ColorMemory::kRegionBytes, and ColorMemory::value_bytes():
-  // with more memory, regions are baked in fewer pieces. Surfaces in memory take up to
-  // `surface_bytes`. The references must outlive it.
+  // Charges `region_bytes`, at least ColorMemory::kRegionBytes, and ColorMemory::value_bytes().
+  // With more memory, regions are baked in fewer pieces. Surfaces in memory take up to
+  // `surface_bytes`. The references must outlive the baker.
   CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
             std::span<const Material> materials, TextureReader& textures, RecordStore& store,
             uint64_t region_bytes, uint64_t surface_bytes, MemoryBudget& budget,
             const CancelToken& cancel);
 
-  // Receives complete records when they exceed the memory limit, and empties them.
+  // Receives and empties the complete records when they exceed the memory limit.
   using TakeRecords = std::function<void(Records& records)>;
-  // Appends the records of the regions with surfaces in Morton order, and clears the bin, which has
-  // all surfaces that touch the cube. `records`: in the order of the attributes. Whenever there are
-  // kManyRecordBytes of one of them, take(records) follows.
+  // Appends the records of the regions with surfaces in Morton order, and clears the bin, which
+  // contains all surfaces that touch the cube. `records` has the order of the attributes. Calls
+  // take(records) whenever the records of one attribute have kManyRecordBytes.
   void bake(const Cube& cube, ChunkList& bin, Records& records, const TakeRecords& take);
 
   static constexpr size_t kManyRecordBytes = 256 << 10;
@@ -61,14 +61,14 @@ class CubeBaker {
   const std::span<const StoredAttribute> attributes_;
   RecordStore& store_;
   const uint64_t surface_bytes_;
-  const uint32_t max_cells_;  // of a region per piece
+  const uint32_t max_cells_;  // cells of a region per piece
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   const MemoryCharge charge_;
-  MemoryCharge sum_charge_;  // for sums beyond ColorMemory::kValueSumBytes
+  MemoryCharge sum_charge_;  // for sums that exceed ColorMemory::kValueSumBytes
   RegionBaker<TextureReader> baker_;
-  std::vector<FixedSurface> surfaces_;  // of the cube
-  std::vector<FixedSurface> touching_;  // of a region, or a part of them
+  std::vector<FixedSurface> surfaces_;  // surfaces of the cube
+  std::vector<FixedSurface> touching_;  // surfaces of a region, or a part of them
   std::vector<ColoredCell> cells_;
   std::vector<CellValues> values_;
 };

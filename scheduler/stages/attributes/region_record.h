@@ -1,5 +1,5 @@
-// The colors of regions as the artifacts of the color stage hold them: records, one after another
-// (docs/format.md, "Stored colors").
+// Records of the colors of regions, one after another, as stored in the artifacts of the color
+// stage (docs/format.md, "Stored colors").
 #pragma once
 
 #include <cstddef>
@@ -14,13 +14,13 @@ namespace voxdag {
 
 void append_region(const EncodedRegion& region, std::vector<std::byte>& out);
 
-// Reads records that append_region() wrote from the front of `bytes`. The bytes have passed a
+// Reads records that append_region() wrote from the front of `bytes`. The bytes must have passed a
 // checksum; remaining defects throw.
 class RegionRecords {
  public:
   explicit RegionRecords(std::span<const std::byte> bytes) : in_(bytes) {}
-  // The next region; nothing after the last one. Throws Error{kCorrupt} for bytes that are no
-  // record.
+  // Returns the next region; nullopt after the last one. Throws Error{kCorrupt} for bytes that are
+  // not a record.
   std::optional<EncodedRegion> next();
 
  private:

@@ -12,7 +12,7 @@ namespace {
 constexpr uint32_t kGridLevels = 9;
 constexpr uint64_t kBudgetBytes = uint64_t{256} << 20;
 
-// Triangles all over the grid, from a quarter of a voxel to a quarter of the grid across; every
+// Triangles in the complete grid, from a quarter of a voxel to a quarter of the grid in size. Every
 // eighth is a sliver.
 std::vector<FixedTriangle> check_triangles(int count) {
   uint64_t state = 0x9e3779b97f4a7c15ull;

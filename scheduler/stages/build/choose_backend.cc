@@ -9,9 +9,10 @@
 namespace voxdag {
 namespace {
 
-// Workers per GPU: enough that transfers and host work of some overlap with kernels of others.
+// Workers per GPU: enough to overlap transfers and host work of some workers with kernels of
+// others.
 constexpr unsigned kWorkersPerDevice = 4;
-// A CUDA context alone has some hundred MiB resident that are charged to no budget.
+// A CUDA context has several hundred MiB of resident memory that no budget contains.
 constexpr uint64_t kMinMemoryForGpu = uint64_t{2} << 30;
 
 [[noreturn]] void refuse_backend(const std::string& what) {
@@ -28,7 +29,7 @@ BackendChoice cpu_choice() {
   return {"cpu", [] { return make_cpu_backend(); }};
 }
 
-// The workers open the GPUs in turn.
+// The workers are distributed over the GPUs round-robin.
 BackendChoice gpu_choice(const Gpus& gpus) {
   const auto next = std::make_shared<std::atomic<int>>(0);
   return {"cuda", [gpus, next] { return gpus.open((*next)++ % gpus.count); },
@@ -39,7 +40,7 @@ Gpus cuda_gpus(Method method) {
   return {cuda_device_count(), [method](int device) { return make_cuda_backend(method, device); }};
 }
 
-// Why a GPU must not be used; "" if it may be.
+// Returns the reason why a GPU must not be used; "" if it may be used.
 std::string fault_of(const Gpus& gpus, int device) {
   try {
     return difference_from_cpu(*gpus.open(device));
@@ -68,7 +69,7 @@ BackendChoice choose_backend(const RunOptions& options, Progress& progress) {
   if (options.backend == BackendName::kParallelHost)
     return {"parallel-host", [method] { return make_parallel_host_backend(method); }};
   if (options.backend == BackendName::kCuda) return gpu_choice(cuda_gpus(method));
-  // With `auto`, a method that is given is one of the CPU backend.
+  // With `auto`, an explicit method is a method of the CPU backend.
   if (options.backend == BackendName::kCpu || options.method != MethodName::kDefault)
     return cpu_choice();
   return choose_automatically(cuda_gpus(method), options.memory_bytes, progress);

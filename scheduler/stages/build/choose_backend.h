@@ -15,30 +15,32 @@ struct BackendChoice {
   std::string name;
   // Opens one backend per call; every worker calls it once.
   std::function<std::unique_ptr<Backend>()> open;
-  unsigned max_workers = 256;  // more of them gain nothing
+  unsigned max_workers = 256;  // more workers gain nothing
 };
 
-// Throws Error{kInvalidInput} for a method that the backend lacks, Error{kDevice} if there is no
-// GPU for `cuda`.
+// Throws Error{kInvalidInput} for a method that the backend lacks, Error{kDevice} for `cuda` on a
+// machine without a GPU.
 void check_backend(const RunOptions& options);
 
-// The choice for options that passed check_backend() and have their memory filled in. `auto` takes
-// the GPUs if there are any, the budget suffices for them and each builds a few subvolumes like the
-// CPU backend; else the CPU, with a warning if there is a GPU.
+// Returns the backend for options that passed check_backend() and have their memory filled in.
+// `auto` uses the GPUs if there are any, the budget is large enough for them, and each builds a few
+// subvolumes exactly like the CPU backend. Otherwise it uses the CPU, with a warning if there is a
+// GPU.
 BackendChoice choose_backend(const RunOptions& options, Progress& progress);
 
-// The machine's GPUs; tests have others.
+// The machine's GPUs. Tests pass others.
 struct Gpus {
   int count = 0;
   std::function<std::unique_ptr<Backend>(int device)> open;
 };
-// The choice for `auto`.
+// Returns the backend for `auto`.
 BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress);
 
 // Compares a backend with the CPU backend on this machine, because a faulty driver or device could
 // produce wrong voxels unnoticed. Builds a few small subvolumes, with a thousand triangles of all
 // sizes and several hash lengths. Returns "" if all level arrays and counts are equal, else a
-// sentence. Propagates the backend's exceptions. The CPU's part takes about 30 ms.
+// sentence with the difference. Propagates the backend's exceptions. The CPU's part takes about 30
+// ms.
 std::string difference_from_cpu(Backend& backend);
 
 }  // namespace voxdag

@@ -22,14 +22,14 @@ bool lighter(const QueuedSubvolume& a, const QueuedSubvolume& b) {
   return a.subvolume.weight < b.subvolume.weight;
 }
 
-// The remaining subvolumes of all workers, heaviest first. It ends when it is empty and no worker
-// builds a subvolume, which could still be split.
+// The remaining subvolumes of all workers, heaviest first. The queue ends when it is empty and no
+// worker is building a subvolume that could still be split.
 class Queue {
  public:
   explicit Queue(std::vector<QueuedSubvolume> heap) : heap_(std::move(heap)) {
     std::make_heap(heap_.begin(), heap_.end(), lighter);
   }
-  // The next one to build; nothing at the end.
+  // Returns the next subvolume to build; nullopt at the end.
   std::optional<QueuedSubvolume> pop() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return failure_ || !heap_.empty() || in_flight_ == 0; });
@@ -40,7 +40,7 @@ class Queue {
     ++in_flight_;
     return next;
   }
-  // Replaces a popped subvolume by `parts`; a built subvolume has none.
+  // Replaces a popped subvolume by `parts`. A built subvolume has no parts.
   void done(const std::vector<QueuedSubvolume>& parts) {
     std::lock_guard lock(mutex_);
     --in_flight_;
@@ -61,9 +61,9 @@ class Queue {
       changed_.notify_all();
     }
   }
-  // To be called once all workers have stopped.
+  // Call it after all workers have stopped.
   bool has_failed() const { return failure_ != nullptr; }
-  // To be called once all workers have stopped.
+  // Call it after all workers have stopped.
   void rethrow_failure() const {
     if (failure_) std::rethrow_exception(failure_);
   }
@@ -95,7 +95,7 @@ class Worker {
         segment_(commits_->segment()),
         backend_(options.open_backend()) {}
 
-  // Builds one subvolume, or returns the up to eight that replace it.
+  // Builds one subvolume and returns {}, or returns up to eight parts that replace it.
   std::vector<QueuedSubvolume> build(const QueuedSubvolume& queued) {
     cancel_.check();
     const StoredSubvolume& subvolume = queued.subvolume;
@@ -216,7 +216,7 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options,
     if (!queue.has_failed()) queue.guard([&] { commits->finish(); });
     unfinished.add(std::move(commits));
   }
-  // A failure does not lose finished subvolumes.
+  // Finished subvolumes are kept even if a worker has failed.
   if (queue.has_failed()) queue.guard([&] { unfinished.commit(); });
   queue.rethrow_failure();
   return counts;

@@ -1,6 +1,7 @@
-// Builds subvolumes on worker threads: each takes the heaviest one left, builds it with its own
-// backend, appends the artifact to its own segment file and commits it. A subvolume that outgrows
-// the worker's share of memory is split in eight, which are queued in its place.
+// Builds subvolumes on worker threads. Each worker repeatedly takes the heaviest remaining
+// subvolume, builds it with its own backend, appends the artifact to its own segment file and
+// commits it. If a subvolume needs more memory than the worker's share, it is split in eight, which
+// are queued in its place.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@
 
 namespace voxdag {
 
-// A subvolume that is to be built, and the bin of its triangles.
+// A subvolume to build, and the bin of its triangles.
 struct QueuedSubvolume {
   StoredSubvolume subvolume;
   BinId bin = 0;
@@ -27,19 +28,19 @@ struct QueuedSubvolume {
 struct ExecutorOptions {
   DagShape shape;
   unsigned threads = 1;
-  uint64_t built = 0;  // subvolumes that need not be built, for the progress
+  uint64_t built = 0;  // already built subvolumes, for the progress
   // Subvolumes with longer edges are split without an attempt to build them.
   int64_t longest_edge = INT64_MAX;
   std::function<std::unique_ptr<Backend>()> open_backend;
   std::string segment_folder;
   uint32_t first_segment_id = 0;
   double checkpoint_interval_s = 2;
-  ArtifactCache* cache = nullptr;  // null if builds share no artifacts
+  ArtifactCache* cache = nullptr;  // null if builds do not share artifacts
 };
 
 struct ExecutorCounts {
   uint64_t split = 0;
-  uint64_t cached = 0;  // copied from the cache instead of built
+  uint64_t cached = 0;  // subvolumes copied from the cache instead of built
 };
 
 // Builds `subvolumes` and releases their bins. Records the results in `jobs`; the last groups are

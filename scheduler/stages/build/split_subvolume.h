@@ -1,5 +1,5 @@
-// A subvolume becomes its octants: where it does not fit the memory of a worker, or takes a
-// cluster's task too long.
+// Replaces a subvolume by its octants, if it does not fit a worker's memory or takes a cluster task
+// too long.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 
 namespace voxdag {
 
-// The octants of `whole` that have triangles, recorded in its place, and a bin for each; the bin of
-// `whole` is released. The edge of `whole` must be longer than kSmallestEdge.
+// Records the octants of `whole` that have triangles in its place. Returns them with a bin for
+// each, and releases the bin of `whole`. The edge of `whole` must be longer than kSmallestEdge.
 std::vector<QueuedSubvolume> split_subvolume(const QueuedSubvolume& whole, uint32_t grid_levels,
                                              TriangleStore& triangles, JobStore& jobs,
                                              Progress& progress, const CancelToken& cancel);

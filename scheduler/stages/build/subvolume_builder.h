@@ -15,13 +15,13 @@ class SubvolumeBuilder {
  public:
   virtual ~SubvolumeBuilder() = default;
 
-  // Records subvolumes that an earlier run built outside this process, for the scene with that
+  // Records subvolumes that an earlier run built outside this process for the scene with this
   // digest. Called after the plan is in the job store and before build().
   virtual void resume(const std::string& scene_digest) = 0;
   // The partition and build stages: fills bins from the scene's triangles and builds `planned`.
   // Frees the triangles.
   virtual void build(PreparedScene& scene, std::span<const StoredSubvolume> planned) = 0;
-  // Adds the builder's totals. Called even if there was nothing to build.
+  // Adds the builder's totals. Also called if there was nothing to build.
   virtual void add_to(BuildReport& report) const = 0;
 };
 

@@ -1,4 +1,4 @@
-// Builds subvolumes on the threads of this process, each on its own.
+// Builds subvolumes on the threads of this process, one subvolume per thread.
 #pragma once
 
 #include <span>

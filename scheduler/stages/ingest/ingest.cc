@@ -45,7 +45,7 @@ class SnappedPiece {
   }
 
   const IngestCounts& counts() const { return counts_; }
-  // Triangles of the piece before the first one that reaches too far, if any.
+  // Number of triangles before the first one that extends too far; nullopt if none does.
   const std::optional<uint64_t>& too_far() const { return too_far_; }
   std::span<const std::byte> records() const {
     return {records_.data(), counts_.triangles * record_bytes_};

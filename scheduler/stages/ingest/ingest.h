@@ -1,7 +1,9 @@
 // The two passes over a scene. The scan finds its bounds. Ingest snaps its triangles to the grid,
-// counts them into the top tree and stores them in the scene's bin. Resume rule: both continue from
-// the given state, which an earlier run may have saved.
-//  Several threads read pieces of the scene, of 16384 declared triangles each. Their results are
+// counts them in the top tree and stores them in the scene's bin.
+//
+// Resume rule: both continue from the given state, which an earlier run may have saved.
+//
+// Several threads read pieces of the scene, of 16384 declared triangles each. Their results are
 // processed in the order of the pieces, so the state and the plan do not depend on the number of
 // threads.
 #pragma once
@@ -15,18 +17,18 @@
 
 namespace voxdag {
 
-// Called after each piece, when the state covers all triangles up to its position.
+// Called after each piece. The state then covers all triangles up to its position.
 using AfterPiece = std::function<void()>;
 
 // Adds the scene's triangles to the bounds of `state`.
 void scan(TriangleSource& scene, IngestState& state, const StageContext& context,
           const AfterPiece& after_piece);
 
-// The grid that the geometry options describe, for a scene with these bounds.
+// Returns the grid for these geometry options and a scene with these bounds.
 Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds);
 
-// Streams the scene into the scene's bin of `store` and counts it into `top`. Throws Error{kLimit}
-// for a triangle that reaches into the grid from beyond the coordinate limit.
+// Streams the scene into the scene's bin of `store` and counts it in `top`. Throws Error{kLimit}
+// for a triangle that touches the grid and extends beyond the coordinate limit.
 void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, TopTree& top,
             const StageContext& context, const AfterPiece& after_piece);
 

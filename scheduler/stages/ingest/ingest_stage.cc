@@ -13,15 +13,16 @@
 namespace voxdag {
 namespace {
 
-// Expected bricks of a subvolume: a fraction of a second of work, with tables that fit the
-// processor's caches.
+// Maximum expected bricks per subvolume: a fraction of a second of work, with tables that fit in
+// the processor's caches.
 constexpr double kMaxBricksPerSubvolume = 4e6;
-// A small build has about this many subvolumes at least, of at least this many expected bricks.
+// A small build has at least about this many subvolumes, if each has at least this many expected
+// bricks.
 constexpr double kMinSubvolumes = 64;
 constexpr double kMinBricksPerSubvolume = 131072;
-// Maximum wait until the times of the scene's files can be trusted.
+// Maximum wait until the file times of the scene can be trusted.
 constexpr int64_t kMaxWaitNs = 200'000'000;
-// More bins than this would make their buffers too small; large subvolumes are split later.
+// With more bins their buffers would be too small. Large subvolumes are split later instead.
 constexpr size_t kMaxBins = 8192;
 
 std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const RunOptions& options) {
@@ -70,7 +71,8 @@ class Preparation {
     for (const std::string& warning : scene.warnings()) context_.progress.warn(warning);
   }
 
-  // Waits until the scene's files are old enough to trust their times, if that is soon.
+  // Enables checkpoints. If the scene's files are slightly too young for their times to be trusted,
+  // waits first.
   void enable_checkpoints() {
     checkpoint_.forget();
     if (!checkpoint_.is_worthwhile(scene_.open())) return;

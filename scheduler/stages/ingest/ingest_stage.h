@@ -1,4 +1,4 @@
-// The ingest stage: from the scene to its triangles in a store, and the subvolumes they are for.
+// The ingest stage: from the scene to its triangles in a store, and a plan of the subvolumes.
 #pragma once
 
 #include <cstdint>
@@ -16,20 +16,20 @@
 
 namespace voxdag {
 
-// A scene after ingest: its triangles, and the subvolumes they are to be partitioned to.
+// A scene after ingest: its triangles, and the subvolumes they will be partitioned into.
 struct PreparedScene {
   IngestState state;
   std::unique_ptr<MemoryBudget> triangle_budget;
   std::unique_ptr<TriangleStore> triangles;
   std::vector<SubvolumePlan> plan;  // empty if an earlier run partitioned the triangles
-  double max_durable_bytes = 0;     // of disk that the triangles take in a build
+  double max_durable_bytes = 0;     // disk space of the triangles during a build
 
-  // Digest of the grid and the snapped triangles; identifies the content.
+  // Digest of the grid and the snapped triangles. It identifies the content.
   std::string digest() const { return state.digest.hex(); }
 };
 
-// Scans and ingests the scene of a checked spec and plans its subvolumes, resuming at the
-// checkpoint of an earlier run; the scene is not opened if that one was past ingest. Throws
+// Scans and ingests the scene of a checked spec and plans its subvolumes. Resumes at the checkpoint
+// of an earlier run; if that run had finished ingest, the scene is not opened. Throws
 // DamagedTriangles if the stored triangles are damaged.
 PreparedScene prepare_scene(const BuildSpec& spec, BuildScene& scene, MemoryBudget& budget,
                             StageClock& clock, const BuildContext& context,

@@ -15,17 +15,17 @@
 
 namespace voxdag {
 
-// Declared triangles of a piece. The digest and the plan depend on it.
+// Number of declared triangles per piece. The digest and the plan depend on this number.
 inline constexpr uint64_t kPieceTriangles = 16384;
 
-// The budget has no room for all readers of the scene.
+// Thrown if the budget has no room for all readers of the scene.
 class TooManyReaders : public Error {
  public:
   explicit TooManyReaders(const Error& error) : Error(error) {}
 };
 
-// Reads the scene from triangle `position` on: has a Piece read itself, and commits it, which moves
-// `position` to its end.
+// Reads the scene from triangle `position` to its end, piece by piece. Each piece is read with
+// Piece::read() and then passed to `commit`, which moves `position` to the end of the piece.
 template <class Piece, class MakePiece, class Commit>
 void read_pieces(TriangleSource& scene, const uint64_t& position, const StageContext& context,
                  MakePiece make_piece, Commit commit) {

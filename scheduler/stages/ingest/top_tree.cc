@@ -11,7 +11,8 @@
 namespace voxdag {
 namespace {
 
-// The smallest edge of a cell in voxels: finer ones cost more than they improve the plan.
+// The smallest edge of a cell in voxels. Finer cells cost more time than they save by a better
+// plan.
 constexpr int64_t kMinCellEdge = 2 * kSmallestEdge;
 
 }  // namespace
@@ -26,7 +27,7 @@ ExpectedWork expected_work(const SnappedTriangle& t) {
     const double high = std::max(std::max(t.v[0][a], t.v[1][a]), t.v[2][a]);
     extents += (high - low) * kVoxel;
   }
-  double area = 0;  // of the three projections: area * (|nx| + |ny| + |nz|)
+  double area = 0;  // sum of the areas of the three projections: area * (|nx| + |ny| + |nz|)
   for (int a = 0; a < 3; ++a) {
     const int b = (a + 1) % 3, c = (a + 2) % 3;
     area += 0.5 * std::abs(e[0][b] * e[1][c] - e[0][c] * e[1][b]);
@@ -54,7 +55,8 @@ void TopTree::Tally::clear() {
   last_cell_ = {};
 }
 
-// Neighbors in the scene mostly touch the same few cells, whose entries the slots find again.
+// Neighbors in the scene usually touch the same few cells. The slots find the entries of these
+// cells again.
 void TopTree::Tally::add(const FixedTriangle& triangle, double weight) {
   if (last_cell_.contains(triangle)) {
     entries_[entry_of_last_cell_].weight += static_cast<float>(weight);
@@ -75,7 +77,7 @@ void TopTree::Tally::add(const FixedTriangle& triangle, double weight) {
   if (touched_.size() == 1) remember_cell(triangle);
 }
 
-// The triangle touches one cell, and is inside it unless it leaves the grid.
+// The triangle touches one cell, and is inside it unless it extends beyond the grid.
 void TopTree::Tally::remember_cell(const FixedTriangle& triangle) {
   const CellBox box(triangle, grid_levels_, depth_);
   Cube cell{depth_, {}};
@@ -115,7 +117,8 @@ void TopTree::Tally::find_touched(const FixedTriangle& triangle) {
     return collect(triangle, cube,
                    morton_encode(cube.position[0], cube.position[1], cube.position[2]));
   }
-  // A box within one cell touches it; one across two crosses their common face; more are tested.
+  // A box within one cell touches the cell; a box across two cells touches both, because it crosses
+  // their common face. Larger boxes need tests.
   const int64_t units = (kUnitsPerVoxel << grid_levels_) >> depth_;
   for (int64_t x = box.low[0]; x <= box.high[0]; ++x)
     for (int64_t y = box.low[1]; y <= box.high[1]; ++y)

@@ -1,6 +1,6 @@
-// The dense top tree: for every cell of a coarse level, how many triangles touch it and how much
-// work they are expected to be. It decides which cubes of the grid become subvolumes. Threads fill
-// separate tallies, which are added to the tree serially.
+// The dense top tree. It stores for every cell of a coarse level how many triangles touch it and
+// how much work they are expected to be. This decides which cubes of the grid become subvolumes.
+// Threads fill separate tallies, which are added to the tree serially.
 #pragma once
 
 #include <array>
@@ -18,9 +18,9 @@
 
 namespace voxdag {
 
-// Voxels and bricks that a triangle is expected to touch: for bricks the volume, in bricks, of the
-// Minkowski sum of the triangle and a brick, that is area * (|nx| + |ny| + |nz|) + the extents
-// along the axes + 1.
+// Expected number of voxels and bricks that a triangle touches. The number of bricks is the volume,
+// in bricks, of the Minkowski sum of the triangle and a brick: area * (|nx| + |ny| + |nz|) + the
+// extents along the axes + 1.
 struct ExpectedWork {
   double voxels, bricks;
 };
@@ -28,18 +28,18 @@ ExpectedWork expected_work(const SnappedTriangle& triangle);
 
 struct SubvolumePlan {
   Cube cube;
-  double weight = 0;       // expected bricks, each triangle's own counted
-  uint64_t triangles = 0;  // at least as many as touch the cube
+  double weight = 0;       // sum of the expected bricks of each triangle
+  uint64_t triangles = 0;  // upper bound of the triangles that touch the cube
 };
 
 class TopTree {
  public:
   static constexpr uint32_t kMaxDepth = 7;  // 128^3 cells
 
-  // Cells of `depth`, at most kMaxDepth and at least the smallest subvolume in size; the counters
-  // are charged to `budget`.
+  // Makes a tree with cells of level `depth`, at most kMaxDepth. A cell is at least as large as the
+  // smallest subvolume. The counters are charged to `budget`.
   TopTree(uint32_t grid_levels, MemoryBudget& budget, uint32_t depth);
-  // The deepest tree whose counters take at most `bytes`.
+  // Returns the depth of the deepest tree whose counters take at most `bytes`.
   static uint32_t depth_within(uint32_t grid_levels, uint64_t bytes);
 
   // The contributions of some triangles to the cells of a tree. Not thread-safe.
@@ -47,7 +47,7 @@ class TopTree {
    public:
     explicit Tally(const TopTree& top) : grid_levels_(top.grid_levels_), depth_(top.depth_) {}
     void clear();
-    // `weight`: the bricks that the triangle is expected to touch.
+    // `weight`: the number of bricks that the triangle is expected to touch.
     void add(const FixedTriangle& triangle, double weight);
 
    private:
@@ -71,17 +71,17 @@ class TopTree {
 
     const uint32_t grid_levels_;
     const uint32_t depth_;
-    std::vector<Entry> entries_;                 // a cell may have several
-    std::vector<LargeTriangle> large_;           // those that touch more than kMaxTouched cells
-    std::array<uint32_t, kSlots> last_entry_{};  // of the cells of a slot
-    std::vector<uint64_t> touched_;              // by the last triangle
-    CubeInside last_cell_;                       // that a triangle was inside of
+    std::vector<Entry> entries_;                 // several are possible for one cell
+    std::vector<LargeTriangle> large_;           // triangles that touch more than kMaxTouched cells
+    std::array<uint32_t, kSlots> last_entry_{};  // for the cells of a slot
+    std::vector<uint64_t> touched_;              // cells that the last triangle touches
+    CubeInside last_cell_;                       // a cell that contains a complete triangle
     size_t entry_of_last_cell_ = 0;
   };
   void add(Tally& tally);
   double total_weight() const { return total_weight_; }
-  // The counters as plain bytes, with which another top tree of the same depth can be filled; the
-  // total is separate.
+  // The counters as plain bytes, which can fill another top tree of the same depth. The total is
+  // not included.
   std::span<const std::byte> cells() const {
     return std::as_bytes(std::span(cells_.data(), cells_.size()));
   }
@@ -91,10 +91,11 @@ class TopTree {
   }
   uint64_t occupied_cells() const;
 
-  // The largest cubes of weight <= `max_weight` (single cells may weigh more), occupied ones only,
-  // in Morton order.
+  // Returns the largest occupied cubes of weight <= `max_weight`, in Morton order. Single cells may
+  // have a greater weight.
   std::vector<SubvolumePlan> subvolumes_by_weight(double max_weight) const;
-  // Occupied cubes of this edge (or of the cells' edge, if that is larger), in Morton order.
+  // Returns the occupied cubes of this edge (or of the cells' edge if that is larger), in Morton
+  // order.
   std::vector<SubvolumePlan> subvolumes_by_edge(int64_t edge_voxels) const;
 
  private:
@@ -103,7 +104,7 @@ class TopTree {
     uint32_t triangles = 0;
   };
 
-  // Most of the grid is empty: gather() first tests cubes this many levels above the cells.
+  // Most of the grid is empty, so gather() first tests cubes this many levels above the cells.
   static constexpr uint32_t kSkippedLevels = 2;
   bool is_empty(uint64_t code) const;
   template <class IsSmallEnough>

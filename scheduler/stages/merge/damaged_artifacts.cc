@@ -16,7 +16,7 @@
 namespace voxdag {
 namespace {
 
-// Maximum number of damaged subvolumes in warnings; the others are counted.
+// Maximum number of damaged subvolumes named in warnings; the rest is only counted.
 constexpr size_t kMaxWarnings = 5;
 
 struct DamagedSubvolume {
@@ -24,11 +24,11 @@ struct DamagedSubvolume {
   std::string defect;
 };
 
-// Reads the frames only if `reads_frames`.
+// Checks the artifact's roots and, if `reads_frames`, reads its levels above `level`.
 void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
                 const StoredSubvolume& subvolume, bool reads_frames) {
   const ArtifactReader reader(std::move(segment), subvolume.artifact);
-  // A cluster's task may have split the subvolume, and merged it with others.
+  // A cluster task may have split the subvolume and merged it with others.
   if (std::ranges::none_of(reader.roots(), [&](const ArtifactRoot& root) {
         return contains(subvolume.cube, root.cube);
       }))
@@ -40,14 +40,14 @@ void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
       reader.read_frame(l.level, i, frame);
 }
 
-// Reads the artifacts of all built subvolumes, the levels above `level` (of smaller number): the
-// others are no longer needed and may be released.
+// Reads the artifacts of all built subvolumes and returns the damaged ones. Reads only levels above
+// `level` (with smaller numbers), because the others may already be released.
 std::vector<DamagedSubvolume> find_damaged(std::span<const StoredSubvolume> subvolumes,
                                            uint32_t level, const WorkFolder& work,
                                            const CancelToken& cancel) {
   std::vector<DamagedSubvolume> damaged;
   std::map<uint32_t, std::shared_ptr<ReadableFile>> segments;
-  std::set<std::pair<uint32_t, uint64_t>> sound;  // artifacts, by their places
+  std::set<std::pair<uint32_t, uint64_t>> sound;  // artifacts, by segment and offset
   for (const StoredSubvolume& subvolume : subvolumes) {
     if (subvolume.state != SubvolumeState::kBuilt || subvolume.summary.empty()) continue;
     cancel.check();

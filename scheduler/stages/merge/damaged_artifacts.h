@@ -7,8 +7,8 @@
 
 namespace voxdag {
 
-// Reads the artifacts that the merge still needs and plans subvolumes with damaged ones again, with
-// a warning. Returns their number.
+// Reads the artifacts that the merge still needs. Plans subvolumes with damaged artifacts again,
+// with a warning, and returns the number of these subvolumes.
 size_t replan_damaged(BuildJob& job);
 
 }  // namespace voxdag

@@ -13,7 +13,7 @@
 
 namespace voxdag {
 
-// The artifacts of built subvolumes. Several subvolumes may share one.
+// Returns the different artifacts of built subvolumes. Several subvolumes may share one.
 std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> subvolumes);
 
 // Writes all levels to `out` and fills in the report.

@@ -30,10 +30,10 @@ void partition(TriangleStream& triangles, const CubeTree& tree, BinWriter& write
 constexpr size_t kPartitionPiece = 16384;
 constexpr size_t kBatchTriangles = 256;
 
-// Some triangles of the scene, encoded for each leaf that they touch, in their order.
+// Consecutive triangles of the scene, encoded for each leaf that they touch, in order.
 class TouchedPiece {
  public:
-  // Room for kPartitionPiece and whatever one triangle touches.
+  // Allocates space for kPartitionPiece records, plus the records of one more triangle.
   TouchedPiece(const CubeTree& tree, size_t leaves, size_t record_bytes, MemoryBudget& budget)
       : tree_(tree),
         leaves_(leaves),
@@ -47,7 +47,7 @@ class TouchedPiece {
     batch_size_ = next_ = 0;
     fill();
   }
-  // Finds the leaves of the next triangles that fit the buffer. False at the end.
+  // Finds the leaves of the next triangles that fit the buffer. Returns false at the end.
   bool fill() {
     runs_.clear();
     used_ = 0;
@@ -76,7 +76,7 @@ class TouchedPiece {
     size_t leaf, records;
   };
 
-  // Makes batch_[next_] the next triangle. False at the end.
+  // Makes batch_[next_] the next triangle. Returns false at the end.
   bool read() {
     if (next_ < batch_size_) return true;
     const size_t n = std::min(left_, batch_.size());
@@ -90,19 +90,19 @@ class TouchedPiece {
   CubeTree::Hint hint_;
   const size_t leaves_;
   const size_t record_bytes_;
-  const size_t capacity_;  // records
+  const size_t capacity_;  // in records
   PageBuffer<std::byte> records_;
   size_t used_ = 0;
   std::vector<Run> runs_;
   std::unique_ptr<TriangleStream> triangles_;
-  size_t left_ = 0;  // triangles of the piece that were not read
+  size_t left_ = 0;  // triangles of the piece that are not read yet
   std::array<FixedTriangle, kBatchTriangles> batch_;
   size_t batch_size_ = 0, next_ = 0;
 };
 
 using BinsByCube = std::map<Cube, CubeBin>;
 
-// The bin of the cube or of the nearest cube around it.
+// Returns the bin of the cube or of the smallest cube around it that has a bin.
 const CubeBin& nearest(const BinsByCube& bins, const Cube& wanted) {
   for (Cube cube = wanted;; cube = cube.parent()) {
     const auto found = bins.find(cube);
@@ -192,7 +192,8 @@ std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
   BinsByCube by_cube;
   for (const CubeBin& bin : store.cube_bins()) by_cube[bin.cube] = bin;
   std::vector<BinId> assigned(cubes.size());
-  std::map<Cube, std::vector<size_t>> parts_of;  // indexes into `cubes`, by the cube around them
+  std::map<Cube, std::vector<size_t>>
+      parts_of;  // indexes into `cubes`, keyed by the enclosing cube
   for (size_t i = 0; i < cubes.size(); ++i) {
     const CubeBin& found = nearest(by_cube, cubes[i]);
     if (found.cube == cubes[i]) {
@@ -217,7 +218,7 @@ std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
     partition(store, by_cube.at(whole).bin, CubeTree(grid_levels, whole, leaves), targets,
               buffer_bytes / threads, context.build.cancel);
   });
-  // The artifacts of the others may already be durable.
+  // The artifacts of the other bins may already be durable.
   for (const CubeBin& bin : store.cube_bins()) store.release(bin.bin);
   return assigned;
 }

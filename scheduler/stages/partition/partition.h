@@ -13,24 +13,24 @@
 
 namespace voxdag {
 
-// The tree above a set of disjoint cubes, to find which of them a triangle touches.
+// The tree above a set of disjoint cubes. It finds the cubes that a triangle touches.
 class CubeTree {
  public:
   // `root` contains all `leaves`.
   CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube> leaves);
-  // A leaf that a triangle was inside of.
+  // A leaf that contains a complete triangle.
   struct Hint {
     size_t leaf = 0;
     CubeInside inside;
   };
-  // Calls visit(index into leaves) for every leaf that the triangle touches. Fast if it is inside
-  // the leaf of `hint`, which is replaced if it is inside another one.
+  // Calls visit(index into leaves) for every leaf that the triangle touches. Fast if the triangle
+  // is inside the leaf of `hint`. If it is inside another leaf, `hint` is set to that leaf.
   template <class Visit>
   void for_each_touched(const FixedTriangle& triangle, Hint& hint, const Visit& visit) const {
     if (hint.inside.contains(triangle)) return visit(hint.leaf);
     int32_t node = 0;
     Cube cube = root_;
-    // A triangle inside one cube touches no other, so that no overlap test is needed that far.
+    // A triangle inside one cube touches no other, so no overlap test is needed down to that cube.
     const CellBox box(triangle, grid_levels_, deepest_);
     if (const Cube around = box.is_inside_grid() ? box.cube_around() : Cube{};
         contains(root_, around))
@@ -48,7 +48,7 @@ class CubeTree {
   static constexpr int32_t kNone = -1;
   struct Node {
     int32_t child[8] = {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};
-    int32_t leaf = kNone;  // index of the leaf that this node is, if it is one
+    int32_t leaf = kNone;  // index of this leaf; kNone for inner nodes
   };
 
   template <class Visit>
@@ -74,20 +74,20 @@ class CubeTree {
 void partition(TriangleStore& store, BinId from, const CubeTree& tree,
                const std::vector<BinId>& leaf_bins, size_t buffer_bytes, const CancelToken& cancel);
 
-// Called after each piece with the number of the scene's triangles that were copied so far; those
+// Called after each piece with the number of the scene's triangles copied so far. These triangles
 // are in the bins after writer.flush().
 using AfterPartitionPiece = std::function<void(uint64_t copied, BinWriter& writer)>;
 
-// Copies the scene's triangles, from number `first` on, to the store's cube bins. Creates the bins
-// for `cubes` unless an earlier run has created them. Several threads find the cubes that pieces of
-// the scene touch; the pieces are copied in their order. Drops the scene's bin.
+// Copies the scene's triangles, starting at number `first`, to the store's cube bins. Creates the
+// bins for `cubes` unless an earlier run has created them. Several threads find the cubes that
+// pieces of the scene touch; the pieces are copied in order. Drops the scene's bin.
 void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const Cube> cubes,
                      size_t buffer_bytes, uint64_t first, const StageContext& context,
                      const AfterPartitionPiece& after_piece);
 
-// Returns for each of `cubes`, in the same order, a bin with its triangles: the cube's bin, or a
-// part filled from the bin of the smallest enclosing cube. Each returned bin has one reference.
-// Releases the other cube bins. Throws DamagedTriangles for a cube without an enclosing cube bin.
+// Returns a bin with the triangles of each of `cubes`, in the same order: the cube's bin, or a part
+// filled from the bin of the smallest enclosing cube. Each returned bin has one reference. Releases
+// the other cube bins. Throws DamagedTriangles for a cube without an enclosing cube bin.
 std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
                                std::span<const Cube> cubes, size_t buffer_bytes,
                                const StageContext& context);

@@ -11,8 +11,8 @@
 
 namespace voxdag {
 
-// Partitions the triangles to the subvolumes at `cubes`; returns the bin of each, in the same
-// order. Throws DamagedTriangles if triangles are missing.
+// Partitions the triangles into the subvolumes at `cubes`. Returns the bin of each subvolume, in
+// the same order. Throws DamagedTriangles if triangles are missing.
 std::vector<BinId> partition_prepared(PreparedScene& scene, std::span<const Cube> cubes,
                                       IngestCheckpoint& checkpoint, const StageContext& context);
 

@@ -13,23 +13,23 @@ namespace {
 // prefixes.
 // The padding of regions with few cells is more.
 constexpr double kColorBytesPerCell = 0.69;
-// Values are not compressed; a third more for the coarser levels, and prefixes.
+// Values are not compressed. The coarser levels add a third, and there are prefixes.
 constexpr double kCellsOfAllLevels = 1.36;
 constexpr double kPrefixBytesPerCell = 0.03;
 constexpr EstimateRange kFileSpread = {0.95, 1, 1.25};
-// Its header, tables and padding.
+// Header, tables and padding of a section.
 constexpr EstimateRange kFixedFileBytes = {0, 4096, 12288};
-// Sums and lengths of regions.
+// An artifact also has checksums and lengths of regions.
 constexpr double kArtifactOverFile = 1.02;
-// A surface with an image and without vertex colors, in all its cubes.
+// Bytes of a surface with an image and without vertex colors, added up over all its cubes.
 constexpr double kExpectedSurfaceBytes = 65;
 constexpr EstimateRange kSurfaceCopies = {1, 1.5, 3};
 constexpr double kSecondsPerCell = 1.2e-7;
-constexpr double kSecondsPerValue = 2e-8;  // of each other attribute
-// An image's page is decoded, filtered and stored.
+constexpr double kSecondsPerValue = 2e-8;  // per other attribute
+// Time to decode, filter and store a page of an image.
 constexpr double kSecondsPerPage = 3e-5;
 
-// In the file, without the padding of regions with few cells.
+// Bytes per cell in the file, without the padding of regions with few cells.
 double bytes_per_cell(const AttributeSet& attributes, uint64_t materials) {
   double bytes = 0;
   for (const Attribute attribute : attributes.list())

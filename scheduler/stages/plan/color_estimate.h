@@ -10,17 +10,18 @@
 namespace voxdag {
 
 struct ColorEstimate {
-  EstimateRange cells;           // of the color grid, that have a color
+  EstimateRange cells;           // cells of the color grid that have a color
   EstimateRange file_bytes;      // of the sections in the global file
-  EstimateRange artifact_bytes;  // of colors in the work folder, until the file is done
-  EstimateRange spill_bytes;     // of surfaces and pyramids of images that do not fit in memory
+  EstimateRange artifact_bytes;  // colors in the work folder until the file is complete
+  EstimateRange spill_bytes;     // surfaces and image pyramids that do not fit in memory
   EstimateRange memory_bytes;
   EstimateRange cpu_s;
 
   EstimateRange disk_bytes() const { return file_bytes + artifact_bytes + spill_bytes; }
 };
 
-// `options` with a color resolution. Opens the scene and the headers of its images.
+// Estimates the cost for `options` with a color resolution. Opens the scene and reads the headers
+// of its images.
 ColorEstimate estimate_colors(const GeometryOptions& options, BuildScene& scene,
                               const EstimateRange& cells, uint64_t triangles,
                               const StageContext& context);

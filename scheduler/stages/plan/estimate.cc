@@ -13,22 +13,23 @@
 namespace voxdag {
 namespace {
 
-// What the growth of the DAG per doubling of R exceeds this by falls by this factor per doubling.
-// Measured from 8192 on: Sponza's falls from 2.72 to 2.52 at 524288, the dragon's from 3.17 to 2.75
-// at 32768 and 2.65 on average to 262144. At coarser resolutions it falls and rises again, while
-// triangles become larger than bricks: hence fine pilots.
+// Growth of the DAG per doubling of R. Its excess over kLateGrowth falls by the factor kGrowthDecay
+// with each doubling. Measured from 8192 on: Sponza's growth falls from 2.72 to 2.52 at 524288, the
+// dragon's from 3.17 to 2.75 at 32768 and to 2.65 on average up to 262144. At coarser resolutions
+// the growth falls and rises again while triangles become larger than bricks, so pilots must be
+// fine.
 constexpr double kLateGrowth = 2.5;
 constexpr double kGrowthDecay = 0.75;
 // Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
 constexpr double kSpreadPerDoubling = 1.12;
-// Bytes per node of the global file: a pilot has fewer, since coarse levels repeat more.
+// Bytes per node of the global file. A pilot has fewer, because coarse levels repeat more.
 constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;
 // Measured on real scenes: artifact nodes per unique node, compressed bytes per node, and the CPU
 // time of a build relative to its pilot.
 constexpr double kArtifactNodesPerUnique = 1.5;
 constexpr double kArtifactBytesPerNode = 16;
-// More than an uncompressed node takes, in an artifact or in the global file.
+// More bytes than an uncompressed node takes, in an artifact or in the global file.
 constexpr double kMaxDiskBytesPerNode = 40;
 constexpr double kBuildOverPilotTime = 1.5;
 // A surface that crosses a brick sets about 16 of its voxels.
@@ -37,18 +38,19 @@ constexpr double kMaxCellsPerBrick = 32;
 constexpr double kMemoryBytesPerNode = 26;
 constexpr double kBaseMemoryBytes = 24e6;
 
-// Below this resolution a build fits any disk that can hold its scene: no estimate is made.
+// A build below this resolution fits any disk that can store its scene, so no estimate is made.
 constexpr uint32_t kMinLevelsToEstimate = 12;
-// This estimate's pilot is much coarser than the build, so its cost is negligible.
+// The pilot of this estimate is much coarser than the build, so its cost is negligible.
 constexpr uint32_t kPilotLevelsBelow = 5;
 
-// A pilot build: the whole scene as one subvolume on a coarser grid, counted and thrown away.
+// A pilot build: the complete scene as one subvolume on a coarser grid. Its output is counted and
+// discarded.
 struct PilotCounts {
   uint32_t levels = 0;  // of the pilot's grid
   double voxels = 0;
   double svo_nodes = 0;
   double dag_nodes = 0;
-  double file_bytes = 0;  // what its global file would take
+  double file_bytes = 0;  // size its global file would have
   double cpu_s = 0;
 };
 
@@ -61,8 +63,8 @@ class CountingSink : public SubDagSink {
   uint64_t words = 0;
 };
 
-// Builds triangles that are snapped to 2^levels, or finer ones by `shift`, on a grid of 2^levels.
-// nullopt if it does not fit the budget.
+// Builds triangles that are snapped to 2^levels (or to a grid finer by `shift` levels) on a grid of
+// 2^levels. Returns nullopt if the build does not fit the budget.
 std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t shift,
                                        uint32_t levels, Backend& backend, MemoryBudget& budget,
                                        const CancelToken& cancel) {
@@ -83,8 +85,8 @@ std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t
   return counts;
 }
 
-// Runs pilots at two consecutive resolutions, the coarser first: the finest whose triangles and
-// tables fit the budget. Returns fewer pilots if several resolutions do not fit.
+// Runs pilots at two consecutive resolutions, the finest whose triangles and tables fit the budget.
+// Returns them with the coarser first, or fewer if several resolutions do not fit.
 std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
                                       const StageContext& context) {
   const auto backend = make_cpu_backend();
@@ -109,16 +111,18 @@ std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot
   return pilots;
 }
 
-// a R^2 + b R through the last two pilots, at `doublings` past the last, or before it.
+// Returns a R^2 + b R, fitted to the last two pilots, `doublings` after the last one (before it if
+// negative).
 double grow_as_surface(double coarse, double fine, int doublings) {
   const double ratio = std::exp2(doublings);
-  const double square = 2 * (fine - 2 * coarse), linear = fine - square;  // of the fine pilot
+  const double square = 2 * (fine - 2 * coarse),
+               linear = fine - square;  // values at the fine pilot
   if (square <= 0) return fine * ratio * ratio;
   const double grown = square * ratio * ratio + linear * ratio;
   return doublings < 0 ? std::max(grown, 1.0) : std::max(grown, fine);
 }
 
-// The growth from the last pilot but one to the last, falling from there.
+// Starts with the growth between the last two pilots. The growth falls with each further doubling.
 double grow_as_dag(const std::vector<PilotCounts>& pilots, int doublings) {
   const double nodes = pilots.back().dag_nodes;
   if (pilots.size() < 2 || nodes == 0) return nodes * std::exp2(1.5 * doublings);
@@ -131,8 +135,8 @@ double grow_as_dag(const std::vector<PilotCounts>& pilots, int doublings) {
   return result;
 }
 
-// What must be spilled is spilled already. A large scene is also stored durably where the disk has
-// space; it is freed piece by piece while artifacts are written.
+// Triangles that do not fit in memory are already spilled. A large scene is also stored durably if
+// the disk has space; this copy is freed gradually while artifacts are written.
 EstimateRange triangles_on_disk(const PreparedScene& scene) {
   const double spilled = static_cast<double>(scene.triangles->file_bytes());
   return {spilled, std::max(spilled, scene.max_durable_bytes / 2),
@@ -154,8 +158,8 @@ void add_colors(const ColorEstimate& colors, Estimate& estimate) {
 // actual size.
 double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
                       BuildScene& source, const StageContext& context) {
-  // A triangle touches about A/4 + E/2 + 1 cubes for every A + E + 1 of half their edge
-  // (expected_work()): over all levels twice its bricks, and one cube per level.
+  // For every A + E + 1 cubes of half the edge, a triangle touches about A/4 + E/2 + 1 cubes
+  // (expected_work()). So over all levels it touches twice its bricks, plus one cube per level.
   double bricks = 0;
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.state.counts.triangles);
@@ -217,7 +221,7 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   estimate.free_memory = budget.limit();
   const auto pilots = build_pilots(scene, pilot_levels, context);
   if (pilots.empty()) {
-    // Too many triangles even for a small grid: their expected voxels are an upper bound.
+    // There are too many triangles even for a small grid. Their expected voxels are an upper bound.
     estimate.voxels = {0, scene.state.counts.expected_voxels, scene.state.counts.expected_voxels};
     return estimate;
   }

@@ -37,13 +37,13 @@ class CoarserStream : public TriangleStream {
   const uint32_t shift_;
 };
 
-// Remembers some of the last triangles that it has seen.
+// Remembers some of the most recent triangles.
 class RecentTriangles {
  public:
   static constexpr size_t kBytes = (size_t{1} << 14) * sizeof(FixedTriangle);
 
   RecentTriangles() : slots_(kBytes / sizeof(FixedTriangle)) {}
-  // False if it remembers an equal one.
+  // Returns false if an equal triangle is remembered.
   bool add(const FixedTriangle& triangle) {
     uint64_t hash = 0;
     for (const auto& vertex : triangle.v)
@@ -55,7 +55,7 @@ class RecentTriangles {
   }
 
  private:
-  // Coordinates are odd: none equals an empty slot.
+  // Coordinates are odd, so no triangle equals an empty slot.
   std::vector<FixedTriangle> slots_;
 };
 

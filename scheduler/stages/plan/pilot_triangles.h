@@ -1,6 +1,6 @@
-// The triangles of a scene on the coarser grid of a pilot. Triangles that become equal and are
-// close in the scene's order are kept once. If the scene's triangles are much smaller than the
-// pilot's voxels, few remain, and they have the same voxels.
+// The triangles of a scene on the coarser grid of a pilot. Of triangles that become equal and are
+// close in the scene's order, one is kept. If the scene's triangles are much smaller than the
+// pilot's voxels, few triangles remain, with the same voxels.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,14 @@ namespace voxdag {
 
 class PilotTriangles {
  public:
-  // Triangles of the store's scene bin, coordinates divided by 2^shift, read by all threads as the
-  // stage "estimate". If they take more than `budget` has, is_complete() is false.
+  // Copies the triangles of the store's scene bin, with coordinates divided by 2^shift. All threads
+  // read them, as the stage "estimate". If `budget` is too small for them, is_complete() is false.
   PilotTriangles(const TriangleStore& scene, uint32_t shift, MemoryBudget& budget,
                  const StageContext& context);
 
   bool is_complete() const { return is_complete_; }
-  // On a grid that is 2^shift times coarser again. This must outlive the stream.
+  // Streams the triangles on a grid that is again 2^shift times coarser. This object must outlive
+  // the stream.
   std::unique_ptr<TriangleStream> open(uint32_t shift) const;
   // CPU time of all threads.
   double cpu_s() const { return cpu_s_; }

@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// True if an earlier run was stopped after it had published the file. Fills in the report.
+// True if an earlier run was stopped after publishing the file. Fills in the report.
 bool is_published(BuildJob& job, AttributeSections& attributes);
 
 // Writes checksums, syncs and renames the file, and fills in the report.

@@ -1,5 +1,5 @@
-// A digest of the grid and of the snapped triangles in their order. It detects scenes that changed
-// since a job began. A plain value: a checkpoint stores it and a later run continues it.
+// A digest of the grid and of the snapped triangles in order. It detects scenes that changed since
+// a job began. A plain value: a checkpoint stores it and a later run continues it.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ class ContentDigest {
   explicit ContentDigest(const Grid& grid);
   // Adds the checksum of the next piece of the scene.
   void add(const Checksum128& piece);
-  // The digest of the added data as 32 lower-case hex digits.
+  // Returns the digest of the added data as 32 lower-case hex digits.
   std::string hex() const;
 
  private:

@@ -18,9 +18,11 @@ namespace {
 constexpr int64_t kSecondNs = 1'000'000'000;
 constexpr int64_t kTickNs = kSecondNs / 10;
 constexpr int64_t kCoarseTickNs = 2 * kSecondNs;
-// After the partition the file contains each triangle twice, some more often.
+// After the partition the file contains each triangle at least twice, and some triangles more
+// often.
 constexpr double kDurableCopies = 2.2;
-// Free disk that a scene's triangles need, relative to their copies: the build needs as much again.
+// Required free disk space, relative to the size of all copies of the scene's triangles. The build
+// needs as much again.
 constexpr double kFreePerCopy = 2;
 
 std::string request_of(const BuildSpec& spec) {
@@ -81,7 +83,7 @@ std::optional<IngestState> IngestCheckpoint::resume() {
     work_.remove_durable();
     return std::nullopt;
   }
-  // Without a job there is no plan for whose cubes the triangles could have been partitioned.
+  // Without a job there is no plan with the cubes into which the triangles were partitioned.
   if (record_->request == request_of(spec_) && files_are_unchanged() &&
       (record_->state.stage != IngestStage::kReady || jobs_->job()))
     return record_->state;
@@ -100,7 +102,7 @@ bool IngestCheckpoint::is_worthwhile(const TriangleSource& scene) const {
 }
 
 void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
-  // Within bounds that are given, there may be none of them.
+  // With given bounds, none of the triangles may be inside.
   if (spec_.run.force || spec_.geometry.bounds) return;
   const double bytes = static_cast<double>(scene.declared_triangles()) *
                        static_cast<double>(triangle_record_bytes(is_wide(spec_)));
@@ -178,7 +180,7 @@ void IngestCheckpoint::save_in_background(IngestState& state, std::optional<TopT
   wait();
   if (!record_) return;
   last_save_s_ = wall_seconds();
-  if (!store_) return commit(state);  // A scan has no triangles yet.
+  if (!store_) return commit(state);  // The scan has no triangles yet.
   const std::shared_ptr<TriangleFile> file = store_->file();
   if (top) {
     state.top_tree = file->append(top->cells);
@@ -191,7 +193,7 @@ void IngestCheckpoint::save_in_background(IngestState& state, std::optional<TopT
     commit(state);
     if (old.bytes && old.offset != state.top_tree.offset) file->release(old);
   });
-  // Tests need a checkpoint after every batch.
+  // Tests require a checkpoint after every batch.
   if (spec_.run.checkpoint_interval_s == 0) wait();
 }
 
@@ -231,7 +233,7 @@ void IngestCheckpoint::forget() {
 
 void IngestCheckpoint::forget_saved() {
   if (!jobs_) return;
-  // The file goes first: a full disk may have no other space in which the job store can commit.
+  // The file is removed first: a full disk may have no other space for a commit of the job store.
   work_.remove_durable();
   jobs_->forget_ingest();
 }
@@ -252,7 +254,7 @@ bool IngestCheckpoint::files_are_unchanged() const {
       return context_.files.open_read(file.path)->identity() == file.identity;
     });
   } catch (const Error&) {
-    return false;  // Reading the scene reports the error.
+    return false;  // The error is reported when the scene is read.
   }
 }
 

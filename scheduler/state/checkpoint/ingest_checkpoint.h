@@ -33,26 +33,28 @@ struct TopTreeCells {
 
 class IngestCheckpoint {
  public:
-  // Without a job store there are no checkpoints, and no triangles outlive the process.
+  // Without a job store there are no checkpoints, and triangles do not outlive the process.
   IngestCheckpoint(const BuildSpec& spec, JobStore* jobs, WorkFolder& work,
                    const BuildContext& context);
 
-  // The state of an earlier run with this scene, if there is one; enables checkpoints then.
+  // Returns the state of an earlier run with this scene and enables checkpoints; nullopt if there
+  // is no such state.
   std::optional<IngestState> resume();
   // True if the scene is large enough for checkpoints and the disk has space for its triangles.
   bool is_worthwhile(const TriangleSource& scene) const;
-  // Throws Error{kNoSpace} if the scene's triangles fit neither memory nor disk, unless forced: it
-  // may have billions of them in a few bytes.
+  // Throws Error{kNoSpace} if the scene's triangles fit neither memory nor disk, unless forced. A
+  // scene of a few bytes can declare billions of triangles.
   void check_disk_space(const TriangleSource& scene) const;
-  // Enables checkpoints for a scene opened at that Unix time, and removes checkpoints of other
-  // scenes. Does nothing if a later change of a file might not show in its times.
+  // Enables checkpoints for a scene that was opened at Unix time `opened_ns`, and removes
+  // checkpoints of other scenes. Does nothing if a later change of a file might not change its
+  // times.
   void enable(const TriangleSource& scene, int64_t opened_ns);
-  // True if checkpoints are enabled for a scene of exactly these files.
+  // True if checkpoints are enabled for a scene with exactly these files.
   bool matches(const std::vector<SourceFile>& files) const;
 
-  // Opens the store for the triangles: as it was at the state's checkpoint if checkpoints are
-  // enabled, else an empty one in memory. Memory is charged to `share`. The store must live until
-  // the last save().
+  // Opens the store for the triangles. If checkpoints are enabled, the store has the contents of
+  // the state's checkpoint; otherwise it is empty and in memory. Memory is charged to `share`. The
+  // store must live until the last save().
   std::unique_ptr<TriangleStore> open_store(const IngestState& state, MemoryBudget& share);
   // True if the state's checkpoint stored cells of the top tree; load_top_tree() reads them.
   bool has_top_tree(const IngestState& state) const;
@@ -60,28 +62,28 @@ class IngestCheckpoint {
 
   // True if a checkpoint is due and the last one is durable.
   bool is_due();
-  // Makes the triangles in the store durable, and then that they are as `state` says, along with
-  // `top` if given; sets the extents in `state`. Does nothing where checkpoints are not enabled,
-  // and disables them if a file of the scene has changed.
+  // Makes the triangles in the store durable, then a row with `state` and, if given, `top`. Sets
+  // the extents in `state`. Does nothing if checkpoints are not enabled, and disables them if a
+  // file of the scene has changed.
   void save(IngestState& state, std::optional<TopTreeCells> top = {});
   // Saves on another thread, so that ingest does not wait for the disk. The next call throws the
   // thread's error.
   void save_in_background(IngestState& state, std::optional<TopTreeCells> top = {});
-  // All subvolumes are built and recorded: removes the triangles. What remains is the record that
-  // lets a later run know the scene without reading it.
+  // Removes the triangles after all subvolumes are built and recorded. Keeps the record, so that a
+  // later run recognizes the scene without reading it.
   void finish();
 
   // True if the job store has a checkpoint of any scene.
   bool has_saved();
   // Removes all checkpoints, and disables them until the next enable().
   void forget();
-  // The same for the rest of this run.
+  // Like forget(), and checkpoints remain disabled for the rest of this run.
   void disable();
   // True if checkpoints are enabled for triangles that would also fit in memory.
   bool is_optional();
 
  private:
-  // Waits for save_in_background(), and throws what went wrong there.
+  // Waits for save_in_background() and throws its error, if any.
   void wait();
   void wait_ignoring_errors();
   bool files_are_unchanged() const;
@@ -93,17 +95,17 @@ class IngestCheckpoint {
   WorkFolder& work_;
   const BuildContext& context_;
   bool is_disabled_;
-  DurableStore* store_ = nullptr;       // the open one, if it is durable
-  std::optional<IngestRecord> record_;  // as last saved; none while checkpoints are not enabled
+  DurableStore* store_ = nullptr;       // the open store, if it is durable
+  std::optional<IngestRecord> record_;  // as last saved; none unless checkpoints are enabled
   double last_save_s_ = 0;
-  std::future<void> pending_;  // while valid, record_ belongs to its thread
+  std::future<void> pending_;  // while valid, its thread uses record_
 };
 
-// Bytes of disk that the durable triangles of a scene take at most, reached at the end of the
+// Returns the maximum disk space of the durable triangles of a scene, reached at the end of the
 // partition; 0 if the scene is too small for checkpoints.
 double max_durable_bytes(const BuildSpec& spec, uint64_t triangles);
-// The Unix time from which on a change of these files shows in their identities; INT64_MAX if one
-// of them is not known.
+// Returns the earliest Unix time at which a change of these files is certain to change their
+// identities; INT64_MAX if an identity is unknown.
 int64_t trusted_from_ns(const std::vector<SourceFile>& files);
 
 }  // namespace voxdag

@@ -16,20 +16,21 @@
 namespace voxdag {
 
 struct IngestCounts {
-  uint64_t triangles = 0;        // that may touch the grid
-  uint64_t dropped_outside = 0;  // their boxes miss it
+  uint64_t triangles = 0;        // triangles that may touch the grid
+  uint64_t dropped_outside = 0;  // triangles whose boxes miss the grid
   uint64_t dropped_invalid = 0;
-  double expected_voxels = 0;  // the sum over the triangles; shared voxels count twice
+  double expected_voxels = 0;  // total of the triangles; shared voxels count twice
 };
 
 enum class IngestStage : uint32_t {
   kScan,       // the bounds of the triangles up to `position` are known
   kIngest,     // the grid is known, and the triangles up to `position` are in the scene's bin
-  kPartition,  // all are; the first `position` of them are also in cube bins
-  kReady,      // all are in the cube bins; the scene's bin is released
+  kPartition,  // all triangles are in the scene's bin; the first `position` of them are also in
+               // cube bins
+  kReady,      // all triangles are in the cube bins; the scene's bin is released
 };
 
-// A plain value. What is not known yet has its default.
+// A plain value. Members that are not known yet have their defaults.
 struct IngestState {
   IngestStage stage = IngestStage::kScan;
   uint32_t top_tree_depth = 0;
@@ -39,14 +40,14 @@ struct IngestState {
   Grid grid;
   IngestCounts counts;
   ContentDigest digest;
-  Extent top_tree;  // its cells, in the durable store's file
+  Extent top_tree;  // cells of the top tree in the durable store's file
   double top_tree_weight = 0;
-  DurableStoreState triangles;  // without a file once all subvolumes are recorded
+  DurableStoreState triangles;  // without a file after all subvolumes are recorded
 };
 
 struct IngestRecord {
   std::string request;            // the geometry options and scenes of the build
-  std::vector<SourceFile> files;  // that the scene was read from
+  std::vector<SourceFile> files;  // files of the scene
   IngestState state;
 };
 

@@ -14,7 +14,7 @@ std::unique_ptr<JobStore> open_job_store(FileSystem& files, const WorkFolder& wo
     const bool is_not_ours = error.code() == ErrorCode::kInvalidInput;
     const bool is_unreadable =
         error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kUnsupportedVersion;
-    // A file that is no job store is replaced only if an earlier build used the folder.
+    // A file that is not a job store is replaced only if an earlier build used the folder.
     if (!restart || !(is_unreadable || (is_not_ours && work.existed_before()))) throw;
   }
   for (const char* suffix : {"", "-wal", "-shm", "-journal"})

@@ -24,8 +24,8 @@
 namespace voxdag {
 
 struct BuildJob {
-  // Takes the locks and opens the job store. With RunOptions::restart a job store that cannot be
-  // read is replaced. The references must outlive this.
+  // Takes the locks and opens the job store. With RunOptions::restart an unreadable job store is
+  // replaced. The references must outlive this object.
   BuildJob(const BuildSpec& spec, BuildScene& scene, MemoryBudget& budget,
            const BuildContext& context);
 
@@ -33,11 +33,11 @@ struct BuildJob {
   DagShape shape() const {
     return {.grid_levels = report.grid.levels, .hash_bits = spec.geometry.hash_bits};
   }
-  // The subvolumes that are not built.
+  // Returns the subvolumes that are not built yet.
   std::vector<StoredSubvolume> planned() const;
   // Records finished work. Errors are ignored: the build is already failing with its first error.
   void commit_best_effort();
-  // Throws Error{kInvalidInput}: the work folder holds another job.
+  // Throws Error{kInvalidInput}: the work folder contains another job.
   [[noreturn]] void refuse(const std::string& difference) const;
 
   const BuildSpec& spec;
@@ -53,10 +53,10 @@ struct BuildJob {
   const BuildContext context;
   IngestCheckpoint checkpoint;
   BuildReport report;
-  bool start_over;  // the stored job does not count
+  bool start_over;  // the stored job is ignored
 };
 
-// The work folder of a build with these options.
+// Returns the work folder of a build with these options.
 std::string work_folder_of(const RunOptions& options);
 
 }  // namespace voxdag
