@@ -4,12 +4,12 @@
 //      triangles and the voxel's closed cube. Triangles that miss the cube are harmless.
 //   2. The sub-DAG is unique: no two equal nodes, level arrays in the total order. It does not
 //      depend on the order of the triangles, the memory, the method or the backend's caches.
-//   3. All large buffers are charged to the budget given. When it cannot hold the subvolume the
-//      outcome is kNeedsSplit, and the sink was not called; the caller splits the cube and tries
-//      again. A cube of kSmallestEdge voxels never needs more than kSmallestBudget.
+//   3. All large buffers are charged to the given budget. If the budget cannot hold the subvolume,
+//      build() returns kNeedsSplit without calling the sink, and the caller splits the cube and
+//      tries again. A cube of kSmallestEdge voxels never needs more than kSmallestBudget.
 //   4. A backend is used for many subvolumes, by one thread, and may cache planes and tables.
 //
-// tests/conformance runs over every backend.
+// tests/conformance tests every backend.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ namespace voxdag {
 
 // Voxels along the edge of the smallest subvolume that the scheduler splits down to.
 inline constexpr int64_t kSmallestEdge = 64;
-// Bytes that suffice for it, however many triangles stream through.
+// Budget that suffices for a subvolume of kSmallestEdge, for any number of triangles.
 inline constexpr uint64_t kSmallestBudget = uint64_t{8} << 20;
 
 // The triangles that may touch a subvolume, in no particular order; can be read repeatedly.
@@ -36,7 +36,7 @@ class TriangleStream {
  public:
   virtual ~TriangleStream() = default;
   virtual uint64_t count() const = 0;
-  // Starts again at the first triangle.
+  // Restarts the stream at the first triangle.
   virtual void rewind() = 0;
   // Fills the front of `out`; returns the number of triangles read, 0 at the end.
   virtual size_t read(std::span<FixedTriangle> out) = 0;
@@ -85,19 +85,19 @@ enum class Method {
   kHashes,    // voxel list, DAG by hashes
 };
 
-// The parallel pipeline on the host's threads (0 for all of them): for tests and comparisons.
+// The parallel pipeline on the host's threads (0: all of them), for tests and comparisons.
 std::unique_ptr<Backend> make_parallel_host_backend(Method method, unsigned threads = 1);
 
-// The number of GPUs that make_cuda_backend() can open: 0 where this build has no CUDA, or the
-// machine no driver or device. Never throws.
+// Returns the number of GPUs that make_cuda_backend() can open. 0 if this build has no CUDA, or if
+// the machine has no driver or device. Never throws.
 int cuda_device_count();
 inline bool cuda_device_available() { return cuda_device_count() > 0; }
-// Why there is no usable device, as a sentence; empty if there is one.
+// Returns why there is no usable device, as a sentence; "" if there is one.
 std::string cuda_device_problem();
 
-// The parallel pipeline on a GPU, device memory charged to the build's budget like any other. It
-// has its own stream, so two backends on one device overlap transfers and host work of one with
-// kernels of the other. Throws Error{kDevice} when there is no such device.
+// Returns the parallel pipeline on a GPU. Device memory is charged to the build's budget like any
+// other. Each backend has its own stream, so if two share a device, transfers and host work of one
+// overlap with kernels of the other. Throws Error{kDevice} if there is no such device.
 std::unique_ptr<Backend> make_cuda_backend(Method method = Method::kFast, int device = 0);
 
 }  // namespace voxdag

@@ -1,4 +1,4 @@
-// Seconds of wall and CPU time, for reports and measurements; no result depends on them.
+// Seconds of wall time and CPU time, for reports and measurements. No result depends on them.
 #pragma once
 
 #include <time.h>
@@ -16,27 +16,27 @@ inline double clock_seconds(clockid_t clock) {
   clock_gettime(clock, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
-// Since an arbitrary start; never set back.
+// Seconds since an arbitrary start; never goes back.
 inline double wall_seconds() { return clock_seconds(CLOCK_MONOTONIC); }
-// Since 1970-01-01 UTC.
+// Seconds since 1970-01-01 UTC.
 inline double unix_seconds() { return clock_seconds(CLOCK_REALTIME); }
 // User and system time of all threads of this process.
 inline double process_cpu_seconds() { return clock_seconds(CLOCK_PROCESS_CPUTIME_ID); }
 inline double thread_cpu_seconds() { return clock_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
-// CPU time by threads, to see whether a stage keeps all of them busy. The threads that
-// parallel_for() starts one after the other for the same worker count as one; so do all that run in
-// the background. A thread adds its time when it ends.
+// CPU time by threads, which shows if a stage keeps all of them busy. All threads that
+// parallel_for() has started for the same worker count as one, and so do all background threads. A
+// thread adds its time when it ends.
 class ThreadTimes {
  public:
   static constexpr size_t kThreads = 257;
   static constexpr size_t kBackground = kThreads - 1;
   using Seconds = std::array<double, kThreads>;
 
-  // Adds the time of this ending thread to a worker's time; workers above 255 share a place.
+  // Adds the time of the ending thread to a worker's time. All workers from 255 share one entry.
   static void add(size_t worker) { times_ns_[std::min(worker, kBackground - 1)] += now_ns(); }
   static void add_background() { times_ns_[kBackground] += now_ns(); }
-  // The times so far. This thread acts as worker 0, so its time counts as that worker's.
+  // Returns the times so far. The calling thread's time counts as worker 0's.
   static Seconds now() {
     Seconds seconds;
     for (size_t i = 0; i < kThreads; ++i) seconds[i] = 1e-9 * static_cast<double>(times_ns_[i]);

@@ -1,5 +1,5 @@
-// The codes of Error in the outside world. One table, in docs/errors.md, maps a code to the exit
-// status of the command line and to the HTTP status of the service; the functions below are that
+// Mappings of Error codes to the outside. One table in docs/errors.md maps a code to the exit
+// status of the command line and to the HTTP status of the service. The functions below are this
 // table in code.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// The code of this name, if there is one.
+// Returns the code with this name; nullopt if there is none.
 std::optional<ErrorCode> error_code_named(std::string_view name);
 // Exit status of the command line for a code; never 0.
 int exit_status(ErrorCode code);

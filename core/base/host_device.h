@@ -1,5 +1,5 @@
-// VOXDAG_HD marks a function that runs on the host and, in CUDA sources, on the device too.
-// Only this file and core/backend/ test which compiler is used.
+// VOXDAG_HD marks a function that runs on the host and, in CUDA sources, also on the device. Only
+// this file and core/backend/ test which compiler is used.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ VOXDAG_HD inline int popcount64(uint64_t x) {
 #endif
 }
 
-// Position of the lowest set bit; x must not be 0.
+// Returns the position of the lowest set bit; x must not be 0.
 VOXDAG_HD inline int lowest_bit(uint64_t x) {
 #if defined(__CUDA_ARCH__)
   return __ffsll(static_cast<long long>(x)) - 1;

@@ -1,4 +1,4 @@
-// 128-bit integers, which g++, clang and nvcc have, and functions that mix the bits of a number.
+// 128-bit integers (available in g++, clang and nvcc), and functions that mix the bits of a number.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,7 @@
 
 namespace voxdag {
 
-// Thrown if a budget, or a device's memory, cannot hold a piece of work that its owner can split.
+// Thrown if a budget, or a device's memory, cannot hold a piece of work that the caller can split.
 struct OutOfBudget {};
 
 class MemoryBudget {
@@ -26,12 +26,12 @@ class MemoryBudget {
   uint64_t limit() const { return limit_; }
   uint64_t used() const { return used_.load(std::memory_order_relaxed); }
   uint64_t peak() const { return peak_.load(std::memory_order_relaxed); }
-  // Bytes that could be charged now, parents included.
+  // Bytes that can be charged now. The parents' limits are considered.
   uint64_t available() const;
 
-  // False, and nothing charged, if it does not fit.
+  // Returns false and charges nothing if it does not fit.
   bool try_charge(uint64_t bytes);
-  // Throws Error{kOutOfMemory} naming `what` if it does not fit.
+  // Throws Error{kOutOfMemory} with `what` if it does not fit.
   void charge(uint64_t bytes, std::string_view what);
   void release(uint64_t bytes);
 
@@ -46,7 +46,7 @@ class MemoryBudget {
 class MemoryCharge {
  public:
   MemoryCharge() = default;
-  // Throws Error{kOutOfMemory} naming `what` if it does not fit.
+  // Throws Error{kOutOfMemory} with `what` if it does not fit.
   MemoryCharge(MemoryBudget& budget, uint64_t bytes, std::string_view what)
       : budget_(&budget), bytes_(bytes) {
     budget.charge(bytes, what);
@@ -59,7 +59,7 @@ class MemoryCharge {
   ~MemoryCharge() {
     if (budget_) budget_->release(bytes_);
   }
-  // Grows or shrinks the charge to `bytes`; false, and unchanged, if it does not fit.
+  // Grows or shrinks the charge to `bytes`. Returns false without a change if it does not fit.
   bool try_resize(uint64_t bytes);
   uint64_t bytes() const { return bytes_; }
 

@@ -1,6 +1,6 @@
-// A large array of zero-filled pages straight from the system, in huge pages where that helps. They
-// return to the system as soon as they are freed, which the general allocator does not promise;
-// tables and level arrays therefore live here. Not thread-safe.
+// A large array of zero-filled pages allocated directly from the system, in huge pages where they
+// help. Freed pages return to the system immediately, which the general allocator does not
+// guarantee. So tables and level arrays use this buffer. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,10 +15,10 @@
 
 namespace voxdag {
 
-// Throws Error{kOutOfMemory} naming `what` when the system has no pages left.
+// Throws Error{kOutOfMemory} with `what` if the system has no pages left.
 void* allocate_pages(size_t bytes, std::string_view what);
-// Appends zero-filled pages, moving all of them to other addresses where necessary; no bytes are
-// copied.
+// Appends zero-filled pages. If necessary, moves all pages to other addresses, without copying
+// bytes.
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what);
 void free_pages(void* pages, size_t bytes);
 
@@ -28,7 +28,7 @@ class PageBuffer {
 
  public:
   PageBuffer() = default;
-  // Charged to `budget`; throws Error{kOutOfMemory} naming `what` if it does not fit.
+  // Charges `budget`. Throws Error{kOutOfMemory} with `what` if it does not fit.
   PageBuffer(MemoryBudget& budget, size_t size, std::string_view what)
       : charge_(budget, byte_count(size), what),
         data_(size ? static_cast<T*>(allocate_pages(byte_count(size), what)) : nullptr),
@@ -50,8 +50,8 @@ class PageBuffer {
     if (data_) free_pages(data_, size_ * sizeof(T));
   }
 
-  // Makes a buffer that is not empty larger; the new elements are zero. Throws Error{kOutOfMemory}
-  // naming `what` if it does not fit; the buffer is then unchanged.
+  // Enlarges a buffer that is not empty. The new elements are zero. Throws Error{kOutOfMemory} with
+  // `what` if it does not fit; the buffer is then unchanged.
   void grow(size_t size, std::string_view what) {
     const uint64_t old_bytes = charge_.bytes();
     if (!charge_.try_resize(byte_count(size)))
@@ -74,7 +74,7 @@ class PageBuffer {
   T* end() { return data_ + size_; }
 
  private:
-  // UINT64_MAX, which never fits, if the product overflows.
+  // Returns UINT64_MAX, which never fits, if the product overflows.
   static uint64_t byte_count(size_t size) {
     return size <= SIZE_MAX / sizeof(T) ? size * sizeof(T) : UINT64_MAX;
   }

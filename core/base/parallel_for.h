@@ -1,5 +1,5 @@
-// Loops over items on several threads. Each thread takes the next item when it has finished one,
-// and can commit its results in the order of the items.
+// Loops over items on several threads. When a thread has finished an item, it takes the next one.
+// Results can be committed in the order of the items.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,10 @@
 
 namespace voxdag {
 
-// Calls body(worker, item) for every item below `count`, on up to `workers` threads, including the
-// caller's; `worker` is the number of the thread, from 0. After an exception no further item is
-// started. Once all threads have stopped, the exception of the first failed item is rethrown. So if
-// the same items fail each time, the exception is the same for any number of threads.
+// Calls body(worker, item) for every item below `count`, on up to `workers` threads including the
+// caller. `worker` is the number of the thread, counted from 0. After an exception no further item
+// is started. Once all threads have stopped, the exception of the first failed item is rethrown. So
+// if the same items fail each time, the exception is the same for any number of threads.
 template <class Body>
 void parallel_for(unsigned workers, size_t count, Body&& body) {
   std::atomic<size_t> next{0};
@@ -48,18 +48,18 @@ void parallel_for(unsigned workers, size_t count, Body&& body) {
     for (unsigned worker = 1; worker < workers && worker < count; ++worker)
       threads.emplace_back(work_and_end, worker);
   } catch (const std::exception&) {
-    // The system has no more threads: the started threads and this one do all the work.
+    // The system has no more threads, so the started threads and this one do all the work.
   }
   work(0);
   for (std::thread& thread : threads) thread.join();
   if (failure) std::rethrow_exception(failure);
 }
 
-// Gives each item a turn, in the order of their numbers. Thread-safe.
+// Gives each item a turn, in the order of the items' numbers. Thread-safe.
 class Turns {
  public:
-  // Waits for the turn of an item, which lasts until end(). False if the item has none because one
-  // before it failed.
+  // Waits for the turn of an item, which lasts until end(). Returns false if the item gets no turn
+  // because an earlier item failed.
   bool wait_for(size_t item) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return item == turn_ || item > failed_; });
@@ -70,12 +70,12 @@ class Turns {
     ++turn_;
     changed_.notify_all();
   }
-  // True if an item before this one has failed.
+  // True if an earlier item has failed.
   bool is_lost(size_t item) {
     const std::lock_guard lock(mutex_);
     return item > failed_;
   }
-  // No item after this one gets its turn.
+  // After this call, no later item gets a turn.
   void fail(size_t item) {
     const std::lock_guard lock(mutex_);
     failed_ = std::min(failed_, item);
@@ -89,9 +89,9 @@ class Turns {
   size_t failed_ = SIZE_MAX;
 };
 
-// Calls prepare(worker, item) for every item below `count`, on several threads as parallel_for()
-// does, and then commit(worker, item), sequentially in the order of the items. All items before the
-// first that throws are committed, and no others.
+// Calls prepare(worker, item) for every item below `count`, on several threads like parallel_for().
+// Calls commit(worker, item) sequentially in the order of the items. If an item throws, exactly the
+// items before the first such item are committed.
 template <class Prepare, class Commit>
 void parallel_for_in_order(unsigned workers, size_t count, Prepare&& prepare, Commit&& commit) {
   Turns turns;

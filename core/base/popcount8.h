@@ -1,12 +1,13 @@
-// Bits set in a byte. A table, since baseline x86-64 has no instruction for it and std::popcount is
-// a call there.
+// Counts the bits set in a byte, with a table: baseline x86-64 has no instruction for it, so
+// std::popcount would be a function call.
 #pragma once
 
 #include <cstdint>
 
 namespace voxdag {
 
-// A plain array: sources compiled for other instruction sets share no inline function through it.
+// A plain array, so that sources compiled for other instruction sets do not share an inline
+// function by using it.
 struct Popcount8Table {
   uint8_t of[256] = {};
   constexpr Popcount8Table() {

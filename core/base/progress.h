@@ -1,5 +1,6 @@
-// How long work reports its progress. Stages follow one another; within a stage any thread may
-// advance. Implementations (a terminal's bar, plain lines, the service) are thread-safe.
+// The interface through which work reports its progress. Stages run one after another; within a
+// stage any thread may call advance(). Implementations (a terminal's bar, plain lines, the service)
+// are thread-safe.
 #pragma once
 
 #include <array>
@@ -11,13 +12,13 @@
 
 namespace voxdag {
 
-// A subvolume of a build, for those who show how far it is.
+// A subvolume of a build, as shown to users.
 struct SubvolumeStatus {
   int64_t id = 0;
-  std::array<uint64_t, 3> corner{};  // the low one, in voxels of the grid
+  std::array<uint64_t, 3> corner{};  // low corner, in voxels of the grid
   uint64_t edge = 0;                 // in voxels
   bool built = false;
-  // What a built subvolume consists of.
+  // Contents of a built subvolume.
   uint64_t voxels = 0;
   uint64_t nodes = 0;
   uint64_t bytes = 0;
@@ -25,12 +26,12 @@ struct SubvolumeStatus {
 
 // The batches of a build on a cluster, and the tasks for them.
 struct ClusterTasks {
-  uint64_t batches = 0;                           // all of them
-  uint64_t built = 0;                             // batches
-  uint64_t waiting = 0;                           // tasks
-  uint64_t failed_attempts = 0;                   // of tasks
-  std::map<std::string, uint64_t> running;        // tasks, by node
-  std::map<std::string, uint64_t> built_of_node;  // batches
+  uint64_t batches = 0;                           // total
+  uint64_t built = 0;                             // built batches
+  uint64_t waiting = 0;                           // waiting tasks
+  uint64_t failed_attempts = 0;                   // failed attempts of tasks
+  std::map<std::string, uint64_t> running;        // running tasks, by node
+  std::map<std::string, uint64_t> built_of_node;  // built batches, by node
 };
 
 class Progress {
@@ -41,9 +42,9 @@ class Progress {
   // The stage continues where an earlier run ended: `done` units count toward the total but not
   // toward the rate. Called after begin_stage(), if at all.
   virtual void resume_at(uint64_t done) = 0;
-  // `count` more units are done.
+  // Reports that `count` more units are done.
   virtual void advance(uint64_t count) = 0;
-  // The total became known or changed (a subvolume was split, say).
+  // Reports a total that became known or has changed, for example because a subvolume was split.
   virtual void set_total(uint64_t total) = 0;
   virtual void end_stage() = 0;
   // A warning that a user should read, one sentence.
@@ -51,16 +52,17 @@ class Progress {
 
   // The position of the grid in the scene. Called before set_subvolumes().
   virtual void set_grid(const std::array<double, 3>& /*origin*/, double /*edge*/) {}
-  // All subvolumes of the build, including those built by an earlier run. Replaces earlier reports.
+  // All subvolumes of the build, including the ones built by an earlier run. Replaces earlier
+  // reports.
   virtual void set_subvolumes(uint64_t /*resolution*/, std::span<const SubvolumeStatus> /*all*/) {}
-  // A worker begins with a planned subvolume; it is done when it is built or split.
+  // A worker has begun a planned subvolume. The subvolume is done when it is built or split.
   virtual void subvolume_begun(int64_t /*id*/) {}
   virtual void subvolume_built(const SubvolumeStatus& /*built*/) {}
   // `parts` replace the subvolume `id`.
   virtual void subvolume_split(int64_t /*id*/, std::span<const SubvolumeStatus> /*parts*/) {}
-  // What the build uses now: resident memory, and disk space of the work folder.
+  // Current resource usage: resident memory, and disk space of the work folder.
   virtual void set_usage(uint64_t /*memory_bytes*/, uint64_t /*disk_bytes*/) {}
-  // How the tasks of a cluster stand.
+  // Current state of the tasks of a cluster.
   virtual void set_cluster_tasks(const ClusterTasks& /*tasks*/) {}
 };
 

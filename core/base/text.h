@@ -1,4 +1,4 @@
-// Text from and for people and protocols: sizes, counts, durations, lists of numbers, hexadecimal
+// Converts text for people and protocols: sizes, counts, durations, lists of numbers, hexadecimal
 // and percent-encoded bytes. Pure functions.
 #pragma once
 
@@ -15,8 +15,8 @@
 
 namespace voxdag {
 
-// Bytes of a size as people write it: "512MiB", "8GiB", "64M" (binary), "1000000". Throws
-// Error{kInvalidInput} naming `option` unless the text is a number with an optional unit.
+// Parses a size: "512MiB", "8GiB", "64M" (binary), "1000000". Returns bytes. Throws
+// Error{kInvalidInput} with `option` unless the text is a number with an optional unit.
 uint64_t parse_size(const std::string& text, const std::string& option);
 // "1.25 GiB"
 std::string size_text(uint64_t bytes);
@@ -25,18 +25,19 @@ std::string count_text(uint64_t count);
 // "1 m 04 s", "12.3 s"
 std::string duration_text(double seconds);
 
-// The shortest text that reads back as the same number, whatever the locale.
+// Returns the shortest text that reads back as the same number, in any locale.
 std::string number_text(double number);
 
-// A Unix time in UTC, in a format of strftime().
+// Formats a Unix time in UTC, with a format of strftime().
 std::string utc_text(time_t time, const char* format);
 
 // Two lower-case hexadecimal digits per byte.
 std::string hex_text(std::span<const unsigned char> bytes);
-// The bytes that a percent-encoded text stands for (RFC 3986); nothing if an escape is broken.
+// Decodes a percent-encoded text (RFC 3986); nullopt if an escape is broken.
 std::optional<std::string> percent_decoded(std::string_view text);
 
-// All of `text` as kCount numbers with `separator` between them; nothing if it is anything else.
+// Parses `text` as exactly kCount numbers with `separator` between them; nullopt for any other
+// text.
 template <class Number, size_t kCount>
 std::optional<std::array<Number, kCount>> parse_numbers(std::string_view text, char separator) {
   std::array<Number, kCount> numbers{};

@@ -37,13 +37,13 @@ class AttributeSet {
     return rest;
   }
   constexpr bool any() const { return *this != AttributeSet(); }
-  // True if some of them depend on the scene's textures.
+  // True if any of them depends on the scene's textures.
   constexpr bool use_images() const { return any_row(&AttributeTraits::uses_images); }
-  // True if values of some of them are indexes of a list of names.
+  // True if the values of any of them are indexes of a list of names.
   constexpr bool have_names() const { return any_row(&AttributeTraits::has_names); }
   constexpr bool operator==(const AttributeSet&) const = default;
 
-  // In the order of their sections.
+  // Returns the attributes in the order of their sections.
   std::vector<Attribute> list() const {
     std::vector<Attribute> found;
     for (const AttributeTraits& row : kAttributeTable)
@@ -69,7 +69,7 @@ class AttributeSet {
   bool has_[std::size(kAttributeTable)] = {};
 };
 
-// Throws Error{kInvalidInput} that names `option` for a name that is not in the table.
+// Throws Error{kInvalidInput} with `option` for a name that is not in the table.
 inline Attribute attribute_named(std::string_view name, const std::string& option) {
   std::string expected = kAttributeTable[0].name;
   for (const AttributeTraits& row : kAttributeTable) {

@@ -22,17 +22,17 @@ enum class Encoding : uint8_t {
   kColorBlock,  // the colors of 32 cells in 16 bytes (block_codec.h)
   kByte,        // 0 to 255
   kOctahedral,  // a unit vector in two bytes up to 254 (normal_code.h)
-  kNameIndex,   // an index into a list of names, which is stored behind the values
+  kNameIndex,   // an index into a list of names, which is stored after the values
 };
 
-// A type of the numbers that queries and exports turn values into.
+// Number types of values in queries and exports.
 enum class NumberType : uint8_t { kUint8, kUint32, kFloat };
 
 struct EncodingTraits {
   Encoding encoding;
-  uint32_t block_bytes;  // of 32 cells; 0 if the number of names decides
+  uint32_t block_bytes;  // for 32 cells; 0 if it depends on the number of names
   NumberType number;
-  uint32_t components;  // numbers of a value
+  uint32_t components;  // number of components of a value
 
   constexpr uint32_t decoded_bytes() const {
     return components * (number == NumberType::kUint8 ? 1 : 4);
@@ -56,25 +56,25 @@ uint32_t alpha_of_cell(const ColorSum& sum, const CellValues& values);
 uint32_t normal_of_cell(const ColorSum& sum, const CellValues& values);
 uint32_t material_of_cell(const ColorSum& sum, const CellValues& values);
 
-// The value of a cell, from the values of its 1 to 8 set children in Morton order.
-// The mean, rounded to nearest (half up).
+// Returns the value of a cell from the values of its 1 to 8 set children in Morton order: the mean,
+// rounded to nearest (half up).
 uint32_t mean_alpha(std::span<const uint32_t> children);
-// The children's normal if all are equal. Otherwise the normal of the sum of their directions, or
-// the first child's where the sum is zero.
+// Returns the children's normal if all are equal. Otherwise returns the normal of the sum of their
+// directions, or the first child's if the sum is zero.
 uint32_t mean_normal(std::span<const uint32_t> children);
-// The most frequent value, the lowest of several.
+// Returns the most frequent value; on ties, the lowest.
 uint32_t commonest(std::span<const uint32_t> children);
 
 }  // namespace attribute_rules
 
 struct AttributeTraits {
   Attribute attribute;
-  const char* name;    // in options, JSON and messages
-  const char* plural;  // of arrays, sections and messages
+  const char* name;    // name in options, JSON and messages
+  const char* plural;  // name in arrays, sections and messages
   Encoding encoding;
   bool uses_images = false;       // depends on the scene's textures
-  const char* ply_properties[3];  // of a value's components
-  // Null for colors, which are encoded from the sums of cells.
+  const char* ply_properties[3];  // names of a value's components
+  // Null for colors, which are encoded from the cells' sums.
   uint32_t (*value_of_cell)(const ColorSum& sum, const CellValues& values) = nullptr;
   uint32_t (*value_of_parent)(std::span<const uint32_t> children) = nullptr;
 
@@ -82,7 +82,7 @@ struct AttributeTraits {
   constexpr bool has_names() const { return encoding == Encoding::kNameIndex; }
 };
 
-// In the order of their sections.
+// Rows in the order of their sections.
 inline constexpr AttributeTraits kAttributeTable[] = {
     {.attribute = Attribute::kColor,
      .name = "color",
@@ -118,7 +118,7 @@ constexpr const AttributeTraits& traits_of(Attribute attribute) {
   return kAttributeTable[static_cast<size_t>(attribute) - 1];
 }
 
-// The tables' rows are found by index.
+// The rows must be at their index, because lookups use it.
 static_assert([] {
   for (size_t i = 0; i < std::size(kEncodingTable); ++i)
     if (kEncodingTable[i].encoding != static_cast<Encoding>(i)) return false;
@@ -129,14 +129,15 @@ static_assert([] {
 
 constexpr const char* name_of(Attribute attribute) { return traits_of(attribute).name; }
 
-// Bytes of a value in the global file that is not a color; `names` is the length of the list.
+// Returns the bytes per value in the global file, for attributes other than color. `names` is the
+// length of the list.
 constexpr uint32_t value_bytes(Attribute attribute, uint64_t names) {
   const uint32_t block_bytes = traits_of(traits_of(attribute).encoding).block_bytes;
   if (block_bytes > 0) return block_bytes / 32;
   return names <= 256 ? 1 : names <= 65536 ? 2 : 4;
 }
 
-// Returns the expectation that a stored value does not meet, or null.
+// Returns the expectation that a stored value violates; null if the value is valid.
 constexpr const char* value_error(Encoding encoding, uint32_t value, uint64_t names) {
   if (encoding == Encoding::kOctahedral && ((value & 255) == 255 || value >> 8 == 255))
     return "expected bytes up to 254";

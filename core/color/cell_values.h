@@ -1,4 +1,4 @@
-// The sums of a baked cell that are not part of its ColorSum, turned into values.
+// Values of a baked cell that are not part of its ColorSum.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct CellValues {
   uint32_t material = 0;  // an index into the list of the scene's materials
 };
 
-// Bytes of a list of names in the global file, without the padding behind it.
+// Returns the bytes of a list of names in the global file, without the padding after it.
 inline uint64_t list_bytes(std::span<const std::string> names) {
   uint64_t bytes = sizeof(uint32_t);
   for (const std::string& name : names) bytes += sizeof(uint32_t) + name.size();

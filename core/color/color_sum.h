@@ -15,11 +15,11 @@ namespace voxdag {
 struct ColorSum {
   std::array<uint64_t, 3> seen{};   // of weight x alpha x intensity: red, green, blue
   uint64_t seen_weight = 0;         // of weight x alpha
-  std::array<uint64_t, 3> plain{};  // of weight x intensity: used where all alpha is 0
+  std::array<uint64_t, 3> plain{};  // of weight x intensity; used if all alpha values are 0
   uint64_t weight = 0;
 
   VOXDAG_HD void add(const ColorSum& other) {
-    // As eight equal numbers, which compilers add with vector instructions.
+    // Adds them as eight numbers of one type, which compilers vectorize.
     uint64_t sums[8], more[8];
     static_assert(sizeof sums == sizeof(ColorSum));
     std::memcpy(sums, this, sizeof sums);
@@ -36,7 +36,7 @@ struct ColoredCell {
   ColorSum sum;       // its weight is above 0
 };
 
-// The color of a cell, as it is stored: sRGB, 8 bits, and alpha, linear.
+// The stored color of a cell: sRGB with 8 bits, and linear alpha.
 struct Color {
   std::array<uint8_t, 3> rgb{};
   uint8_t alpha = 255;

@@ -18,14 +18,15 @@ namespace voxdag {
 // Byte 0 in the low 8 bits.
 using NormalCode = uint16_t;
 
-// The sum of normals whose own rule gives none: upwards along z.
+// The normal of sums whose rule gives none: upwards along z.
 inline constexpr NormalCode kNoNormal = 127 << 8 | 127;
 
 namespace color {
 
 VOXDAG_HD inline int64_t absolute(int64_t x) { return x < 0 ? -x : x; }
 
-// 127 x / length to the nearest, halves away from zero. 0 <= |x| <= length < 2^55.
+// Returns 127 x / length rounded to nearest, halves away from zero. Requires 0 <= |x| <= length <
+// 2^55.
 VOXDAG_HD inline int64_t in_127ths(int64_t x, int64_t length) {
   const int64_t magnitude = (254 * absolute(x) + length) / (2 * length);
   return x < 0 ? -magnitude : magnitude;
@@ -33,7 +34,7 @@ VOXDAG_HD inline int64_t in_127ths(int64_t x, int64_t length) {
 
 }  // namespace color
 
-// The code of a direction of any length, with components below 2^53; not all of them 0.
+// Returns the code of a direction of any length. Its components are below 2^53 and not all 0.
 VOXDAG_HD inline NormalCode encode_normal(int64_t x, int64_t y, int64_t z) {
   const int64_t width = color::absolute(x), height = color::absolute(y);
   const int64_t length = width + height + color::absolute(z);
@@ -46,7 +47,8 @@ VOXDAG_HD inline NormalCode encode_normal(int64_t x, int64_t y, int64_t z) {
                                  (127 + color::in_127ths(along, length)) << 8);
 }
 
-// The direction with a length of 2^14, each component to the nearest. The bytes are at most 254.
+// Returns the direction with a length of 2^14, each component rounded to nearest. The bytes are at
+// most 254.
 VOXDAG_HD inline std::array<int64_t, 3> decode_normal(NormalCode code) {
   const int across = (code & 255) - 127, along = (code >> 8) - 127;
   const int width = across < 0 ? -across : across, height = along < 0 ? -along : along;

@@ -18,10 +18,11 @@ inline constexpr uint16_t kFullIntensity = 65535;
 
 // A corner of a triangle.
 struct SurfaceCorner {
-  // In images from the upper left corner, 2^kTextureBits to an image, magnitude at most 2^40; after
-  // KHR_texture_transform and before wrapping.
+  // Image coordinates from the upper left corner: 2^kTextureBits per image, magnitude at most 2^40,
+  // after KHR_texture_transform and before wrapping.
   std::array<int64_t, 2> texture{};
-  // COLOR_0, or white: red, green, blue (linear) and alpha, kFullIntensity for 1.
+  // COLOR_0 as red, green, blue (linear) and alpha, with kFullIntensity for 1. White if the file
+  // has none.
   std::array<uint16_t, 4> color{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
 };
 
@@ -30,8 +31,8 @@ struct SurfaceTriangle {
   WorldTriangle position;
   std::array<SurfaceCorner, 3> corners;
   uint32_t material = 0;  // index into SceneMaterials::materials
-  // Its front is where the corners run clockwise: in a mirrored instance, or every second time in
-  // a strip. Nothing but normals depends on it.
+  // True if the corners run clockwise when seen from the front: in mirrored instances, and in every
+  // second triangle of a strip. Only normals depend on it.
   bool is_flipped = false;
 };
 
@@ -51,12 +52,12 @@ struct Material {
   static constexpr uint32_t kNoNumber = UINT32_MAX;
 
   std::string name;
-  // Index into SceneMaterials::names; none for triangles to which their file gives no material.
+  // Index into SceneMaterials::names; kNoNumber if the file gives the triangle no material.
   uint32_t number = kNoNumber;
   // Base color, linear, and alpha; kFullIntensity for 1.
   std::array<uint16_t, 4> factor{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
   AlphaMode alpha_mode = AlphaMode::kOpaque;
-  uint16_t alpha_cutoff = kFullIntensity / 2;  // of kMask
+  uint16_t alpha_cutoff = kFullIntensity / 2;  // for kMask
   uint32_t image = kNoImage;                   // index into SceneMaterials::images
   std::array<Wrap, 2> wrap{Wrap::kRepeat, Wrap::kRepeat};
 

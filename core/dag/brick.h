@@ -24,10 +24,10 @@ VOXDAG_HD constexpr int brick_coordinate(int bit, int axis) {
   return (bit >> (2 - axis) & 1) | (bit >> (5 - axis) & 1) << 1;
 }
 
-// Which of the eight octants of a brick have voxels: bit i for byte i of its mask.
+// Returns the octants of a brick that have voxels: bit i for byte i of its mask.
 VOXDAG_HD constexpr uint32_t octants(uint64_t mask) {
   constexpr uint64_t kLowBits = 0x7f7f7f7f7f7f7f7full;
-  // The top bit of each byte that is not 0; the product brings the eight of them together.
+  // The top bit of each byte that is not 0. The product collects these eight bits.
   const uint64_t tops = (((mask & kLowBits) + kLowBits) | mask) & ~kLowBits;
   return static_cast<uint32_t>((tops >> 7) * 0x0102040810204080ull >> 56);
 }

@@ -10,8 +10,8 @@
 
 namespace voxdag {
 
-// What all parts of one DAG have in common. Written with names where the numbers are set:
-// `{.grid_levels = 11, .hash_bits = 64}`.
+// Properties that all parts of one DAG share. Write them with names: `{.grid_levels = 11,
+// .hash_bits = 64}`.
 struct DagShape {
   uint32_t grid_levels = 2;  // L; bricks are level L-2
   uint32_t hash_bits = 64;   // 4 to 64
@@ -20,28 +20,28 @@ struct DagShape {
   bool operator==(const DagShape&) const = default;
 };
 
-// Where a sub-DAG stands in the grid's octree, and how its nodes are hashed. One struct, so that
+// The position of a sub-DAG in the grid's octree, and the hash of its nodes. A struct, so that
 // callers name these numbers (`{.cube_level = 2, .grid_levels = 11, .hash_bits = 64}`) instead of
-// passing neighboring integers that could be swapped.
+// passing adjacent integers that could be swapped.
 struct SubDagShape {
-  uint32_t cube_level = 0;   // of the root
+  uint32_t cube_level = 0;   // level of the root
   uint32_t grid_levels = 2;  // L; bricks are level L-2
   uint32_t hash_bits = 64;   // 4 to 64
 
   uint32_t brick_level() const { return grid_levels - kBrickLevels; }
 };
 
-// Totals of a subvolume that was built.
+// Totals of a built subvolume.
 struct SubDagSummary {
   uint64_t voxels = 0;     // set voxels in the cube
-  uint64_t svo_nodes = 0;  // octree nodes from the cube's root to the bricks, both included
-  uint64_t dag_nodes = 0;  // unique nodes, bricks included
+  uint64_t svo_nodes = 0;  // octree nodes from the cube's root to the bricks, inclusive
+  uint64_t dag_nodes = 0;  // unique nodes, including bricks
   uint64_t root_hash = 0;  // truncated; 0 when empty
   bool empty() const { return voxels == 0; }
 };
 
 // Receives a sub-DAG from the bricks upwards: bricks() once, then nodes() for every level from L-3
-// up to the cube's own level, where the array has exactly one node, the root. Nothing is called for
+// up to the cube's own level. The last array has exactly one node, the root. Nothing is called for
 // an empty subvolume. The views are only valid during the call.
 class SubDagSink {
  public:
@@ -50,7 +50,7 @@ class SubDagSink {
   virtual void nodes(const NodeLevelView& level) = 0;
 };
 
-// A whole sub-DAG in memory, for tests and small subvolumes.
+// A complete sub-DAG in memory, for tests and small subvolumes.
 struct SubDag : SubDagSink {
   struct Nodes {
     uint32_t level = 0;

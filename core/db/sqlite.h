@@ -1,6 +1,6 @@
 // A small wrapper of SQLite: a connection that closes itself, statements that bind and step, and
-// errors as voxdag::Error. row.h reads and writes complete rows. Not thread-safe: a connection and
-// its statements must not be used concurrently. Only sqlite.cc includes sqlite3.h.
+// errors as voxdag::Error. table_rows.h reads and writes complete rows. Not thread-safe: a
+// connection and its statements must not be used concurrently. Only sqlite.cc includes sqlite3.h.
 #pragma once
 
 #include <cstddef>
@@ -26,14 +26,14 @@ class SqlStatement {
   SqlStatement& bind(int parameter, double value);
   SqlStatement& bind(int parameter, std::string_view text);
   SqlStatement& bind(int parameter, std::span<const std::byte> bytes);
-  // 64-bit words are stored as the signed integer of the same bits.
+  // Stores a 64-bit word as the signed integer with the same bits.
   SqlStatement& bind_word(int parameter, uint64_t word) {
     return bind(parameter, static_cast<int64_t>(word));
   }
 
   // True if there is a row to read.
   bool step();
-  // Runs a statement that has no rows, after which it can be bound again.
+  // Runs a statement that returns no rows. Afterwards it can be bound again.
   void run();
   void reset();
 
@@ -61,7 +61,7 @@ class SqlDatabase {
 
   void execute(const std::string& sql);
   SqlStatement prepare(std::string_view sql) { return SqlStatement(handle_.get(), sql); }
-  // The single integer that a query answers.
+  // Returns the single integer that a query returns.
   int64_t integer(const std::string& sql);
 
  private:
@@ -71,13 +71,13 @@ class SqlDatabase {
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
-// True if a database has no tables and belongs to no program.
+// True if a database has no tables and no application id.
 bool is_new(SqlDatabase& database);
 
-// What is committed with kLater may be lost in a power cut until the next commit with kNow.
+// Commits with kLater may be lost in a power cut until the next commit with kNow.
 enum class Durable { kNow, kLater };
 
-// Rolls back unless commit() was called.
+// The destructor rolls back unless commit() was called.
 class SqlTransaction {
  public:
   explicit SqlTransaction(SqlDatabase& database, Durable durable = Durable::kNow);
@@ -89,8 +89,8 @@ class SqlTransaction {
   bool open_ = true;
 };
 
-// Runs `sql`, which makes or changes tables, and marks the database as one of this kind
-// (PRAGMA application_id) and version of its schema (PRAGMA user_version), all or nothing.
+// Runs `sql`, which creates or changes tables, and marks the database with its kind (PRAGMA
+// application_id) and the version of its schema (PRAGMA user_version), all or nothing.
 void change_schema(SqlDatabase& database, const std::string& sql, int64_t application_id,
                    int64_t version);
 

@@ -91,7 +91,7 @@ ColumnNames column_names() {
   return names;
 }
 
-// Runs a statement that names the columns and then, after `between`, has a parameter for each.
+// Writes a record with the statement `before` (COLUMNS) `between` (VALUES) `after`.
 template <class Record>
 void write_row(SqlDatabase& database, const std::string& before, const char* between,
                const std::string& after, Record record) {
@@ -105,21 +105,21 @@ void write_row(SqlDatabase& database, const std::string& before, const char* bet
   statement.run();
 }
 
-// Inserts the record's row into `table`, in place of one with the same key.
+// Inserts the record's row into `table`. Replaces a row with the same key.
 template <class Record>
 void put_row(SqlDatabase& database, const std::string& table, Record record) {
   write_row(database, "INSERT OR REPLACE INTO " + table, "VALUES", "", std::move(record));
 }
 
-// Changes the rows of `table` for which `condition` holds into the record's. Unlike put_row() it
-// does not remove rows that refer to them.
+// Writes the record to all rows of `table` that satisfy `condition`. Unlike put_row(), it does not
+// remove rows that refer to them.
 template <class Record>
 void update_row(SqlDatabase& database, const std::string& table, const std::string& condition,
                 Record record) {
   write_row(database, "UPDATE " + table + " SET", "=", "WHERE " + condition, std::move(record));
 }
 
-// The rows of `table`; `rest` may filter and order them.
+// Returns the rows of `table`; `rest` may filter and order them.
 template <class Record>
 SqlStatement select_rows(SqlDatabase& database, const std::string& table,
                          const std::string& rest = "") {
@@ -127,7 +127,7 @@ SqlStatement select_rows(SqlDatabase& database, const std::string& table,
                           rest);
 }
 
-// The row that a statement of select_rows() stands at.
+// Returns the current row of a statement of select_rows().
 template <class Record>
 Record read_row(const SqlStatement& statement) {
   Record record;
@@ -136,7 +136,7 @@ Record read_row(const SqlStatement& statement) {
   return record;
 }
 
-// The first row of `table`, if there is one.
+// Returns the first row of `table`; nullopt if the table is empty.
 template <class Record>
 std::optional<Record> find_row(SqlDatabase& database, const std::string& table) {
   SqlStatement rows = select_rows<Record>(database, table);

@@ -33,32 +33,34 @@
 
 namespace voxdag {
 
-// The first command of submit, plan, build that offers an option; later ones offer it as well.
+// The first of the commands submit, plan and build that offers an option. The later ones also offer
+// it.
 enum class Scope { kSubmit, kPlan, kBuild };
 
-// A member's name and everything that interfaces tell about it. The same name is the JSON member,
-// the Python keyword and, with dashes, the command-line option.
+// A member's name, and everything that the interfaces document about it. The name is also the JSON
+// member, the Python keyword and, with dashes, the command-line option.
 struct Field {
   const char* name;
   const char* help = "";
-  const char* heading = "";       // of the group that --help lists it in
-  const char* shorthand = "";     // on the command line: "-r"
-  const char* default_text = "";  // of a default that is not a value: "half the RAM"
+  const char* heading = "";       // heading of its group in --help
+  const char* shorthand = "";     // short option of the command line: "-r"
+  const char* default_text = "";  // description of a default that is not a value: "half the RAM"
   const char* parts = "";         // names of an array's numbers: "X,Y,Z,EDGE"
-  const char* excluded = "";      // another field that cannot be given at the same time
-  const char* needed = "";        // another field that has to be given at the same time
+  const char* excluded = "";      // another field that must not be given together with this one
+  const char* needed = "";        // another field that must be given together with this one
   Scope scope = Scope::kSubmit;
-  std::optional<int64_t> min, max;  // of an integer, of bytes, of a line's characters
-  size_t max_items = 0;             // of a list of at least one item; 0 for any list
+  std::optional<int64_t> min,
+      max;               // of an integer, of a size in bytes, or of the number of characters
+  size_t max_items = 0;  // for a list of at least one item; 0: no limit
   bool is_power_of_two = false;
-  bool is_above_zero = false;  // of a number; of the last number of an array
-  bool is_bytes = false;       // an integer that people write as 8GiB
-  bool is_line = false;        // a text without control characters
+  bool is_above_zero = false;  // for a number, or for the last number of an array
+  bool is_bytes = false;       // an integer that users write as 8GiB
+  bool is_line = false;        // a text without control characters (one line)
   bool is_path = false;
   bool is_required = false;
-  bool is_positional = false;     // on the command line
+  bool is_positional = false;     // positional on the command line
   bool is_left_if_empty = false;  // JSON leaves the member out if it is empty
-  // True if geometry_json() has it; without a value, if it differs from its default.
+  // True if geometry_json() contains the field. Not set: contained if it differs from its default.
   std::optional<bool> in_key;
 
   constexpr Field(const char* its_name, const char* its_help = "")
@@ -94,7 +96,7 @@ struct Field {
   constexpr Field needs(const char* other) const { return with(&Field::needed, other); }
 };
 
-// A value that a decoder refuses. The message names the field, the value and the expectation.
+// A value that a decoder refuses. The message has the field, the value and the expectation.
 struct FieldError : Error {
   explicit FieldError(std::string message) : Error(ErrorCode::kInvalidInput, std::move(message)) {}
 };
@@ -104,8 +106,8 @@ concept NamedEnum = std::is_enum_v<E> && requires(E e) {
   enum_names(e);
 };
 
-// Describes a set of names, such as AttributeSet: `names(set)`, `add(set, name)`, which returns
-// false for an unknown name, and the list `all()`.
+// Describes a set of names, such as AttributeSet. Members: `names(set)`; `add(set, name)`, which
+// returns false for an unknown name; and the list `all()`.
 template <class T>
 struct NameSetTraits;
 template <class T>
@@ -134,7 +136,7 @@ struct IsNumbers : std::false_type {};
 template <size_t kCount>
 struct IsNumbers<std::array<double, kCount>> : std::true_type {};
 
-// Visits nothing. Its members are all that `fields` may use of a visitor.
+// Visits nothing. `fields` functions may use only the members that it has.
 struct NoVisitor {
   template <class T>
   void operator()(const Field&, T&) {}
@@ -148,7 +150,7 @@ concept Described = requires(T& value, NoVisitor& visitor) {
   fields(visitor, value);
 };
 
-// The names of an enumeration's values, but for the empty name of "not given".
+// Returns the names of an enumeration's values, without the empty name that means "not given".
 template <NamedEnum E>
 std::vector<std::string> choices_of(E e = {}) {
   std::vector<std::string> choices;
@@ -172,16 +174,16 @@ std::optional<E> enum_of(std::string_view text) {
 
 // "a, b, c"
 std::string joined(const std::vector<std::string>& words, const char* separator = ", ");
-// "64MiB": a size that parse_size() reads, in the largest unit that is exact.
+// Returns a size in the largest unit that is exact, as parse_size() reads it: "64MiB".
 std::string exact_size_text(uint64_t bytes);
-// The bytes of a size such as "8GiB"; nothing for another text.
+// Parses a size such as "8GiB" into bytes; nullopt for any other text.
 std::optional<uint64_t> size_of_text(const std::string& text);
-// UTF-8 characters.
+// Returns the number of UTF-8 characters.
 size_t character_count(std::string_view text);
-// The spelling of a field on the command line: "--hash-bits".
+// Returns the spelling of a field on the command line: "--hash-bits".
 std::string option_name(const char* field_name);
 
-// What a value of type T has to be, for messages: "a power of two from 4 to 1048576".
+// Returns the expectation for values of type T, for messages: "a power of two from 4 to 1048576".
 template <class T>
 std::string expectation(const Field& field);
 std::string expected_integer(const Field& field, const std::string& low, const std::string& high);
@@ -223,7 +225,7 @@ std::string expectation(const Field& field) {
   }
 }
 
-// True if a value respects the limits that its field states.
+// True if a value satisfies the field's limits.
 template <class T>
 bool fits(const Field& field, const T& value) {
   if constexpr (IsOptional<T>::value) {
@@ -249,7 +251,7 @@ bool fits(const Field& field, const T& value) {
   }
 }
 
-// What a field's value is by default; "" if there is nothing to tell.
+// Returns a text with the field's default; "" if it has none worth showing.
 template <class T>
 std::string default_text(const Field& field, const T& value) {
   if (*field.default_text) return field.default_text;
@@ -267,7 +269,7 @@ std::string default_text(const Field& field, const T& value) {
   }
 }
 
-// The help of a field with its default, and with its limits if `has_limits`.
+// Returns the help of a field with its default, and with its limits if `has_limits`.
 template <class T>
 std::string documentation(const Field& field, const T& value, bool has_limits) {
   using Inner = typename OptionalValue<T>::type;
@@ -279,7 +281,7 @@ std::string documentation(const Field& field, const T& value, bool has_limits) {
   return standard.empty() ? text : text + " (default: " + standard + ")";
 }
 
-// Reads a value as people write it on a command line. Returns whether the text is a valid value.
+// Parses a value from the command line. Returns false if the text is not a valid value.
 template <class T>
 bool parse_text(const Field& field, const std::string& text, T& value) {
   if constexpr (IsOptional<T>::value) {

@@ -16,8 +16,8 @@ using FieldJson = nlohmann::ordered_json;
 namespace json_fields {
 
 [[noreturn]] void refuse(const std::string& name, const std::string& expected);
-// A whole number, for which 64.0 is accepted. Calls `take` with an int64_t or uint64_t; returns
-// whether that was possible.
+// Reads a whole number; also accepts 64.0. Calls `take` with an int64_t or uint64_t. Returns false
+// if that is impossible.
 bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,
                   const std::function<bool(int64_t)>& take_signed);
 
@@ -79,9 +79,9 @@ FieldJson encode(T value) {
 // Returns the members of `options` that differ from the members of `defaults`.
 FieldJson difference(const FieldJson& options, const FieldJson& defaults);
 
-inline constexpr size_t kMaxNames = 64;  // of a set of names in options
+inline constexpr size_t kMaxNames = 64;  // for a set of names in options
 
-// Records have all members, options the given ones.
+// Records have all members; options have only the given ones.
 enum class Members { kAll, kGiven };
 
 template <class T>
@@ -135,8 +135,8 @@ void decode_value(const Field& field, const FieldJson& json, Members members, T&
     decode_value(Field(field.name).items(max_items), json, members, names);
     for (const std::string& name : names) expect(NameSetTraits<T>::add(value, name));
   } else if constexpr (IsVector<T>::value) {
-    // In options, a list of limited length may be a single item. Nothing is copied: copying a value
-    // of a request recurses as deep as the value is nested.
+    // In options, a list of limited length may be a single item. Nothing is copied, because copying
+    // a value of a request recurses as deep as the value is nested.
     const bool is_item = members == Members::kGiven && field.max_items > 0 && !json.is_array();
     expect(is_item || json.is_array());
     value.clear();
@@ -213,7 +213,7 @@ T record_from_json(const FieldJson& json) {
   return record;
 }
 
-// Throws Error{kCorrupt}, which begins with `what`, for a text that is no such record.
+// Throws Error{kCorrupt}, beginning with `what`, for a text that is not such a record.
 template <class T>
 T record_from_text(std::string_view text, const std::string& what) {
   try {
@@ -230,8 +230,8 @@ FieldJson options_json(const T& options) {
   return json_fields::difference(json_fields::encode(options), json_fields::encode(T{}));
 }
 
-// Sets the options that are given. Throws FieldError that names the member; `name` is what messages
-// call the object.
+// Sets the given options. Throws FieldError with the name of the member. `name` is the object's
+// name in messages.
 template <class T>
 void set_options(const FieldJson& json, const std::string& name, T& options) {
   json_fields::decode(json, name, json_fields::Members::kGiven, options);

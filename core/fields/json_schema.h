@@ -1,4 +1,4 @@
-// JSON schemas (2020-12, as OpenAPI 3.1 has them) of structs with a description.
+// JSON schemas (2020-12, as in OpenAPI 3.1) of structs with a description.
 #pragma once
 
 #include <map>
@@ -15,7 +15,7 @@ void write_schema(FieldJson& schema, Members members);
 
 FieldJson integer_schema(const Field& field, bool is_unsigned);
 FieldJson line_schema(const Field& field);
-// `kCount` numbers, of which the last may have to be above 0.
+// Schema of `kCount` numbers. If the field requires it, the last one must be above 0.
 FieldJson numbers_schema(const Field& field, size_t count);
 
 template <class T>
@@ -102,7 +102,7 @@ void write_schema(FieldJson& schema, Members members) {
 
 }  // namespace json_fields
 
-// The schema of a record, all of whose members are present.
+// Returns the schema of a record. All members are required.
 template <class T>
 FieldJson record_schema() {
   FieldJson schema;
@@ -110,7 +110,7 @@ FieldJson record_schema() {
   return schema;
 }
 
-// The schema of options, of which the required ones have to be given.
+// Returns the schema of options, with its list of required options.
 template <class T>
 FieldJson options_schema() {
   FieldJson schema;

@@ -1,6 +1,6 @@
-// XXH64 to detect damage (simple enough that the header-only reader has its own), XXH3 to tell
-// large contents apart, SHA-256 to identify them, and a checksum of words that can be computed in
-// parts.
+// XXH64 detects damage and is simple enough for the header-only reader to have its own
+// implementation. XXH3 distinguishes large contents, SHA-256 identifies them. Also a checksum of
+// words that can be computed in parts.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,8 @@ namespace voxdag {
 // XXH64 with seed 0.
 uint64_t checksum64(std::span<const std::byte> bytes);
 
-// XXH3 of 128 bits, several times as fast: tells contents apart, but not against forgery.
+// XXH3 with 128 bits, several times as fast as SHA-256. Distinguishes contents, but does not
+// protect against forgery.
 struct Checksum128 {
   uint64_t low = 0, high = 0;
   bool operator==(const Checksum128&) const = default;
@@ -55,7 +56,7 @@ class Sha256 {
   Sha256();
   ~Sha256();
   void add(std::span<const std::byte> bytes);
-  // Returns 64 lower-case hex digits. Nothing may be added after it.
+  // Returns 64 lower-case hex digits. Nothing may be added afterwards.
   std::string finish();
 
  private:
@@ -64,11 +65,12 @@ class Sha256 {
 };
 // The SHA-256 of a text: 64 lower-case hex digits.
 std::string sha256_hex(std::string_view text);
-// The SHA-256 of a file, read once from its begin to its end; `progress` is advanced by its bytes.
+// Returns the SHA-256 of a file, reading it once from beginning to end. Advances `progress` by its
+// bytes.
 std::string sha256_of_file(const ReadableFile& file, const CancelToken& cancel,
                            Progress* progress = nullptr);
-// "sha-256=:BASE64:" of a SHA-256 in hex, as the header fields Content-Digest and Repr-Digest carry
-// it (RFC 9530).
+// Returns "sha-256=:BASE64:" for a SHA-256 in hex, the format of the header fields Content-Digest
+// and Repr-Digest (RFC 9530).
 std::string digest_field(const std::string& sha256);
 
 }  // namespace voxdag

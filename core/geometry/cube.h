@@ -16,7 +16,7 @@ namespace voxdag {
 inline constexpr int kMinGridLevels = 2;   // R = 4: the root is a brick
 inline constexpr int kMaxGridLevels = 20;  // R = 1 048 576
 
-// A child's coordinate in its parent along an axis, 0 or 1.
+// Returns a child's coordinate in its parent along an axis, 0 or 1.
 VOXDAG_HD constexpr int child_coordinate(int index, int axis) { return index >> (2 - axis) & 1; }
 
 struct Cube {
@@ -31,7 +31,7 @@ struct Cube {
   VOXDAG_HD Cube parent() const {
     return {level - 1, {position[0] >> 1, position[1] >> 1, position[2] >> 1}};
   }
-  // Which child of its parent this cube is.
+  // Returns the child index of this cube in its parent.
   VOXDAG_HD int child_index() const {
     return static_cast<int>(4 * (position[0] & 1) + 2 * (position[1] & 1) + (position[2] & 1));
   }
@@ -39,7 +39,7 @@ struct Cube {
   VOXDAG_HD int64_t edge_voxels(uint32_t grid_levels) const {
     return int64_t{1} << (grid_levels - level);
   }
-  // By level, then x, y and z: an order for containers, without meaning in the octree.
+  // Orders by level, then x, y and z. For containers only; it has no meaning in the octree.
   std::strong_ordering operator<=>(const Cube&) const = default;
 };
 

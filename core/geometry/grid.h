@@ -32,7 +32,7 @@ using WorldTriangle = RealTriangle;
 // On the lattice of a grid: whole odd numbers, of any magnitude.
 using SnappedTriangle = RealTriangle;
 
-// The bounds of triangles of finite vertices.
+// Returns the bounds of triangles with finite vertices.
 WorldBounds bounds_of(std::span<const WorldTriangle> triangles);
 
 struct Grid {
@@ -43,28 +43,28 @@ struct Grid {
   int64_t resolution() const { return int64_t{1} << levels; }
   bool operator==(const Grid&) const = default;
 
-  // The default cube around a scene. A scene without extent, or without triangles, gets edge 1.
-  // Throws Error{kInvalidInput} for levels outside [2, 20], Error{kLimit} if the grid is not
-  // finite.
+  // Returns the default cube around a scene. A scene without extent, or without triangles, gets
+  // edge 1. Throws Error{kInvalidInput} for levels outside [2, 20], Error{kLimit} if the grid is
+  // not finite.
   static Grid around(const WorldBounds& bounds, uint32_t levels);
-  // A cube given by its low corner and its edge, finite and edge > 0.
+  // Returns the cube with this low corner and this edge, finite and > 0.
   static Grid given(const std::array<double, 3>& origin, double edge, uint32_t levels);
-  // Voxels of edge `voxel_size`, the cube centered on the scene; a scene that does not fit is
-  // Error{kInvalidInput}.
+  // Returns a cube with voxels of edge `voxel_size`, centered on the scene. Throws
+  // Error{kInvalidInput} if the scene does not fit.
   static Grid with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels);
 };
 
 enum class SnapResult {
   kInside,   // may touch the grid
   kOutside,  // its box misses the grid: dropped and counted
-  kTooFar,   // reaches the grid, but a coordinate is beyond kCoordinateLimit: a limit error
+  kTooFar,   // touches the grid, but a coordinate is beyond kCoordinateLimit: a limit error
 };
 
 // Snaps vertices, three coordinates each, in place. NaN remains NaN.
 void snap_vertices(const Grid& grid, std::span<double> coordinates);
-// `out` is only meaningful for kInside.
+// Sets `out` only if it returns kInside.
 SnapResult to_fixed(const Grid& grid, const SnappedTriangle& snapped, FixedTriangle& out);
-// Both: snaps a triangle of finite vertices.
+// Snaps a triangle with finite vertices and converts it with to_fixed().
 SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out);
 
 // log2 of a resolution; throws Error{kInvalidInput} unless it is a power of two in [4, 2^20].

@@ -1,4 +1,4 @@
-// Descending the octree with a triangle: which children of a cube does it touch? Exact (closed
+// Descends the octree with a triangle: finds the children of a cube that it touches. Exact (closed
 // triangle, closed cube), so every way of walking the tree finds the same cubes.
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace voxdag {
 
-// The cube of `level`, at most cube.level, that contains `cube`.
+// Returns the cube of `level`, at most cube.level, that contains `cube`.
 inline Cube ancestor(const Cube& cube, uint32_t level) {
   const uint32_t up = cube.level - level;
   return {level, {cube.position[0] >> up, cube.position[1] >> up, cube.position[2] >> up}};
@@ -22,18 +22,18 @@ inline bool contains(const Cube& outer, const Cube& inner) {
   return inner.level >= outer.level && ancestor(inner, outer.level) == outer;
 }
 
-// The interior of a cube. Neighbors in a scene are mostly in the same cube, so the last cube is
-// tested before the octree is descended.
+// The interior of a cube. Neighbors in a scene are usually in the same cube, so the last cube is
+// tested before descending the octree.
 class CubeInside {
  public:
-  // Contains nothing.
+  // An empty interior.
   CubeInside() = default;
   CubeInside(const Cube& cube, uint32_t grid_levels)
       : shift_(kUnitBits + static_cast<int>(grid_levels - cube.level)) {
     for (int a = 0; a < 3; ++a) low_[a] = static_cast<int64_t>(cube.position[a]) << shift_;
   }
   bool contains(const FixedTriangle& triangle) const {
-    uint64_t distances = 0;  // from the low corner
+    uint64_t distances = 0;  // distances from the low corner
     for (const auto& vertex : triangle.v)
       for (int a = 0; a < 3; ++a) distances |= static_cast<uint64_t>(vertex[a] - low_[a]);
     return distances >> shift_ == 0;
@@ -44,7 +44,7 @@ class CubeInside {
   int shift_ = 0;
 };
 
-// The cells of a level that a triangle's box reaches.
+// The cells of a level that a triangle's box touches.
 struct CellBox {
   CellBox(const FixedTriangle& triangle, uint32_t grid_levels, uint32_t cell_level)
       : level(cell_level) {
@@ -74,8 +74,8 @@ struct CellBox {
   int64_t low[3], high[3];
 };
 
-// Bit c is set if the triangle touches child c of the cube, `parent_units` being the cube's edge in
-// lattice units. The triangle must touch the cube itself.
+// Bit c of the result is set if the triangle touches child c of the cube. `parent_units` is the
+// cube's edge in lattice units. The triangle must touch the cube itself.
 inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube,
                                  int64_t parent_units) {
   const int64_t half = parent_units / 2;
@@ -92,7 +92,8 @@ inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube
     inside &= first >= low[a] && last <= low[a] + parent_units;
   }
   if ((mask & (mask - 1)) == 0) return mask;  // its box is inside one child
-  // A triangle inside the cube that is on both sides of one middle, and no other, crosses it.
+  // A triangle inside the cube whose box crosses exactly one of the middle planes also crosses this
+  // plane.
   if (inside && popcount64(mask) == 2) return mask;
   uint32_t touched = 0;
   for (uint32_t rest = mask; rest; rest &= rest - 1) {

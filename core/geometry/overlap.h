@@ -1,8 +1,8 @@
 // The exact test of a closed triangle against a closed axis-aligned cube, both on the fixed-point
-// lattice: the separating-axis test as arranged in Schwarz and Seidel, "Fast Parallel Surface and
-// Solid Voxelization on GPUs" (2010), section 4.1: bounding box, plane, and three edge tests in
-// each of the three projections. All in integers, so it is exact for slivers and degenerate
-// triangles too. This is the definition that every faster kernel must equal.
+// lattice. It is the separating-axis test as arranged in Schwarz and Seidel, "Fast Parallel Surface
+// and Solid Voxelization on GPUs" (2010), section 4.1: bounding box, plane, and three edge tests in
+// each of the three projections. All arithmetic is in integers, so the test is also exact for
+// slivers and degenerate triangles. All faster kernels must give the same result.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 
 namespace voxdag {
 
-// The test in integers `Int` for products: 64 bits where the triangle's coordinates relative to the
-// cube, and the cube's edge, are below kNarrowReach, 128 where they are below 2^41.
+// The test with products of type `Int`: 64 bits if the cube's edge and the triangle's coordinates
+// relative to the cube are below kNarrowReach, 128 bits if they are below 2^41.
 template <class Int>
 VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int64_t (&low)[3],
                                                int64_t edge) {
@@ -57,8 +57,8 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
 // Edges of the triangle are then below 2^20, its normal below 2^41, the plane's sums below 2^63.
 inline constexpr int64_t kNarrowReach = int64_t{1} << 19;
 
-// `low`: the cube's low corner, `edge`: its edge, in lattice units (1/256 voxel).
-// Needs |coordinates| <= 2^40 for triangle and cube.
+// `low`: the cube's low corner, `edge`: its edge, in lattice units (1/256 voxel). Requires
+// |coordinates| <= 2^40 for triangle and cube.
 VOXDAG_HD inline bool triangle_touches_cube(const FixedTriangle& t, const int64_t (&low)[3],
                                             int64_t edge) {
   bool narrow = edge < kNarrowReach;

@@ -1,9 +1,8 @@
-// Reads a PNG or JPEG image row by row. Which of them it is, its first bytes tell. Profiles, gamma
-// and orientation are ignored, as glTF wants it.
+// Reads a PNG or JPEG image row by row. Detects the format by its first bytes. Ignores profiles,
+// gamma and orientation, as glTF requires.
 //
 // Decoders: libpng, and libjpeg-turbo with its accurate integer transform and smooth upsampling.
-// Whatever is wrong with the bytes, of any size that they claim, ends in BrokenImage. Not
-// thread-safe.
+// All invalid bytes end in BrokenImage, including bytes that declare any size. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -20,21 +19,21 @@ namespace voxdag {
 class EncodedBytes {
  public:
   virtual ~EncodedBytes() = default;
-  // Fills `out` and returns its size, or less where the bytes end.
+  // Fills `out` and returns its size, or less at the end of the bytes.
   virtual size_t read(std::span<std::byte> out) = 0;
 };
 
-// Ends "<image> ...": "is a WebP image, expected PNG or JPEG".
+// The end of a message "<image> ...", for example "is a WebP image, expected PNG or JPEG".
 struct BrokenImage {
   std::string message;
 };
 
 class ImageReader {
  public:
-  // Wider and higher images are refused, and such of more pixels.
+  // Max width and height, and max number of pixels. Larger images are refused.
   static constexpr uint32_t kMaxEdge = 65535;
   static constexpr uint64_t kMaxPixels = uint64_t{1} << 28;
-  // So is one whose decoder would need more memory than this.
+  // Images whose decoder needs more memory are refused.
   static constexpr uint64_t kMaxDecoderBytes = uint64_t{2} << 30;
 
   virtual ~ImageReader() = default;
@@ -42,8 +41,8 @@ class ImageReader {
   uint32_t height() const { return height_; }
   // Bits of a channel, 8 or 16.
   int bits() const { return bits_; }
-  // The next row: red, green, blue, alpha of each pixel, bits() each, in the machine's byte order.
-  // Throws BrokenImage and the source's errors.
+  // Reads the next row: red, green, blue, alpha of each pixel, bits() each, in the machine's byte
+  // order. Throws BrokenImage and the source's errors.
   virtual void read_row(std::span<std::byte> row) = 0;
 
  protected:
@@ -53,7 +52,7 @@ class ImageReader {
   int bits_ = 8;
 };
 
-// For kSize, rows are not read, and no memory is taken for them.
+// With kSize no rows can be read, and no memory is allocated for them.
 enum class ImageUse { kPixels, kSize };
 
 // The source must outlive the reader. Throws BrokenImage, Error{kOutOfMemory} if decoding does not

@@ -17,13 +17,14 @@
 
 namespace voxdag {
 
-// Changes when a file does: equal identities mean equal bytes, unless the file was changed so soon
-// before that the file system's clock had not advanced.
+// Changes when the file changes. Equal identities mean equal bytes, unless the file was changed so
+// recently that the file system's clock has not advanced since then.
 struct FileIdentity {
   uint64_t inode = 0;
   uint64_t bytes = 0;
-  int64_t modified_ns = 0;  // Unix time, of the contents
-  int64_t changed_ns = 0;   // of contents, names and times; no program can set it back
+  int64_t modified_ns = 0;  // Unix time of the last change of the contents
+  // Unix time of the last change of contents, names or times; no program can set it back.
+  int64_t changed_ns = 0;
   bool operator==(const FileIdentity&) const = default;
 };
 
@@ -32,9 +33,9 @@ class ReadableFile {
   virtual ~ReadableFile() = default;
   virtual const std::string& path() const = 0;
   virtual uint64_t size() const = 0;
-  // When it was opened; all zeros where that is not known.
+  // Identity when the file was opened; all zeros if unknown.
   virtual FileIdentity identity() const { return {}; }
-  // Fills `out` from `offset`; a file that ends before is Error{kCorrupt}.
+  // Fills `out` from `offset`. Throws Error{kCorrupt} if the file ends earlier.
   virtual void read_at(uint64_t offset, std::span<std::byte> out) const = 0;
 };
 
@@ -42,14 +43,15 @@ class WritableFile {
  public:
   virtual ~WritableFile() = default;
   virtual const std::string& path() const = 0;
-  // Writes all of `data` at `offset`, growing the file as needed.
+  // Writes all of `data` at `offset`. Extends the file as needed.
   virtual void write_at(uint64_t offset, std::span<const std::byte> data) = 0;
-  // Frees the space of a range whose contents are no longer needed. It reads as zeros afterwards,
-  // or as before where the file system cannot do that.
+  // Frees the disk space of a range whose contents are no longer needed. The range then reads as
+  // zeros, or as before if the file system does not support this.
   virtual void release(uint64_t /*offset*/, uint64_t /*bytes*/) {}
-  // Returns once all written data is on the disk.
+  // Returns after all written data is on the disk.
   virtual void sync() = 0;
-  // Flushes nothing by itself, reports what close() reports. Called by the destructor, silently.
+  // Does not flush. Throws the errors that close() reports. The destructor calls it and ignores
+  // errors.
   virtual void close() = 0;
 };
 
@@ -57,12 +59,13 @@ struct DirectoryEntry {
   std::string name;
   bool is_directory = false;
   uint64_t bytes = 0;
-  uint64_t disk_bytes = 0;  // disk usage: less than `bytes` where space was released
+  uint64_t disk_bytes = 0;  // disk usage; less than `bytes` if space was released
   double modified_s = 0;    // Unix time
   bool is_special = false;  // neither a file nor a directory: a link, a pipe, a device
 };
 
-// An exclusive lock, released when this is destroyed or the process ends, however it ends.
+// An exclusive lock. It is released when this object is destroyed or when the process ends for any
+// reason.
 class FileLock {
  public:
   virtual ~FileLock() = default;
@@ -73,16 +76,16 @@ class FileSystem {
   virtual ~FileSystem() = default;
   virtual std::unique_ptr<ReadableFile> open_read(const std::string& path) = 0;
   // Creates an empty file under `path`, or empties an existing file. Like open_write() and
-  // try_lock(), it refuses a symbolic link and a file with other hard links as
-  // Error{kInvalidInput}.
+  // try_lock(), throws Error{kInvalidInput} for a symbolic link and for a file with other hard
+  // links.
   virtual std::unique_ptr<WritableFile> create(const std::string& path) = 0;
   // Opens the file under `path` with its contents, or creates an empty one.
   virtual std::unique_ptr<WritableFile> open_write(const std::string& path) = 0;
   virtual bool exists(const std::string& path) = 0;
   virtual void rename(const std::string& from, const std::string& to) = 0;
   virtual void remove(const std::string& path) = 0;
-  // Makes the directory and those above it that are missing. A file in the place of one is
-  // Error{kInvalidInput}.
+  // Creates the directory and its missing parents. Throws Error{kInvalidInput} if one of these
+  // names is a file.
   virtual void make_directories(const std::string& path) = 0;
   // Removes an empty directory.
   virtual void remove_directory(const std::string& path) = 0;
@@ -91,14 +94,15 @@ class FileSystem {
   virtual void touch(const std::string& path) = 0;
   // Makes renames and new names in the directory survive a power cut.
   virtual void sync_directory(const std::string& path) = 0;
-  // Locks the file at `path`, made if it is not there; nullptr if another holder has it.
+  // Locks the file at `path`, creating it if necessary. Returns nullptr if another holder has the
+  // lock.
   virtual std::unique_ptr<FileLock> try_lock(const std::string& path) = 0;
-  // True if a holder has the lock of the file at `path`, which need only be readable. A try_lock()
-  // at the same instant may fail.
+  // True if a holder has the lock of the file at `path`, which must be readable. A concurrent
+  // try_lock() may fail.
   virtual bool is_locked(const std::string& path) = 0;
-  // Bytes that an unprivileged user may still write to the disk of `path`.
+  // Returns the bytes that an unprivileged user may still write to the disk of `path`.
   virtual uint64_t free_space(const std::string& path) = 0;
-  // The number of the disk of `path`. Paths on one disk share its free space.
+  // Returns the number of the disk of `path`. Paths on one disk share its free space.
   virtual uint64_t device(const std::string& path) = 0;
 };
 
@@ -107,8 +111,8 @@ FileSystem& system_files();
 
 // Folder for temporary files of this process: $TMPDIR, /tmp or the current folder.
 std::string temporary_parent();
-// Makes a folder that only this user may enter, named `prefix` plus six unpredictable characters,
-// and returns its path.
+// Creates a folder that only this user may enter and returns its path. Its name is `prefix` plus
+// six unpredictable characters.
 std::string make_temporary_folder(const std::string& prefix);
 
 // Removes the contents of a folder, if it exists.
@@ -116,12 +120,12 @@ void remove_entries(FileSystem& files, const std::string& path);
 // Removes a folder with its contents, if it exists.
 void remove_tree(FileSystem& files, const std::string& path);
 
-// The directory part of a path, "." if it has none.
+// Returns the directory part of a path, "." if it has none.
 std::string parent_directory(const std::string& path);
-// The whole of a small file; one larger than `limit_bytes` is Error{kLimit}.
+// Reads a small file completely. Throws Error{kLimit} if it is larger than `limit_bytes`.
 std::string read_small_file(FileSystem& files, const std::string& path, uint64_t limit_bytes);
-// Puts `contents` under `path`, whole or not at all: writes path + ".partial", syncs it, renames it
-// and syncs the directory.
+// Replaces the file at `path` by `contents` atomically: writes path + ".partial", syncs it, renames
+// it and syncs the directory.
 void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents);
 
 }  // namespace voxdag

@@ -1,4 +1,5 @@
-// A file system and files that forward every call to others: bases for those that change a few.
+// A file system and files that forward every call to others: base classes for implementations that
+// change a few calls.
 #pragma once
 
 #include <memory>
@@ -12,7 +13,7 @@ namespace voxdag {
 
 class ForwardingFiles : public FileSystem {
  public:
-  // `files` must outlive this.
+  // `files` must outlive this object.
   explicit ForwardingFiles(FileSystem& files) : files_(files) {}
 
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override {

@@ -5,7 +5,7 @@
 
 namespace voxdag {
 
-// As gethostname() gives it, cut to 255 bytes; "" if it gives none.
+// Returns the name from gethostname(), cut to 255 bytes; "" if there is none.
 std::string host_name();
 
 }  // namespace voxdag

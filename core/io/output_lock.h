@@ -14,7 +14,7 @@ namespace voxdag {
 
 class OutputLock {
  public:
-  // The locked file. It is empty and exists while a process writes the output.
+  // Path of the lock file. The file is empty and exists while a process writes the output.
   static std::string path_of(const std::string& output) { return output + ".lock"; }
   // Throws Error{kIo} if another process holds the lock.
   OutputLock(FileSystem& files, const std::string& output)

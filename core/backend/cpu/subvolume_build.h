@@ -1,5 +1,5 @@
-// Building the sub-DAG of one subvolume: triangles descend the octree to tiles, tiles are drawn and
-// reduced to nodes, nodes to the root.
+// Builds the sub-DAG of one subvolume. Triangles descend the octree to tiles; tiles are drawn and
+// reduced to nodes, and nodes to the root.
 #pragma once
 
 #include <cstdint>
@@ -14,23 +14,24 @@
 
 namespace voxdag::cpu {
 
-// For one build, by one thread. Throws OutOfBudget, before the sink is called, if the budget is too
-// small.
+// Used for one build, by one thread. Throws OutOfBudget, before the sink is called, if the budget
+// is too small.
 class SubvolumeBuild {
  public:
   SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, PooledMemory& memory,
                  const CancelToken& cancel, const TableSizes& expected);
   SubDagSummary run(TriangleStream& stream, SubDagSink& sink);
-  // After run().
+  // Valid after run().
   TableSizes table_sizes() const { return tables_.sizes(); }
 
  private:
   NodeRef build_streamed(TriangleStream& stream);
   void read(TriangleStream& stream);
-  // The node of a cube of 2^size_log2 voxels that the entries [first, first + count) of the stack
-  // may touch.
+  // Returns the node of a cube of 2^size_log2 voxels. The entries [first, first + count) of the
+  // stack may touch the cube.
   NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);
-  // True if a cube of at most tile size is better split, since its parts may be in the plane memo.
+  // True if it is better to split a cube of at most tile size, because its parts may be in the
+  // plane memo.
   bool worth_splitting(int size_log2, size_t first, size_t count);
   NodeRef build_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   Octants test_octants(Entry entry, const LatticeCube& cube) const;

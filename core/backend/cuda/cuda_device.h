@@ -1,5 +1,5 @@
-// One GPU as one backend uses it: a stream and pinned host memory for small transfers. Used for
-// many subvolumes, by one thread.
+// One GPU for one backend: a stream and pinned host memory for small transfers. Used for many
+// subvolumes, by one thread.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +20,9 @@ class CudaSpace;
 class CudaDevice {
  public:
   static constexpr std::string_view kName = "cuda";
-  static constexpr size_t kStagingTriangles = 4096;  // of a staging area: 288 KiB
+  static constexpr size_t kStagingTriangles = 4096;  // capacity of a staging area (288 KiB)
 
-  // Throws Error{kDevice} saying why there is no such device.
+  // Throws Error{kDevice} with the reason if there is no such device.
   explicit CudaDevice(int device);
 
   // Makes this the thread's current device.
@@ -32,15 +32,15 @@ class CudaDevice {
   // A pinned word that single values are copied to.
   void* mailbox() { return mailbox_.get(); }
 
-  // A pinned area; waits until the last copy from it is complete.
+  // Returns a pinned area. Waits until the last copy from this area is complete.
   std::span<FixedTriangle> free_staging(const std::string& where);
-  // Copies the first `count` triangles of the area that free_staging() returned last, in stream
-  // order.
+  // Copies the first `count` triangles of the area that free_staging() returned most recently, in
+  // stream order.
   void send_staging(size_t count, FixedTriangle* to, const std::string& where);
 
   // Free bytes of the device, including those that its memory pool retains.
   uint64_t available(const std::string& where) const;
-  // Allocates device memory in stream order. Throws OutOfBudget where there is not enough.
+  // Allocates device memory in stream order. Throws OutOfBudget if there is not enough.
   void* allocate(uint64_t bytes, const std::string& where);
   void release(void* memory) noexcept;
 
@@ -50,13 +50,14 @@ class CudaDevice {
     Event copied;
   };
 
-  int device_ = 0;  // the runtime's number
+  int device_ = 0;  // number in the CUDA runtime
   std::string place_;
-  cudaMemPool_t pool_ = nullptr;  // the device's own
+  cudaMemPool_t pool_ = nullptr;  // memory pool of this device
   Pinned<uint64_t> mailbox_;
   Staging staging_[2];
   int next_staging_ = 0;
-  Stream stream_;  // the last member: it is destroyed, and its work waited for, before the others
+  // Last member, so that its destructor waits for pending work before the others are destroyed.
+  Stream stream_;
 };
 
 }  // namespace voxdag::cuda

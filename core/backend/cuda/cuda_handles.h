@@ -12,9 +12,9 @@
 
 namespace voxdag::cuda {
 
-// Checks a call of the runtime: running out of device memory is OutOfBudget (the subvolume is
-// split), any other failure an Error{kDevice} that names the call and the place.
-// `call`: the runtime's or CUB's function; `where`: device and subvolume.
+// Checks a call of the runtime. Running out of device memory becomes OutOfBudget, so that the
+// subvolume is split. Any other failure becomes Error{kDevice} with the call and the place. `call`:
+// the function of the runtime or of CUB; `where`: device and subvolume.
 inline void check_call(cudaError_t status, const char* call, const std::string& where) {
   if (status == cudaSuccess) return;
   cudaGetLastError();  // clears the error, which is reported here

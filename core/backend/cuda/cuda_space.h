@@ -70,7 +70,7 @@ class CudaSpace {
   template <class T>
   void upload(const T* from, T* to, uint64_t n) {
     transfer(from, to, n, cudaMemcpyHostToDevice);
-    // `from` may be gone soon, and whether the copy still reads it depends on the system.
+    // `from` may be freed soon, and it depends on the system whether the copy is still reading it.
     check(cudaStreamSynchronize(stream()), "cudaStreamSynchronize");
   }
   template <class T>

@@ -1,5 +1,5 @@
-// The kernels of the CUDA backend, and their launch: the only code that runs on the device apart
-// from CUB's. Only for CUDA sources, and for the simulated device (tests/cuda_sim).
+// The kernels of the CUDA backend, and the function that launches them. No other code runs on the
+// device apart from CUB's. Only for CUDA sources, and for the simulated device (tests/cuda_sim).
 #pragma once
 
 #include <cuda_runtime.h>
@@ -14,7 +14,7 @@
 namespace voxdag::cuda {
 
 inline constexpr unsigned kThreadsPerBlock = 256;
-// What every device offers without asking.
+// Shared memory that every device has without a special request.
 inline constexpr size_t kMaxSharedBytes = size_t{48} << 10;
 
 template <class F>
@@ -39,7 +39,7 @@ __global__ void __launch_bounds__(Kernel::kThreads, Kernel::kMinResidentBlocks)
   }
 }
 
-// Output i of an expansion; its source is found by bisection.
+// Computes output i of an expansion. Finds its source by bisection.
 template <class F>
 struct ExpandOne {
   const uint32_t* offsets;
@@ -64,7 +64,7 @@ struct Grid {
   size_t shared_bytes = 0;
 };
 
-// Launches a kernel; every launch passes here. `where`: as in check_call().
+// Launches a kernel. All launches use this function. `where`: as in check_call().
 template <class... Parameters>
 void launch(const Grid& grid, cudaStream_t stream, const std::string& where,
             void (*kernel)(Parameters...), std::type_identity_t<Parameters>... arguments) {

@@ -31,7 +31,7 @@ BrickList<Space> voxelize(Space& space, Method method, const SubvolumeTask& task
       voxelize_by_tiles(space, task, triangles, bricks);
       return bricks;
     } catch (const OutOfBudget&) {
-      // A larger cube is split; the smallest has to fit, however many triangles there are.
+      // A larger cube can be split, but the smallest must fit for any number of triangles.
       if (cube_levels > kTileLevels) throw;
     }
   }

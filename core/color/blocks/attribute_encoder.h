@@ -26,7 +26,7 @@ class AttributeEncoder {
   void add(std::span<const ColoredCell> cells, std::span<const CellValues> values,
            uint32_t first_code);
   bool empty() const { return traits_.is_color() ? colors_.empty() : values_.empty(); }
-  // Once, after at least one cell was added.
+  // Call it once, after at least one cell was added.
   EncodedRegion finish(uint64_t morton);
 
  private:

@@ -20,10 +20,10 @@ inline constexpr size_t kBlockBytes = 16;
 
 using ColorBlock = std::array<std::byte, kBlockBytes>;
 
-// 1 to 32 colors; their alpha is not stored. The weights of cells that are not there are 0.
+// Encodes 1 to 32 colors. Their alpha is not stored. The weights of missing cells are 0.
 using EncodeBlock = ColorBlock (*)(const Color* colors, size_t count);
 ColorBlock encode_block_portable(const Color* colors, size_t count);
-// The same for AVX2, with the same results; null if it was not built or this machine cannot run it.
+// The AVX2 version, with the same results; null if it was not built or this machine cannot run it.
 EncodeBlock encode_block_avx2();
 EncodeBlock fastest_block_encoder();
 

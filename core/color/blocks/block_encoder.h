@@ -14,7 +14,7 @@
 
 namespace voxdag {
 
-// The weights are 0 to kTop; an end is what its stored bits decode to.
+// The weights are 0 to kTop. An end is the color that its stored bits decode to.
 struct BlockModeA {
   static constexpr int32_t kTop = 7;
   VOXDAG_INLINE static uint32_t pack(const int32_t (&end)[3]) {
@@ -44,7 +44,7 @@ template <class Set>
 class BlockEncoder {
  public:
   static ColorBlock encode(const Color* colors, size_t count) {
-    // Most blocks are full: compilers then know how often all loops run.
+    // Most blocks are full. With a constant count, compilers know the length of all loops.
     return count == kBlockCells ? encode_any(colors, kBlockCells) : encode_any(colors, count);
   }
 
@@ -111,8 +111,8 @@ class BlockEncoder {
     out.range = high - low;
   }
 
-  // Shortens the axis until its components have 10 bits, rounded toward 0. False if nothing is
-  // left.
+  // Shortens the axis until its components have 10 bits, rounded toward 0. Returns false if the
+  // result is zero.
   VOXDAG_INLINE static bool normalize(const int64_t (&from)[3], int32_t (&axis)[3]) {
     uint64_t largest = 0;
     for (const int64_t f : from) largest |= static_cast<uint64_t>(f < 0 ? -f : f);
@@ -125,7 +125,7 @@ class BlockEncoder {
     return true;
   }
 
-  // The colors along their principal axis. They must not all be equal.
+  // Projects the colors to their principal axis. They must not all be equal.
   VOXDAG_INLINE static void project_to_principal_axis(Colors& colors, size_t count,
                                                       Projection& out) {
     constexpr int kSteps = 4;
@@ -152,13 +152,13 @@ class BlockEncoder {
     normalize(next, axis);
     project(colors, count, axis, out);
     if (out.range > 0) return;
-    // Rounding turned it away from all differences.
+    // After rounding, the axis was orthogonal to all differences.
     for (int c = 0; c < 3; ++c) axis[c] = c == widest;
     project(colors, count, axis, out);
   }
 
-  // The ends that least squares finds for the weights which the colors' places along the axis are
-  // nearest to. Each weight is at most `top`, 0 and `top` occur, so that the determinant is not 0.
+  // Fits the ends by least squares. The weight of a color is the one nearest to its position on the
+  // axis. Each weight is at most `top`; the weights 0 and `top` occur, so the determinant is not 0.
   VOXDAG_INLINE static void fit_ends(const Colors& colors, size_t count,
                                      const Projection& projection, int32_t top,
                                      int32_t (&ends)[2][3]) {
@@ -178,8 +178,9 @@ class BlockEncoder {
     const int32_t mixed = top * sum - second_squares;
     const int32_t first_squares = top * (top * n - sum) - mixed;
     const int32_t determinant = first_squares * second_squares - mixed * mixed;
-    // Numerators below 2^27 are here multiplied by at most 14. A quotient of 31-bit numbers that is
-    // not whole is too far below the next whole number for a double to be rounded to it.
+    // Numerators are below 2^27 and are multiplied by at most 14 here. If a quotient of 31-bit
+    // numbers is not an integer, it is so far below the next integer that a double is never rounded
+    // up to it.
     const double divisor = 2 * determinant;
     for (int c = 0; c < 3; ++c) {
       const int32_t second = product_of(k, colors.value[c], count);
@@ -195,7 +196,7 @@ class BlockEncoder {
     }
   }
 
-  // Gives each color the weight of the nearest point between the ends, and adds up the errors.
+  // Gives each color the weight of the nearest point between the ends, and sums the errors.
   VOXDAG_INLINE static void choose_weights(const Colors& colors, size_t count,
                                            const int32_t (&ends)[2][3], int32_t top, Fit& out) {
     int32_t along[3], start = 0, square = 0;
@@ -215,7 +216,7 @@ class BlockEncoder {
       out.weights[i] = static_cast<uint8_t>(weights[i]);
     }
     for (size_t i = count; i < kBlockCells; ++i) out.weights[i] = 0;
-    // What weight k decodes to: (first (top - k) + second k + top / 2) / top, rounded down.
+    // Weight k decodes to (first (top - k) + second k + top / 2) / top, rounded down.
     const auto divisor = static_cast<uint16_t>(top);
     int32_t error = 0;
     for (int c = 0; c < 3; ++c) {
@@ -232,7 +233,7 @@ class BlockEncoder {
     out.error = error;
   }
 
-  // The ends are in the order of their bits, the larger first.
+  // Packs the ends in the order of their bits, the larger first.
   template <class Mode>
   VOXDAG_INLINE static void fit(const Colors& colors, size_t count, const Projection& projection,
                                 Fit& out) {
@@ -245,7 +246,7 @@ class BlockEncoder {
     choose_weights(colors, count, ends, Mode::kTop, out);
   }
 
-  // Eight weights, the first one lowest.
+  // Returns eight weights, the first one lowest.
   VOXDAG_INLINE static uint64_t eight(const uint8_t* weights) {
     uint64_t all = 0;
     for (int i = 0; i < 8; ++i) all |= uint64_t{weights[i]} << 8 * i;

@@ -18,21 +18,22 @@
 
 namespace voxdag {
 
-// The rank of a cell is counted from its ancestor so many levels above.
+// A cell's rank is counted within its ancestor this many levels above.
 inline constexpr uint32_t kPrefixLevels = 4;
 
 struct EncodedRegion {
-  uint64_t morton = 0;                               // of the region, among the cubes of its level
+  uint64_t morton = 0;  // of the region, among cubes of the region's level
   std::array<uint32_t, kRegionLevels + 1> counts{};  // cells by level, the finest first
   std::vector<std::byte> blocks;
-  // For the finest level and the next one, where kPrefixLevels above it there is a level below the
-  // region: for each cell of that level, in Morton order, the cells of the finer one before it.
+  // Two tables: for the finest level and for the next one. A table exists if the level
+  // kPrefixLevels above is below the region. It has an entry for each cell of that level above, in
+  // Morton order: the number of cells of the finer level before it.
   std::vector<uint32_t> prefix;
   ColorSum total;
 };
 
-// The stored color of a cell that is `up` levels above the finest one; its code belongs to its
-// level.
+// Returns the stored color of a cell `up` levels above the finest level. The cell's code belongs to
+// its level.
 using CellColor = std::function<Color(uint32_t up, const ColoredCell& cell)>;
 
 // Encodes a region whose finest cells come in parts, so that their sums need not be in memory
@@ -40,15 +41,15 @@ using CellColor = std::function<Color(uint32_t up, const ColoredCell& cell)>;
 // in addition to the result.
 class RegionEncoder {
  public:
-  // `levels` is kRegionLevels, or less where the grid has fewer remaining levels. If `color` is not
-  // null, it gives the cells' colors instead of their sums.
+  // `levels` is kRegionLevels, or less if the grid has fewer remaining levels. If `color` is not
+  // null, it returns the cells' colors, which are used instead of their sums.
   explicit RegionEncoder(uint32_t levels, CellColor color = nullptr)
       : levels_(levels), color_(std::move(color)) {}
-  // The next cells in increasing order, their codes counted from `first_code`; with that, they are
-  // below 8^levels.
+  // Adds cells in increasing order. Their codes are counted from `first_code`. The resulting codes
+  // are below 8^levels.
   void add(std::span<const ColoredCell> cells, uint32_t first_code = 0);
   bool empty() const { return colors_.empty(); }
-  // Requires at least one cell. Called once, at the end.
+  // Call it once, at the end. Requires at least one cell.
   EncodedRegion finish(uint64_t morton);
 
  private:
@@ -61,15 +62,15 @@ class RegionEncoder {
   const CellColor color_;
   EncodedRegion region_;
   std::vector<Color> colors_;
-  std::vector<ColoredCell> parents_;  // of the level that was added last
-  uint32_t last_code_ = 0;            // of a cell of that level
+  std::vector<ColoredCell> parents_;  // cells of the level that was added last
+  uint32_t last_code_ = 0;            // code of a cell of this level
 };
 
 // Encodes all cells in one call. Thread-safe.
 EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
                             const CellColor& color = nullptr);
 
-// How many entries `prefix` has with these counts.
+// Returns the number of entries of `prefix` for these counts.
 inline size_t prefix_entries(uint32_t levels,
                              const std::array<uint32_t, kRegionLevels + 1>& counts) {
   size_t entries = 0;

@@ -1,6 +1,6 @@
-// The values of a region for an attribute other than color, as the file stores them: in the order
-// of its colors (region.h), with a fixed number of bytes each, the lowest first. They come in
-// blocks of 32 cells like colors, the bytes of cells that are not there being 0.
+// The values of a region for an attribute other than color, as stored in the file: in the same
+// order as colors (region.h), with a fixed number of bytes each, lowest byte first. Like colors,
+// they come in blocks of 32 cells. Bytes of missing cells are 0.
 #pragma once
 
 #include <cstdint>
@@ -19,19 +19,19 @@ struct ValuedCell {
 };
 
 // Encodes a region, as encode_region() does for colors, and leaves `total` zero. Coarser cells get
-// the attribute's value_of_parent(). Thread-safe. Memory: up to 10 bytes for each cell, aside from
-// the result.
+// the attribute's value_of_parent(). Thread-safe. Memory: up to 10 bytes for each cell, in addition
+// to the result.
 EncodedRegion encode_values(Attribute attribute, uint32_t bytes, uint32_t levels, uint64_t morton,
                             std::span<const ValuedCell> cells);
 
-// The value of the `i`-th cell in blocks of values.
+// Returns the value of the `i`-th cell in blocks of values.
 inline uint32_t value_at(const std::byte* blocks, uint64_t i, uint32_t bytes) {
   uint32_t value = 0;
   for (uint32_t b = bytes; b-- > 0;)
     value = value << 8 | std::to_integer<uint32_t>(blocks[i * bytes + b]);
   return value;
 }
-// The value of the coarsest cell, which is the region.
+// Returns the value of the coarsest cell, which is the region.
 uint32_t value_of_region(const EncodedRegion& region, uint32_t bytes);
 
 }  // namespace voxdag

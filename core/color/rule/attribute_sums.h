@@ -37,7 +37,7 @@ class AttributeSums {
   void add(uint32_t cell, const SurfaceFacing& facing, uint32_t columns, uint32_t weight) {
     for_each([&](auto& sums) { sums.add(cell, facing, columns, weight); });
   }
-  // To be called when a surface first covers a column of the cell, once for each cell.
+  // Call it once for each cell, when a surface first covers a column of the cell.
   void reset(uint32_t cell) {
     for_each([&](auto& sums) { sums.reset(cell); });
   }

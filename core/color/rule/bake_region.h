@@ -34,16 +34,16 @@
 
 namespace voxdag {
 
-// Bakes one region after another, for one thread; the memory is used again.
+// Bakes one region after another, on one thread, and reuses its memory.
 template <class Textures>
 class RegionBaker {
  public:
   // Upper bound of its allocations, without `cells`.
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
-  // Maximum number of cells of a region that a triangle touches: 4 where its projection covers one.
+  // Maximum number of cells of a region that a triangle touches: 4 for each cell of its projection.
   static constexpr uint32_t kTriangleCells = 4u << (2 * kRegionLevels);
 
-  // The references must outlive it. Each triangle's material is an index into `materials`.
+  // The references must outlive this object. Each triangle's material is an index into `materials`.
   // `wanted`: the values that finish() computes in addition to colors. Material values are the
   // materials' numbers.
   RegionBaker(const ColorGrid& grid, std::span<const Material> materials, Textures& textures,
@@ -55,8 +55,8 @@ class RegionBaker {
         spread_[a][k] = static_cast<uint32_t>(spread_bits3(k) << (2 - a));
   }
 
-  // `region`: a cube of at most 64^3 color cells. `triangles`: all that may touch it, and at most
-  // 2^32. `cells` becomes the cells that they touch, in Morton order.
+  // `region`: a cube of at most 64^3 color cells. `triangles`: all triangles that may touch it, at
+  // most 2^32. Sets `cells` to the cells that they touch, in Morton order.
   void bake(const Cube& region, std::span<const FixedSurface> triangles,
             std::vector<ColoredCell>& cells) {
     begin(region);
@@ -64,7 +64,8 @@ class RegionBaker {
     finish(cells);
   }
 
-  // The same for triangles that come in any number of parts; `max_cells` may stop add().
+  // begin(), add() and finish() do the same for triangles in any number of parts. `max_cells` may
+  // stop add().
   void begin(const Cube& region, uint32_t max_cells = color::RegionCells::kMaxCells) {
     max_cells_ = max_cells;
     cells_.reserve(std::min(max_cells + kTriangleCells, color::RegionCells::kMaxCells));
@@ -74,16 +75,17 @@ class RegionBaker {
       last_[a] = first_[a] + (int64_t{1} << down) - 1;
     }
   }
-  // False: they touch more cells than they may, by up to kTriangleCells, and finish() gives no
-  // colors, but must be called.
+  // Returns false if the triangles touch more than `max_cells` cells (up to kTriangleCells more).
+  // finish() must then still be called, but returns no colors.
   bool add(std::span<const FixedSurface> triangles) {
     triangles_ = triangles;
     for (uint32_t i = 0; i < triangles.size() && cells_.count() <= max_cells_; ++i) add_triangle(i);
     add_waiting();
     return cells_.count() <= max_cells_;
   }
-  // The same in parts; after each, charge(bytes) receives the allocations of the sums for
-  // `wanted`, up to 16 MiB more than in its last call. It stops add() by returning false.
+  // Adds triangles in parts. After each part, charge(bytes) receives the allocated bytes of the
+  // sums for `wanted`, which grow by at most 16 MiB between two calls. If it returns false, add()
+  // stops.
   template <class Charge>
   bool add(std::span<const FixedSurface> triangles, const Charge& charge) {
     constexpr size_t kAtOnce = 16;
@@ -96,7 +98,7 @@ class RegionBaker {
     return are_all;
   }
   void finish(std::vector<ColoredCell>& cells) { finish(cells, values_); }
-  // `values`: one for each cell if normals or materials are wanted.
+  // `values` gets an element for each cell if normals or materials are wanted.
   void finish(std::vector<ColoredCell>& cells, std::vector<CellValues>& values) {
     cells_.take(cells, values);
   }
@@ -123,7 +125,8 @@ class RegionBaker {
     }
   }
 
-  // False if the triangle's box has no columns of any two axes: most tiny triangles.
+  // Returns false if the triangle's box contains no column of any two axes, as for most tiny
+  // triangles.
   bool may_cover(const FixedTriangle& triangle) const {
     const int bits = grid_.cell_bits() - 2;
     const int64_t half = int64_t{1} << (bits - 1);
@@ -133,8 +136,8 @@ class RegionBaker {
     return axes >= 2;
   }
 
-  // Adds a triangle to the cells of which it covers columns. Cells are collected in a batch, so
-  // that they are on their way from memory while others are found.
+  // Adds a triangle to the cells in which it covers columns. Cells are collected in a batch, so
+  // that their memory is prefetched while other cells are found.
   template <class Int>
   class CoveredCells {
    public:
@@ -170,7 +173,7 @@ class RegionBaker {
     static constexpr size_t kBatch = 32;
     struct Cell {
       int64_t p, q;
-      uint32_t columns, cell, weight;  // `cell`: the code, from cover() on the number
+      uint32_t columns, cell, weight;  // `cell` is the code, and after cover() the cell's number
       typename color::SurfaceLook<Textures>::Spot spot;
     };
 
@@ -224,7 +227,7 @@ class RegionBaker {
     if (waiting_.size() == kMaxWaiting) add_waiting();
     waiting_.push_back({index, code});
   }
-  // Adds closest points to those cells that nothing covers so far.
+  // Adds closest points to the cells that nothing has covered.
   void add_waiting() {
     std::optional<color::SurfaceLook<Textures>> look;
     color::SurfaceFacing facing;
@@ -254,7 +257,7 @@ class RegionBaker {
     return spread_[0][position[0] - first_[0]] | spread_[1][position[1] - first_[1]] |
            spread_[2][position[2] - first_[2]];
   }
-  // In lattice units.
+  // Returns the center in lattice units.
   std::array<int64_t, 3> center_of(uint32_t code) const {
     uint32_t at[3];
     morton_decode(code, at[0], at[1], at[2]);
@@ -267,13 +270,13 @@ class RegionBaker {
   const ColorGrid grid_;
   const std::span<const Material> materials_;
   Textures& textures_;
-  uint32_t spread_[3][64];  // by axis: the bits of a coordinate in a code
+  uint32_t spread_[3][64];  // per axis, the bits of a coordinate in a code
   std::span<const FixedSurface> triangles_;
   uint32_t max_cells_ = 0;
   int64_t first_[3] = {}, last_[3] = {};  // cells of the region
   color::RegionCells cells_;
   std::vector<Waiting> waiting_;
-  std::vector<CellValues> values_;  // none
+  std::vector<CellValues> values_;  // always empty
 };
 
 // RegionBaker::bake() for a single region.

@@ -50,14 +50,14 @@ VOXDAG_HD inline void normal_of(const FixedTriangle& t, Int (&n)[3]) {
   }
 }
 
-// Along x, y, z. The square root of IEEE 754 is exact for planes across an axis.
+// Along x, y, z. IEEE 754 square roots are exact for planes perpendicular to an axis.
 template <class Int>
 VOXDAG_HD inline double length_of(const Int (&n)[3]) {
   const double x = to_double(n[0]), y = to_double(n[1]), z = to_double(n[2]);
   return std::sqrt(x * x + y * y + z * z);
 }
 
-// Twice the triangle's area, in lattice units.
+// Returns twice the triangle's area, in lattice units.
 VOXDAG_HD inline double area_of(const FixedTriangle& triangle) {
   if (is_narrow(triangle)) {
     int64_t n[3];
@@ -74,7 +74,7 @@ struct CellTriangle {
   // The edge function in a projection, >= 0 inside: a x + b y + base in lattice units.
   struct Edge {
     Int a, b, base;
-    // In cells: the largest value over the closed cell (p, q) is >= 0 iff a p + b q + touch >= 0.
+    // In cells: the maximum over the closed cell (p, q) is >= 0 iff a p + b q + touch >= 0.
     Int touch;
   };
 
@@ -82,9 +82,9 @@ struct CellTriangle {
   int cell_bits;    // log2 E
   int64_t v[3][3];  // [vertex][permuted axis]
   Int normal[3];    // all 0 if the triangle is degenerate
-  double slope[2];  // of its height along axis 2; only for estimates
+  double slope[2];  // slope of the height along axis 2; only for estimates
   bool degenerate;
-  double area;  // doubled, in lattice units: the length of the normal
+  double area;  // twice the area in lattice units: the length of the normal
   // The plane's offset -n.v: in cells, rounded down and up; in quarters, at columns.
   Int plane_floor, plane_ceil, column_floor, column_ceil;
   // [projection along axis d][edge i from vertex i to i + 1], over axes d + 1 and d + 2.

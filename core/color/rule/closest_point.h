@@ -1,6 +1,6 @@
 // The point of a triangle that is closest to a cell's center, for cells in which no triangle covers
-// a column. In IEEE doubles, in the order written here; exact positions matter little, but all
-// machines must agree.
+// a column. Computed in IEEE doubles, in the order written here: the exact position matters little,
+// but all machines must agree.
 #pragma once
 
 #include <array>
@@ -25,8 +25,8 @@ VOXDAG_HD inline Vector cross(const Vector& a, const Vector& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-// Where on the segment from a to b, 0 to 1, the origin is closest; `distance` becomes the square of
-// how far it is.
+// Returns the position (0 to 1) on the segment from a to b that is closest to the origin. Sets
+// `distance` to the square of its distance.
 VOXDAG_HD inline double closest_on_segment(const Vector& a, const Vector& b, double& distance) {
   const Vector along = b - a;
   const double length = dot(along, along), forward = -dot(a, along);
@@ -40,8 +40,8 @@ VOXDAG_HD inline double closest_on_segment(const Vector& a, const Vector& b, dou
   return t;
 }
 
-// `center` in lattice units. The center's projection on the plane, if the triangle contains it;
-// otherwise the closest point of the edges, of the first edge on ties.
+// Returns the center's projection on the plane if the triangle contains it, otherwise the closest
+// point of the edges (on ties, of the first edge). `center` is in lattice units.
 VOXDAG_HD inline SurfacePoint closest_point(const FixedTriangle& triangle,
                                             const std::array<int64_t, 3>& center) {
   constexpr double kOne = static_cast<double>(kPointOne);

@@ -20,7 +20,7 @@ struct ColorGrid {
 
   // log2 of a color cell's edge in lattice units: 8 to 26.
   VOXDAG_HD int cell_bits() const { return kUnitBits + static_cast<int>(levels - color_levels); }
-  // The level of full regions, or 0 where the whole grid is smaller.
+  // Returns the level of full regions, or 0 if the complete grid is smaller.
   VOXDAG_HD uint32_t region_level() const {
     return color_levels > kRegionLevels ? color_levels - kRegionLevels : 0;
   }

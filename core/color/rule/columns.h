@@ -10,12 +10,12 @@ namespace voxdag::color {
 
 inline constexpr uint32_t kAllColumns = 0xffff;
 
-// How many columns there are, and the sums of their i and j.
+// The number of columns, and the sums of their i and j.
 struct ColumnTotals {
   int64_t count, sum_i, sum_j;
 };
 
-// The same for the 256 sets of columns of two rows: j is 0 or 1.
+// The same totals for the 256 sets of columns of two rows: j is 0 or 1.
 struct ColumnTable {
   uint8_t count[256] = {}, sum_i[256] = {}, sum_j[256] = {};
   constexpr ColumnTable() {
@@ -37,7 +37,8 @@ VOXDAG_HD inline ColumnTotals totals_of(uint32_t columns) {
           kTable.sum_j[low] + kTable.sum_j[high] + 2 * high_count};
 }
 
-// The columns (i, j) where first + a i + b j < 0. The sums must fit, or be meant to wrap.
+// Returns the columns (i, j) for which first + a i + b j < 0. The sums must fit, or wrap
+// intentionally.
 template <class Int>
 VOXDAG_HD inline uint32_t negative_columns_one_by_one(Int first, Int a, Int b) {
   uint32_t columns = 0;
@@ -49,7 +50,7 @@ VOXDAG_HD inline uint32_t negative_columns_one_by_one(Int first, Int a, Int b) {
   return columns;
 }
 
-// The same, two columns per step with SSE2, which every x86-64 has.
+// The same with SSE2, which every x86-64 has: two columns per step.
 template <class Int>
 VOXDAG_HD inline uint32_t negative_columns(Int first, Int a, Int b) {
 #ifdef VOXDAG_SSE2
@@ -58,7 +59,7 @@ VOXDAG_HD inline uint32_t negative_columns(Int first, Int a, Int b) {
     const __m128i two = _mm_set1_epi64x(wrapping_sum(a, a)), down = _mm_set1_epi64x(b);
     __m128i left = start, right = _mm_add_epi64(start, two), rows[4];
     for (int j = 0; j < 4; ++j) {
-      // The high halves have the signs.
+      // The signs are in the high halves.
       rows[j] = _mm_castps_si128(
           _mm_shuffle_ps(_mm_castsi128_ps(left), _mm_castsi128_ps(right), 0b11'01'11'01));
       left = _mm_add_epi64(left, down);

@@ -1,4 +1,4 @@
-// A triangle where it covers columns of cells: how much it weighs there, and its mean point.
+// A triangle that covers columns of cells: its weight and its mean point in a cell.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace voxdag::color {
 
-// What a column weighs where the surface is square to it; up to sqrt(3) times as much where it is
-// oblique, since it then has more area. Where nothing covers a column, each triangle weighs 1.
+// Weight of a column where the surface is perpendicular to it. Oblique surfaces have more area and
+// up to sqrt(3) times the weight. If nothing covers a column, each triangle weighs 1.
 inline constexpr double kColumnWeight = 64;
 
 struct Reciprocals {
@@ -24,7 +24,7 @@ struct Reciprocals {
 template <class Int>
 class CoveredSurface {
  public:
-  // The triangle must outlive it. A degenerate triangle covers nothing.
+  // The triangle must outlive this object. A degenerate triangle covers nothing.
   VOXDAG_HD explicit CoveredSurface(const CellTriangle<Int>& triangle) : t_(triangle) {
     if (t_.degenerate) return;
     const double normal = to_double(t_.normal[2]);
@@ -36,7 +36,7 @@ class CoveredSurface {
     return column_weight_ * static_cast<uint32_t>(totals.count);
   }
 
-  // The mean of the covered columns of a cell, at least one.
+  // Returns the mean of the covered columns of a cell. There must be at least one.
   VOXDAG_HD SurfacePoint mean_point(int64_t p, int64_t q, const ColumnTotals& totals) const {
     constexpr Reciprocals kReciprocals{};
     const Int sum_p = 4 * p * totals.count + totals.sum_i;
@@ -47,7 +47,8 @@ class CoveredSurface {
   }
 
  private:
-  // Exact sum over the columns of the edge function, which is the area opposite to a vertex.
+  // Returns the exact sum of the edge function over the columns, which is the area opposite to a
+  // vertex.
   VOXDAG_HD Int sum_of(int i, Int sum_p, Int sum_q, Int count) const {
     const auto& e = t_.edges[2][i];
     const Int quarters = wrapping_sum(wrapping_product(e.a, sum_p), wrapping_product(e.b, sum_q));

@@ -1,5 +1,5 @@
-// Integers of the color rule: products that are exact, or exact modulo 2^64 where the result is
-// known to fit, and conversions to doubles that round alike everywhere.
+// Integers of the color rule. Products are exact, or exact modulo 2^64 if the result is known to
+// fit. Conversions to doubles round in the same way on every machine.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 #include "core/base/host_device.h"
 #include "core/base/integers.h"
 
-// What is done with SSE2 is also there in plain code.
+// Code with SSE2 has an equivalent in plain code.
 #ifdef VOXDAG_SSE2
 #include <emmintrin.h>
 #endif
@@ -41,7 +41,7 @@ VOXDAG_HD inline Int negative_part(Int x) {
   return x < 0 ? x : 0;
 }
 
-// Rounds to nearest, once. 128-bit numbers that do not fit in 64 bits are rounded by halves,
+// Rounds to nearest, once. 128-bit numbers that do not fit in 64 bits are rounded as two halves,
 // because compilers convert them with different library functions.
 VOXDAG_HD inline double to_double(int64_t x) { return static_cast<double>(x); }
 VOXDAG_HD inline double to_double(int128 x) {
@@ -51,7 +51,7 @@ VOXDAG_HD inline double to_double(int128 x) {
          static_cast<double>(static_cast<uint64_t>(x));
 }
 
-// floor(x) of a number of magnitude below 2^62.
+// Returns floor(x) for |x| below 2^62.
 VOXDAG_HD inline int64_t floor_of(double x) {
   const int64_t whole = static_cast<int64_t>(x);
   return static_cast<double>(whole) > x ? whole - 1 : whole;

@@ -12,7 +12,7 @@
 
 namespace voxdag::color {
 
-// One of AttributeSums.
+// A member of AttributeSums.
 class MaterialSums {
  public:
   static constexpr Attribute kAttribute = Attribute::kMaterial;
@@ -42,7 +42,7 @@ class MaterialSums {
   }
   void clear() {
     materials_.clear();
-    further_ = {};  // which may be large
+    further_ = {};  // frees the memory, which may be large
     max_further_ = kFewFurther;
   }
   uint64_t bytes() const {
@@ -53,7 +53,7 @@ class MaterialSums {
  private:
   static constexpr size_t kFewFurther = size_t{1} << 14;
 
-  // Cells mostly have one material; the weights of others are in a list of all cells.
+  // Most cells have one material. The weights of further materials are in one list for all cells.
   struct FirstMaterial {
     uint32_t material = 0;
     uint32_t is_reset = 0;
@@ -62,7 +62,7 @@ class MaterialSums {
   struct FurtherMaterial {
     uint32_t cell = 0;
     uint32_t material = 0;
-    uint64_t weight = 0;  // twice the weight, and whether it came after the reset
+    uint64_t weight = 0;  // twice the weight, plus 1 if it was added after the reset
 
     bool is_like(const FurtherMaterial& other) const {
       return cell == other.cell && material == other.material && !((weight ^ other.weight) & 1);
@@ -102,7 +102,7 @@ class MaterialSums {
 
   std::vector<FirstMaterial> materials_;
   std::vector<FurtherMaterial> further_;
-  size_t max_further_ = kFewFurther;  // before their weights are added up
+  size_t max_further_ = kFewFurther;  // length of the list at which its weights are added up
 };
 
 }  // namespace voxdag::color

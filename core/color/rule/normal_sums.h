@@ -11,8 +11,8 @@
 
 namespace voxdag::color {
 
-// The sum of the triangles' areas in a cell. `turned` sums them with the dominant component turned
-// positive: the orientation of a sheet whose two sides are in the cell.
+// The sum of the triangles' areas in a cell. In `turned`, the dominant component of each area is
+// positive. This is the orientation of a sheet whose two sides are both in the cell.
 struct NormalSum {
   int64_t area[3] = {}, turned[3] = {};
 
@@ -25,8 +25,8 @@ struct NormalSum {
   }
 };
 
-// The normal of the sum of all areas, or of the turned areas where the sum is less than 1/64 of
-// them.
+// Returns the normal of the sum of all areas, or of the turned areas if the sum is less than 1/64
+// of them.
 VOXDAG_HD inline NormalCode normal_of_sum(const NormalSum& sum) {
   const auto largest = [](const int64_t(&v)[3]) {
     int64_t most = 0;
@@ -38,7 +38,7 @@ VOXDAG_HD inline NormalCode normal_of_sum(const NormalSum& sum) {
   return (rest | turned) == 0 ? kNoNormal : encode_normal(v[0], v[1], v[2]);
 }
 
-// One of AttributeSums.
+// A member of AttributeSums.
 class NormalSums {
  public:
   static constexpr Attribute kAttribute = Attribute::kNormal;

@@ -1,8 +1,9 @@
 // The cells of a region that surfaces touch, and their sums, found by Morton code in the region.
 //
-// A cell is covered if a surface covers a column of it; surfaces that do not then count for
-// nothing. Since that is known at the end only, a cell has the sum of the latter until the first
-// one that covers a column starts it from zero. So the sums do not depend on the order.
+// A cell is covered if a surface covers a column of it. In a covered cell, surfaces that cover no
+// column are ignored. This is known only at the end. So a cell has the sum of non-covering surfaces
+// until the first surface that covers a column restarts it from zero. The sums do not depend on the
+// order of the surfaces.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +25,7 @@ class RegionCells {
   static constexpr uint64_t kMaxBytes =
       uint64_t{kMaxCells} * (4 + 3 * sizeof(ColorSum)) + (64 << 10);
 
-  // `wanted`: for what else than the color there are sums.
+  // `wanted`: attributes other than color that have sums.
   explicit RegionCells(const AttributeSet& wanted = {})
       : attributes_(wanted), places_(kMaxCells), touched_(kMaxCells / 64) {}
 
@@ -32,9 +33,9 @@ class RegionCells {
   void reserve(size_t cells) { sums_.reserve(cells); }
 
   bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
-  // To be called some time before the cell is touched or covered.
+  // Call it some time before touch() or cover().
   void prefetch(uint32_t code) const { __builtin_prefetch(&places_[code]); }
-  // Makes the cell exist. The sums of cells are numbered.
+  // Adds the cell if it is new, and returns the number of its sum.
   uint32_t touch(uint32_t code) {
     uint32_t& place = places_[code];
     if (place == 0) {
@@ -44,7 +45,8 @@ class RegionCells {
     }
     return (place & ~kCovered) - 1;
   }
-  // The sum of surfaces that cover columns of the cell.
+  // Like touch(), for a surface that covers columns of the cell. The first call for a cell restarts
+  // its sum from zero.
   uint32_t cover(uint32_t code) {
     const uint32_t number = touch(code);
     if (!is_covered(code)) {
@@ -59,7 +61,7 @@ class RegionCells {
 
   AttributeSums& attributes() { return attributes_; }
 
-  // Moves the cells into `cells`, in Morton order, and their values other than colors and alpha
+  // Moves the cells into `cells`, in Morton order. Moves their values other than colors and alpha
   // into `values`, which remains empty without such attributes.
   void take(std::vector<ColoredCell>& cells, std::vector<CellValues>& values) {
     cells.clear();
@@ -89,7 +91,8 @@ class RegionCells {
   static constexpr uint32_t kCovered = 1u << 31;
 
   AttributeSums attributes_;
-  std::vector<uint32_t> places_;  // in sums_, from 1, and kCovered if it is; 0: not touched
+  // Number in sums_, counted from 1, plus kCovered if the cell is covered; 0: not touched.
+  std::vector<uint32_t> places_;
   std::vector<uint64_t> touched_;
   std::vector<ColorSum> sums_;
 };

@@ -15,7 +15,7 @@ inline constexpr double kColumnArea = 1 << 20;
 
 // A triangle's contribution to each cell that it touches.
 struct SurfaceFacing {
-  // For each column: the normal, as long as the column's area. Up to kColumnArea along each axis.
+  // For each column: a normal whose length is the column's area. Up to kColumnArea along each axis.
   int64_t area[3] = {};
   bool is_backward = false;  // its dominant component is negative
   uint32_t material = 0;

@@ -1,4 +1,4 @@
-// What a triangle looks like at a point of it: texture, factor and vertex color, and alpha.
+// The look of a triangle at one of its points: texture, factor, vertex color and alpha.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct SurfacePoint {
   int64_t second, third;
 };
 
-// Clamped, so that no weight is negative.
+// The weights are clamped, so that none is negative.
 VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
   constexpr double kOne = static_cast<double>(kPointOne);
   SurfacePoint point{0, 0};
@@ -31,10 +31,10 @@ VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
   return point;
 }
 
-// The level of the image's pyramid that has one to two texels along the edge of a color cell, on
-// the mean over the triangle: the largest l with 4^l <= texels in the triangle / its area in cells.
-// `area`: of the triangle, doubled, in lattice units. A triangle without area is taken for a square
-// over its longest edge, or over a lattice unit. All in IEEE doubles, in this order.
+// Returns the level of the image's pyramid that has one to two texels along the edge of a color
+// cell, on average over the triangle: the largest l with 4^l <= texels in the triangle / its area
+// in cells. `area`: twice the triangle's area, in lattice units. A triangle without area counts as
+// a square over its longest edge, or over a lattice unit. All in IEEE doubles, in this order.
 template <class Textures>
 VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& textures,
                                         uint32_t image, int cell_bits, double area) {
@@ -46,7 +46,7 @@ VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& t
     du[i] = static_cast<double>(c[j].texture[0] - c[i].texture[0]);
     dv[i] = static_cast<double>(c[j].texture[1] - c[i].texture[1]);
   }
-  double texels;  // 2^(2 kTextureBits) times their number
+  double texels;  // number of texels, times 2^(2 kTextureBits)
   if (area > 0) {
     const double determinant = du[0] * dv[1] - du[1] * dv[0];
     texels = (determinant < 0 ? -determinant : determinant) * (width * height);
@@ -116,7 +116,8 @@ VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, 
 #endif
 }
 
-// How a triangle contributes to the cells that it touches. The textures must outlive it.
+// The contribution of a triangle to the cells that it touches. The textures must outlive this
+// object.
 template <class Textures>
 class SurfaceLook {
  public:
@@ -140,12 +141,12 @@ class SurfaceLook {
     for (const uint32_t t : tint_) no_tint_ = no_tint_ && t == kFullIntensity;
   }
 
-  // Where to look for a point.
+  // The position of a point in the textures.
   struct Spot {
     SurfacePoint point;
     TexelSquare texels;  // if there is an image
   };
-  // Its texels are on their way from memory then.
+  // Also prefetches the texels.
   VOXDAG_HD Spot spot_at(const SurfacePoint& point) const {
     Spot spot{point, {}};
     if (!view_) return spot;
@@ -155,7 +156,7 @@ class SurfaceLook {
     return spot;
   }
 
-  // Adds the look at a spot, which stands for `weight`, less than 2^24.
+  // Adds the look at a spot with `weight`, which is less than 2^24.
   VOXDAG_HD void add(const Spot& spot, uint64_t weight, ColorSum& sum) {
     Texel texel = ~Texel{0};
     if (view_) texel = look_up(*view_, spot.texels);
@@ -178,7 +179,7 @@ class SurfaceLook {
     }
   }
 
-  // Rounded down. Changes of 2^32 and more, 256 images, need 128 bits.
+  // Rounds down. Changes of 2^32 or more (256 images) need 128 bits.
   VOXDAG_HD int64_t coordinate(const SurfacePoint& point, int a) const {
     const int64_t second = change_[0][a], third = change_[1][a];
     int64_t change;
@@ -206,8 +207,8 @@ class SurfaceLook {
   Wrap wrap_[2];
   int64_t change_[2][2];  // of texture coordinates, from corner 0 to corners 1 and 2
   bool is_near_;          // all changes are below kNear
-  bool one_tint_;         // all over the triangle
-  bool no_tint_;          // it leaves texels as they are
+  bool one_tint_;         // the same tint for the complete triangle
+  bool no_tint_;          // the tint does not change texels
   uint32_t tint_[4] = {};
 };
 

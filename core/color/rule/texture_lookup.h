@@ -16,13 +16,13 @@ VOXDAG_HD inline uint32_t channel(Texel texel, int index) {
   return static_cast<uint32_t>(texel >> (16 * index)) & 0xffff;
 }
 
-// a b / 65535, rounded to nearest: the product of two intensities.
+// Returns a b / 65535, rounded to nearest: the product of two intensities.
 VOXDAG_HD inline uint32_t scaled(uint32_t a, uint32_t b) {
   const uint32_t product = a * b + 32768;
   return (product + (product >> 16)) >> 16;
 }
 
-// A coordinate in [0, 2^kTextureBits].
+// Wraps a coordinate into [0, 2^kTextureBits].
 VOXDAG_HD inline int64_t wrapped(int64_t coordinate, Wrap wrap) {
   constexpr int64_t kOne = int64_t{1} << kTextureBits;
   if (wrap == Wrap::kRepeat) return coordinate & (kOne - 1);
@@ -31,7 +31,7 @@ VOXDAG_HD inline int64_t wrapped(int64_t coordinate, Wrap wrap) {
   return in_two > kOne ? 2 * kOne - in_two : in_two;
 }
 
-// The two texels next to a coordinate along one axis, and how much of 256 the second one counts.
+// The two texels next to a coordinate along one axis, and the weight of the second one (of 256).
 struct TexelPair {
   uint32_t first, second, fraction;
 };
@@ -49,7 +49,7 @@ VOXDAG_HD inline TexelPair texels_at(int64_t coordinate, Wrap wrap, uint32_t siz
   return pair;
 }
 
-// Two channels each in one word of two 32-bit lanes, since 65535 * 65536 + 32768 < 2^32.
+// Each word has two channels in 32-bit lanes, because 65535 * 65536 + 32768 < 2^32.
 VOXDAG_HD inline Texel blended(const Texel (&texels)[4], uint32_t x_fraction, uint32_t y_fraction) {
   constexpr uint64_t kLanes = 0x0000ffff0000ffffull, kHalf = 0x0000800000008000ull;
   const uint64_t x1 = x_fraction, x0 = 256 - x1, y1 = y_fraction, y0 = 256 - y1;
@@ -67,7 +67,7 @@ struct TexelSquare {
   TexelPair x, y;
 };
 
-// `view`: of a level of an image.
+// `view` is a level of an image.
 template <class View>
 VOXDAG_HD inline TexelSquare texels_around(const View& view, const Wrap (&wrap)[2], int64_t u,
                                            int64_t v) {

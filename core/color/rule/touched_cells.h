@@ -60,7 +60,7 @@ class TouchedCells {
     }
   }
 
-  // Sets first_ and last_, the cells of the column that the plane touches.
+  // Sets first_ and last_ to the range of the column's cells that the plane touches.
   VOXDAG_HD void find_plane(int64_t p, int64_t q) {
     if (t_.degenerate) {
       first_ = range_.first[2];
@@ -80,10 +80,11 @@ class TouchedCells {
     lowest_ = wrapping_sum(wrapping_sum(at_cell, t_.plane_ceil), fall_);
     correct();
   }
-  // The same, from the column before.
+  // Updates them from the previous column.
   VOXDAG_HD void climb() {
     if (t_.degenerate) return;
-    // By at most a cell: one step without branches, which nobody could predict.
+    // The plane rises by at most one cell. One step without branches, which would often be
+    // mispredicted.
     const Int n = t_.normal[2];
     highest_ += t_.normal[1];
     lowest_ += t_.normal[1];
@@ -94,8 +95,8 @@ class TouchedCells {
     last_ -= static_cast<int64_t>(down);
     lowest_ -= n * down;
   }
-  // highest_ becomes the plane's highest value over cell first_, the first cell where it is >= 0;
-  // lowest_ its lowest value over last_, the last where it is <= 0.
+  // Sets first_ to the first cell where the plane's highest value is >= 0, and last_ to the last
+  // cell where its lowest value is <= 0. highest_ and lowest_ become these values.
   VOXDAG_HD void correct() {
     const Int n = t_.normal[2];
     for (; highest_ < 0; ++first_) highest_ += n;
@@ -112,7 +113,7 @@ class TouchedCells {
     const bool inside =
         !t_.degenerate && ((at[0] - margin_[0]) | (at[1] - margin_[1]) | (at[2] - margin_[2])) >= 0;
     const uint32_t columns = t_.degenerate ? 0 : inside ? kAllColumns : columns_in_shadow(p, q);
-    // The plane in the column of cells is split by the planes between them.
+    // If the plane touches several of these cells, the covered columns are divided among the cells.
     const bool split = first_ != last_ && columns != 0;
     const bool exact = t_.column_floor == t_.column_ceil;
     Int at_bottom = 0;

@@ -16,7 +16,7 @@ namespace voxdag {
 class BrickTable {
  public:
   struct Slot {
-    uint64_t mask;  // 0: the slot is free
+    uint64_t mask;  // 0: free slot
     uint32_t id;
     uint32_t tag;  // top half of the brick's hash
   };
@@ -25,14 +25,14 @@ class BrickTable {
 
   uint64_t size() const { return count_; }
 
-  // Reserves slots for `more` bricks; must precede the calls below.
+  // Reserves slots for `more` bricks. Call it before the functions below.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow(count_ + more);
   }
 
   void prefetch(uint64_t hash) const { __builtin_prefetch(&slots_[hash >> shift_]); }
 
-  // `hash` is hash_brick(mask), mask not 0.
+  // Requires mask != 0. `hash` is hash_brick(mask).
   uint32_t find_or_add(uint64_t mask, uint64_t hash) {
     uint64_t at = hash >> shift_;
     while (true) {
@@ -53,8 +53,8 @@ class BrickTable {
       if (slot.mask != 0) visit(slot.mask, slot.id);
   }
 
-  // All slots in use, in the order of (hash truncated to `hash_bits`, mask). The table can then no
-  // longer be searched.
+  // Returns all used slots, in the order of (hash truncated to `hash_bits`, mask). Afterwards the
+  // table cannot be searched.
   std::span<const Slot> sort_slots(uint32_t hash_bits);
 
  private:

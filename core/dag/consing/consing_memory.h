@@ -8,8 +8,9 @@
 namespace voxdag {
 
 struct ConsingMemory {
-  // Pages retained for the next sub-DAG, uncharged, while they fit next to the charged memory. A
-  // budget of less than eight times kMinPageBytes can be exceeded by kMinPageBytes.
+  // Retained pages for the next sub-DAG. They are not charged, and are kept only while they fit
+  // next to the charged memory. A budget of less than eight times kMinPageBytes can be exceeded by
+  // kMinPageBytes.
   static constexpr uint64_t kMinPageBytes = uint64_t{8} << 20;
   static constexpr uint64_t kMaxPageBytes = uint64_t{128} << 20;
   static constexpr uint64_t page_bytes(uint64_t budget_bytes) {

@@ -54,8 +54,8 @@ class NodeTable {
   uint64_t total_children() const { return used_ - count_ * Record::kWords; }
   Record record(uint32_t id) { return {&records_[id]}; }
 
-  // Reserves memory for `more` nodes; must precede the calls below. Eight children can be read from
-  // any record, however many it has.
+  // Reserves memory for `more` nodes. Call it before the functions below. Eight children can be
+  // read from any record, even if it has fewer.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow_slots(count_ + more);
     const uint64_t words = kFirstId + used_ + more * (Record::kWords + 8);
@@ -68,8 +68,8 @@ class NodeTable {
     __builtin_prefetch(&records_[static_cast<uint32_t>(slots_[hash >> shift_])]);
   }
 
-  // The id of a node with this hash, mask (not 0) and popcount(mask) children. Eight elements of
-  // `children` must be readable, however many there are.
+  // Returns the id of the node with this hash, mask (not 0) and popcount(mask) children; adds the
+  // node if it is new. Eight elements of `children` must be readable, even if there are fewer.
   uint32_t find_or_add(uint64_t hash, uint32_t mask, const uint32_t* children, int child_count) {
     uint64_t at = hash >> shift_;
     while (const uint64_t slot = slots_[at]) {
@@ -90,17 +90,18 @@ class NodeTable {
     }
   }
 
-  // All slots in use, in the order of (hash, mask, children) of their records; the lower half of a
-  // slot is an id. `hashes_changed`: records were given other hashes than they were added with. The
-  // table can then no longer be searched.
+  // Returns all used slots, in the order of (hash, mask, children) of their records. The lower half
+  // of a slot is an id. `hashes_changed`: records were given new hashes after they were added.
+  // Afterwards the table cannot be searched.
   std::span<const uint64_t> sort_slots(bool hashes_changed);
 
  private:
-  static constexpr uint64_t kFirstId = 1;  // so that no slot in use is 0
+  static constexpr uint64_t kFirstId = 1;  // not 0, because a used slot must not be 0
 
   bool is_node(uint32_t id, uint32_t mask, const uint32_t* children, int child_count) const {
     const uint32_t* words = &records_[id + 2];
-    // Compares all eight without branching: a loop over the children would often be mispredicted.
+    // Compares all eight without branches, because a loop over the children would often be
+    // mispredicted.
     const uint32_t(&compared)[8] = kFirstWords.of[child_count];
     uint32_t differ = words[0] ^ mask;
     for (int i = 0; i < 8; ++i) differ |= (words[1 + i] ^ children[i]) & compared[i];

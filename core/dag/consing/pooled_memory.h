@@ -1,5 +1,5 @@
-// Memory for the build of one subvolume: arrays charged to its budget, on pages that are cached
-// between subvolumes, since fetching fresh ones from the system costs more than filling them.
+// Memory for the build of one subvolume: arrays charged to its budget. Their pages are cached
+// between subvolumes, because new pages from the system cost more than filling them.
 #pragma once
 
 #include <cstddef>
@@ -25,11 +25,13 @@ class PagePool {
   PagePool& operator=(const PagePool&) = delete;
   ~PagePool() { clear(); }
 
-  // The size of a new page range for `bytes`: a power of two up to 4 MiB, whole pages above.
+  // Returns the size of a new page range for `bytes`: a power of two up to 4 MiB, whole pages
+  // above.
   static size_t range_bytes(size_t bytes);
-  // Removes the smallest cached range of `bytes` to `max_bytes` bytes; null without one.
+  // Removes and returns the smallest cached range of `bytes` to `max_bytes` bytes; null if there is
+  // none.
   Pages take(size_t bytes, size_t max_bytes);
-  // Caches the range; frees the oldest ones where there would be more than `max_cached` bytes.
+  // Caches the range. Frees the oldest ranges if the cache would exceed `max_cached` bytes.
   void put(Pages pages, size_t max_cached) noexcept;
   void clear() noexcept;
   size_t cached_bytes() const { return cached_bytes_; }
@@ -37,22 +39,22 @@ class PagePool {
  private:
   void free_oldest() noexcept;
 
-  std::vector<Pages> cached_;  // the oldest first
+  std::vector<Pages> cached_;  // oldest first
   size_t cached_bytes_ = 0;
 };
 
-// Allocates the arrays of one build, charged to `budget` while they live. Cached pages are not
-// charged, but are freed where the budget has no room for them and an allocation together.
+// Allocates the arrays of one build, charged to `budget` during their lifetime. Cached pages are
+// not charged. They are freed if the budget has no space for both them and an allocation.
 class PooledMemory {
  public:
   MemoryBudget& budget;
   PagePool& pool;
 
-  // Zeroed pages of range_bytes(bytes), or, if `zero` is false, up to twice that with undefined
-  // contents. Throws OutOfBudget where the budget has no room, Error{kOutOfMemory} where the system
-  // has none.
+  // Returns zeroed pages of range_bytes(bytes). If `zero` is false, returns up to twice as many,
+  // with undefined contents. Throws OutOfBudget if the budget has no space, Error{kOutOfMemory} if
+  // the system has none.
   PagePool::Pages allocate(size_t bytes, bool zero);
-  // Makes a range larger and preserves its contents. Throws like allocate(); the range is then
+  // Enlarges a range and preserves its contents. Throws like allocate(); the range is then
   // unchanged.
   void grow(PagePool::Pages& pages, size_t bytes);
   void free(PagePool::Pages pages) noexcept;
@@ -81,8 +83,8 @@ class PooledArray {
     if (pages_.data) memory_->free(pages_);
   }
 
-  // Makes the size at least `size`, and at least a quarter larger than before. Elements are
-  // preserved; new ones are undefined.
+  // Increases the size to at least `size`, and by at least a quarter. Elements are preserved; new
+  // ones are undefined.
   void grow(PooledMemory& memory, size_t size) {
     if (!pages_.data) {
       *this = PooledArray(memory, size);

@@ -1,5 +1,5 @@
-// The common part of the two hash tables: the number of their slots, and sorting the slots, which
-// linear probing leaves nearly in the order of the hash.
+// The common part of the two hash tables: the number of their slots, and a sort of the slots, which
+// linear probing leaves nearly in hash order.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// Slots are at most 5/8 full, and a power of two.
+// Returns the maximum number of used slots: 5/8 of `slots`, which is a power of two.
 inline uint64_t entries_for(uint64_t slots) { return slots / 8 * 5; }
 inline uint64_t slots_for(uint64_t entries) {
   uint64_t slots = 512;
@@ -18,8 +18,9 @@ inline uint64_t slots_for(uint64_t entries) {
   return slots;
 }
 
-// Moves the slots in use to the front, in their order, and those that wrapped around the end of the
-// table behind them, where they belong. `tag(slot)` is the upper half of the hash.
+// Moves the used slots to the front without changing their order. Slots that wrapped around the end
+// of the table go behind the others, which is their correct place. `tag(slot)` is the upper half of
+// the hash.
 template <class Slot, class InUse, class Tag>
 std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   std::vector<Slot> wrapped;
@@ -30,7 +31,7 @@ std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
     else
       slots[count++] = slots[i];
   }
-  // Always written, then overwritten if it is not in use: a branch would be mispredicted half the
+  // Always writes; an unused slot is then overwritten. A branch would be mispredicted half the
   // time.
   for (; i < slots.size(); ++i) {
     const bool used = in_use(slots[i]);
@@ -41,13 +42,13 @@ std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   return slots.first(count + wrapped.size());
 }
 
-// Sorts slots that are no further from their position than the longest cluster of the table.
+// Sorts slots whose distance from their final position is at most the longest cluster of the table.
 // `tag(slot)` is the upper half of the hash; `less(a, b)` must be consistent with it.
 template <class Slot, class Tag, class Less>
 void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
   if (slots.empty()) return;
-  // Most of the work, almost without branches: from the back, the slot with the smallest tag so far
-  // moves down until it meets a smaller one.
+  // First pass: most of the work, almost without branches. From the back, the slot with the
+  // smallest tag so far moves down until it meets a smaller tag.
   Slot down = slots.back();
   for (size_t i = slots.size() - 1; i-- > 0;) {
     const Slot other = slots[i];
@@ -56,7 +57,7 @@ void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
     down = passes ? down : other;
   }
   slots.front() = down;
-  // The remaining work: insertion sort.
+  // Second pass: insertion sort.
   for (size_t i = 1; i < slots.size(); ++i) {
     const auto before = tag(slots[i - 1]), here = tag(slots[i]);
     if (before < here) continue;

@@ -35,7 +35,8 @@ struct OctreeCounts {
   }
 };
 
-// The number of entries in the tables of a cube, by s; an estimate for the next cube.
+// The numbers of entries in the tables for one cube, indexed by s. They are an estimate for the
+// next cube.
 struct TableSizes {
   uint64_t entries[kMaxGridLevels + 1] = {};
 };
@@ -54,9 +55,10 @@ class SubDagTables {
   OctreeCounts& counts() { return counts_; }
   TableSizes sizes() const;
 
-  // Adds a brick, which may be empty; counts one octree node if it is not.
+  // Adds a brick, which may be empty. Counts one octree node if it is not empty.
   NodeRef add_brick(uint64_t mask);
-  // Adds the parent of eight cubes of half its size; counts one octree node if it is not empty.
+  // Adds the parent of eight cubes of half its size. Counts one octree node if the parent is not
+  // empty.
   NodeRef add_node(int size_log2, const NodeRef (&children)[8]);
 
  private:

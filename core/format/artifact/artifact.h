@@ -24,7 +24,8 @@ namespace voxdag {
 
 inline constexpr uint32_t kFrameRows = 4096;
 
-// The place of an artifact. `checksum` covers its index, which has the checksums of all frames.
+// The position of an artifact. `checksum` covers its index, which contains the checksums of all
+// frames.
 struct ArtifactRef {
   uint32_t segment = 0;       // id of the segment file
   uint64_t offset = 0;        // first byte of the artifact
@@ -53,10 +54,10 @@ struct ArtifactRoot {
 // A frame in its level.
 struct FrameInfo {
   uint64_t first_row = 0;
-  uint64_t first_child = 0;  // children of the rows of the level before this frame
-  uint64_t first_hash = 0;   // truncated hash of its first row
+  uint64_t first_child = 0;  // children of all rows before this frame, in the same level
+  uint64_t first_hash = 0;   // truncated hash of the frame's first row
   uint64_t offset = 0;       // in the segment
-  uint32_t bytes = 0;        // as stored
+  uint32_t bytes = 0;        // stored size
   uint32_t rows = 0;
   uint32_t children = 0;
   uint64_t checksum = 0;

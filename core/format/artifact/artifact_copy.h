@@ -11,15 +11,15 @@
 namespace voxdag {
 
 // Appends the artifact at `ref` in `from` to `to`, as the artifact of `cube` on a grid of
-// 2^grid_levels voxels per edge. The checksums of the frames are verified. Throws Error{kCorrupt}
-// if the artifact is damaged, not of one subvolume, or not of a cube of this size.
+// 2^grid_levels voxels per edge. Verifies the checksums of the frames. Throws Error{kCorrupt} if
+// the artifact is damaged, has several subvolumes, or belongs to a cube of another size.
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
                           uint32_t grid_levels, SegmentWriter& to);
 
-// Writes the artifact at `ref` of `from` as a cache entry at `path`, whole or not at all: first to
-// `partial`, a name that only the caller uses, which is then renamed. The file is not synced: an
-// entry that a power failure damages fails its checksums and is a cache miss. Returns the size of
-// the file in bytes.
+// Writes the artifact at `ref` of `from` as a cache entry at `path`, atomically: writes to
+// `partial`, a name that only the caller uses, and renames it. The file is not synced. If a power
+// failure damages an entry, its checksums fail and it is a cache miss. Returns the size of the file
+// in bytes.
 uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
                            const ReadableFile& from, const ArtifactRef& ref);
 
@@ -27,10 +27,11 @@ struct CacheEntry {
   std::unique_ptr<ReadableFile> file;
   ArtifactRef ref;
   ArtifactRoot root;       // as it was built
-  uint64_t dag_nodes = 0;  // of all its levels
+  uint64_t dag_nodes = 0;  // total of all levels
 };
 
-// Throws Error{kNotFound} if there is no file, Error{kCorrupt} or Error{kUnsupportedVersion}.
+// Throws Error{kNotFound} if the file does not exist; Error{kCorrupt} or Error{kUnsupportedVersion}
+// if it is invalid.
 CacheEntry read_cache_entry(FileSystem& files, const std::string& path);
 
 }  // namespace voxdag

@@ -27,8 +27,8 @@ struct ArtifactIndex {
 
 std::vector<std::byte> encode_index(const ArtifactIndex& index);
 
-// Throws Error{kCorrupt} or Error{kUnsupportedVersion} beginning with `where` unless every field
-// obeys the rules of docs/format.md, so that a decoded index needs no further check.
+// Throws Error{kCorrupt} or Error{kUnsupportedVersion} beginning with `where` if any field violates
+// the rules of docs/format.md. So a decoded index needs no further check.
 ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& ref,
                            const std::string& where);
 

@@ -16,18 +16,18 @@ namespace voxdag {
 
 class ArtifactReader {
  public:
-  // `segment` must be the file that ref.segment names. Throws Error{kCorrupt} or
+  // `segment` must be the file of ref.segment. Throws Error{kCorrupt} or
   // Error{kUnsupportedVersion}.
   ArtifactReader(std::shared_ptr<ReadableFile> segment, const ArtifactRef& ref);
 
   const DagShape& shape() const { return shape_; }
   std::span<const ArtifactRoot> roots() const { return roots_; }
-  // From the bricks upwards: level L-2 first.
+  // Levels from the bricks upwards: level L-2 first.
   std::span<const ArtifactLevel> levels() const { return levels_; }
-  // nullptr if the artifact does not reach up to `level`.
+  // Returns nullptr if the artifact has no such level.
   const ArtifactLevel* level(uint32_t level) const;
-  // Decodes frame `index` of `level`, which must exist. Throws Error{kCorrupt} naming segment,
-  // level and frame.
+  // Decodes frame `index` of `level`, which must exist. Throws Error{kCorrupt} with segment, level
+  // and frame.
   void read_frame(uint32_t level, size_t index, Frame& out) const;
 
  private:

@@ -1,5 +1,6 @@
-// Writes one artifact to a segment, level by level from the bricks upwards, any number of rows at a
-// time. Throws Error{kCorrupt} naming segment and level if rows break the rules of artifact.h.
+// Writes one artifact to a segment, level by level from the bricks upwards. Each call adds any
+// number of rows. Throws Error{kCorrupt} with segment and level if rows violate the rules of
+// artifact.h.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +29,7 @@ class ArtifactWriter : public SubDagSink {
   void bricks(const BrickLevelView& level) override;
   void nodes(const NodeLevelView& level) override;
 
-  // Writes the index. The artifact can be read once the segment was flushed.
+  // Writes the index. The artifact can be read after the next flush of the segment.
   ArtifactRef finish(std::span<const ArtifactRoot> roots);
 
  private:

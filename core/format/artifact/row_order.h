@@ -8,7 +8,7 @@
 
 namespace voxdag {
 
-// The row before the checked rows; not present at the start of a level.
+// The row before the checked rows; none at the start of a level.
 struct LastRow {
   bool present = false;
   uint64_t hash = 0;
@@ -16,12 +16,12 @@ struct LastRow {
   uint32_t children[8] = {};
 };
 
-// Bricks: masks not 0, strictly increasing by (hash, mask), where hashes[i] belongs to masks[i].
-// Returns nullptr or the error; `last` becomes the last row.
+// Checks bricks: masks not 0, strictly increasing by (hash, mask), where hashes[i] belongs to
+// masks[i]. Returns nullptr or the error; `last` becomes the last row.
 const char* check_brick_order(std::span<const uint64_t> hashes, std::span<const uint64_t> masks,
                               LastRow& last);
-// Nodes: masks not 0, as many children as the masks have bits, each below `child_rows`, hashes
-// truncated to `hash_bits`, strictly increasing in the total order. Returns nullptr or the
+// Checks nodes: masks not 0, as many children as the masks have bits, each below `child_rows`,
+// hashes truncated to `hash_bits`, strictly increasing in the total order. Returns nullptr or the
 // error; `last` becomes the last row.
 const char* check_node_order(const NodeLevelView& rows, uint64_t child_rows, uint32_t hash_bits,
                              LastRow& last);

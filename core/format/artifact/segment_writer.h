@@ -15,8 +15,8 @@
 
 namespace voxdag {
 
-// What a SegmentWriter charges to the budget: a buffer of 1 MiB, the frame that an ArtifactWriter
-// builds, and zstd's tables.
+// Memory that a SegmentWriter charges: a buffer of 1 MiB, the frame that an ArtifactWriter builds,
+// and zstd's tables.
 inline constexpr uint64_t kSegmentWriterBytes = uint64_t{3} << 19;
 
 // "segment-<id>.vdseg" in `folder`.
@@ -30,21 +30,21 @@ class SegmentWriter {
   SegmentWriter(FileSystem& files, const std::string& folder, uint32_t id, MemoryBudget& budget);
   ~SegmentWriter();
   uint32_t id() const { return id_; }
-  // Bytes so far, buffered ones included.
+  // Bytes appended so far, including buffered bytes.
   uint64_t size() const { return written_ + buffered_; }
-  // Writes the buffer to the file without waiting for the disk, so that readers see all bytes.
+  // Writes the buffer to the file, so that readers see all bytes. Does not wait for the disk.
   void flush();
-  // Flushes and frees the buffer. Nothing may be appended after it.
+  // Flushes and frees the buffer. Nothing may be appended afterwards.
   void complete();
-  // Flushes, and returns once all bytes so far, and the name of the file, are on the disk.
+  // Flushes. Returns after all bytes so far and the file's directory entry are on the disk.
   void sync();
-  // The same for the bytes that were flushed before. It may run concurrently with all calls of
-  // another thread but sync() and itself. Once it has failed it always fails, since the system
-  // reports only once that it lost bytes.
+  // Syncs the bytes flushed before the call. Another thread may call any function concurrently,
+  // except sync() and this one. After a failure it always fails, because the system reports lost
+  // bytes only once.
   void sync_written();
   // Bytes that were flushed.
   uint64_t written() const { return written_; }
-  // Frees the disk space that a flush left behind when it failed for lack of space.
+  // Frees the disk space left by a flush that failed because the disk was full.
   void release_unwritten();
 
  private:

@@ -1,9 +1,9 @@
-// Writes the section of an attribute behind the levels of a global file. docs/format.md, "The color
-// section" and "The sections of alpha, normals and materials", is the byte layout.
+// Writes the section of an attribute after the levels of a global file. docs/format.md, "The color
+// section" and "The sections of alpha, normals and materials", documents the byte layout.
 //
-// The regions of tier 0 are written as they come. The cells of the coarser tiers and the
-// directories are in memory until finish(): 32 bytes a region, and tier 1, which is a
-// ten-thousandth of tier 0. All of that is charged to the budget. One thread uses a writer.
+// The regions of tier 0 are written when they are added. The cells of the coarser tiers and the
+// directories are in memory until finish(): 32 bytes per region, and tier 1, which is a
+// ten-thousandth of tier 0. All of this is charged to the budget. One thread uses a writer.
 #pragma once
 
 #include <cstdint>
@@ -21,15 +21,15 @@ namespace voxdag {
 
 class AttributeSectionWriter {
  public:
-  // Encodes a region of colors of a tier above the first; each cell has the sum of the totals of
-  // the regions in it.
+  // Encodes a region of colors in a tier above the first. Each cell has the sum of the totals of
+  // its regions.
   using EncodeColors = std::function<EncodedRegion(uint32_t tier, uint64_t morton,
                                                    std::span<const ColoredCell> cells)>;
 
-  // The levels of `file` must be complete, and there must be some. The set cells of level
-  // `cell_levels` (2 to 20, at most the grid's) have the attribute, and also the cells of all
-  // coarser levels. `names`: the list indexed by the values, if the attribute has one. Without
-  // `encode_coarse` coarser cells have the colors of their sums.
+  // The levels of `file` must be complete and not empty. The set cells of level `cell_levels` (2 to
+  // 20, at most the grid's) and of all coarser levels have the attribute. `names`: the list indexed
+  // by the values, if the attribute has one. Without `encode_coarse`, coarser cells have the colors
+  // of their sums.
   AttributeSectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
                          std::span<const std::string> names, MemoryBudget& budget,
                          EncodeColors encode_coarse = nullptr);

@@ -1,7 +1,7 @@
-// Where the nodes of a level of the global file begin. Nodes vary in size, so that this takes a
-// walk over the level from its first word. It is cut into spans for several threads: each span but
-// the first is walked from a word that looks like the beginning of a node, and walked again if the
-// span before it does not end there.
+// Finds where the nodes of a level of the global file begin. Nodes vary in size, so this requires a
+// walk over the level from its first word. The level is cut into spans for several threads. Each
+// span but the first is walked from a word that looks like the beginning of a node. If the previous
+// span does not end there, the span is walked again.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 
 namespace voxdag {
 
-// What the nodes of a level point to their children with; bricks have none.
+// The kind of child pointers in the nodes of a level. Bricks have none.
 enum class Pointers { kNone, kNarrow, kWide };
 
 // Maps the word offset where a node of a level of the global file begins to its index in the level.
@@ -34,7 +34,7 @@ class NodeIndex {
   NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsigned threads,
             MemoryBudget& budget, const CancelToken& cancel, const std::string& where);
 
-  // The index of the node that begins at `offset`; kNone if none does.
+  // Returns the index of the node that begins at `offset`; kNone if no node begins there.
   uint64_t find(uint64_t offset) const {
     if (offset >= level_.word_count) return kNone;
     if (pointers_ == Pointers::kNone) return offset % 2 == 0 ? offset / 2 : kNone;
@@ -44,7 +44,8 @@ class NodeIndex {
                : kNone;
   }
 
-  // The nodes that begin in a span are visited by one thread: visit(index, offset) in their order.
+  // Each span is visited by one thread, which calls visit(index, offset) for the nodes that begin
+  // in the span, in order.
   uint64_t span_count() const { return (level_.word_count + kSpanWords - 1) / kSpanWords; }
   template <class Visit>
   void visit_span(uint64_t span, Visit&& visit) const {
@@ -58,7 +59,7 @@ class NodeIndex {
       for (uint64_t bits = starts_[i]; bits != 0; bits &= bits - 1)
         visit(index++, i * 64 + static_cast<uint64_t>(std::countr_zero(bits)));
   }
-  // Where the last node before the span begins; the span is not the first.
+  // Returns where the last node before the span begins. The span must not be the first.
   uint64_t last_before(uint64_t span) const;
 
  private:
@@ -68,7 +69,7 @@ class NodeIndex {
     uint64_t begin = 0;  // where its first node begins
     uint64_t end = 0;    // where its last node ends
     uint64_t nodes = 0;
-    bool broken = false;  // at `end`, no node can begin there
+    bool broken = false;  // no node can begin at `end`
   };
 
   uint64_t words_of_node(uint64_t at) const;
@@ -79,7 +80,7 @@ class NodeIndex {
   voxdag_reader::Level level_;
   Pointers pointers_ = Pointers::kNone;
   PageBuffer<uint64_t> starts_;        // one bit per word: a node begins here
-  PageBuffer<uint64_t> nodes_before_;  // for each 64 words
+  PageBuffer<uint64_t> nodes_before_;  // one entry per 64 words
 };
 
 }  // namespace voxdag

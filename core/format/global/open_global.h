@@ -26,7 +26,7 @@ inline Error as_error(const voxdag_reader::Error& error) {
   return Error(ErrorCode::kCorrupt, error.what());
 }
 
-// Returns what `use()` returns. Errors of the reader are thrown as Error.
+// Returns the result of `use()`. Errors of the reader are thrown as Error.
 template <class Use>
 auto with_reader_errors(Use use) {
   try {
@@ -36,7 +36,7 @@ auto with_reader_errors(Use use) {
   }
 }
 
-// Returns what `use()` returns. Errors of damage that do not name the file yet do so then.
+// Returns the result of `use()`. Adds the file's name to errors of damage that lack it.
 template <class Use>
 auto naming_file(const std::string& path, const Use& use) {
   try {
@@ -47,14 +47,14 @@ auto naming_file(const std::string& path, const Use& use) {
   }
 }
 
-// The reader, which stands alone, repeats the table's numbers.
+// The standalone reader repeats the table's numbers.
 static_assert(std::ranges::all_of(kAttributeTable, [](const AttributeTraits& row) {
   const auto kind = static_cast<uint32_t>(row.attribute);
   return kind < voxdag_reader::kEndOfKinds &&
          voxdag_reader::kKindBlockBytes[kind] == traits_of(row.encoding).block_bytes;
 }));
 
-// The section of an attribute; one without tiers if the file has none.
+// Returns the section of an attribute; one without tiers if the file has none.
 inline const voxdag_reader::ColorSection& section_of(const voxdag_reader::File& file,
                                                      Attribute attribute) {
   return file.section(static_cast<uint32_t>(attribute));
@@ -92,10 +92,10 @@ void put_value(Attribute attribute, const voxdag_reader::ColorRegion& region, ui
   }
 }
 
-// The bytes of a file, and the file of such bytes: whoever watches the mapping for pages that
-// cannot be read (WatchedMapping) does so between the two.
+// Two steps: maps the file's bytes, and opens the file in them. A caller that watches the mapping
+// for unreadable pages (WatchedMapping) starts watching between the two.
 inline std::shared_ptr<const voxdag_reader::Bytes> map_global_file(const std::string& path) {
-  system_files().open_read(path);  // refuses a folder or a pipe as it does for every other input
+  system_files().open_read(path);  // refuses a folder or a pipe like every other input
   return with_reader_errors([&] {
     return std::make_shared<const voxdag_reader::Bytes>(path, voxdag_reader::Access::kMap);
   });

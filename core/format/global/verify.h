@@ -24,8 +24,8 @@
 
 namespace voxdag {
 
-// Throws Error{kCorrupt} that names the problem, the place and the expectation. Works on up to
-// `threads` threads. Levels of over `narrow_words` words must be wide, others not.
+// Throws Error{kCorrupt} with the problem, the place and the expectation. Works on up to `threads`
+// threads. Levels of more than `narrow_words` words must be wide, and only those.
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
                         Progress& progress, const CancelToken& cancel,
                         uint64_t narrow_words = global_layout::kNarrowLevelWords);

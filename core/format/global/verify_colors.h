@@ -16,8 +16,8 @@
 
 namespace voxdag {
 
-// Throws Error{kCorrupt} that names the problem, the place and the expectation. Works on up to
-// `threads` threads; a file without attributes is valid.
+// Throws Error{kCorrupt} with the problem, the place and the expectation. Works on up to `threads`
+// threads. A file without attributes is valid.
 void verify_colors(const voxdag_reader::File& file, unsigned threads, Progress& progress,
                    const CancelToken& cancel);
 

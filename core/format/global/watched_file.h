@@ -10,12 +10,12 @@ namespace voxdag {
 
 class WatchedFile {
  public:
-  // `file` must outlive this.
+  // `file` must outlive this object.
   explicit WatchedFile(const voxdag_reader::File& file)
       : file_(file), mapping_(file.data(), file.file_bytes()) {}
 
-  // Throws Error{kIo} if a part of the file could not be read since then; results made from it must
-  // be discarded.
+  // Throws Error{kIo} if a part of the file could not be read since construction. Results made from
+  // the file must then be discarded.
   void check_readable() const {
     if (mapping_.is_damaged())
       throw Error(ErrorCode::kIo,
@@ -23,7 +23,7 @@ class WatchedFile {
   }
 
   // Returns the result of work(), which must call check_readable() before it publishes a result.
-  // Its errors may be caused by zeros.
+  // Errors of work() may be caused by pages of zeros.
   template <class Work>
   auto run(const Work& work) const {
     try {

@@ -1,5 +1,5 @@
-// The plane of a triangle. Which voxels are set in a cube that the triangle covers depends only on
-// the plane's direction and its offset from the cube's corner.
+// The plane of a triangle. If the triangle covers a cube, the set voxels of the cube depend only on
+// the plane's direction and on its offset from the cube's corner.
 #pragma once
 
 #include <cstdint>
@@ -18,21 +18,22 @@ namespace voxdag::cpu {
 struct Plane {
   int64_t n[3];
   int128 c;
-  bool fractional;  // (n.q + c) / 256 is no integer, for all cubes alike: q is a multiple of 256
+  // (n.q + c) / 256 is not an integer; the same for all cubes, because q is a multiple of 256.
+  bool fractional;
 
   // Sums of the positive and of the negative components.
   int64_t rising() const;
   int64_t falling() const;
 
-  // True if all values n.k + f within a cube that the plane crosses fit 62 bits.
+  // True if all values n.k + f within a cube that the plane crosses fit in 62 bits.
   bool fits(int size_log2) const;
-  // True if the plane touches a cube of 2^size_log2 voxels with offset f. Needs fits().
+  // True if the plane touches a cube of 2^size_log2 voxels with offset f. Requires fits().
   bool crosses(int64_t f, int size_log2) const;
-  // Sets f for a cube; false if the plane misses it. Needs fits().
+  // Sets f for a cube. Returns false if the plane misses the cube. Requires fits().
   bool offset_from(const LatticeCube& cube, int size_log2, int64_t& f) const;
 };
 
-// The plane of a triangle whose vertices have equal coordinates along an axis; found without
+// Returns the plane of a triangle whose vertices have equal coordinates along an axis. Needs no
 // arithmetic.
 template <class Int>
 std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t) {
@@ -45,10 +46,10 @@ std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t) {
   return {};
 }
 
-// The plane of a triangle that is not degenerate.
+// Returns the plane of a triangle, which must not be degenerate.
 Plane plane_of(const NarrowTriangle& t);
 
-// The plane n.k + f crosses voxel k iff low <= n.k <= high.
+// Range of n.k: the plane n.k + f crosses voxel k iff low <= n.k <= high.
 struct PlaneRange {
   int64_t low, high;
 
@@ -58,13 +59,14 @@ struct PlaneRange {
       rising += x > 0 ? x : 0;
       size += x > 0 ? x : -x;
     }
-    // Over a voxel's corners the value rises to n.k + f + rising, and falls below that by `size`.
+    // Over a voxel's corners the value rises to n.k + f + rising. Its minimum is `size` below that
+    // maximum.
     low = -(f + rising);
     high = low + size - (fractional ? 1 : 0);
   }
 };
 
-// The voxels of a brick that the plane n.k + f crosses.
+// Returns the voxels of a brick that the plane n.k + f crosses.
 inline uint64_t plane_brick(const int64_t (&n)[3], int64_t f, bool fractional) {
   const PlaneRange crossed(n, f, fractional);
   uint64_t mask = 0;

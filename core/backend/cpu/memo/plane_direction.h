@@ -16,7 +16,7 @@ namespace voxdag::cpu {
 // Not thread-safe.
 class PlaneDirection {
  public:
-  static constexpr int kSizeLog2 = 3;  // of the nodes
+  static constexpr int kSizeLog2 = 3;  // size of the nodes
   static constexpr int kCorners = 9 * 9 * 9;
 
   struct Known {
@@ -31,13 +31,14 @@ class PlaneDirection {
     return n_[0] == plane.n[0] && n_[1] == plane.n[1] && n_[2] == plane.n[2];
   }
 
-  // n.k for the voxels k of a node in Morton order; times 8, for the nodes of a tile.
+  // n.k for the voxels k of a node in Morton order. Multiplied by 8, these are the values for the
+  // nodes of a tile.
   const int64_t* offsets() const { return offsets_; }
   // A plane crosses a node iff its offset f is within [min_offset(), max_offset()].
   int64_t min_offset() const { return values_[0]; }
   int64_t max_offset() const { return values_[kCorners - 1] - 1; }
 
-  // The node at an offset within [min_offset(), max_offset()].
+  // Returns the node at an offset within [min_offset(), max_offset()].
   const Known& node(int64_t f, SubDagTables& tables, const Kernels& kernels) {
     Known& known = known_[interval(f)];
     if (known.nodes == 0) make(f, tables, kernels, known);
@@ -47,13 +48,13 @@ class PlaneDirection {
  private:
   static constexpr int kBuckets = 256;
 
-  // The number of values <= f, minus one.
+  // Returns the number of values <= f, minus one.
   int interval(int64_t f) const {
     int i = bucket_[bucket(f)];
     while (values_[i + 1] <= f) ++i;
     return i;
   }
-  // Monotonic in f. The table was made by the same arithmetic, so rounding does not matter.
+  // Monotonic in f. The table was built with the same arithmetic, so rounding does not matter.
   int bucket(int64_t f) const {
     return static_cast<int>(static_cast<double>(f - values_[0]) * buckets_per_unit_);
   }
@@ -63,7 +64,7 @@ class PlaneDirection {
   double buckets_per_unit_;
   int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer
   int64_t offsets_[512];
-  uint16_t bucket_[kBuckets + 1];  // the last value that is <= every f of the bucket
+  uint16_t bucket_[kBuckets + 1];  // index of the last value that is <= every f of the bucket
   Known known_[kCorners];
 };
 static_assert(sizeof(PlaneDirection) <= 24 << 10);

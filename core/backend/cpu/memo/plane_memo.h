@@ -27,11 +27,11 @@ class PlaneMemo {
             const Kernels& kernels)
       : memory_(memory), tables_(tables), reducer_(reducer), kernels_(kernels) {}
 
-  // log2 of the edge of the smallest cube that is worth a call of build().
+  // log2 of the edge of the smallest cube for which build() is worthwhile.
   static constexpr int kSmallestLog2 = 4;
 
-  // Sets `node` to the node of a cube which one triangle covers and no other touches. False if the
-  // plane is not in the memo (yet), or not for cubes of this size.
+  // Sets `node` to the node of a cube that one triangle covers and no other triangle touches.
+  // Returns false if the plane is not in the memo (yet), or not for cubes of this size.
   bool build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube, int size_log2,
              NodeRef& node);
   // True if build() would succeed for cubes of up to 64^3 voxels that the triangle covers.
@@ -40,7 +40,7 @@ class PlaneMemo {
  private:
   struct KnownPlane {
     Plane plane;
-    PlaneDirection* direction;  // null: a small normal
+    PlaneDirection* direction;  // null for a small normal
   };
   struct SmallNode {
     uint64_t key;  // 0: free
@@ -49,8 +49,9 @@ class PlaneMemo {
     uint32_t id;
   };
 
-  // Values of known_: below kWorthwhile the number of tiles that the triangle has covered so far;
-  // from there kWorthwhile + the number of its plane; or kNever.
+  // Meaning of the values in known_: below kWorthwhile, the number of tiles that the triangle has
+  // covered so far; from kWorthwhile, kWorthwhile plus the number of the triangle's plane; or
+  // kNever.
   static constexpr uint32_t kWorthwhile = 24;  // tiles
   static constexpr uint32_t kNever = UINT32_MAX;
 

@@ -21,12 +21,13 @@ class TileReducer {
   TileReducer(SubDagTables& tables, const Kernels& kernels)
       : tables_(tables), kernels_(kernels), memo_(tables.memory()) {}
 
-  // The node of a tile of 2^size_log2 voxels; its octree nodes and voxels are added to the tables'
-  // counts. Leaves the tile empty.
+  // Returns the node of a tile of 2^size_log2 voxels, adds the tile's octree nodes and voxels to
+  // the tables' counts, and empties the tile.
   NodeRef reduce_bricks(TileBricks& tile, int size_log2);
 
-  // The node of a cube whose nodes of 2^from_log2 voxels are known: those whose bits are set in
-  // `existing`, in Morton order; next(m) returns id and hash of the m-th, which is already counted.
+  // Returns the node of a cube, given its nodes of 2^from_log2 voxels. The bits set in `existing`
+  // are these nodes' cubes, in Morton order. next(m) returns the id and hash of the m-th node,
+  // which is already counted.
   template <class Next>
   NodeRef reduce_nodes(const uint64_t* existing, int from_log2, int size_log2, Next next) {
     const int words = words_of(size_log2 - from_log2);
@@ -57,7 +58,7 @@ class TileReducer {
     }
   };
 
-  // The number of words of the bit set of all cubes `levels` levels below a cube.
+  // Number of words in the bit set of all cubes `levels` levels below a cube.
   static int words_of(int levels) { return levels > 2 ? 1 << (3 * levels - 6) : 1; }
   // Finds ids and hashes of the listed voxel blocks, and clears the blocks in the tile.
   void find_blocks(TileBricks& tile, int count);
@@ -67,7 +68,8 @@ class TileReducer {
   static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
 
   static constexpr int kMaxBricks = kTileBlocks * kBlockBricks;
-  static constexpr int kChildren = 8;  // readable behind the first child of any node
+  // Words that must be readable after the first child of any node.
+  static constexpr int kChildren = 8;
 
   SubDagTables& tables_;
   const Kernels& kernels_;
@@ -79,8 +81,9 @@ class TileReducer {
   } existing_;
   uint32_t ids_[kTileBlocks + kChildren] = {};
   uint64_t hashes_[kTileBlocks];
-  Parents parents_;  // the level above
-  // Voxel blocks of a tile: numbers and keys, and the positions in this list of the new ones.
+  Parents parents_;  // nodes of the level above
+  // Voxel blocks of a tile: their numbers, their keys, and the positions of new blocks in this
+  // list.
   uint16_t blocks_[kTileBlocks + 1];
   uint64_t keys_[kTileBlocks + 1];
   uint16_t new_blocks_[kTileBlocks];

@@ -16,12 +16,13 @@ namespace voxdag::cpu {
 // Bit masks of the children of a cube.
 struct Octants {
   uint32_t touched;  // every child that the triangle touches, and possibly some others
-  uint32_t
-      inside;  // children of `touched` inside the triangle's projection: the plane test decides
+  // Children of `touched` that are inside the triangle's projection, so that the plane test
+  // decides.
+  uint32_t inside;
 };
 
 struct VoxelBlockContent {
-  uint32_t mask;  // of the bricks that are not empty
+  uint32_t mask;  // mask of the non-empty bricks
   uint32_t voxels;
 };
 
@@ -29,7 +30,7 @@ struct Kernels {
   const char* name;
   // Sets exactly the voxels of the tile that the triangle touches.
   void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
-  // The triangle must touch the cube. `inside`: it covers the whole cube.
+  // Requires that the triangle touches the cube. `inside`: the triangle covers the complete cube.
   Octants (*test_octants)(const NarrowTriangle& triangle, const LatticeCube& cube, bool inside);
   // Sets bit i of `bits` iff low <= values[i] <= high, for `count` values, a multiple of 4; the
   // other bits of the last word are 0.

@@ -47,8 +47,8 @@ struct OctantTest {
   const Triangle<Coordinate>& t;
   const LatticeCube& cube;
   double half;        // edge of a child
-  double reach;       // no coordinate relative to the cube's low corner is larger
-  int long_axes = 0;  // along which the triangle is as long as a child
+  double reach;       // max coordinate relative to the cube's low corner
+  int long_axes = 0;  // number of axes along which the triangle is as long as a child
   double normal[3];
 
   OctantTest(const Triangle<Coordinate>& triangle, const LatticeCube& box)

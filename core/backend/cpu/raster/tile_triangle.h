@@ -39,13 +39,13 @@ struct TileTriangle {
 
   bool inside;  // edges do not matter in this tile, and are not set
   int first_voxel[3], last_voxel[3];
-  int dominant;   // axis of the largest component of the normal, which is >= 0
+  int dominant;   // axis of the normal's largest component, which is >= 0
   Int normal[3];  // all 0 if the triangle is degenerate
   Int lowest;
   Int width;
   Edge edges[3][3];  // [projection][edge]
 
-  // False if the triangle certainly touches no voxel of the tile.
+  // Returns false if the triangle certainly touches no voxel of the tile.
   bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const LatticeCube& tile);
 
  private:

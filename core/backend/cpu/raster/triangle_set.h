@@ -1,4 +1,4 @@
-// The triangles of one subvolume in memory, compact, and the cubes that they are tested against.
+// The triangles of one subvolume in compact form, and the cubes that they are tested against.
 #pragma once
 
 #include <algorithm>
@@ -86,7 +86,8 @@ class TriangleSet {
  public:
   explicit TriangleSet(PooledMemory& memory) : memory_(memory) {}
 
-  // Entries of triangles are 0..narrow_count()-1, and the same with kWide.
+  // Entries of narrow triangles are 0..narrow_count()-1. Entries of wide triangles are counted in
+  // the same way, with kWide set.
   uint32_t narrow_count() const { return narrow_count_; }
   uint32_t wide_count() const { return wide_count_; }
   void add(const WideTriangle& triangle);
@@ -97,7 +98,8 @@ class TriangleSet {
 
  private:
   PooledMemory& memory_;
-  PooledArray<NarrowTriangle> narrow_;  // one more than used, so that four can be loaded for three
+  // One more than used, so that a load of four elements is possible at the last three.
+  PooledArray<NarrowTriangle> narrow_;
   PooledArray<WideTriangle> wide_;
   uint32_t narrow_count_ = 0;
   uint32_t wide_count_ = 0;

@@ -13,9 +13,9 @@ struct alignas(64) VoxelBlock {
   uint64_t bricks[kBlockBricks];
 };
 
-// Constants of block_key(), the hash of voxel blocks: the sum of products of the bricks' halves
-// after adding constants (the hash family NH of Black et al., "UMAC", 1999), which vectors of
-// 32-bit lanes compute as fast as they load the bricks.
+// Constants of block_key(), the hash of voxel blocks (hash family NH of Black et al., "UMAC",
+// 1999). Adds a constant to each half brick, multiplies pairs and sums the products. Vectors of
+// 32-bit lanes compute this as fast as they load the bricks.
 struct BlockKeys {
   alignas(64) uint64_t add[kBlockBricks] = {};
   constexpr BlockKeys() {

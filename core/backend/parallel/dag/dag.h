@@ -49,7 +49,8 @@ struct HashBrick {
 // Only bits [64 - hash_bits, 64) of a truncated hash can be set.
 inline int first_hash_bit(uint32_t hash_bits) { return 64 - static_cast<int>(hash_bits); }
 
-// The number of children of each of some octree nodes; the prefix sums are their first positions.
+// Returns the number of children of each of some octree nodes. The prefix sums are the positions of
+// their first children.
 struct CountChildren {
   OctreeNodes nodes;
   const uint32_t* items;
@@ -64,7 +65,7 @@ struct SameWord {
   VOXDAG_HD bool operator()(uint32_t a, uint32_t b) const { return words[a] == words[b]; }
 };
 
-// 1 where a sorted item differs from the one before.
+// 1 if a sorted item differs from the previous one, else 0.
 template <class Same>
 struct MarkFirstOfEquals {
   Same same;

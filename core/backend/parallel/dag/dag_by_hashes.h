@@ -33,7 +33,7 @@ struct HashOctreeNode {
   }
 };
 
-// The octree nodes that the survivors above have as children, with their hashes.
+// Lists the octree nodes that are children of the survivors above, with their hashes.
 struct EmitCandidates {
   OctreeNodes nodes;
   const uint32_t* parents;  // octree nodes
@@ -116,7 +116,7 @@ struct VerifyNode {
   }
 };
 
-// Hashes of all octree nodes: element 0 for the bricks, element l + 1 for tree.levels[l].
+// Hashes of all octree nodes. Element 0 is for the bricks, element l + 1 for tree.levels[l].
 template <class Space>
 std::vector<SpaceArray<Space, uint64_t>> hash_octree(Space& space, const Octree<Space>& tree,
                                                      uint32_t hash_bits) {
@@ -139,11 +139,11 @@ template <class Space>
 struct Survivors {
   uint32_t count = 0;
   SpaceArray<Space, uint32_t> nodes;   // octree nodes, in the order of their hashes
-  SpaceArray<Space, uint64_t> hashes;  // ascending, all different
+  SpaceArray<Space, uint64_t> hashes;  // ascending, no duplicates
 };
 
-// The children of `parents` without duplicates; `level` receives mask and child list of each
-// parent.
+// Returns the children of `parents` without duplicates. Writes mask and child list of each parent
+// to `level`.
 template <class Space>
 Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
                                  const Survivors<Space>& parents, const uint64_t* octree_hashes,
@@ -178,7 +178,7 @@ Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
   return out;
 }
 
-// The octree's root, as the only survivor of its level.
+// Returns the octree's root, the only survivor of its level.
 template <class Space>
 Survivors<Space> surviving_root(Space& space, const SpaceArray<Space, uint64_t>& root_hash) {
   Survivors<Space> root;
@@ -190,7 +190,7 @@ Survivors<Space> surviving_root(Space& space, const SpaceArray<Space, uint64_t>&
   return root;
 }
 
-// The DAG, or nothing if two different nodes have the same hash.
+// Returns the DAG, or nullopt if two different nodes have the same hash.
 template <class Space>
 std::optional<SpaceDag<Space>> make_dag_by_hashes(Space& space, const Octree<Space>& tree,
                                                   uint32_t hash_bits) {

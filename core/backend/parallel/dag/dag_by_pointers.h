@@ -19,13 +19,14 @@
 
 namespace voxdag::parallel {
 
-// One level reduced: the octree nodes that remain, and the survivor that replaces each other one.
+// One reduced level: the surviving octree nodes, and for each octree node the survivor that
+// replaces it.
 template <class Space>
 struct Reduced {
   uint32_t count = 0;
   SpaceArray<Space, uint32_t> survivors;  // octree nodes, in the total order
   SpaceArray<Space, uint64_t> hashes;     // of the survivors
-  SpaceArray<Space, uint32_t> index_of;   // of each octree node: its survivor's position
+  SpaceArray<Space, uint32_t> index_of;   // position of the survivor of each octree node
 };
 
 // A level's nodes as child lists of the level below, already reduced.
@@ -36,7 +37,7 @@ struct LinkedNodes {
   VOXDAG_HD uint32_t child(uint32_t node, uint32_t rank) const {
     return index_of[nodes.first_child[node] + rank];
   }
-  // 0 where there is no child, otherwise its position + 1.
+  // Returns 0 if there is no child, otherwise the child's position + 1.
   VOXDAG_HD uint64_t pointer(uint32_t node, uint32_t slot) const {
     const uint32_t mask = nodes.masks[node];
     if (!(mask >> slot & 1)) return 0;
@@ -44,8 +45,8 @@ struct LinkedNodes {
   }
 };
 
-// The child pointers of slots [first, end), of `bits` bits each, as one sort key; the first is the
-// most significant.
+// Combines the child pointers of slots [first, end), with `bits` bits each, into one sort key. The
+// first pointer is the most significant.
 struct PointerKey {
   LinkedNodes links;
   uint32_t first, end;
@@ -74,7 +75,7 @@ struct SameNode {
   }
 };
 
-// With marks scanned, sorted position i belongs to group marked[i + 1] - 1.
+// With scanned marks, sorted position i belongs to group marked[i + 1] - 1.
 struct TakeFirstOfEquals {
   const uint32_t* marked;
   const uint32_t* items;
@@ -167,13 +168,13 @@ Reduced<Space> reduce_bricks(Space& space, const Octree<Space>& tree, uint32_t h
                        });
 }
 
-// `child_hashes`: of the level below, `child_count` nodes.
+// `child_hashes`: the hashes of the `child_count` nodes of the level below.
 template <class Space>
 Reduced<Space> reduce_nodes(Space& space, uint32_t node_count, const LinkedNodes& links,
                             const uint64_t* child_hashes, uint32_t child_count,
                             uint32_t hash_bits) {
   Order<Space> order(space, node_count);
-  const int bits = std::bit_width(child_count);  // of 0 (none) to child_count
+  const int bits = std::bit_width(child_count);  // pointers range from 0 (none) to child_count
   const uint32_t slots = std::min(8u, 64u / static_cast<uint32_t>(bits));
   for (uint32_t end = 8; end > 0;) {
     const uint32_t first = end > slots ? end - slots : 0;

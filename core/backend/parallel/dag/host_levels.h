@@ -1,5 +1,5 @@
-// A DAG's level arrays on the host. All of them are copied before the sink is called, since the
-// sink must not be called for a subvolume that does not fit.
+// A DAG's level arrays on the host. All of them are copied before the first call of the sink,
+// because the sink must not be called for a subvolume that does not fit.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace voxdag::parallel {
 
-// An array of a space, on the host: the array itself if the space is HostSpace, otherwise a copy.
+// A space's array on the host. It is the array itself if the space is HostSpace, otherwise a copy.
 template <class Space, class T>
 class HostArray {
  public:

@@ -10,7 +10,8 @@
 
 namespace voxdag::parallel {
 
-// Flags the first of the sorted codes in each larger cube, that is with equal bits from `shift` on.
+// Flags the first code in each larger cube. Codes are sorted; the codes of a cube have equal bits
+// from bit `shift`.
 struct MarkFirstOfCube {
   const uint64_t* codes;
   int shift;
@@ -30,9 +31,9 @@ class BrickList {
   uint64_t* codes() { return codes_.data(); }
   uint64_t* masks() { return masks_.data(); }
 
-  // Reserves `count` places behind the last brick and returns the position of the first; commit()
-  // adds the bricks written there. If there is no space, duplicate bricks are merged; if that frees
-  // too little, the list grows.
+  // Reserves `count` places after the last brick and returns the position of the first; commit()
+  // adds the bricks written there. If there is no space, merges duplicate bricks. If this frees too
+  // little, the list grows.
   uint32_t reserve(uint32_t count) {
     if (size_ + uint64_t{count} <= codes_.size()) return size_;
     merge();

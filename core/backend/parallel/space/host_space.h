@@ -93,7 +93,7 @@ class HostSpace {
   void upload_staged(std::span<const FixedTriangle>, FixedTriangle*) {}
 
  private:
-  // Calls body(begin, end) for parts of [0, n); a small n runs on the caller's thread alone.
+  // Calls body(begin, end) for parts of [0, n). A small range runs only on the caller's thread.
   template <class Body>
   void for_chunks(uint64_t n, Body body) {
     constexpr uint64_t kChunk = 4096;
@@ -105,7 +105,7 @@ class HostSpace {
   template <bool kWithValues>
   void radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch, Array<uint32_t>* values,
                   Array<uint32_t>* value_scratch, uint32_t n, BitRange bits);
-  // The number of parts to divide n items into where each part has its own counts.
+  // Returns the number of parts for n items if each part has its own counts.
   uint32_t part_count(uint32_t n) const;
   // Calls body(part, begin, end) for the items of each part.
   template <class Body>

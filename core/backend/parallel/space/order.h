@@ -1,5 +1,5 @@
-// A permutation of items, refined by stable radix sorts: sorting by the least significant part of a
-// key first, then by the more significant parts, sorts by the whole key.
+// A permutation of items, refined by stable radix sorts. To sort by a long key, sort by its least
+// significant part first, then by the more significant parts.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ struct Gather {
   VOXDAG_HD void operator()(uint32_t i) const { to[i] = from[items[i]]; }
 };
 
-// Elements items[0, count) of `from`.
+// Returns the elements items[0, count) of `from`.
 template <class T, class Space>
 SpaceArray<Space, T> gather(Space& space, uint32_t count, const uint32_t* items, const T* from) {
   SpaceArray<Space, T> out(space, count);
@@ -64,7 +64,7 @@ class Order {
     space_.sort_pairs(keys_, key_scratch, items_, item_scratch, count_, bits);
   }
 
-  // The inverse permutation: the position of each item.
+  // Returns the inverse permutation: the position of each item.
   SpaceArray<Space, uint32_t> places() {
     SpaceArray<Space, uint32_t> place_of(space_, count_);
     space_.for_each(count_, InvertOrder{items_.data(), place_of.data()});

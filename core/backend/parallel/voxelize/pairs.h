@@ -17,7 +17,7 @@
 
 namespace voxdag::parallel {
 
-// The position of the set bit that has `rank` set bits below it.
+// Returns the position of the set bit that has `rank` set bits below it.
 VOXDAG_HD inline int select_bit(uint64_t mask, uint32_t rank) {
   int at = 0;
   for (int width = 32; width > 0; width /= 2) {
@@ -31,8 +31,8 @@ VOXDAG_HD inline int select_bit(uint64_t mask, uint32_t rank) {
   return at;
 }
 
-// Positions of cubes in a subvolume: cube `code` of edge 2^shift units has its low corner at the
-// subvolume's origin plus (code, decoded) * 2^shift.
+// Positions of cubes in a subvolume. A cube has an edge of 2^shift units. Its low corner is the
+// subvolume's origin plus its decoded code times 2^shift.
 struct CubePlace {
   int64_t origin[3];
 
@@ -47,8 +47,8 @@ struct CubePlace {
   }
 };
 
-// The count step: the parts of each pair's cube that its triangle touches. N = 2: children,
-// 4: a brick's voxels.
+// The count step: finds the parts of each pair's cube that the pair's triangle touches. N = 2:
+// children, 4: a brick's voxels.
 template <int N>
 struct CountParts {
   CubePlace place;
@@ -66,7 +66,7 @@ struct CountParts {
   }
 };
 
-// The emit step: one new pair for each part. `out_triangles` is null where only codes are wanted.
+// The emit step: one new pair for each part. `out_triangles` is null if only codes are needed.
 struct EmitParts {
   int code_bits;  // 3 for children, 6 for voxels of a brick
   const uint64_t* codes;
@@ -81,7 +81,7 @@ struct EmitParts {
   }
 };
 
-// The first pairs: every triangle with the whole subvolume.
+// The first pairs: every triangle with the complete subvolume.
 struct StartPairs {
   uint32_t first_triangle;
   uint64_t* codes;
@@ -92,12 +92,12 @@ struct StartPairs {
   }
 };
 
-// The end of the longest slice of sources from `first` with at most `max_outputs` outputs, and the
-// number of its outputs.
+// Finds the longest slice of sources, starting at `first`, that has at most `max_outputs` outputs.
+// Returns the end of the slice and the number of its outputs.
 struct FindSlice {
   const uint32_t* offsets;
   uint32_t first, count, max_outputs;
-  uint32_t* answer;  // [2]
+  uint32_t* answer;  // two elements
   VOXDAG_HD void operator()(uint32_t) const {
     uint32_t last = first, end = count + 1;
     while (end - last > 1) {
@@ -112,16 +112,16 @@ struct FindSlice {
 // The destination of the pairs of the last level.
 struct PairSpan {
   uint64_t* codes;
-  uint32_t* triangles;  // null where only codes are wanted
+  uint32_t* triangles;  // null if only codes are needed
   uint32_t capacity;
 };
 
 template <class Space>
 class PairExpansion {
  public:
-  // Pairs descend `depths` levels from the subvolume; if `to_voxels`, that is the level of bricks,
-  // and one more step turns the pairs into voxels. `window`: capacity of a frame in pairs, at
-  // least 64.
+  // Pairs descend `depths` levels from the subvolume. If `to_voxels` is set, this is the level of
+  // bricks, and one more step turns the pairs into voxels. `window`: capacity of a frame in pairs,
+  // at least 64.
   PairExpansion(Space& space, const SubvolumeTask& task, int depths, bool to_voxels,
                 uint32_t window)
       : space_(space),
@@ -137,8 +137,8 @@ class PairExpansion {
   uint32_t window() const { return window_; }
 
   // Expands triangles [first, last) of `triangles`, at most a window of them. `out` receives the
-  // pairs: they are written to PairSpan out.span(), then counted by out.commit(n); out.flush()
-  // makes space where not even one source's pairs fit.
+  // pairs: they are written to PairSpan out.span(), then counted by out.commit(n). out.flush()
+  // makes space if not even the pairs of one source fit.
   template <class Out>
   void run(const FixedTriangle* triangles, uint32_t first, uint32_t last, Out& out) {
     triangles_ = triangles;

@@ -16,9 +16,10 @@
 namespace voxdag::parallel {
 
 inline constexpr int kTileLevels = 6;  // log2 of a tile's edge in voxels
-inline constexpr int kCellLevels = 4;  // of a cell's
+inline constexpr int kCellLevels = 4;  // log2 of a cell's edge
 inline constexpr uint32_t kTileBricks = 1u << 3 * (kTileLevels - kBrickLevels);
-inline constexpr int kTileCodeBits = 3 * (kTileLevels - kCellLevels);  // of a cell within its tile
+inline constexpr int kTileCodeBits =
+    3 * (kTileLevels - kCellLevels);  // bits of a cell's code within its tile
 
 struct DrawTile {
   static constexpr uint32_t kThreads = 256;
@@ -28,8 +29,8 @@ struct DrawTile {
   static constexpr uint32_t kGroup = 16;                    // threads whose counts are added up
 
   struct Shared {
-    uint64_t masks[kTileBricks + kThreads];  // at slot()
-    uint32_t counts[kThreads];               // bricks not empty, of each thread's run
+    uint64_t masks[kTileBricks + kThreads];  // indexed by slot()
+    uint32_t counts[kThreads];               // non-empty bricks in each thread's run
     uint32_t groups[kThreads / kGroup];      // sums over groups of threads
   };
   // One word of padding after each thread's run, so that neighboring threads use different banks.
@@ -37,12 +38,12 @@ struct DrawTile {
 
   CubePlace place;
   const FixedTriangle* triangles;
-  const uint64_t* codes;  // of the pairs' cells, sorted by tile
+  const uint64_t* codes;  // cells of the pairs, sorted by tile
   const uint32_t* pair_triangles;
   const uint32_t* tile_starts;  // first pair of each tile
   uint32_t tile_count, pair_count, first_tile;
 
-  // Space for kTileBricks of each thread block, and the number of bricks written.
+  // Space for kTileBricks per thread block, and the number of bricks written.
   uint64_t* brick_codes;
   uint64_t* brick_masks;
   uint32_t* brick_counts;

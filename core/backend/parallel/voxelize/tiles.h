@@ -35,7 +35,7 @@ class CellPairs {
   const uint64_t* codes() const { return codes_.data(); }
   const uint32_t* triangles() const { return triangles_.data(); }
 
-  // By tile; codes have `code_bits` bits.
+  // Sorts the pairs by tile; codes have `code_bits` bits.
   void sort(int code_bits) {
     if (size_ == 0 || code_bits == kTileCodeBits) return;
     SpaceArray<Space, uint64_t> code_scratch(space_, codes_.size());
@@ -43,7 +43,7 @@ class CellPairs {
     space_.sort_pairs(codes_, code_scratch, triangles_, triangle_scratch, size_,
                       {.begin = kTileCodeBits, .end = code_bits});
   }
-  // The first pair of each tile.
+  // Returns the first pair of each tile.
   SpaceArray<Space, uint32_t> tile_starts(uint32_t& tile_count) {
     SpaceArray<Space, uint8_t> flags(space_, size_);
     SpaceArray<Space, uint32_t> starts(space_, size_);
@@ -91,8 +91,8 @@ void draw_tiles(Space& space, const SubvolumeTask& task, const FixedTriangle* tr
   }
 }
 
-// Fills `bricks` with all bricks that the triangles touch. The subvolume is at least as large as a
-// tile. Throws OutOfBudget where it does not fit; `bricks` is then undefined.
+// Fills `bricks` with all bricks that the triangles touch. The subvolume must be at least as large
+// as a tile. Throws OutOfBudget if it does not fit; `bricks` is then undefined.
 template <class Space>
 void voxelize_by_tiles(Space& space, const SubvolumeTask& task, TriangleStream& stream,
                        BrickList<Space>& bricks) {

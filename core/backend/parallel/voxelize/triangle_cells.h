@@ -31,10 +31,11 @@ namespace voxdag::parallel {
 
 inline constexpr int64_t kNarrowUnits = int64_t{1} << 28;
 
-// Cells are bits in Morton order (N = 2: child index, N = 4: brick bit): the sum of this over axes.
+// Returns the part of a cell's bit number for coordinate k along `axis`. The bit number, in Morton
+// order (N = 2: child index, N = 4: brick bit), is the sum of the three parts.
 VOXDAG_HD constexpr int cell_bit(int axis, int k) { return ((k & 1) | (k & 2) << 2) << (2 - axis); }
 
-// Cells with coordinate 0 along `axis`, repeated for all its coordinates.
+// Copies cells with coordinate 0 along `axis` to all other coordinates of this axis.
 template <int N>
 VOXDAG_HD inline uint64_t repeat_along(int axis, uint64_t cells) {
   cells |= cells << cell_bit(axis, 1);
@@ -46,7 +47,8 @@ VOXDAG_HD inline Int clamp_to(int128 x, Int bound) {
   return x > bound ? bound : x < -bound ? static_cast<Int>(-bound) : static_cast<Int>(x);
 }
 
-// A narrow triangle against the cells of a lattice, whose first group its bounding box touches.
+// A narrow triangle on a lattice of cells, starting with the first group that its bounding box
+// touches.
 struct TriangleOnLattice {
   // In the projection along one axis, a cell is on the inner side of an edge iff
   // a k_a + b k_b + constant >= 0, along the two axes that follow.
@@ -57,8 +59,8 @@ struct TriangleOnLattice {
   int32_t first[3], last[3];  // cells of the bounding box
   int64_t n[3];
   int128 plane;       // n . (low - v) / 2^shift, floored
-  int32_t remainder;  // 1 if that was not exact
-  bool short_normal;  // 32 bits will do for the plane
+  int32_t remainder;  // 1 if the division left a remainder
+  bool short_normal;  // the plane test needs only 32 bits
   Edge edges[3][3];   // [projection][edge]
 
   VOXDAG_HD TriangleOnLattice(const FixedTriangle& t, const int64_t (&low)[3], int shift) {
@@ -158,7 +160,7 @@ struct TriangleOnLattice {
   }
 };
 
-// As touched_cells(), one cell after the other: for triangles too large for 64-bit products.
+// Like touched_cells(), but cell by cell, for triangles too large for 64-bit products.
 template <int N>
 VOXDAG_HD inline uint64_t touched_cells_one_by_one(const FixedTriangle& t, const int64_t (&low)[3],
                                                    int shift) {
@@ -173,7 +175,7 @@ VOXDAG_HD inline uint64_t touched_cells_one_by_one(const FixedTriangle& t, const
   return cells;
 }
 
-// False if the bounding box misses a cube of edge 2^shift.
+// Returns false if the bounding box misses a cube of edge 2^shift.
 VOXDAG_HD inline bool box_touches_cube(const FixedTriangle& t, const int64_t (&low)[3], int shift) {
   for (int a = 0; a < 3; ++a)
     if (t.high(a) < low[a] || t.low(a) > low[a] + (int64_t{1} << shift)) return false;

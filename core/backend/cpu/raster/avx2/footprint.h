@@ -17,8 +17,9 @@ namespace {
 
 template <int D>
 struct Footprint {
-  ColumnList columns;  // of bricks, with a voxel column inside
-  // [q][p of a brick]: the voxel columns inside, bit p + 4 q; only set in the rows of `columns`.
+  ColumnList columns;  // columns of bricks that have a voxel column inside
+  // Voxel columns inside the footprint, indexed [q][p of a brick]: bit p + 4 q. Only the rows in
+  // `columns` are set.
   alignas(32) uint16_t inside[16][16];
 
   VOXDAG_INLINE explicit Footprint(const TileTriangle<int32_t>& t) {
@@ -49,7 +50,7 @@ struct Footprint {
       const uint32_t empty = static_cast<uint32_t>(
           _mm256_movemask_epi8(_mm256_cmpeq_epi8(bytes, _mm256_setzero_si256())));
       const uint32_t present = ~(empty & empty >> 16) & 0xffff;
-      // The triangle is convex, so the columns between are also present.
+      // The triangle is convex, so all columns between the first and the last are also present.
       if (present != 0) columns.add(q, __builtin_ctz(present), 31 - __builtin_clz(present));
       store(inside[q], interleaved(_mm256_permute4x64_epi64(bytes, 0b11'01'10'00)));
     }
@@ -61,11 +62,11 @@ struct Footprint {
   static VOXDAG_INLINE void store(uint16_t (&row)[16], __m256i bits) {
     _mm256_store_si256(reinterpret_cast<__m256i*>(row), bits);
   }
-  // A number of voxels to shift out; shifting by 64 leaves none.
+  // Returns the number of voxels to shift out. Shifting by 64 leaves none.
   static VOXDAG_INLINE __m256i count(__m256d x) {
     return _mm256_cvtepi32_epi64(_mm256_cvttpd_epi32(_mm256_min_pd(x, _mm256_set1_pd(64.0))));
   }
-  // In each half of 16 bytes, the lower eight and the upper eight in turns.
+  // Interleaves the lower eight and the upper eight bytes of each 16-byte half.
   static VOXDAG_INLINE __m256i interleaved(__m256i x) {
     return _mm256_unpacklo_epi8(x, _mm256_srli_si256(x, 8));
   }

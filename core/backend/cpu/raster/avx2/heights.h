@@ -64,8 +64,8 @@ class Heights {
   // The heights at which the plane passes a column of bricks.
   struct Column {
     int p, q;
-    int64_t from, to;  // the bricks that it may touch; none if from > to
-    int brick;         // in which the lowest voxel column begins,
+    int64_t from, to;  // range of bricks that the plane may touch; empty if from > to
+    int brick;         // brick in which the lowest voxel column begins
     int within;        // units of 16-bit lanes above the floor of `brick`
   };
   // Only bricks from `first` to `last` are considered.
