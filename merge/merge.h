@@ -31,17 +31,17 @@
 
 namespace voxdag {
 
-// Scratch files go through `files`; `out` gets all levels but is not sealed. Resumes the state that
-// `checkpoint` has; a state that does not fit is discarded with a warning, and the merge starts
+// Merges all levels into `out`, without sealing it. Scratch files use `files`. Resumes the state in
+// `checkpoint`. If the state does not fit, it is discarded with a warning, and the merge starts
 // over. Throws Error.
 MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalFileWriter& out,
                            MemoryBudget& budget, unsigned threads, Progress& progress,
                            const CancelToken& cancel, Checkpoint* checkpoint = nullptr);
 
-// Merges sub-DAGs into one artifact at the end of `out`, which has all their roots: rows that
-// several of them have become one, and a later merge has fewer to read. There must be an input.
-// Throws Error{kOutOfMemory} if even passes over neighbors do not fit the budget, or the artifact
-// would have over 2^32 rows.
+// Merges sub-DAGs into one artifact at the end of `out`, with all their roots. Equal rows of
+// different sub-DAGs become one, so a later merge has fewer rows to read. There must be at least
+// one input. Throws Error{kOutOfMemory} if even passes over neighbors do not fit the budget, or if
+// the artifact would have over 2^32 rows.
 ArtifactRef merge_to_artifact(const MergeInputs& inputs, FileSystem& files, SegmentWriter& out,
                               MemoryBudget& budget, unsigned threads, Progress& progress,
                               const CancelToken& cancel, MergeReport& report);

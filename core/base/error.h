@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// Returns the code with this name; nullopt if there is none.
+// Returns the code with this name; nullopt if none exists.
 std::optional<ErrorCode> error_code_named(std::string_view name);
 // Exit status of the command line for a code; never 0.
 int exit_status(ErrorCode code);

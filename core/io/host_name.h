@@ -5,7 +5,7 @@
 
 namespace voxdag {
 
-// Returns the name from gethostname(), cut to 255 bytes; "" if there is none.
+// Returns the name from gethostname(), cut to 255 bytes; "" if none exists.
 std::string host_name();
 
 }  // namespace voxdag

@@ -1,8 +1,8 @@
-// Makes a merge recoverable: saves how far it is, and resumes it from the state saved last.
+// Makes a merge recoverable: saves its progress, and resumes it from the last saved state.
 //
 // A state is saved within a pass (the artifacts merged so far replace their inputs), after a pass,
-// and in the final pass after a level. Which bytes of the inputs are never read again follows from
-// the state, and they are released once it is durable.
+// and in the final pass after a level. The state determines which bytes of the inputs are never
+// read again. These bytes are released once the state is durable.
 #pragma once
 
 #include <span>
@@ -26,21 +26,22 @@ class MergeRecovery {
         pending_(pending),
         saver_(checkpoint, inputs.checkpoint_interval_s) {}
 
-  // Resumes the saved state, if there is one that fits: changes `pending`, the report and `out`,
-  // and returns how far the final pass is. A state that does not fit is discarded with a warning.
+  // Resumes the saved state if there is one and it fits: changes `pending`, the report and `out`,
+  // and returns the progress of the final pass. A state that does not fit is discarded with a
+  // warning.
   PassProgress restore(GlobalFileWriter& out);
 
-  // True if a state should be saved now. Rethrows the last save's error.
+  // True if it is time to save a state. Rethrows the last save's error.
   bool due() { return saver_.due(); }
-  // Within a pass: `merged`, in `segment`, replace the pending artifacts before `next`.
+  // Call it within a pass: `merged`, in `segment`, replace the pending artifacts before `next`.
   void save_in_pass(PassSegment& segment, std::vector<ArtifactRef> merged, size_t next);
-  // After a pass: `merged`, in `segment`, have replaced all artifacts, which were `before`.
+  // Call it after a pass: `merged`, in `segment`, have replaced all artifacts of `before`.
   void save_pass(const PassSegment& segment, std::vector<ArtifactRef> merged,
                  std::span<const SurveyedArtifact> before);
-  // After a level of the final pass. `readers` read the pending artifacts.
+  // Call it after a level of the final pass. `readers` read the pending artifacts.
   void save_level(const PassProgress& progress, std::span<const ArtifactReader> readers,
                   GlobalFileWriter& out);
-  // Waits for the save in progress, and rethrows its error.
+  // Waits for the running save and rethrows its error.
   void wait() { saver_.wait(); }
   void finish() { saver_.finish(); }
 
@@ -48,9 +49,9 @@ class MergeRecovery {
   PassProgress resume(const MergeState& state, GlobalFileWriter& out);
   PassProgress resume_final_pass(const FinalPassState& state, GlobalFileWriter& out);
   MergeState make_state(std::vector<ArtifactRef> intermediates) const;
-  // The intermediates among the pending artifacts from `begin` on.
+  // Returns the intermediates among the pending artifacts, starting at `begin`.
   std::vector<ArtifactRef> intermediates_from(size_t begin) const;
-  // Frames of the inputs from the bricks up to `level`, without frames returned earlier.
+  // Returns the frames of the inputs from the bricks up to `level`, except frames returned earlier.
   std::vector<SegmentRange> newly_merged(std::span<const ArtifactReader> readers, uint32_t level);
 
   const MergeContext& context_;

@@ -1,8 +1,8 @@
 // The durable state of an unfinished merge, and its encoding.
 //
-// A merge reduces a set of artifacts to fewer ones in passes, and writes the remaining ones into
-// the global file, level by level, in the final pass. Its state is that set and, during the final
-// pass, the pass's progress.
+// A merge reduces a set of artifacts to a smaller set in passes. In the final pass it writes the
+// remaining artifacts into the global file, level by level. The state is the current set and,
+// during the final pass, the pass's progress.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@
 
 namespace voxdag {
 
-// How far the final pass is; see PassProgress.
+// Progress of the final pass; see PassProgress.
 struct FinalPassState {
   uint32_t level = 0;
   std::string output;         // path of the global file
@@ -36,8 +36,8 @@ struct MergeState {
   uint64_t inputs_checksum = 0;
   uint32_t next_scratch_id = 0;
   MergeReport report;
-  // Artifacts that passes made, in segments of the scratch folder. They replace the inputs whose
-  // roots they hold.
+  // Artifacts written by passes, in segments of the scratch folder. They replace the inputs that
+  // have the same roots.
   std::vector<ArtifactRef> intermediates;
   std::optional<FinalPassState> final_pass;
 };

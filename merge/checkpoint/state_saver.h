@@ -1,5 +1,5 @@
-// Saves the state of a merge in the background, and retains the scratch files that the durable
-// state names.
+// Saves the state of a merge in the background, and keeps the scratch files that the durable state
+// names.
 //
 // One thread calls it. A background thread uses the checkpoint while a state is being saved.
 #pragma once
@@ -20,15 +20,15 @@ namespace voxdag {
 
 class StateSaver {
  public:
-  // Without a checkpoint nothing is loaded, due or saved.
+  // Without a checkpoint, load() returns nothing, due() returns false and save() does nothing.
   StateSaver(Checkpoint* checkpoint, double interval_s)
       : checkpoint_(checkpoint), interval_s_(interval_s) {}
-  // The files that the durable state names outlive the merge.
+  // Does not remove the files that the durable state names: they outlive the merge.
   ~StateSaver();
   StateSaver(const StateSaver&) = delete;
   StateSaver& operator=(const StateSaver&) = delete;
 
-  // The durable state, if there is one. Throws Error{kCorrupt} if it is damaged.
+  // Returns the durable state; nullopt if none exists. Throws Error{kCorrupt} if it is damaged.
   std::optional<MergeState> load() const;
   // Adds a file that the loaded state names.
   void add_named(std::shared_ptr<ScratchPath> path) { named_.push_back(std::move(path)); }
@@ -39,21 +39,21 @@ class StateSaver {
   // True if the last save has finished and enough CPU time has passed since it began. Throws what
   // that save threw.
   bool due();
-  // Saves a state in the background. `named` are the scratch files that it names, which `sync`
-  // makes durable; the files of the state before are removed then, and `merged` is released.
+  // Saves a state in the background. `named` are the scratch files that the state names; `sync`
+  // makes them durable. Then removes the files of the previous state and releases `merged`.
   void save(uint32_t level, MergeState state, std::vector<std::shared_ptr<ScratchPath>> named,
             std::function<void()> sync, std::vector<SegmentRange> merged);
-  // Waits for the save in progress, and rethrows its error.
+  // Waits for the running save and rethrows its error.
   void wait();
-  // The same at the end of the merge. Does not release the remaining bytes, because their files are
-  // removed soon.
+  // Like wait(), at the end of the merge. Does not release the remaining bytes, because their files
+  // are removed soon.
   void finish();
 
  private:
   Checkpoint* const checkpoint_;
   const double interval_s_;
   double saved_s_ = process_cpu_seconds();
-  std::vector<std::shared_ptr<ScratchPath>> named_;  // belongs to the save in progress, if any
+  std::vector<std::shared_ptr<ScratchPath>> named_;  // files of the running save, if any
   std::atomic<bool> finishing_ = false;
   std::future<void> save_;
 };

@@ -1,4 +1,4 @@
-// Merges the rows of one hash when they do not fit in memory (hashes truncated to a few bits). They
+// Merges the rows of one hash if they do not fit in memory (hashes truncated to a few bits). They
 // cannot be divided by hash, so they are merged row by row: the rows of every run are rewired into
 // a scratch file, part by part, and read back through one small buffer per run.
 #pragma once
@@ -9,8 +9,8 @@
 
 namespace voxdag {
 
-// Merges all rows of hash `hash`; the first unique one goes to `first_position`. Uses at most
-// `bytes` of the budget.
+// Merges all rows of hash `hash`. The first unique row gets the position `first_position`. Uses at
+// most `bytes` of the budget.
 LevelExtent merge_hash_group(const MergeContext& context, const LevelTask& task, uint64_t hash,
                              uint64_t first_position, uint64_t bytes);
 

@@ -1,6 +1,6 @@
 // K-way heap merge, row by row, for rows that the bucket sort cannot hold: many rows with few
 // distinct hashes (truncated hashes). Each run is in the total order, so a heap with one cursor per
-// run is enough, whatever the number of equal hashes. Not thread-safe.
+// run is enough for any number of equal hashes. Not thread-safe.
 #pragma once
 
 #include <algorithm>
@@ -13,10 +13,10 @@
 
 namespace voxdag {
 
-// Gets rows in the total order, deduplicates them and writes them.
+// Receives rows in the total order, deduplicates them and writes them.
 class OrderedRowWriter {
  public:
-  // The first row goes to `first_position`.
+  // The first row gets the position `first_position`.
   OrderedRowWriter(LevelOutput& output, const RowFormat& format, uint64_t first_position,
                    MemoryBudget& budget)
       : output_(output),
@@ -29,7 +29,7 @@ class OrderedRowWriter {
     if (!any_ || compare_rows(format_, last_, row) != 0) push(row);
     return last_position_;
   }
-  // Writes the rows that are still in the buffer.
+  // Writes the remaining rows of the buffer.
   void flush();
 
   uint64_t nodes() const { return nodes_; }
@@ -48,7 +48,7 @@ class OrderedRowWriter {
   LevelOutput& output_;
   const RowFormat format_;
   MergedRows buffer_;
-  uint64_t flushed_;  // the position after all rows that were written
+  uint64_t flushed_;  // position after all written rows
   uint64_t nodes_ = 0;
   bool any_ = false;
   RowKey last_;

@@ -25,26 +25,26 @@
 
 namespace voxdag {
 
-// The frames of one run that a partition holds, and where their rows begin in its columns.
+// The frames of one run that belong to a partition, and the begin of their rows in its columns.
 struct RunSlice {
   size_t run = 0;
   FrameSpan frames;
-  uint64_t first_row = 0;  // of the run
+  uint64_t first_row = 0;  // in the run
   RowCount size{};
   uint64_t row_base = 0, word_base = 0;
 };
 
-// Rows of a slice before some row, and words of those rows.
+// Numbers of rows and of their words in a slice before some row.
 struct RowOffset {
   uint32_t row = 0;
   uint32_t word = 0;
 };
 
-// The memory of a partition's columns. It is reused by the next partition, since the system takes
-// as long to zero new pages as it takes to read rows into them.
+// The memory of a partition's columns. The next partition reuses it, because zeroing new pages
+// takes the system as long as reading rows into them.
 class PartitionMemory {
  public:
-  // Makes space for so many rows, each with `position_words` words of a position; the previous
+  // Makes space for `count` rows, each with `position_words` words for its position. The previous
   // contents of the columns are lost.
   void reserve(const RowCount& count, uint32_t position_words, MemoryBudget& budget);
   void release() { *this = {}; }
@@ -66,19 +66,21 @@ struct PartitionWorkers {
 
 // An upper bound of the memory of a Frame with kFrameRows rows.
 inline constexpr uint64_t kFrameMemoryBytes = uint64_t{640} << 10;
-// Below this, 32 bits count the words of a partition.
+// Limit below which 32 bits can count the words of a partition.
 inline constexpr uint64_t kMaxPartitionBytes = uint64_t{8} << 30;
 
 class HashPartition {
  public:
-  // The partition also has `position_words` words, none to two, for the position of each row.
+  // Returns the memory of a partition, including `position_words` words (0 to 2) for the position
+  // of each row.
   static uint64_t bytes_for(const RowCount& count, uint32_t position_words);
-  // The widest interval that begins with hash `first` and whose partition takes at most `bytes`;
-  // none if not even the rows of that one hash fit.
+  // Returns the widest interval that begins with hash `first` and whose partition takes at most
+  // `bytes`; nullopt if not even the rows of this one hash fit.
   static std::optional<HashInterval> widest_interval(std::span<const LevelRun* const> runs,
                                                      uint64_t first, uint64_t bytes,
                                                      uint32_t position_words);
-  // One slice for each run that has frames within the interval; the constructor sets their bases.
+  // Returns one slice for each run that has frames within the interval. The constructor sets their
+  // bases.
   static std::vector<RunSlice> slices_within(std::span<const LevelRun* const> runs,
                                              const HashInterval& interval);
 
@@ -93,12 +95,13 @@ class HashPartition {
   void load(const PositionMaps* child_maps, const PartitionWorkers& workers, MemoryBudget& budget,
             const CancelToken& cancel);
 
-  // The same for all runs.
+  // Row format, the same for all runs.
   const RowFormat& format() const { return runs_[0]->format(); }
   std::span<const RunSlice> slices() const { return slices_; }
   size_t bucket_count() const { return bucket_count_; }
   unsigned bucket_bits() const { return bucket_bits_; }
-  // Where a bucket begins in a slice. bucket_count() is where the last bucket ends.
+  // Returns where a bucket begins in a slice. The begin of bucket_count() is the end of the last
+  // bucket.
   RowOffset bucket_begin(size_t bucket, size_t slice) const {
     return bucket_begins_[bucket * slices_.size() + slice];
   }
@@ -110,7 +113,7 @@ class HashPartition {
  private:
   class Loader;
 
-  // The first hash of a bucket; for bucket_count(), one past the last hash.
+  // Returns the first hash of a bucket. For bucket_count(), one past the last hash.
   uint64_t first_hash(size_t bucket) const {
     return bucket == 0 ? interval_.first
                        : ((interval_.first >> bucket_bits_) + bucket) << bucket_bits_;

@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// The hashes from `first` to `last`, both included.
+// The hashes from `first` to `last`, inclusive.
 struct HashInterval {
   uint64_t first = 0;
   uint64_t last = ~uint64_t{0};
@@ -36,11 +36,11 @@ class LevelRun {
   // True if children are positions, not indices into the run's level below.
   bool rewired() const { return rewired_; }
 
-  // Rows before frame `index`, which may be the end.
+  // Returns the number of rows before frame `index`, which may be one past the last frame.
   uint64_t rows_before(size_t index) const {
     return index < frames_.size() ? frames_[index].first_row : rows_;
   }
-  // Words of those rows.
+  // Returns the number of words of these rows.
   uint64_t words_before(size_t index) const {
     if (format_.bricks) return kBrickWords * rows_before(index);
     return (index < frames_.size() ? frames_[index].first_child : children_) << format_.wide;
@@ -49,7 +49,7 @@ class LevelRun {
     return {rows_before(frames.end) - rows_before(frames.begin),
             words_before(frames.end) - words_before(frames.begin)};
   }
-  // The frames that may hold rows of the interval, found by their first hashes.
+  // Returns the frames that may have rows of the interval, found by the frames' first hashes.
   FrameSpan frames_within(const HashInterval& interval) const;
 
  protected:
@@ -68,7 +68,7 @@ class LevelRun {
   uint64_t children_ = 0;
 };
 
-// A level of an artifact; without rows if the artifact does not reach up to that level.
+// A level of an artifact. It has no rows if the artifact has no such level.
 class ArtifactRun : public LevelRun {
  public:
   // `wide`: positions in the merged level below take two words.

@@ -25,36 +25,36 @@ class PositionMaps {
   // One map for each entry of `rows`; in memory if all of them take at most `resident_bytes`.
   PositionMaps(std::span<const uint64_t> rows, bool wide, uint64_t resident_bytes,
                ScratchFolder& scratch, MemoryBudget& budget);
-  // The maps that an earlier merge left in `file`, of one or two words per row.
+  // Opens the maps that an earlier merge left in `file`, with one or two words per row.
   PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<ScratchFile> file,
                uint64_t resident_bytes, MemoryBudget& budget);
 
   // True if the maps are in memory.
   bool resident() const { return file_ == nullptr; }
   bool wide() const { return wide_; }
-  // Words of a position.
+  // Number of words per position.
   uint32_t position_words() const { return wide_ ? 2 : 1; }
   uint64_t rows(size_t run) const { return first_[run + 1] - first_[run]; }
   std::vector<uint64_t> rows() const;
-  // Rows of the longest map.
+  // Number of rows of the longest map.
   uint64_t max_rows() const;
-  // The words of a whole map; only if resident.
+  // Returns the words of a complete map. Requires resident().
   uint32_t* words(size_t run) { return words_.data() + first_word(run); }
   const uint32_t* words(size_t run) const { return words_.data() + first_word(run); }
 
-  // The words of the positions of rows from `first` on.
+  // Stores the positions of rows, starting at row `first`; `words` are the positions' words.
   void store(size_t run, uint64_t first, std::span<const uint32_t> words);
   void load(size_t run, uint64_t first, std::span<uint32_t> words) const;
   uint64_t at(size_t run, uint64_t row) const;
 
-  // A file that holds all maps: the one they are in, or a copy.
+  // Returns a file with all maps: the file they are in, or a copy.
   std::shared_ptr<ScratchFile> file(ScratchFolder& scratch) const;
 
  private:
   uint64_t first_word(size_t run) const { return first_[run] << wide_; }
   uint64_t total_words() const { return first_.back() << wide_; }
 
-  std::vector<uint64_t> first_;  // the row at which each run's map begins, and the end of the last
+  std::vector<uint64_t> first_;  // first row of each run's map, and the end of the last map
   bool wide_;
   PageBuffer<uint32_t> words_;
   std::shared_ptr<ScratchFile> file_;

@@ -1,4 +1,4 @@
-// A row of a level as the merge holds it, and the terms of the merge, each with one meaning:
+// The rows of a merge, and the merge's terms, each with one meaning:
 //
 //   row             one node or brick of one artifact: hash, mask and words
 //   run             the rows of one level of one artifact (or of the top tree), in the total order
@@ -8,12 +8,12 @@
 //   position        place of a row in the merged level: a word offset in the global file,
 //                   an index in an artifact
 //
-// A node's words are its children, one word each, or in a wide level two, the high half first. A
-// brick is held as a node of mask 3 whose two words are the high and the low half of its voxel
-// mask. So one order, (hash, mask, words lexicographically), is the total order of all of them.
+// A node's words are its children, one word each. In a wide level a child takes two words, the high
+// half first. A brick is represented as a node of mask 3 whose two words are the high and the low
+// half of its voxel mask. So (hash, mask, words lexicographically) is the total order of both.
 //
-// kMaxRowWords words can be read from the first word of any row on: a row is
-// then copied without a branch on its number of words, which would be as good as random.
+// kMaxRowWords words are readable from the first word of any row. So a row is copied without a
+// branch on its number of words, which would be mispredicted.
 #pragma once
 
 #include <algorithm>
@@ -37,7 +37,7 @@ struct RowFormat {
   uint32_t max_words() const { return uint32_t{8} << wide; }
 };
 
-// Appends a position as a child refers to it. Returns the end.
+// Appends a position in the format of a child reference. Returns the end.
 inline uint32_t* put_position(uint32_t* to, uint64_t position, bool wide) {
   if (wide) *to++ = static_cast<uint32_t>(position >> 32);
   *to++ = static_cast<uint32_t>(position);
@@ -68,7 +68,8 @@ struct RowKey {
   const uint32_t* words = nullptr;
 };
 
-// Negative, 0 or positive as `a` is before, equal to or after `b` in the total order.
+// Returns a negative number, 0 or a positive number if `a` is before, equal to or after `b` in the
+// total order.
 inline int compare_rows(const RowFormat& format, const RowKey& a, const RowKey& b) {
   if (a.hash != b.hash) return a.hash < b.hash ? -1 : 1;
   if (a.mask != b.mask) return a.mask < b.mask ? -1 : 1;

@@ -19,7 +19,7 @@ namespace voxdag {
 
 class ScratchFolder {
  public:
-  // Makes the folder if it is missing.
+  // Creates the folder if it is missing.
   ScratchFolder(FileSystem& files, const std::string& path) : files_(files), path_(path) {
     files_.make_directories(path_);
   }
@@ -28,15 +28,15 @@ class ScratchFolder {
 
   FileSystem& files() { return files_; }
   const std::string& path() const { return path_; }
-  // All bytes that this merge wrote to files of the folder, removed files included.
+  // Bytes that this merge has written to files in the folder, including removed files.
   uint64_t bytes_written() const { return bytes_written_; }
   void count_written(uint64_t bytes) { bytes_written_ += bytes; }
-  // Returns every id once.
+  // Returns each id only once.
   uint32_t next_id() { return next_id_++; }
   uint32_t next_id() const { return next_id_; }
   void set_next_id(uint32_t id) { next_id_ = id; }
-  // Removes the files that an earlier merge left, except `names`. Files with names that a merge
-  // never uses are not touched.
+  // Removes the files left by an earlier merge, except `names`. Does not touch files with names
+  // that a merge never uses.
   void remove_all_but(const std::set<std::string>& names);
 
  private:
@@ -46,7 +46,7 @@ class ScratchFolder {
   std::atomic<uint64_t> bytes_written_{0};
 };
 
-// Owns the name of a file in the folder.
+// Owns a file name in the folder.
 class ScratchPath {
  public:
   ScratchPath(ScratchFolder& folder, std::string name) : folder_(folder), name_(std::move(name)) {}
@@ -57,7 +57,7 @@ class ScratchPath {
 
   const std::string& name() const { return name_; }
   std::string path() const { return folder_.path() + "/" + name_; }
-  // The file outlives this object.
+  // After this call the file outlives this object.
   void retain() { retained_ = true; }
 
  private:
@@ -78,11 +78,11 @@ struct ScratchFileState {
 class ScratchFile {
  public:
   explicit ScratchFile(ScratchFolder& folder);
-  // Opens the file that an earlier merge left.
+  // Opens a file left by an earlier merge.
   ScratchFile(ScratchFolder& folder, ScratchFileState state);
 
   void write(uint64_t first_word, std::span<const uint32_t> words);
-  // Throws Error{kCorrupt} if the disk returns other words than were written.
+  // Throws Error{kCorrupt} if the words from the disk differ from the written ones.
   void read(uint64_t first_word, std::span<uint32_t> words) const;
   void sync() { out_->sync(); }
 
@@ -91,7 +91,7 @@ class ScratchFile {
   static std::string name_of(uint32_t id) { return "merge-" + std::to_string(id) + ".tmp"; }
 
  private:
-  // Words of a checksum block; at 8 bytes per block, checksums take a thousandth of the file.
+  // Words per checksum block. With 8 bytes per block, checksums take a thousandth of the file.
   static constexpr uint64_t kBlockWords = 2048;
 
   ScratchFolder& folder_;

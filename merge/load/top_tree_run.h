@@ -1,5 +1,5 @@
 // One level of the top tree: the nodes whose children are roots of subvolumes or other top nodes.
-// It is one more run of its level, its children already positions.
+// It is an additional run of its level. Its children are already positions.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// A node whose cube of the grid and whose position in the merged level are known.
+// A node with its cube in the grid and its position in the merged level.
 struct PlacedNode {
   Cube cube;
   uint64_t hash = 0;  // truncated
@@ -19,9 +19,9 @@ struct PlacedNode {
 
 class TopTreeRun : public LevelRun {
  public:
-  // Makes the parents of `children`, which are all top nodes and roots of the level below; `wide`:
-  // their positions take two words. Throws Error{kCorrupt} for two children with the same cube:
-  // their subvolumes overlap.
+  // Creates the parents of `children`, which are all top nodes and roots of the level below.
+  // `wide`: the children's positions take two words. Throws Error{kCorrupt} if two children have
+  // the same cube, because then their subvolumes overlap.
   TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children, bool wide);
   void read_frame(size_t index, Frame& out) const override;
 
@@ -40,7 +40,7 @@ class TopTreeRun : public LevelRun {
   void add_parents(const std::vector<PlacedNode>& children, uint32_t hash_bits);
   void divide_into_frames();
 
-  std::vector<Node> nodes_;  // in the total order, equal ones included
+  std::vector<Node> nodes_;  // in the total order, including equal nodes
   std::vector<FrameInfo> infos_;
 };
 

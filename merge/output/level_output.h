@@ -18,7 +18,7 @@ struct LevelExtent {
   uint64_t nodes = 0;
   uint64_t positions = 0;
 
-  // Throws Error{kLimit} naming the level if the file's format cannot hold so many positions.
+  // Throws Error{kLimit} with the level if the file's format cannot have so many positions.
   void add(const LevelExtent& part, uint32_t level, bool in_words) {
     nodes += part.nodes;
     positions += part.positions;
@@ -36,7 +36,7 @@ class LevelOutput {
   virtual ~LevelOutput() = default;
   // True if positions count words; otherwise they count rows.
   virtual bool in_words() const = 0;
-  // True if a level with that many positions needs wide child indices in its parents.
+  // True if child indices into a level with this many positions must be wide.
   virtual bool is_wide(uint64_t positions) const = 0;
   virtual void begin_level(uint32_t level) = 0;
   // Receives all rows of the level in order. Calls do not overlap.
@@ -81,7 +81,7 @@ class ArtifactOutput : public LevelOutput {
 
   ArtifactWriter& artifact_;
   uint32_t level_ = 0;
-  // Columns of up to a frame of rows.
+  // Columns with the rows of up to one frame.
   std::vector<uint64_t> brick_masks_;
   std::vector<uint8_t> masks_;
   std::vector<uint32_t> children_;

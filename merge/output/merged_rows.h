@@ -1,4 +1,4 @@
-// Unique rows of a level in the total order, with their hashes, as they go to the output.
+// Unique rows of a level in the total order, with their hashes, for the output.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace voxdag {
 
-// Rows are encoded as in the global file: a node is its mask followed by its children, a brick its
-// low half followed by its high half; so are the two halves of a wide child.
+// Rows are encoded as in the global file. A node is its mask followed by its children; a brick is
+// its low half followed by its high half. A wide child also has its low half first.
 class MergedRows {
  public:
   // Has space for up to `max` rows.
@@ -24,7 +24,7 @@ class MergedRows {
   static uint64_t bytes_for(const RowCount& max) { return 12 * max.rows + 4 * max.words; }
 
   void clear() { word_count_ = row_count_ = 0; }
-  // The row must fit.
+  // Appends a row. There must be space for it.
   void push(uint64_t hash, uint8_t mask, const uint32_t* row_words) {
     hashes_[row_count_++] = hash;
     uint32_t* out = words_.data() + word_count_;

@@ -19,7 +19,7 @@ class PassSegment {
       : PassSegment(scratch, kFirstPassSegment + scratch.next_id()) {
     writer_.emplace(scratch.files(), scratch.path(), id_, budget);
   }
-  // The segment that an earlier merge left.
+  // Opens the segment left by an earlier merge.
   PassSegment(ScratchFolder& scratch, uint32_t id)
       : scratch_(scratch),
         id_(id),
@@ -27,7 +27,7 @@ class PassSegment {
 
   uint32_t id() const { return id_; }
   SegmentWriter& writer() { return *writer_; }
-  // Syncs the file. Nothing is written after it.
+  // Syncs the file. Nothing may be written afterwards.
   void finish() {
     writer_->sync();
     scratch_.count_written(writer_->size());

@@ -15,24 +15,24 @@ namespace voxdag {
 
 struct PassTask {
   DagShape shape;
-  // In the final pass the top tree is added and the last level is the root; in earlier passes it is
-  // the level of the highest subvolume.
+  // The final pass adds the top tree, and its last level is the root. In earlier passes the last
+  // level is the level of the highest subvolume.
   bool is_final = false;
   std::span<const ArtifactReader> artifacts;
 };
 
-// How far a pass is: all that the levels above need to know of the merged ones.
+// The progress of a pass: the information about merged levels that the levels above need.
 struct PassProgress {
-  std::optional<uint32_t> level;     // merged last; none before the bricks
-  std::optional<PositionMaps> maps;  // of that level
-  bool wide = false;                 // whether children in that level are wide
-  std::vector<PlacedNode> placed;    // on that level
-  // Roots of subvolumes on that level and below; `index` is their position in the output.
+  std::optional<uint32_t> level;     // the last merged level; none before the bricks
+  std::optional<PositionMaps> maps;  // maps of this level
+  bool wide = false;                 // true if children in this level are wide
+  std::vector<PlacedNode> placed;    // nodes of this level
+  // Roots of subvolumes in this level and below; `index` is their position in the output.
   std::vector<ArtifactRoot> roots;
 };
 
-// Continues from `progress`, and calls `after_level`, if there is one, after every level. Returns
-// the roots of the subvolumes, `index` being their position in `output`.
+// Continues from `progress`. Calls `after_level`, if set, after every level. Returns the roots of
+// the subvolumes; `index` is their position in `output`.
 std::vector<ArtifactRoot> run_merge_pass(
     const MergeContext& context, const PassTask& task, LevelOutput& output, PassProgress progress,
     const std::function<void(const PassProgress&)>& after_level);

@@ -17,27 +17,28 @@ using OpenSegment = std::function<std::shared_ptr<ReadableFile>(uint32_t)>;
 
 struct SurveyedArtifact {
   ArtifactRef ref;
-  // The least memory that it takes in a merge pass: its index, and a hash partition that holds any
-  // two neighboring frames of it.
+  // Minimum memory of this artifact in a merge pass: its index, and a hash partition that can hold
+  // any two neighboring frames of it.
   uint64_t min_bytes = 0;
-  uint64_t rows = 0;  // of all levels
-  // Checksum of its roots and of the counts of its levels, independent of its place in a file.
+  uint64_t rows = 0;  // of all its levels
+  // Checksum of its roots and of the row counts of its levels, independent of its position in a
+  // file.
   uint64_t content_checksum = 0;
   std::vector<Cube> cubes;  // of its roots
 };
 
 struct ArtifactSurvey {
   uint64_t rows = 0;
-  // In Morton order of their cubes: neighbors share the most nodes, so a pass that merges neighbors
-  // leaves the fewest rows to the next one.
+  // Artifacts in Morton order of their cubes. Neighbors share the most nodes, so a pass that merges
+  // neighbors leaves the fewest rows for the next pass.
   std::vector<SurveyedArtifact> in_morton_order;
 };
 
 class ArtifactSet {
  public:
   // Opens the artifacts, each segment file once, and charges their indexes to the budget. Throws
-  // Error{kCorrupt} for an artifact of another grid or of other hash bits, or whose roots are
-  // missing.
+  // Error{kCorrupt} for an artifact with a different grid or different hash bits, or with missing
+  // roots.
   ArtifactSet(std::span<const SurveyedArtifact> artifacts, const OpenSegment& open,
               const DagShape& shape, MemoryBudget& budget);
 
@@ -48,7 +49,7 @@ class ArtifactSet {
   MemoryCharge charge_;
 };
 
-// Reads the indexes of all artifacts, one after the other. `wide`: the merged levels may be wide.
+// Reads the indexes of all artifacts, one after another. `wide`: the merged levels may be wide.
 ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
                                 const DagShape& shape, bool wide);
 

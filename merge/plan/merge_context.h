@@ -18,11 +18,11 @@
 
 namespace voxdag {
 
-// Progress whose total is corrected as more becomes known.
+// Progress whose total can be corrected later.
 class MergeProgress {
  public:
   explicit MergeProgress(Progress& progress) : progress_(progress) {}
-  // `done` of them were merged by an earlier run.
+  // `done` of these units were merged by an earlier run.
   void begin(uint64_t total, uint64_t done) {
     progress_.begin_stage("merge", total_ = total, "nodes");
     progress_.resume_at(done);
@@ -53,10 +53,11 @@ struct LevelTask {
   uint32_t level = 0;
   RowFormat format;
   std::span<const LevelRun* const> runs;
-  const PositionMaps* child_maps = nullptr;  // of the level below, run for run; null for bricks
-  PositionMaps& maps;                        // filled
-  LevelOutput& output;                       // between begin_level() and end_level()
-  PartitionMemory& memory;                   // reused from level to level
+  const PositionMaps* child_maps =
+      nullptr;              // maps of the level below, one per run; null for bricks
+  PositionMaps& maps;       // filled by the merge of the level
+  LevelOutput& output;      // used between begin_level() and end_level()
+  PartitionMemory& memory;  // reused from level to level
 };
 
 }  // namespace voxdag

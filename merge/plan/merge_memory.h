@@ -18,7 +18,7 @@ namespace voxdag {
 
 struct MergeMemory {
   unsigned workers = 1;
-  uint64_t worker_bytes = 0;    // each
+  uint64_t worker_bytes = 0;    // per worker
   uint64_t resident_bytes = 0;  // position maps of one level
   uint64_t partition_bytes = 0;
 
@@ -35,7 +35,8 @@ struct MergeMemory {
     return plan;
   }
 
-  // The hash partition that free memory allows; the rest is for its bucket begins and the indexes.
+  // Returns the hash partition's part of the free memory. The rest is for its bucket begins and the
+  // indexes.
   static uint64_t partition_bytes_within(uint64_t free_bytes) {
     return free_bytes - free_bytes / 16;
   }

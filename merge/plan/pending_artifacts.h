@@ -1,5 +1,5 @@
-// The artifacts that the next merge pass reads: inputs at first, then artifacts of earlier passes
-// (intermediates), together with the segment files that hold the intermediates.
+// The artifacts that the next merge pass reads: first the inputs, later artifacts of earlier passes
+// (intermediates). Also the segment files of the intermediates.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@ namespace voxdag {
 
 class PendingArtifacts {
  public:
-  // All inputs; a level of the output may have `narrow_words` before it is wide. Throws
-  // Error{kCorrupt} as survey_artifacts() does.
+  // Starts with all inputs. A level of the output is wide if it has more than `narrow_words` words.
+  // Throws Error{kCorrupt} as survey_artifacts() does.
   PendingArtifacts(const MergeInputs& inputs, uint64_t narrow_words);
   PendingArtifacts(const PendingArtifacts&) = delete;
   PendingArtifacts& operator=(const PendingArtifacts&) = delete;
@@ -25,13 +25,13 @@ class PendingArtifacts {
   // In Morton order.
   std::span<const SurveyedArtifact> artifacts() const { return artifacts_; }
   size_t size() const { return artifacts_.size(); }
-  // Rows of all of them.
+  // Number of rows of all pending artifacts.
   uint64_t rows() const { return rows_; }
   bool has_inputs() const;
   // Identifies the inputs by their content.
   uint64_t inputs_checksum() const { return inputs_checksum_; }
-  // Where to end consecutive groups of artifacts so that each can be merged within
-  // `partition_bytes` and has at most `max_rows`; a group has at least one artifact.
+  // Divides the artifacts into consecutive groups and returns the groups' ends. Each group can be
+  // merged within `partition_bytes` and has at most `max_rows`, but at least one artifact.
   std::vector<size_t> group_ends(uint64_t partition_bytes, uint64_t max_rows) const;
   bool fit_at_once(uint64_t partition_bytes) const {
     return size() < 2 || group_ends(partition_bytes, UINT64_MAX).size() == 1;
@@ -42,14 +42,14 @@ class PendingArtifacts {
   PassSegment& add_segment(std::unique_ptr<PassSegment> segment);
   // The scratch files of all segments.
   std::vector<std::shared_ptr<ScratchPath>> segment_paths() const;
-  // After a pass: `merged`, all in `segment`, replace all artifacts. Returns the replaced
+  // Call it after a pass: `merged`, all in `segment`, replace all artifacts. Returns the replaced
   // artifacts.
   std::vector<SurveyedArtifact> replace_all(const std::vector<ArtifactRef>& merged,
                                             const PassSegment& segment);
-  // When a merge is resumed: `intermediates`, whose segments were added, replace the inputs whose
-  // roots they hold.
+  // Call it when a merge is resumed: `intermediates`, whose segments were added, replace the inputs
+  // that have the same roots.
   void replace_inputs(const std::vector<ArtifactRef>& intermediates);
-  // All inputs again, without intermediates.
+  // Goes back to all inputs, without intermediates.
   void reset();
 
  private:

@@ -1,9 +1,9 @@
 // Sorts one bucket of a hash partition: brings its rows, from all runs, into the total order and
 // deduplicates them. This is the inner loop of the merge.
 //
-// Unless hashes are truncated they are spread evenly, so one pass that distributes the rows by the
-// bits of the hash below the bucket's leaves almost nothing to sort. Rows of equal hash are
-// then compared completely. One thread uses a sorter.
+// Unless hashes are truncated, they are spread evenly. So one pass that distributes the rows by the
+// hash bits below the bucket's bits leaves almost nothing to sort. Rows with equal hashes are then
+// compared completely. One thread uses a sorter.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace voxdag {
 
 class BucketSorter {
  public:
-  // Rows of a bucket: the limit for sort().
+  // Maximum rows of a bucket for sort().
   static constexpr uint64_t kMaxRows = uint64_t{1} << 20;
 
   // For buckets of up to `max` rows.
@@ -31,17 +31,17 @@ class BucketSorter {
 
   // The unique rows of the bucket that was sorted last.
   const MergedRows& unique() const { return unique_; }
-  // The position of every row, relative to the first position of the bucket: slice after slice, in
-  // the order of each slice.
+  // Position of every row, relative to the first position of the bucket: slice after slice, in the
+  // order of each slice.
   std::span<const uint32_t> positions() const { return {positions_.data(), row_count_}; }
-  // Returns the number of positions of the unique rows.
+  // Returns the number of positions that the unique rows take.
   uint64_t extent() const { return extent_; }
 
  private:
   struct Entry {
     uint64_t hash;
-    uint32_t row_and_mask;  // the mask above, the row in the order of positions() below
-    uint32_t word;          // the first one, in the partition
+    uint32_t row_and_mask;  // high bits: mask; low bits: the row's index in positions()
+    uint32_t word;          // first word of the row in the partition
 
     uint32_t row() const { return row_and_mask & 0xffffff; }
     uint8_t mask() const { return static_cast<uint8_t>(row_and_mask >> 24); }

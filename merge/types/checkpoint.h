@@ -11,24 +11,24 @@
 
 namespace voxdag {
 
-// Stores the state of an unfinished merge, so that it can be resumed.
+// Stores the state of an unfinished merge, so that the merge can be resumed.
 //
-// A state is some hundred KB that only the merge understands. It names files of the scratch folder
+// A state is a few hundred KB that only the merge interprets. It names files of the scratch folder
 // and the partial global file, all of which are synced before save(). It identifies the inputs by
-// their content, so it still fits after an artifact was built again. Background threads
-// call save() and release(), one after the other.
+// their content, so it still fits if an artifact was built again. Background threads call save()
+// and release(), one call at any time.
 class Checkpoint {
  public:
   virtual ~Checkpoint() = default;
 
-  // The state saved last, if there is one.
+  // Returns the last saved state; nullopt if none exists.
   virtual std::optional<std::vector<std::byte>> load() = 0;
-  // Replaces the state; it is durable on return. From here on only the levels of the inputs above
-  // `level` (with smaller numbers) are read.
+  // Replaces the state; it is durable on return. Afterwards the merge reads only the input levels
+  // above `level` (with smaller numbers).
   virtual void save(uint32_t level, std::span<const std::byte> state) = 0;
   // Discards the state.
   virtual void forget() = 0;
-  // These bytes of the segment of an input are never read again: their space may be freed.
+  // Called for bytes of an input segment that are never read again. Their space may be freed.
   virtual void release(const SegmentRange& range) = 0;
 };
 

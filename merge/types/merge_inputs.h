@@ -18,12 +18,12 @@ struct MergeInputs {
   // The artifacts of the subvolumes, in any order; none for an empty scene. Their cubes are
   // disjoint.
   std::vector<ArtifactRef> artifacts;
-  // Opens the segment file with an id.
+  // Opens the segment file with this id.
   std::function<std::shared_ptr<ReadableFile>(uint32_t)> open_segment;
-  // A folder for data that does not fit in memory, used only by this merge. After the merge it has
-  // only the files named by the state in the checkpoint.
+  // A folder for data that does not fit in memory, used only by this merge. After the merge it
+  // contains only files named by the state in the checkpoint.
   std::string scratch_folder;
-  // The least CPU time between two checkpoints, in seconds.
+  // Minimum CPU time between two checkpoints, in seconds.
   double checkpoint_interval_s = 2;
 };
 

@@ -7,7 +7,7 @@ namespace voxdag {
 
 struct MergeReport {
   uint64_t voxels = 0;
-  uint64_t svo_nodes = 0;  // top tree included
+  uint64_t svo_nodes = 0;  // including the top tree
   uint64_t dag_nodes = 0;
   uint64_t input_nodes = 0;  // rows of all runs of all passes
   uint32_t passes = 0;       // 1 if all runs were merged in one pass

@@ -26,16 +26,16 @@ class DagView {
     std::span<const uint32_t> words;
     bool wide = false;
   };
-  // Levels 0 to L - 2, or nothing for a scene without voxels.
+  // Takes levels 0 to L - 2, or no levels for a scene without voxels.
   explicit DagView(std::vector<Level> levels, uint32_t grid_levels)
       : grid_levels_(grid_levels), levels_(std::move(levels)) {}
   explicit DagView(const voxdag_reader::File& file);
 
   bool empty() const { return levels_.empty(); }
   uint32_t grid_levels() const { return grid_levels_; }
-  // The level at `depth`, 0 to L - 2, in its memory layout; the DAG must not be empty.
+  // Returns the level at `depth`, 0 to L - 2, in its memory layout. The DAG must not be empty.
   const Level& level(uint32_t depth) const { return levels_[depth]; }
-  // Begins to load the node or brick at this word offset, if there is such a word.
+  // Prefetches the node or brick at this word offset. Does nothing if there is no such word.
   void prefetch(uint32_t depth, uint64_t offset) const {
     const std::span<const uint32_t> words = levels_[depth].words;
     if (offset < words.size()) __builtin_prefetch(words.data() + offset);
@@ -43,7 +43,8 @@ class DagView {
   [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
 
-  // The occupied children of a cell larger than a voxel, at `depth` below the root (0 to L - 1).
+  // The occupied children of a cell that is larger than a voxel, at `depth` below the root (0 to L
+  // - 1).
   class Children {
    public:
     uint32_t mask = 0;
@@ -54,17 +55,17 @@ class DagView {
     voxdag_reader::Node node_;
     uint64_t bits_ = 0;
   };
-  // The mask of the brick at this word offset.
+  // Returns the mask of the brick at this word offset.
   uint64_t brick(uint64_t offset) const;
   uint64_t root() const { return grid_levels_ == kBrickLevels ? brick(0) : 0; }
   Children children(uint32_t depth, uint64_t content) const;
-  // Those of a node at a depth above the bricks.
+  // Returns the children of a node at a depth above the bricks.
   Children children_of_node(uint32_t depth, uint64_t offset) const;
-  // The word offset of child `index`, which must be occupied, of a node.
+  // Returns the word offset of a node's child `index`, which must be occupied.
   uint64_t offset(const Children& children, int index) const {
     return children.node_.child(kPopcount8[children.mask & ((1u << index) - 1)]);
   }
-  // The content of child `index`, which must be occupied, of a parent at `depth`.
+  // Returns the content of child `index`, which must be occupied, of a parent at `depth`.
   uint64_t content(uint32_t depth, const Children& children, int index) const {
     if (depth + kBrickLevels < grid_levels_) {
       const uint64_t offset = this->offset(children, index);
@@ -76,11 +77,11 @@ class DagView {
   struct Cell {
     uint32_t depth = 0;  // below the root
     double edge = 0;     // R / 2^depth voxels
-    Vec low;             // its low corner, in voxels
+    Vec low;             // low corner, in voxels
   };
-  // Calls `visit` with each occupied cell at `depth` (0 to L), and on the way down
-  // `select` with each cell above: it returns the mask of the children to descend into. The DAG
-  // must not be empty.
+  // Calls `visit` with each occupied cell at `depth` (0 to L). On the way down, calls `select` with
+  // each cell above, which returns the mask of the children to descend into. The DAG must not be
+  // empty.
   template <class Select, class Visit>
   void for_each_cell(uint32_t depth, const Select& select, const Visit& visit) const {
     visit_below({0, static_cast<double>(resolution()), {}}, root(), depth, select, visit);
@@ -119,7 +120,7 @@ inline DagView::Children DagView::children(uint32_t depth, uint64_t content) con
   return c;
 }
 
-// The cells two levels below a node or brick at `depth`, as the mask of a brick.
+// Returns the cells two levels below a node or brick at `depth`, as the mask of a brick.
 inline uint64_t brick_of_cells(const DagView& dag, uint32_t depth,
                                const DagView::Children& children) {
   uint64_t mask = 0;

@@ -32,7 +32,7 @@ struct Ray {
   Vec at(double t) const { return origin + direction * t; }
 };
 
-// Two unit vectors that form an orthonormal basis with the unit vector `n`.
+// Sets `u` and `w` so that they form an orthonormal basis with the unit vector `n`.
 inline void basis_around(const Vec& n, Vec& u, Vec& w) {
   u = normalized(cross(n, std::fabs(n[1]) < 0.9 ? Vec{{0, 1, 0}} : Vec{{1, 0, 0}}));
   w = cross(n, u);

@@ -1,4 +1,4 @@
-// The attributes of selected cells, for formats of tables: a few numbers for each attribute.
+// The attributes of selected cells, for table formats: a few numbers for each attribute.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ class AttributeCursor {
   voxdag_reader::ColorCursor cursor_;
 };
 
-// One cursor for each attribute of the file, without colors if the job has none.
+// Returns one cursor for each attribute of the file, without colors if the job has none.
 inline std::vector<AttributeCursor> exported_attributes(const ExportJob& job) {
   std::vector<AttributeCursor> cursors;
   for (const Attribute attribute : attributes_of(job.file).list())
@@ -48,7 +48,7 @@ inline std::vector<AttributeCursor> exported_attributes(const ExportJob& job) {
   return cursors;
 }
 
-// Bytes of the numbers of a cell.
+// Returns the bytes of the numbers of one cell.
 inline uint64_t decoded_bytes(std::span<const AttributeCursor> attributes) {
   uint64_t bytes = 0;
   for (const AttributeCursor& attribute : attributes) bytes += attribute.encoding().decoded_bytes();

@@ -1,5 +1,5 @@
-// A buffered output file of an export, named "<path>.partial" until it is published. If destroyed
-// earlier, it removes the file. One thread uses it.
+// A buffered output file of an export, named "<path>.partial" until publish(). The destructor
+// removes an unpublished file. One thread uses it.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ class ExportFile {
     write(std::as_bytes(std::span(&value, 1)));
   }
 
-  // Makes the files durable and then visible under their names. Returns the bytes of all.
+  // Makes the files durable and then renames them to their final names. Returns their total bytes.
   static uint64_t publish(std::span<ExportFile* const> written);
 
  private:

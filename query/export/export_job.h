@@ -20,12 +20,12 @@ namespace voxdag::query {
 struct ExportJob {
   FileSystem& files;
   const voxdag_reader::File& file;
-  const DagView& dag;  // of the file; it has voxels
+  const DagView& dag;  // DAG of the file; not empty
   const WatchedFile& watched;
   Selection selection;
   std::string output;
-  std::string second_output;  // of a format of two files
-  bool has_colors;            // that are to be written, where the format has a place for them
+  std::string second_output;  // second file of a format with two files
+  bool has_colors;            // write colors, if the format supports them
   MemoryBudget& budget;
   Progress& progress;
   const CancelToken& cancel;
@@ -43,7 +43,7 @@ struct ExportJob {
   }
 };
 
-// A stage of the progress that also notices a request to stop; ends when destroyed.
+// A stage of the progress that also checks for cancellation. The destructor ends the stage.
 class ExportStage {
  public:
   ExportStage(const ExportJob& job, std::string_view name, uint64_t total, std::string_view unit)
@@ -73,7 +73,7 @@ class ExportStage {
   uint64_t pending_ = 0, calls_ = 0;
 };
 
-// A long loop that is part of another stage: checks now and then whether it is to end.
+// For long loops that are part of another stage: checks for cancellation from time to time.
 class CancelCheck {
  public:
   explicit CancelCheck(const ExportJob& job) : job_(job) {}
@@ -87,12 +87,13 @@ class CancelCheck {
   uint64_t calls_ = 0;
 };
 
-// The same part of the file on a coarser grid.
+// Returns the same part of the file on a coarser grid.
 Selection coarser(const Selection& selection, uint32_t grid_levels);
-// The options that select it: "--level 11", and "--region" with cells of that grid if it is a part.
+// Returns the options for this selection: "--level 11", and "--region" with cells of that grid if
+// the selection is only a part.
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
-// Publishes the files if the input was intact until then; throws otherwise.
+// Publishes the files if the input has remained intact; throws otherwise.
 inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> written) {
   job.watched.check_readable();
   return ExportFile::publish(written);
@@ -102,16 +103,16 @@ inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> writt
 void require_space(const ExportJob& job, uint64_t bytes);
 
 // Throws Error{code}: "OUTPUT: PROBLEM. --level 11 fits", or "Expected a smaller --region" if no
-// coarser level fits; `fits` is true for a level that fits.
+// coarser level fits. `fits` returns true for a level that fits.
 [[noreturn]] void refuse_size(const ExportJob& job, const std::string& problem,
                               const std::function<bool(uint32_t grid_levels)>& fits,
                               ErrorCode code = ErrorCode::kLimit);
 
-// The number of selected voxels, or anything over `limit` if there are more.
+// Returns the number of selected voxels, or any number over `limit` if there are more.
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);
-// On which coarser grids the job's selection has at most so many cells; asked from the coarsest one
-// on. Equal subtrees are counted once if the memory holds their counts: of a whole file each level
-// is read once for all grids, of a region once for each.
+// Finds the coarser grids on which the job's selection has at most `limit` cells. Query the
+// coarsest grid first. Equal subtrees are counted once if the memory can hold their counts. For a
+// complete file, each level is read once for all grids; for a region, once per grid.
 class CellLimit {
  public:
   CellLimit(const ExportJob& job, uint64_t limit);
@@ -120,23 +121,23 @@ class CellLimit {
  private:
   const ExportJob& job_;
   const uint64_t limit_;
-  std::optional<LevelCells> cells_;  // of a whole file, as long as the memory holds them
+  std::optional<LevelCells> cells_;  // for a complete file, if the memory can hold them
 };
 
-// count_voxels() of the job's selection. Throws Error{kLimit} as above if there are more than
-// `limit`, which `reason` explains, Error{kInvalidInput} for an empty selection.
+// Returns count_voxels() of the job's selection. Throws Error{kLimit} as above if there are more
+// than `limit`, with `reason` as the explanation, and Error{kInvalidInput} for an empty selection.
 uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string& reason);
 
 [[noreturn]] void refuse_empty(const ExportJob& job);
 
-// Throws Error{kCorrupt} unless as many voxels were written as the header of the file, or the count
-// before, has said.
+// Throws Error{kCorrupt} unless `written` equals `expected`, the number of voxels in the header of
+// the file or in an earlier count.
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
-// The color of a selected cell. Throws Error{kCorrupt}.
+// Returns the color of a selected cell. Throws Error{kCorrupt}.
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
                                  const std::array<int64_t, 3>& cell);
 
-// One writer per format; the formats of optional libraries exist if the library was found.
+// One writer per format. Writers that need a missing library do not exist.
 ExportReport write_ply(const ExportJob& job);
 ExportReport write_npz(const ExportJob& job);
 ExportReport write_hashdag(const ExportJob& job);
@@ -145,7 +146,7 @@ ExportReport write_voxel(const ExportJob& job);
 ExportReport write_vox(const ExportJob& job);
 ExportReport write_bt(const ExportJob& job);
 ExportReport write_glb(const ExportJob& job);
-// Uses a smaller limit than the format's, for tests: files of 4 GiB take too long.
+// Like write_glb(), with a smaller limit for tests, because files of 4 GiB take too long.
 ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes);
 ExportReport write_vdb(const ExportJob& job);
 ExportReport write_nvdb(const ExportJob& job);

@@ -1,6 +1,6 @@
-// Counts the set cells in the grid of each level of a file, from the coarsest on. The number of
-// occurrences of a node in the octree is passed on to its children. So the levels above the
-// requested one are read once, and no level below it.
+// Counts the set cells in the grid of each level of a file, starting with the coarsest. Each node
+// passes its number of occurrences in the octree to its children. So the levels above the requested
+// one are read once, and no level below it.
 #pragma once
 
 #include <cstdint>
@@ -14,22 +14,23 @@
 
 namespace voxdag::query {
 
-// One thread uses it.
+// Used by one thread.
 class LevelCells {
  public:
-  // `dag` is the view of `file`, which has voxels; all must outlive this.
+  // `dag` is the view of `file`, which has voxels. All references must outlive this object.
   LevelCells(const voxdag_reader::File& file, const DagView& dag, MemoryBudget& budget,
              const CancelToken& cancel)
       : file_(file), dag_(dag), budget_(budget), cancel_(cancel) {}
 
-  // The set cells of the grid of 2^grid_levels cells per edge, or anything over `limit` if there
-  // are more. The grid is a brick or larger, coarser than the file's, and no coarser than the one
-  // before. Takes 8 bytes for each node two and three levels above the cells, and 2 bits for each
-  // word of theirs. Throws Error{kOutOfMemory} if the budget has less, Error{kCorrupt}.
+  // Returns the number of set cells in the grid of 2^grid_levels cells per edge, or any number over
+  // `limit` if there are more. The grid must be a brick or larger, coarser than the file's, and not
+  // coarser than in the previous call. Takes 8 bytes for each node two and three levels above the
+  // cells, and 2 bits for each word of these nodes. Throws Error{kOutOfMemory} if the budget has
+  // less, Error{kCorrupt}.
   uint64_t count(uint32_t grid_levels, uint64_t limit);
 
  private:
-  // The nodes of a level, and how often each occurs.
+  // The nodes of a level, and the number of occurrences of each.
   struct Level {
     NodeIndex index;
     PageBuffer<uint64_t> places;
@@ -45,8 +46,8 @@ class LevelCells {
   const DagView& dag_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
-  uint32_t depth_ = 0;  // of level_
-  Level level_;         // without nodes before the first count
+  uint32_t depth_ = 0;  // depth of level_
+  Level level_;         // empty before the first count
 };
 
 }  // namespace voxdag::query

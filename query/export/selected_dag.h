@@ -19,8 +19,8 @@ namespace voxdag::query {
 
 class SelectedDag {
  public:
-  // Throws Error{kInvalidInput} if the selection has no voxels, Error{kOutOfMemory} if a DAG that
-  // has to be built does not fit in the job's memory.
+  // Throws Error{kInvalidInput} if the selection has no voxels, Error{kOutOfMemory} if a DAG must
+  // be built and does not fit in the job's memory.
   explicit SelectedDag(const ExportJob& job);
   ~SelectedDag();
 
@@ -33,14 +33,15 @@ class SelectedDag {
   uint64_t word_count() const;
   DagView view() const;
 
-  // What it has at most on a coarser grid, whose bricks come of the nodes two levels above cells.
+  // Upper bounds of its size on a coarser grid. Bricks of this grid are made from the nodes two
+  // levels above its cells.
   struct Size {
     uint64_t words = 0, nodes = 0, bricks = 0;  // nodes without the bricks
   };
   Size size_at(uint32_t grid_levels) const;
 
-  // Calls visit(offset, mask, children) for each node of a level above the bricks, in order;
-  // children are offsets in the next level. Throws Error{kCorrupt} for words that are no node.
+  // Calls visit(offset, mask, children) for each node of a level above the bricks, in order.
+  // Children are offsets in the next level. Throws Error{kCorrupt} for words that are not a node.
   template <class Visit>
   void for_each_node(uint32_t level, const Visit& visit) const {
     const std::span<const uint32_t> words = words_[level], below = words_[level + 1];
@@ -74,8 +75,8 @@ class SelectedDag {
   std::unique_ptr<Built> built_;
 };
 
-// A number per node or brick of a level, charged to the job's memory. It is found by the node's
-// offset: because each node has two words or more, half the offset is unique.
+// A number per node or brick of a level, charged to the job's memory. It is found by half the
+// node's offset, which is unique because each node has at least two words.
 template <class Number>
 class NodeNumbers {
  public:

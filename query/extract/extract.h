@@ -24,13 +24,14 @@ namespace voxdag::query {
 
 struct ExtractSpec {
   Selection selection;
-  // The new grid is the smallest octree-aligned cube around the region, instead of the whole grid.
+  // The new grid is the smallest octree-aligned cube around the region instead of the complete
+  // grid.
   bool crop = false;
   std::string output;
-  bool replace = false;  // a file that exists
+  bool replace = false;  // replace an existing file
   uint64_t memory_bytes = uint64_t{1} << 30;
   unsigned threads = 1;
-  // Levels of over this many words are wide; tests choose fewer.
+  // Maximum words of a narrow level; larger levels are wide. Tests use a smaller limit.
   uint64_t narrow_words = global_layout::kNarrowLevelWords;
 };
 
@@ -44,17 +45,17 @@ struct ExtractReport {
   uint64_t parts = 0;        // cubes with voxels
   uint64_t parts_split = 0;  // cubes that did not fit in memory
   uint32_t merge_passes = 0;
-  uint64_t work_bytes = 0;  // written to temporary files
+  uint64_t work_bytes = 0;  // bytes written to temporary files
 };
 
-// The smallest cube of an octree, of the grid of a selection, that contains its region and has 4
-// cells per edge or more.
+// Returns the smallest octree cube, in the grid of a selection, that contains the selection's
+// region and has at least 4 cells per edge.
 Cube crop_cube(const Selection& selection);
 
 // Writes spec.output, which gets its name when it is complete. Temporary files are in a folder next
-// to it, which is always removed; after a kill, the next extract to that output removes it. Throws
-// Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the errors of
-// LockedOutputs.
+// to it, which is always removed. If the process is killed, the next extract to that output removes
+// the folder. Throws Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the
+// errors of LockedOutputs.
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel);
 

@@ -20,7 +20,7 @@ namespace voxdag::query {
 // Reads ranges of a global file and checks the checksum blocks that they touch. Thread-safe.
 class CheckedReader {
  public:
-  // `header` is the same file, of which only the header is read.
+  // `header` is the same file; only its header is read.
   CheckedReader(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget);
 
   const voxdag_reader::File& header() const { return header_; }
@@ -28,7 +28,7 @@ class CheckedReader {
   // kBlockBytes. Throws Error{kCorrupt} for a block that fails its checksum.
   void read(uint32_t level, uint64_t first, std::span<uint32_t> words, std::span<std::byte> block);
 
-  // Compares the checksum blocks that have these bytes of the file, as read() does.
+  // Verifies the checksum blocks that contain these bytes of the file, as read() does.
   void check(uint64_t begin, uint64_t bytes, std::span<std::byte> block);
 
   static constexpr uint64_t kBlockBytes = CheckedBlocks::kBlockBytes;
@@ -52,7 +52,7 @@ struct WantedNode {
 class NodeReader {
  public:
   static constexpr uint64_t kBufferBytes = uint64_t{1} << 19;
-  // What a reader charges.
+  // Memory that a reader charges.
   static constexpr uint64_t kMemoryBytes = kBufferBytes + CheckedReader::kBlockBytes;
 
   NodeReader(CheckedReader& source, MemoryBudget& budget, const CancelToken& cancel)
@@ -61,28 +61,29 @@ class NodeReader {
         buffer_(budget, kBufferBytes / sizeof(uint32_t), "a window of a file"),
         block_(budget, CheckedReader::kBlockBytes, "a block of a file") {}
 
-  // The node, valid until the next call.
+  // Returns the node, valid until the next call.
   voxdag_reader::Node node(uint32_t level, uint64_t offset);
-  // Calls visit(node, words) for each wanted node; `words` begin with the node, and contain all of
-  // it within the level. `wanted` is in the order of the offsets.
+  // Calls visit(node, words) for each wanted node. `words` begin with the node and contain all of
+  // its words in the level. `wanted` is in the order of the offsets.
   template <class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Visit&& visit) {
     for_each(
         level, wanted, [](std::span<const uint32_t>) {}, visit);
   }
-  // The same; ahead(words) was called for most nodes some nodes before, so that it can prefetch.
+  // Like the above, and calls ahead(words) for most nodes some time before visit(), so that it can
+  // prefetch.
   template <class Ahead, class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Ahead&& ahead, Visit&& visit);
 
-  // A node or a brick that begins with `words`, at `offset` of its level. Throws Error{kCorrupt} if
-  // none can begin there.
+  // Returns the node or brick that begins with `words`, at `offset` of its level. Throws
+  // Error{kCorrupt} if none can begin there.
   voxdag_reader::Node parse_node(uint32_t level, uint64_t offset,
                                  std::span<const uint32_t> words) const;
   uint64_t parse_brick(uint64_t offset, std::span<const uint32_t> words) const;
 
  private:
-  // Reads a window that begins at the first of the wanted nodes and has some of those after it;
-  // returns how many.
+  // Reads a window that begins at the first of the wanted nodes. Returns the number of wanted nodes
+  // in the window.
   size_t fill(uint32_t level, std::span<const WantedNode> wanted);
   [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
 

@@ -8,9 +8,9 @@
 //     selected grid   nodes   ...   bricks          cells
 //     file            nodes   ...   nodes at l-2    their children's masks, at l-1
 //
-// Then, from these bricks up, nodes that have become equal are made one (hash-consing), as in the
-// build of a subvolume, whose tables are used. What a region cuts away is left out on the way down:
-// nodes that it cuts are taken once per position, all others once.
+// Then, from these bricks up, nodes that have become equal are merged (hash-consing), with the
+// tables that also build subvolumes. Cells outside the region are left out on the way down. Nodes
+// that the region cuts are added once per position, all others once.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ namespace voxdag::query {
 // A cube of the selected grid that has voxels of the file.
 struct SelectedPart {
   Cube cube;
-  uint64_t offset = 0;  // of its root in level cube.level of the file
+  uint64_t offset = 0;  // offset of its root in level cube.level of the file
 };
 
 class PartBuilder {
@@ -42,7 +42,7 @@ class PartBuilder {
   // OutOfBudget, before the first call of the sink, if the budget cannot hold the part.
   SubDagSummary build(const SelectedPart& part, const SubDagShape& shape, SubDagSink& sink);
 
-  // The parts that replace a part above the bricks: its children of which anything is selected.
+  // Returns the parts that replace a part above the bricks: its children with selected cells.
   std::vector<SelectedPart> split(const SelectedPart& part);
 
  private:
@@ -50,23 +50,23 @@ class PartBuilder {
     NodeRef ref;
     OctreeCounts counts;
   };
-  // The children of a level's nodes, as numbers in the level below.
+  // The children of a level's nodes, by their numbers in the level below.
   struct Children {
-    PooledArray<uint8_t> masks;   // by number; without children outside the region
-    PooledArray<uint32_t> first;  // by number
+    PooledArray<uint8_t> masks;   // by node number; without children outside the region
+    PooledArray<uint32_t> first;  // by node number
     PooledArray<uint32_t> all;
     uint64_t count = 0;
   };
 
   uint32_t brick_level() const { return selection_.grid_levels - kBrickLevels; }
-  // The low corner and the edge of a cube, in cells of the selected grid.
+  // Returns the low corner and the edge of a cube, in cells of the selected grid.
   std::array<int64_t, 3> corner(uint32_t level, const PartLevel::Position& position) const;
   PartLevel level_of_part(uint32_t level) {
     return PartLevel(memory_, file_.level(level).pointer_bits == 64);
   }
   int64_t edge(uint32_t level) const { return int64_t{1} << (selection_.grid_levels - level); }
 
-  // Reads the nodes of a level, whose children will be added to `below`.
+  // Reads the nodes of a level. Their children are added to `below`.
   template <class Visit>
   void read(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children, Visit visit);
   void read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);

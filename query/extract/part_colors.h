@@ -1,13 +1,13 @@
-// Writes the colors of a part of a global file, or another attribute of its cells, behind the
-// levels of the part's own file.
+// Writes the colors of a part of a global file, or another attribute of its cells, after the
+// levels of the part's file.
 //
 // The color grid of the part is the part of the file's color grid, or of the selected level if that
 // is coarser. A part with fewer than 4 color cells per edge gets 4, with the colors of the cells
 // around them. A cell of the part has
 //
-//   1. the color that the file stores for it, where the region does not cut it, and on the finest
-//      level of the color grid;
-//   2. otherwise the mean of the finest cells that are left of it, in linear light.
+//   1. the color stored in the file, on the finest level of the color grid and if the region does
+//      not cut the cell;
+//   2. otherwise the mean of its remaining finest cells, in linear light.
 //
 // The stored bytes of a region of colors are copied if the region is inside the selection and the
 // part has a tier with the same levels, which depends only on the finest and the coarsest level.
@@ -36,16 +36,16 @@
 namespace voxdag::query {
 
 struct ColoredPart {
-  const voxdag_reader::File& file;  // with the attribute
-  const Selection& selection;       // with at least one set cell
+  const voxdag_reader::File& file;  // has the attribute
+  const Selection& selection;       // has at least one set cell
   const Cube& crop;                 // the new grid: the complete grid, or a cube around the region
 };
 
-// The levels of the part's color grid, from 2 to the levels of its grid.
+// Returns the levels of the part's color grid, from 2 to the levels of the part's grid.
 uint32_t part_color_levels(const ColoredPart& part, Attribute attribute);
 
-// The levels of `out` must be complete. Throws Error{kCorrupt} for a damaged file,
-// Error{kOutOfMemory}, Error{kCanceled}, and voxdag_reader::Error.
+// Writes the attribute. The levels of `out` must be complete. Throws Error{kCorrupt} for a damaged
+// file, Error{kOutOfMemory}, Error{kCanceled}, and voxdag_reader::Error.
 void write_part_attribute(const ColoredPart& part, Attribute attribute, FileSystem& files,
                           GlobalFileWriter& out, MemoryBudget& budget, unsigned threads,
                           Progress& progress, const CancelToken& cancel);

@@ -1,6 +1,6 @@
-// The nodes of one level below a cube of the input that are wanted: each node of which everything
-// is wanted once, whatever the number of its parents, and each node that the region cuts once per
-// position. They are numbered in the order in which they were added.
+// The nodes of one level below a cube of the input that have selected cells. A node that the region
+// does not cut is added once, for any number of parents. A node that the region cuts is added once
+// per position. Nodes are numbered in the order in which they are added.
 //
 //   slots     [tag | number + 1] ...    open addressing by the offset, for nodes that are not cut
 //
@@ -23,7 +23,7 @@ class PartLevel {
  public:
   using Position = std::array<uint32_t, 3>;  // in cubes of the level
 
-  // `wide`: the level of the file has over 2^32 words.
+  // `wide`: the level of the file has more than 2^32 words.
   PartLevel(PooledMemory& memory, bool wide) : memory_(&memory), wide_(wide) {}
 
   uint64_t size() const { return count_; }
@@ -35,14 +35,15 @@ class PartLevel {
             static_cast<uint32_t>(place >> 2 * kAxisBits)};
   }
 
-  // Makes room for about `count` nodes.
+  // Reserves memory for about `count` nodes.
   void reserve(uint64_t count) {
     if (2 * count >= slots_size_) grow_slots(2 * count + 1);
   }
   void prefetch(uint64_t offset) const {
     __builtin_prefetch(&slots_[offset * kMultiplier >> shift_]);
   }
-  // The number of the node at `offset`, all of which is wanted.
+  // Returns the number of the node at `offset`, which the region does not cut. Adds it if it is
+  // new.
   uint32_t find_or_add(uint64_t offset) {
     if (2 * count_ >= slots_size_) grow_slots(2 * count_ + 1);
     const uint64_t hash = offset * kMultiplier;
@@ -56,13 +57,13 @@ class PartLevel {
     slots_[at] = hash << 32 | (index + 1);
     return index;
   }
-  // The number of a node at a position where the region cuts it.
+  // Adds a node that the region cuts at this position, and returns its number.
   uint32_t add_cut(uint64_t offset, const Position& position) {
     return add({offset, position[0] | uint64_t{position[1]} << kAxisBits |
                             uint64_t{position[2]} << 2 * kAxisBits});
   }
 
-  // All nodes in the order of their offsets. Nothing may be added after it.
+  // All nodes in the order of their offsets. No node may be added after sort().
   struct Sorted {
     PooledArray<WantedNode> nodes;
     uint64_t count = 0;

@@ -1,6 +1,6 @@
-// Bricks of a part of a file, in the grid of any of its octree's levels: what boxes, lists of
-// positions and exporters are made from. Memory does not grow with the part, time does with its
-// bricks.
+// Iterates over the bricks of a part of a file, in the grid of any of its octree's levels. Boxes,
+// lists of positions and exporters are built on this. Memory does not grow with the part. Time
+// grows with the part's bricks.
 #pragma once
 
 #include <bit>
@@ -13,7 +13,7 @@
 
 namespace voxdag::query {
 
-// The cell of a bit of a brick's mask.
+// Returns the cell of a bit of a brick's mask.
 inline Position brick_cell(const Brick& brick, int bit) {
   return {brick.low[0] + brick_coordinate(bit, 0), brick.low[1] + brick_coordinate(bit, 1),
           brick.low[2] + brick_coordinate(bit, 2)};
@@ -26,19 +26,19 @@ void for_each_cell_of(Brick brick, const Visit& visit) {
     visit(brick_cell(brick, std::countr_zero(brick.mask)));
 }
 
-// The corner of child `index` of a cube, whose children have that edge.
+// Returns the low corner of child `index` of a cube. `edge` is the children's edge.
 inline Position child_corner(const Position& corner, int index, int64_t edge) {
   return {corner[0] + (index & 4 ? edge : 0), corner[1] + (index & 2 ? edge : 0),
           corner[2] + (index & 1 ? edge : 0)};
 }
 
-// The cells of a brick at `low` that are in the region.
+// Returns the cells of a brick at `low` that are in the region.
 uint64_t mask_within(const Region& region, const Position& low);
 
 // Throws Error{kInvalidInput} unless 0 <= grid_levels <= the file's levels.
 void check_grid_levels(const DagView& dag, uint32_t grid_levels);
 
-// The walk of for_each_brick().
+// The implementation of for_each_brick().
 template <class Visit>
 class BrickWalk {
  public:
@@ -55,7 +55,7 @@ class BrickWalk {
   }
 
  private:
-  // False if a visitor has had enough.
+  // Returns false if the visitor has ended the walk.
   bool enter(uint32_t depth, const Position& low, uint64_t content) {
     if (depth + kBrickLevels == selection_.grid_levels)
       return brick(low, brick_of_cells(dag_, depth, content));
@@ -87,10 +87,10 @@ class BrickWalk {
   Visit& visit_;
 };
 
-// Calls visit(const Brick&) for every brick that has set cells in the region, in Morton order,
-// until it returns false, if it returns anything; the mask is clipped to the region. Cells outside
-// the region or the grid are not visited; no node above a brick is read twice for it.
-// Throws Error{kInvalidInput} unless the selection's grid has at most the file's levels, and
+// Calls visit(const Brick&) for every brick that has set cells in the region, in Morton order. If
+// visit() returns a bool, false ends the walk. The mask is clipped to the region. Cells outside the
+// region or the grid are not visited. No node above a brick is read twice for it. Throws
+// Error{kInvalidInput} unless the selection's grid has at most the file's levels, and
 // Error{kCorrupt} for a damaged DAG.
 template <class Visit>
 void for_each_brick(const DagView& dag, const Selection& selection, Visit&& visit) {

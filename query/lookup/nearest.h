@@ -1,4 +1,4 @@
-// The set cell that is nearest to a point.
+// Finds the set cell that is nearest to a point.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@
 
 namespace voxdag::query {
 
-// The set cell of the grid of 2^grid_levels per edge whose center is nearest to the center of the
-// cell `from`; the lowest Morton code wins a tie. No result if it is farther than the root of
-// max_squared. Descends into near children first, and never into children farther than the best
-// cell so far. grid_levels is at most the file's, coordinates at most kMaxCoordinate. Throws
+// Returns the set cell of the grid of 2^grid_levels per edge whose center is nearest to the center
+// of the cell `from`. On ties, the lowest Morton code wins. No result if the distance exceeds the
+// root of max_squared. Descends into near children first, and never into children farther than the
+// best cell so far. grid_levels is at most the file's, coordinates at most kMaxCoordinate. Throws
 // Error{kCorrupt} for a damaged DAG.
 Nearest find_nearest(const DagView& dag, uint32_t grid_levels, const Position& from,
                      uint64_t max_squared);

@@ -1,5 +1,5 @@
-// The nodes of the grid of 32^3 cells, in a dense array of 256 KiB: descents of many points begin
-// there instead of at the root, and most points of a surface's grid end there.
+// The nodes of the grid of 32^3 cells, in a dense array of 256 KiB. Lookups of many points begin
+// there instead of at the root. In the grid of a surface, most points also end there.
 #pragma once
 
 #include <cstdint>
@@ -14,20 +14,20 @@ class TopCells {
  public:
   static constexpr uint32_t kLevels = 5;
 
-  // True if these cells are nodes, which have children in the grid of `grid_levels`.
+  // True if these cells are nodes that have children in the grid of `grid_levels`.
   static bool serve(const DagView& dag, uint32_t grid_levels) {
     return !dag.empty() && dag.grid_levels() > kLevels + kBrickLevels && grid_levels > kLevels;
   }
 
-  // `dag` must satisfy serve(). Reads the levels above the cells; throws Error{kCorrupt} for a
-  // damaged one.
+  // `dag` must satisfy serve(). Reads the levels above the cells. Throws Error{kCorrupt} if they
+  // are damaged.
   explicit TopCells(const DagView& dag) : cells_(size_t{1} << (3 * kLevels)) {
     fill(dag, 0, dag.root(), 0);
   }
 
   struct Cell {
     uint64_t word;
-    uint32_t mask() const { return word & 255; }  // 0 without a node
+    uint32_t mask() const { return word & 255; }  // 0 if there is no node
     uint64_t offset() const { return word >> 8; }
   };
   // Coordinates are less than 2^kLevels.

@@ -11,21 +11,23 @@
 namespace voxdag::query {
 namespace {
 
-// Masks of a cell's mirrored children: children in which a ray has an interval, and children with
-// an interval of length 0.
+// Masks of a cell's mirrored children: children with a nonempty interval of a ray, and children
+// with an interval of length 0.
 struct Crossed {
   uint32_t inside, touching;
 };
 
-// Two planes of each axis, x, y and z, and a fourth of no meaning: by which rays enter the lower
-// and the upper children of a cell, or by which they leave them; and the rays' parameters at them.
+// Planes on the axes x, y and z; the fourth number has no meaning. There is one set of planes for
+// the lower children of a cell and one for the upper children, either for entering or for leaving
+// them. Also the rays' parameters at these planes.
 template <class Four>
 struct FourPlanes {
   Four lower, upper;
   static FourPlanes of(double all) { return {Four::of(all), Four::of(all)}; }
-  // Four numbers for the planes of the lower children and the same for the upper ones.
+  // The same four numbers for the planes of the lower children and of the upper children.
   static FourPlanes twice(const double* four) { return {Four::load(four), Four::load(four)}; }
-  // By which rays enter the children of the cell at `low`, whose edges are `half`.
+  // The planes at which rays enter the children of the cell at `low`. `half` is the children's
+  // edge.
   static FourPlanes of_cell(Int4 low, double half) {
     const Four l = Four::from(low);
     return {l, l + Four::of(half)};

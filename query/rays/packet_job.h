@@ -1,5 +1,5 @@
-// The rays of a packet while they are cast, and the descents of each: what RayPacket
-// prepares and a walk works on. See packet_walk.h for how.
+// The rays of a packet that is being cast, and the descent of each ray. RayPacket prepares this
+// data, and a walk works on it; see packet_walk.h.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@ namespace voxdag::query {
 
 inline constexpr int kPacketRays = 64;
 
-// A position in voxels, mirrored as the rays are; the fourth number has no meaning.
+// A position in voxels, mirrored like the rays. The fourth number has no meaning.
 using Int4 = int32_t __attribute__((vector_size(16)));
 
-// A node or brick that a ray may cross, to be entered when the ray has left those before.
+// A node or brick that a ray may cross. The ray enters it after it has left the cells before it.
 struct WaitingCell {
-  Int4 low;         // its low corner
-  uint64_t offset;  // in the words of its level
+  Int4 low;         // low corner
+  uint64_t offset;  // word offset in its level
   uint32_t depth;
   int32_t next;  // next cell of the same ray, or -1
 };
@@ -25,13 +25,14 @@ struct WaitingCell {
 // The descent of one ray.
 struct RayDescent {
   static constexpr int kMaxLevels = 20;
-  Int4 low;  // the cell that the ray enters next, as in WaitingCell
+  Int4 low;  // cell that the ray enters next, as in WaitingCell
   uint64_t offset;
   uint32_t depth;
-  uint32_t open;  // bit d: children of the path's node at depth d are left; d is less than `depth`
+  // Bit d: the path's node at depth d has more children to visit; d is less than `depth`.
+  uint32_t open;
   int32_t first_waiting, last_waiting;   // -1 if no cell waits
-  uint8_t left[kMaxLevels];              // which are left, mirrored
-  const uint32_t* children[kMaxLevels];  // of the path's nodes: their words after the mask
+  uint8_t left[kMaxLevels];              // children left to visit, mirrored
+  const uint32_t* children[kMaxLevels];  // words of the path's nodes after the mask
 };
 
 // An origin and the inverse of a direction; the fourth number has no meaning.
@@ -44,7 +45,7 @@ struct PacketJob {
   struct Level {
     const uint32_t* words;
     uint64_t count;
-    uint64_t any_node;  // less than so many words before it, there is room for a node of any size
+    uint64_t any_node;  // at smaller offsets a node of any size fits in the level
     bool wide_children;
   };
 
@@ -59,8 +60,8 @@ struct PacketJob {
   alignas(64) double origin[3][kPacketRays], inverse[3][kPacketRays];
   PacketRay rays[kPacketRays];
   Hit* hits = nullptr;
-  uint64_t found = 0;   // rays that have a hit, hits[ray], the first of its cells
-  uint64_t single = 0;  // rays to be cast separately
+  uint64_t found = 0;   // rays with a hit; hits[ray] is the ray's first cell
+  uint64_t single = 0;  // rays that must be cast separately
 
   // Number of loading or waiting cells that begins a round: as many as memory can load concurrently
   // (measured). One more packet may come first.

@@ -3,13 +3,13 @@
 //
 // Large cells are visited depth first, once for all rays that may cross them: bounds of all rays
 // together skip most children, and each ray is tested with the remaining ones if there are
-// several. Where few rays remain, each descends by itself through its cells in their order, so
-// that it loads nothing behind its hit. Rays take turns, a step each: memory loads the next
-// cell of a ray while the others step.
+// several. If few rays remain, each descends separately through its cells in order, so
+// that it loads nothing behind its hit. Rays take turns, one step each. Memory loads the next cell
+// of a ray while the other rays step.
 //
-// A cell is crossed where a ray has an interval in it that is not empty. One of length 0 in an
-// occupied cell, or two planes passed at the parameter of a hit, mean that the path from the root
-// decides: such a ray is given up, and is cast by itself.
+// A ray crosses a cell if its interval in the cell is not empty. In two cases the result depends on
+// the path from the root: an interval of length 0 in an occupied cell, and two planes passed at the
+// parameter of a hit. Such a ray leaves the packet and is cast separately.
 #pragma once
 
 #include <limits>
@@ -34,7 +34,8 @@ struct MirroredMasks {
 };
 constexpr MirroredMasks kMirroredMasks;
 
-// Which bits of a child's index say that it is the upper one on an axis: all ones there.
+// For each axis, all ones if the bit of this axis is set in the child index, that is for upper
+// children.
 constexpr Int4 kUpperOn[8] = {{0, 0, 0, 0},  {0, 0, -1, 0},  {0, -1, 0, 0},  {0, -1, -1, 0},
                               {-1, 0, 0, 0}, {-1, 0, -1, 0}, {-1, -1, 0, 0}, {-1, -1, -1, 0}};
 
@@ -58,7 +59,7 @@ class PacketWalk {
   }
 
  private:
-  // So few rays part in any cell; all do in bricks. Measured.
+  // At most this many rays continue separately in any cell; in bricks all rays do. Measured.
   static constexpr int kFewRays = 8;
 
   using Planes = FourPlanes<Four>;
@@ -122,7 +123,7 @@ class PacketWalk {
     }
   }
 
-  // As DagView::Children; its functions are not for this instruction set.
+  // Like DagView::Children, whose functions are not compiled for this instruction set.
   struct Node {
     uint32_t mask;
     const uint32_t* children;
@@ -141,7 +142,7 @@ class PacketWalk {
     if (mask - 1 >= 255) job_.dag->corrupt(depth, offset);
     return {mask, words + 1, level.wide_children};
   }
-  // A node near the end of its level.
+  // Checks a node near the end of its level.
   __attribute__((noinline)) void check_node(uint32_t depth, uint64_t offset) const {
     const PacketJob::Level& level = job_.levels[depth];
     if (offset >= level.count || uint64_t{kPopcount8[level.words[offset] & 255]}
@@ -157,7 +158,7 @@ class PacketWalk {
     if (mask == 0) job_.dag->corrupt(brick_depth_, offset);
     return mask;
   }
-  // Where there is no such word, nothing happens.
+  // Does nothing if there is no such word.
   VOXDAG_INLINE void prefetch(uint32_t depth, uint64_t offset) const {
     __builtin_prefetch(reinterpret_cast<const void*>(
         reinterpret_cast<uintptr_t>(job_.levels[depth].words) + 4 * offset));
@@ -171,8 +172,8 @@ class PacketWalk {
                  job_.t_min, job_.t_max);
   }
 
-  // The children of a cell that some ray may cross or touch. Rounding is monotonic, so bounds of
-  // origins and inverse directions give bounds of the parameters.
+  // Returns the children of a cell that some ray may cross or touch. Rounding is monotonic, so
+  // bounds of origins and inverse directions give bounds of the parameters.
   VOXDAG_INLINE uint32_t cross_any(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);
@@ -182,7 +183,7 @@ class PacketWalk {
         cross(min(in * i0, in * i1), max(out * i0, out * i1), job_.t_min, job_.t_max);
     return crossed.inside | crossed.touching;
   }
-  // Which children of a cell all rays cross for certain.
+  // Returns the children of a cell that certainly all rays cross.
   VOXDAG_INLINE uint32_t cross_all(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);
@@ -191,7 +192,7 @@ class PacketWalk {
     return cross(max(in * i0, in * i1), min(out * i0, out * i1), job_.t_min, job_.t_max).inside;
   }
 
-  // Which of the rays cross a cell or touch it.
+  // Returns the rays that cross or touch a cell.
   VOXDAG_INLINE uint64_t crossing(Int4 low, double edge, uint64_t rays) const {
     Four low_plane[3], high_plane[3];
     for (int axis = 0; axis < 3; ++axis) {
@@ -212,7 +213,7 @@ class PacketWalk {
     }
     return crossing & rays;
   }
-  // The first bit of each group of lanes in which there is a ray.
+  // Returns the first bit of each group of lanes that contains a ray.
   VOXDAG_INLINE static uint64_t groups_of(uint64_t rays) {
     rays |= rays >> 1;
     return (rays | rays >> 2) & 0x1111111111111111;
@@ -228,7 +229,7 @@ class PacketWalk {
     const int32_t half = edge / 2;
     uint32_t candidates = mirrored_[n.mask] & cross_any(low, half);
     const bool only = (candidates & (candidates - 1)) == 0;
-    // Rays need no separate test for these.
+    // For these children rays need no separate test.
     const uint32_t by_all = only ? candidates : cross_all(low, half);
     Child children[8];
     int count = 0;
@@ -254,7 +255,8 @@ class PacketWalk {
     }
   }
 
-  // Lets rays part in a cell. Cells come in the order in which their rays cross them.
+  // Separates the rays in a cell: each continues alone. Cells are pushed in the order in which
+  // their rays cross them.
   void push(uint32_t depth, Int4 low, uint64_t offset, uint64_t rays) {
     for (; rays != 0; rays &= rays - 1) {
       const int ray = first_of(rays);
@@ -283,7 +285,7 @@ class PacketWalk {
     descent.first_waiting = cell.next;
   }
 
-  // One step of each ray after the other, until all have ended or left their cells.
+  // Advances all rays by one step each, in turn, until all have ended or left their cells.
   void finish_descents() {
     while (count_ > 0)
       for (int i = 0; i < count_;)
@@ -295,7 +297,7 @@ class PacketWalk {
     waiting_ = 0;
   }
 
-  // The ray enters a cell; whether it continues, with the cell that `descent` has then.
+  // Lets the ray enter a cell. Returns true if the ray continues; `descent` then has its next cell.
   VOXDAG_INLINE bool step(int ray) {
     RayDescent& descent = job_.descents[ray];
     const uint32_t depth = descent.depth;
@@ -319,7 +321,8 @@ class PacketWalk {
     return enter_next(descent);
   }
 
-  // Goes to the first of these children of the path's node at `depth`; the others are left.
+  // Enters the first of these children of the path's node at `depth`. The others remain to be
+  // visited.
   VOXDAG_INLINE void enter_first(RayDescent& descent, uint32_t depth, uint32_t in, const Node& n) {
     const int index = first_of(in);
     descent.low = corner(descent.low, index, int32_t{1} << (job_.grid_levels - depth - 1));
@@ -332,7 +335,7 @@ class PacketWalk {
     prefetch(depth + 1, descent.offset);
   }
 
-  // From a cell without a hit to the next one; whether there is one.
+  // Moves from a cell without a hit to the next cell. Returns false if none exists.
   VOXDAG_INLINE bool enter_next(RayDescent& descent) {
     if (descent.open == 0) {
       if (descent.first_waiting < 0) return false;
@@ -374,13 +377,13 @@ class PacketWalk {
     return report(corner(low, first_of(in), half), half, ray, depth);
   }
 
-  // The ray ends here.
+  // Ends the ray here; it is cast separately.
   bool give_up(int ray) {
     job_.single |= uint64_t{1} << ray;
     return true;
   }
 
-  // The ray's hit is this cell, unless a tie decides about the face.
+  // Reports this cell as the ray's hit, unless a tie decides about the face.
   VOXDAG_INLINE bool report(Int4 low, int32_t edge, int ray, uint32_t depth) {
     const PacketRay& r = job_.rays[ray];
     double t = job_.t_min;
@@ -409,7 +412,7 @@ class PacketWalk {
   PacketJob& job_;
   const uint8_t (&mirrored_)[256];
   const uint32_t brick_depth_;
-  // Rays that descend by themselves, as bits and as a list, and cells that wait for them.
+  // Rays that descend separately, as bits and as a list, and the cells waiting for them.
   uint64_t under_way_ = 0;
   uint8_t list_[kPacketRays];
   int count_ = 0, waiting_ = 0;

@@ -28,18 +28,19 @@ struct Hit {
   double t = 0;
   uint32_t depth = 0;    // levels below the root; the edge of the cell is R / 2^depth voxels
   int64_t cell[3] = {};  // position of the cell, in units of its edge
-  int axis = -1;  // normal axis of the face that the ray entered by; -1 if it began in the cell
+  // Normal axis of the face by which the ray entered; -1 if the ray began in the cell.
+  int axis = -1;
 };
 
 class RayCaster {
  public:
   explicit RayCaster(const DagView& dag) : dag_(dag) {}
 
-  // Finds the first occupied cell between t_min and t_max; false without one. Throws
+  // Finds the first occupied cell between t_min and t_max. Returns false if none exists. Throws
   // Error{kCorrupt} for a damaged DAG.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit) const;
-  // The same with at most `steps_left` nodes and bricks, which it lowers by as many as it read. If
-  // that becomes 0 the ray ends there, and false means nothing.
+  // Like the above, but reads at most `steps_left` nodes and bricks, and subtracts the number read.
+  // If the rest is 0, the ray ended early, and false does not mean that there is no hit.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit,
             uint64_t& steps_left) const;
 

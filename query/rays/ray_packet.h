@@ -1,8 +1,8 @@
-// Casts up to 64 rays together, with the results of RayCaster to the last bit. Neighboring rays
-// visit the same large cells: a packet visits each cell once, for all rays that may cross it. See
+// Casts up to 64 rays together, with bit-identical results to RayCaster. Neighboring rays visit the
+// same large cells. A packet visits each cell once, for all rays that may cross it. See
 // query/rays/packet_walk.h.
 //
-// About 30 KiB; not thread-safe, each thread has its own.
+// A packet takes about 30 KiB. Not thread-safe; each thread needs its own.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,8 @@ class RayPacket {
   RayPacket(const DagView& dag, double stop_size, double t_min, double t_max,
             WalkPacket walk = fastest_packet_walk());
 
-  // Casts up to kRays rays; bit i of the result is set if ray i has a hit, hits[i]. Throws
-  // Error{kCorrupt} for a damaged DAG.
+  // Casts up to kRays rays. Bit i of the result is set if ray i has a hit, which is in hits[i].
+  // Throws Error{kCorrupt} for a damaged DAG.
   uint64_t cast(std::span<const Ray> rays, Hit* hits);
 
  private:

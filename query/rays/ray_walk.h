@@ -18,7 +18,7 @@ namespace voxdag::query {
 
 // A ray whose direction is positive on every axis.
 struct MirroredRay {
-  // A smaller component of a direction counts as 0; its inverse could be infinite.
+  // Smaller components of a direction count as 0, because their inverse could be infinite.
   static constexpr double kMinComponent = 1e-18;
 
   static double component(double d) { return std::max(std::fabs(d), kMinComponent); }
@@ -42,18 +42,18 @@ struct MirroredRay {
 
 class RayWalk {
  public:
-  // A walk of more than `max_steps` nodes and bricks ends there, as if nothing came behind.
+  // Reads at most `max_steps` nodes and bricks. The walk then ends as if there were nothing more.
   RayWalk(const DagView& dag, const MirroredRay& ray, const Cone& cone, double t_max,
           uint64_t max_steps = ~uint64_t{0})
       : dag_(dag), ray_(ray), cone_(cone), t_max_(t_max), steps_left_(max_steps) {}
 
   uint64_t steps_left() const { return steps_left_; }
 
-  // From the root on. The DAG must not be empty. Throws Error{kCorrupt} for a damaged one.
+  // Walks from the root. The DAG must not be empty. Throws Error{kCorrupt} for a damaged DAG.
   bool run(double t_min, Hit& hit);
-  // From a cell on that has children: `low` is its low corner, mirrored like the ray, `size` its
-  // edge, both in voxels; `axis` belongs to the face by which the ray enters it at `t`, -1 if it
-  // begins there.
+  // Walks from a cell that has children. `low` is its low corner, mirrored like the ray, `size` its
+  // edge, both in voxels. `axis` belongs to the face by which the ray enters it at `t`; -1 if the
+  // ray begins there.
   bool run_below(uint32_t depth, const double (&low)[3], double size, uint64_t content,
                  const double (&out)[3], double t, int axis, Hit& hit) {
     axis_ = axis;
@@ -62,8 +62,8 @@ class RayWalk {
   }
 
  private:
-  // Visits the children of a cell with has(index), the nearest first: calls
-  // enter_child(index, low corner, out, t), which returns true for a hit.
+  // Visits the children of a cell with has(index), nearest first: calls enter_child(index, low
+  // corner, out, t), which returns true for a hit.
   template <class Has, class EnterChild>
   bool cross(const double (&low)[3], double half, const double (&out)[3], double t, const Has& has,
              const EnterChild& enter_child);

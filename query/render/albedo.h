@@ -1,5 +1,5 @@
 // The share of light that a surface reflects, from the file's colors or gray plaster. Not
-// thread-safe; refers to the file.
+// thread-safe. Refers to the file.
 #pragma once
 
 #include <optional>
@@ -15,11 +15,11 @@ inline constexpr Vec kPlaster{{0.74, 0.70, 0.64}};
 
 class Albedo {
  public:
-  // `colors`: the file whose colors are shown, or null; one without colors is gray.
+  // `colors`: the file whose colors are shown, or null. The result is gray if it has no colors.
   explicit Albedo(const voxdag_reader::File* colors) {
     if (colors && colors->has_colors()) cursor_.emplace(*colors);
   }
-  // Red, green and blue, linear. Throws Error{kCorrupt} for damaged colors.
+  // Returns red, green and blue, linear. Throws Error{kCorrupt} for damaged colors.
   Vec of(const SurfaceHit& surface);
 
  private:

@@ -1,4 +1,4 @@
-// A pinhole camera in voxel units, and where to put one to see a set of points. Immutable.
+// A pinhole camera in voxel units, and a placement of the camera for a set of points. Immutable.
 #pragma once
 
 #include <vector>
@@ -15,13 +15,13 @@ struct Placement {
 
 class Camera {
  public:
-  // Throws Error{kInvalidInput} if the eye is on the target, or further away than a double holds,
-  // or the field of view not in (0, 180).
+  // Throws Error{kInvalidInput} if the eye is at the target, if their distance exceeds the range of
+  // a double, or if the field of view is not in (0, 180).
   Camera(const Placement& placement, int width, int height);
 
-  // The ray through a point of the picture, in pixels from its upper left corner.
+  // Returns the ray through a point of the picture, in pixels from its upper left corner.
   Ray ray(double x, double y) const;
-  // The width of a pixel at distance 1.
+  // Returns the width of a pixel at distance 1.
   double pixel_spread() const { return pixel_; }
   const Vec& eye() const { return eye_; }
   const Vec& forward() const { return forward_; }
@@ -32,9 +32,9 @@ class Camera {
   double half_width_, half_height_;  // of the picture, in pixels
 };
 
-// Looks from the direction `toward_eye` (of any length), with all of `points` in the center of the
-// picture and as large as they fit; a few outliers among thousands may be outside. Needs at least
-// one point.
+// Returns a placement in the direction `toward_eye` (of any length) with all of `points` centered
+// and as large as possible. A few outliers among thousands may be outside. Needs at least one
+// point.
 Placement fit_camera(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
                      double aspect);
 

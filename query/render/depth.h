@@ -13,19 +13,19 @@ namespace voxdag::query {
 
 struct DepthMap {
   int width = 0, height = 0;
-  // Rows from the top: voxels along the ray through the center of the pixel, infinity where there
-  // is no surface.
+  // Rows from the top. Each value is the distance in voxels along the ray through the center of the
+  // pixel, infinity if there is no surface.
   std::vector<float> depths;
 };
 
-// All distances of a grid without voxels are infinite. Throws the errors of render_picture().
+// If the grid has no voxels, all distances are infinite. Throws the errors of render_picture().
 DepthMap render_depth(const DagView& dag, const Placement& placement, int width, int height,
                       unsigned threads, const CancelToken& cancel);
 
-// The bytes that a map and its file take for each pixel.
+// Bytes per pixel of a map and its file.
 inline constexpr uint64_t kDepthBytesPerPixel = 2 * sizeof(float);
 
-// The bytes of a file that numpy.load() reads: an array (height, width) of float32.
+// Returns the bytes of a file for numpy.load(): an array (height, width) of float32.
 std::string encode_npy(const DepthMap& map);
 
 }  // namespace voxdag::query

@@ -16,12 +16,13 @@ struct Float3 {
   operator Vec() const { return {{x, y, z}}; }
 };
 
-// Means over a pixel's samples: `floor` over those that met no surface, the rest over the others.
+// Means over a pixel's samples: `floor` over the samples that met no surface, all others over the
+// samples that met one.
 struct GBufferPixel {
   float coverage = 0;  // share of the samples that met a surface
   Float3 offset;       // from the eye to the surface, in voxels
   Float3 normal;       // unit vector
-  Float3 albedo;       // red, green and blue share of light that is reflected
+  Float3 albedo;       // reflected share of red, green and blue light
   Float3 sky;          // red, green and blue light from the sky; 1 is an open sky
   float sun = 0;       // share of the sun that is visible
   float floor = 1;     // brightness of the floor; 1 without a shadow
@@ -37,9 +38,10 @@ struct GBuffer {
     return pixels[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
   }
 
-  // The pixel with its sky light averaged over the neighbors on the same plane, or its floor light
-  // over the floor; sun and normal, which have finer detail, over fewer neighbors. `pixel_spread`
-  // is the width of a pixel at distance 1. Does not modify the buffer.
+  // Returns the pixel with smoothed light. The sky light is averaged over the neighbors on the same
+  // plane, the floor light over neighbors on the floor. Sun and normal have finer detail and are
+  // averaged over fewer neighbors. `pixel_spread` is the width of a pixel at distance 1. Does not
+  // modify the buffer.
   GBufferPixel smoothed(int x, int y, double pixel_spread);
 };
 

@@ -14,18 +14,19 @@ namespace voxdag::query {
 
 class Lighting {
  public:
-  // Places the sun for the visible surface; `seen` is a sample of it. A camera outside the scene
-  // also sees a floor below it, which receives the scene's shadow.
+  // Places the sun for the visible surface; `seen` are samples of the surface. A camera outside the
+  // scene also sees a floor below it, which receives the scene's shadow.
   Lighting(const DagView& dag, const Box& box, const Camera& camera,
            const std::vector<SurfaceHit>& seen);
 
-  // Red, green and blue light from the sky; an open sky gives about 1.
+  // Returns red, green and blue light from the sky. An open sky gives about 1.
   Vec sky_light(const SurfaceHit& surface, int rays, const Sampler& sampler) const;
-  // 1 if the surface sees the sampled point of the sun, 0 if not.
+  // Returns 1 if the surface sees the sampled point of the sun, else 0.
   double sun_light(const SurfaceHit& surface, const Sampler& sampler) const;
-  // What a surface with this albedo and normal reflects of both, red, green and blue.
+  // Returns the light of sun and sky (red, green and blue) that a surface with this albedo and
+  // normal reflects.
   Vec reflected(const Vec& albedo, const Vec& normal, const Vec& sky, double sun) const;
-  // Brightness of the floor where `ray` meets it; 1 without a floor or shadow.
+  // Returns the brightness of the floor where `ray` meets it; 1 if there is no floor or no shadow.
   double floor_light(const Ray& ray, const Sampler& sampler) const;
 
  private:

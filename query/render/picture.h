@@ -20,10 +20,10 @@ struct Picture {
   }
 };
 
-// The bytes of its PNG file, which names voxdag as its software. Throws Error{kOutOfMemory} if
-// libpng runs out of memory.
+// Returns the picture as a PNG file, which names voxdag as its software. Throws Error{kOutOfMemory}
+// if libpng runs out of memory.
 std::string encode_png(const Picture& picture);
-// True if the file is one of encode_png().
+// True if the file was written by encode_png().
 bool is_rendered_png(const ReadableFile& file);
 
 }  // namespace voxdag::query

@@ -12,9 +12,9 @@ namespace voxdag::query {
 
 struct RenderOptions {
   int width = 1280, height = 720;
-  int samples = 2;  // per pixel, along each of its sides
+  int samples = 2;  // samples per pixel along each of its sides
   unsigned threads = 1;
-  // The file of the DAG, to show its colors if it has some; null for gray.
+  // The DAG's file, for its colors; null for gray.
   const voxdag_reader::File* colors = nullptr;
 };
 

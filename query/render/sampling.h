@@ -1,4 +1,4 @@
-// Low-discrepancy sample points that depend on nothing but the pixel: a picture is the same for any
+// Low-discrepancy sample points that depend only on the pixel. So a picture is the same for any
 // number of threads.
 #pragma once
 
@@ -10,8 +10,8 @@ namespace voxdag::query {
 inline constexpr double kPi = 3.14159265358979323846;
 
 // Points in [0, 1)^2 that cover the square evenly (the R2 sequence). Each dimension of a sample
-// (its place in the pixel, its rays to the sky) shifts the sequence by a random amount. The
-// sequences of neighboring pixels start far apart, so that the noise that remains is fine.
+// (its position in the pixel, its rays to the sky) shifts the sequence by a random amount. The
+// sequences of neighboring pixels start far apart, so the remaining noise is fine.
 class Sampler {
  public:
   struct Pair {
@@ -24,7 +24,7 @@ class Sampler {
                x * 0.4142135623730951 + y * 0.7320508075688772},
         sample_(sample) {}
 
-  // Point `i` of the `count` points that each sample of the pixel takes in this dimension.
+  // Returns point `i` of the `count` points that each sample of the pixel uses in this dimension.
   Pair pair(uint64_t dimension, int i = 0, int count = 1) const {
     const double n = static_cast<double>(sample_) * count + i;
     return {wrap(start_[0] + random(dimension, 0) + 0.7548776662466927 * n),
@@ -42,7 +42,7 @@ class Sampler {
   int sample_ = 0;
 };
 
-// A cosine-distributed direction around the unit vector `n`.
+// Returns a cosine-distributed direction around the unit vector `n`.
 inline Vec cosine_direction(const Vec& n, const Sampler::Pair& p) {
   Vec a, b;
   basis_around(n, a, b);

@@ -10,7 +10,7 @@
 
 namespace voxdag::query {
 
-// A ray that sees as far as any does.
+// Distance at which the view of any ray ends.
 inline constexpr double kFarthest = 1e30;
 // The cone of a ray through a pixel that is `pixel_spread` wide at distance 1: cells of up to three
 // quarters of a pixel are drawn as one cell.
@@ -19,15 +19,15 @@ inline Cone visible_cone(double pixel_spread) { return {0, 0.75 * pixel_spread};
 struct SurfaceHit {
   double t = 0;          // ray parameter of the hit
   double size = 0;       // edge of the cell that was hit, in voxels
-  uint32_t depth = 0;    // of that cell, below the root
-  int64_t cell[3] = {};  // its position, in units of its edge
+  uint32_t depth = 0;    // depth of this cell below the root
+  int64_t cell[3] = {};  // position of this cell, in units of its edge
   Vec normal;            // unit vector on the side that the ray came from
   Vec start;             // free space in front of the surface, where rays to the light start
 };
 
-// Finds the first surface on a ray through a pixel that is `pixel_spread` wide at distance 1; false
-// without one. Voxels of many pixels are shown as cubes, smaller ones as the surface that they
-// sample. Throws Error{kCorrupt} for a damaged DAG.
+// Finds the first surface on a ray through a pixel that is `pixel_spread` wide at distance 1.
+// Returns false if none exists. Voxels that cover many pixels are shown as cubes, smaller ones as
+// the surface that they sample. Throws Error{kCorrupt} for a damaged DAG.
 bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, SurfaceHit& surface);
 
 }  // namespace voxdag::query

@@ -1,5 +1,5 @@
-// Default camera placements, and the bounds of the occupied part of the grid. All functions of a
-// DAG require a DAG that is not empty.
+// Default camera placements, and the bounds of the occupied part of the grid. Functions that take a
+// DAG require that it is not empty.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace voxdag::query {
 
-// Where a point in voxels is in the world.
+// Converts a point in voxels to world space.
 std::array<double, 3> world_point(const Vec& point, const voxdag_reader::File& file);
 
 struct Box {
@@ -22,37 +22,38 @@ struct Box {
   double diagonal() const { return length(high - low); }
 };
 
-// The box around the occupied cells of 1/2048 of the grid's edge; a larger one if that would take
-// more than some tens of millions of cells. Throws as `cancel` does.
+// Returns the box around the occupied cells of 1/2048 of the grid's edge. If this would take more
+// than some tens of millions of cells, returns a larger box. Throws as `cancel` does.
 Box occupied_box(const DagView& dag, const CancelToken& cancel = {});
 
 // Occupied cells of one size.
 struct OccupiedCells {
   std::vector<Vec> centers;
   double edge;
-  // Points that a view must have in its picture to show the cells: their centers, or their corners
-  // if there are few cells.
+  // Returns points that must be in the picture to show the cells: the cells' centers, or their
+  // corners if there are few cells.
   std::vector<Vec> outline() const;
 };
-// Those of 1/64 of the grid's edge; finer ones where there are few of them, since the scene is
-// small in its grid.
+// Returns the occupied cells of 1/64 of the grid's edge. If they are few, the scene is small in its
+// grid, and finer cells are returned.
 OccupiedCells occupied_cells(const DagView& dag);
 
 // "auto", "iso", "front", "back", "left", "right", "top", "inside".
 const std::vector<std::string>& view_names();
 
-// The placement of a named view. "inside" is a place within the scene with a long view, walls
-// around and a floor below; "auto" is "inside" for a scene most of which cannot be seen from
-// outside, and "iso" for any other. `aspect` is the picture's width divided by its height; without
-// `fov_degrees`, the view decides on the field of view. Throws Error{kInvalidInput} for another
-// name, and as `cancel` does: "inside" and "auto" cast rays for up to half a second. For a
-// second or two if the scene is dust: their number of steps is limited, and the view is the best of
-// those tried until then, or "iso".
+// Returns the placement of a named view. "inside" is a position within the scene with a long view,
+// walls around and a floor below. "auto" is "inside" if most of the scene cannot be seen from
+// outside, otherwise "iso". `aspect` is the picture's width divided by its height. Without
+// `fov_degrees`, the view chooses the field of view.
+// "inside" and "auto" cast rays for up to half a second, or one to two seconds if the scene is
+// dust. Their number of steps is limited. At the limit, the result is the best view so far, or
+// "iso".
+// Throws Error{kInvalidInput} for another name, and as `cancel` does.
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
                      std::optional<double> fov_degrees, const CancelToken& cancel = {});
 
-// The same for several views of a DAG, with their common parts computed once. Refers to the DAG and
-// the token.
+// Like named_view(), for several views of a DAG. Computes their common parts once. Refers to the
+// DAG and the token.
 class NamedViews {
  public:
   NamedViews(const DagView& dag, const CancelToken& cancel) : dag_(dag), cancel_(cancel) {}

@@ -16,14 +16,14 @@
 namespace voxdag::query {
 
 struct ColorPageAddress {
-  uint32_t level = 0;                  // of its cells
-  std::array<uint64_t, 3> position{};  // of its low corner, in pages
+  uint32_t level = 0;                  // level of the page's cells
+  std::array<uint64_t, 3> position{};  // position of the low corner, in pages
 };
 
-// Pages of one file. Refers to it; each thread needs its own.
+// Pages of one file. Refers to the file. Each thread needs its own object.
 class ColorPages {
  public:
-  // `dag` must belong to the file, and also `blocks`, if given.
+  // `dag` and, if given, `blocks` must belong to the file.
   ColorPages(const voxdag_reader::File& file, const DagView& dag,
              const CheckedBlocks* blocks = nullptr)
       : file_(&file),
@@ -33,13 +33,13 @@ class ColorPages {
         cursor_(checked_file_) {}
   ColorPages(const ColorPages&) = delete;  // the cursor refers to a member
 
-  // The words of the page: one if none of its cells is set. Throws Error{kNotFound} if the file has
-  // no colors of that level or the grid no such cells, and Error{kCorrupt}; DamagedBlock if a block
-  // that it needs is damaged.
+  // Returns the words of the page: one word if none of its cells is set. Throws Error{kNotFound} if
+  // the file has no colors of this level or the grid has no such cells, Error{kCorrupt}, and
+  // DamagedBlock if a needed block is damaged.
   std::vector<uint32_t> encode(const ColorPageAddress& address);
 
  private:
-  // The file, as a cursor uses it.
+  // The file in the form that a cursor needs.
   struct CheckedFile {
     const voxdag_reader::File& file;
     const DagView& dag;

@@ -19,9 +19,9 @@ class NodeChecks {
     bytes_ = 4 * (is_brick ? 2 : dag.level(level + 1).wide ? 17 : 9);
   }
 
-  // The node or brick at this word offset, which may be any; throws DamagedBlock. Checks as many
-  // words as the largest node has, because the first word, which determines the number, may be
-  // damaged.
+  // Throws DamagedBlock if the node or brick at this word offset, which may have any value, is
+  // damaged. Checks as many words as the largest node has, because the first word, which determines
+  // the number, may be damaged.
   void expect_intact(uint64_t offset) const {
     if (blocks_ && offset < words_) blocks_->expect_intact_at(place_ + 4 * offset, bytes_);
   }

@@ -1,4 +1,5 @@
-// Gives equal word offsets of a level the same number: 0, 1, 2, ... in order of first use.
+// Assigns numbers to the word offsets of a level: 0, 1, 2, ... in order of first use. Equal offsets
+// get the same number.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +10,7 @@ namespace voxdag::query {
 
 class OffsetTable {
  public:
-  // The number of the offset, a new one if it was not added before.
+  // Returns the number of the offset; a new number if the offset is new.
   uint32_t add(uint64_t offset) {
     if (offsets_.size() * 2 >= slots_.size()) grow();
     uint32_t& slot = find(offset);
@@ -19,11 +20,11 @@ class OffsetTable {
     }
     return slot - 1;
   }
-  // In the order of their numbers.
+  // All offsets in the order of their numbers.
   const std::vector<uint64_t>& offsets() const { return offsets_; }
 
  private:
-  // The slot that has the offset, or the free one where it belongs.
+  // Returns the slot of the offset, or the free slot for it.
   uint32_t& find(uint64_t offset) {
     size_t at = static_cast<size_t>(offset * 0x9e3779b97f4a7c15ull >> 32) & (slots_.size() - 1);
     while (slots_[at] != 0 && offsets_[slots_[at] - 1] != offset)
@@ -35,7 +36,7 @@ class OffsetTable {
     for (size_t i = 0; i < offsets_.size(); ++i) find(offsets_[i]) = static_cast<uint32_t>(i + 1);
   }
 
-  std::vector<uint32_t> slots_;  // a power of two of numbers plus 1; 0 is free
+  std::vector<uint32_t> slots_;  // a power of two; number + 1, or 0 for a free slot
   std::vector<uint64_t> offsets_;
 };
 

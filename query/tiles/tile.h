@@ -15,24 +15,25 @@
 
 namespace voxdag::query {
 
-// How many levels of nodes a tile may have: with 5 its size is at most 700 KiB.
+// Maximum levels of nodes in a tile. With 5 levels, a tile has at most 700 KiB.
 inline constexpr uint32_t kMaxTileLevels = 5;
 // The first word of a tile: "VDT1".
 inline constexpr uint32_t kTileMagic = 0x31544456;
 
 struct TileAddress {
   uint32_t level = 0;
-  uint64_t offset = 0;  // in words, of a node in that level
+  uint64_t offset = 0;  // word offset of a node in this level
 };
 
-// The level at which a tile with a root at `level`, which is above the bricks, is cut off: the next
-// one below it that is a multiple of `tile_levels` above the bricks.
+// Returns the level at which a tile is cut off if its root is at `level`, which is above the
+// bricks. It is the next level below the root that is a multiple of `tile_levels` above the bricks.
 uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level);
 
-// The words of the tile. `tile_levels` is 1 to kMaxTileLevels. Throws Error{kNotFound} for an
-// address that cannot have a node, and Error{kCorrupt} if the words there lead to no node or brick:
-// the address is inside a node, or the file is damaged. With the blocks of its file, damage is
-// DamagedBlock, and is found even if the words look like nodes.
+// Returns the words of the tile. `tile_levels` is 1 to kMaxTileLevels. Throws Error{kNotFound} for
+// an address that cannot have a node. Throws Error{kCorrupt} if the words there do not lead to
+// nodes or bricks, because the address is inside a node or the file is damaged. If the blocks of
+// the file are given, damage is reported as DamagedBlock, and is found even if the words look like
+// nodes.
 std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels, const TileAddress& root,
                                   const CheckedBlocks* blocks = nullptr);
 

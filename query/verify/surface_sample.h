@@ -1,8 +1,8 @@
 // A seeded sample of the voxels near a scene's surface, computed from its triangles without the
-// code that builds DAGs. The sample is boxes of voxels around random points of random triangles:
-// half of the triangles are drawn uniformly, half by area, so that neither a floor of two triangles
-// nor a million leaves is missed. Takes two passes over the scene; memory depends on the sample
-// only.
+// code that builds DAGs. The sample consists of boxes of voxels around random points of random
+// triangles. Half of the triangles are drawn uniformly, half by area, so that neither a floor of
+// two triangles nor a million leaves is missed. Takes two passes over the scene. Memory depends
+// only on the sample.
 #pragma once
 
 #include <bitset>
@@ -17,7 +17,7 @@
 
 namespace voxdag::query {
 
-inline constexpr int64_t kBoxEdge = 16;  // voxels, or the whole grid if that is smaller
+inline constexpr int64_t kBoxEdge = 16;  // in voxels; the complete grid if it is smaller
 inline constexpr size_t kSampleBoxes = 256;
 
 struct SampleBox {
@@ -32,11 +32,11 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
 
 struct SampleReport {
   uint64_t boxes = 0;
-  uint64_t voxels = 0;  // compared
-  uint64_t set = 0;     // of the compared voxels
+  uint64_t voxels = 0;  // compared voxels
+  uint64_t set = 0;     // compared voxels that are set
 };
 
-// Throws Error{kCorrupt} that names the first voxel in which the file differs from the sample.
+// Throws Error{kCorrupt} with the first voxel that differs between the file and the sample.
 SampleReport compare_with_sample(const voxdag_reader::File& file,
                                  const std::vector<SampleBox>& boxes);
 

@@ -68,7 +68,7 @@ struct JobResult {
   std::string sha256;
   uint64_t bytes = 0;
   MergeReport merge;     // all fields except input_nodes and scratch_bytes
-  std::string sections;  // digest of the sections after the levels; "" if there are none
+  std::string sections;  // digest of the sections after the levels; "" if none exist
 };
 
 // The progress of a build as other processes see it.

@@ -26,13 +26,13 @@ class ColorPalette {
 
   explicit ColorPalette(MemoryBudget& budget);
 
-  // Up to 2^32 in all.
+  // Adds a color. At most 2^32 colors can be added.
   void add(voxdag_reader::Rgb color);
-  // After the last add().
+  // Makes the palette after the last add().
   void make();
 
   const std::vector<voxdag_reader::Rgb>& colors() const { return colors_; }
-  // The index in colors() of an added color.
+  // Returns the index in colors() of an added color.
   uint8_t index_of(voxdag_reader::Rgb color) const;
 
  private:
@@ -41,16 +41,16 @@ class ColorPalette {
     uint64_t count = 0;
     std::array<uint64_t, 3> sums{};
   };
-  // What the box is cut by: bins, in Oklab.
+  // A point of a box: a bin of colors, in Oklab.
   struct Point {
     std::array<uint32_t, 3> lab{};
     uint32_t bin = 0;
   };
   struct PaletteBox {
-    size_t begin = 0, end = 0;    // of its points
-    size_t axis = 0;              // of the largest spread
-    uint64_t spread = 0;          // sum of squared distances along it
-    uint64_t sum = 0, count = 0;  // of coordinates along it, and of colors
+    size_t begin = 0, end = 0;    // range of its points
+    size_t axis = 0;              // axis of the largest spread
+    uint64_t spread = 0;          // sum of squared distances along this axis
+    uint64_t sum = 0, count = 0;  // sum of coordinates along this axis, number of colors
   };
 
   static voxdag_reader::Rgb mean_of(const Bin& bin);
@@ -61,7 +61,7 @@ class ColorPalette {
   void assign_bins();
 
   MemoryCharge charge_;
-  // The different colors as 24-bit numbers, increasing, as long as they are few.
+  // The distinct colors as 24-bit numbers, increasing; used only while there are few.
   std::vector<uint32_t> distinct_;
   bool is_exact_ = true;
   std::vector<Bin> bins_;

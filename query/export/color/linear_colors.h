@@ -1,4 +1,4 @@
-// The linear light of stored colors, for formats that ask for it: the same numbers on every
+// The linear light of stored colors, for formats that require it. The numbers are the same on every
 // machine.
 #pragma once
 
