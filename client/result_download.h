@@ -12,14 +12,14 @@ namespace voxdag::client {
 
 struct DownloadResult {
   uint64_t bytes = 0;
-  uint64_t resumed_bytes = 0;  // already present from an earlier attempt
+  uint64_t resumed_bytes = 0;  // already downloaded by an earlier attempt
   std::string sha256;
 };
 
-// Downloads the .vdag file of a succeeded JOB to `output`. Until it is complete and verified it is
-// named `output`.<first digits of the SHA-256>.partial, where a later call resumes. Retries as
-// RetryPolicy does; every attempt that makes progress starts it over. Throws Error{kNotFound} for a
-// job that has not succeeded, Error{kCorrupt} if the bytes do not match the SHA-256.
+// Downloads the .vdag file of a succeeded JOB to `output`. Until the file is complete and verified,
+// its name is `output`.<first digits of the SHA-256>.partial, and a later call resumes it. Retries
+// as RetryPolicy does; an attempt that makes progress restarts the policy. Throws Error{kNotFound}
+// for a job that has not succeeded, Error{kCorrupt} if the bytes do not match the SHA-256.
 DownloadResult download_result(ServiceClient& service, FileSystem& files, const Json& job,
                                const std::string& output, Progress& progress);
 

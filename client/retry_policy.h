@@ -1,5 +1,5 @@
-// When to retry a request: after half a second, then with growing pauses, for five minutes in all.
-// Used by one thread.
+// Delays before retries: half a second at first, then growing, five minutes in total. Used by one
+// thread.
 #pragma once
 
 #include "client/http_client.h"
@@ -10,10 +10,10 @@ namespace voxdag::client {
 class RetryPolicy {
  public:
   explicit RetryPolicy(const CancelToken& cancel) : cancel_(cancel) {}
-  // Waits before the next attempt, at least `min_wait_s`; false once the time for retries is used
-  // up. Throws Error{kCanceled}.
+  // Waits before the next attempt, at least `min_wait_s`. Returns false if the time for retries is
+  // used up. Throws Error{kCanceled}.
   bool wait(double min_wait_s = 0);
-  // Starts over, after an attempt that made progress.
+  // Call it after an attempt that made progress: the delays start over.
   void reset() { waited_s_ = 0, pause_s_ = kFirstPauseS; }
 
  private:
@@ -22,8 +22,9 @@ class RetryPolicy {
   double waited_s_ = 0, pause_s_ = kFirstPauseS;
 };
 
-// Seconds to wait before the next request to a busy server (408, 429, 502 to 504), 0 if the answer
-// has no such field; -1 for any other status, which a retry would not change.
+// Returns the seconds to wait before the next request to a busy server (408, 429, 502 to 504); 0 if
+// the answer has no such field. Returns -1 for any other status, because a retry would not change
+// it.
 double retry_after_s(const ClientResponse& response);
 
 // Throws Error{kCanceled} within about 50 ms of a cancellation.

@@ -1,6 +1,6 @@
-// The API of a `voxdag serve` (docs/api.md): JSON requests that are retried while the server
-// restarts or is busy. Used by one thread. Where an answer is not what docs/api.md says, nlohmann's
-// json::exception comes through.
+// The API of `voxdag serve` (docs/api.md): JSON requests that are retried while the server restarts
+// or is busy. Used by one thread. If an answer differs from docs/api.md, the functions throw
+// nlohmann's json::exception.
 #pragma once
 
 #include <functional>
@@ -20,8 +20,8 @@ class ServiceClient {
       : url_(options.url), cancel_(cancel), http_(options) {}
 
   // Sends a request that may safely be sent twice. Retries it while the server is busy (408, 429,
-  // 502 to 504) and, once it has answered any request, while it cannot be reached. Throws the Error
-  // of any other status from 400 up.
+  // 502 to 504). After the first answered request, also retries while the server cannot be reached.
+  // Throws the Error of any other status from 400.
   using Request = std::function<ClientResponse(HttpClient& http)>;
   ClientResponse send_with_retries(const Request& request);
 
@@ -29,9 +29,9 @@ class ServiceClient {
   Json post(const std::string& path, const Json& body, const HeaderMap& headers = {});
   // Returns the JOB.
   Json job(const std::string& id);
-  // Posts an action ("cancel", "suspend", "resume", "retry"); returns the JOB after it.
+  // Posts an action ("cancel", "suspend", "resume", "retry"). Returns the resulting JOB.
   Json post_action(const std::string& id, const std::string& action);
-  // Calls on_job(JOB) twice per second until the job has ended, and returns it. Throws
+  // Calls on_job(JOB) twice per second until the job has ended, and returns the JOB. Throws
   // Error{kCanceled} if the token is set; the job itself continues.
   Json follow_job(const std::string& id, const std::function<void(const Json& job)>& on_job);
 
@@ -46,7 +46,7 @@ class ServiceClient {
   bool has_answered_ = false;
 };
 
-// "/api/v1/jobs/ID"; throws Error{kInvalidInput} unless the id is 16 hex digits.
+// Returns "/api/v1/jobs/ID". Throws Error{kInvalidInput} unless the id is 16 hex digits.
 std::string job_path(const std::string& id);
 // True if a JOB is in a final state: succeeded, failed or canceled.
 bool has_ended(const Json& job);

@@ -1,4 +1,4 @@
-// The service as one object: what `voxdag serve` runs, given a configuration. Thread-safe.
+// The complete service as one object, for `voxdag serve`. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -17,25 +17,25 @@ namespace voxdag::server {
 
 class Service {
  public:
-  // `log` receives changes with their author, and failures. Checks the configuration, locks the
-  // data folder for this service, opens the stores, resumes the jobs of the last service, and
-  // listens. Throws Error.
+  // Checks the configuration, locks the data folder, opens the stores, resumes the jobs of the
+  // previous service, and listens. `log` receives failures, and changes with their author. Throws
+  // Error.
   Service(ServerConfig config, FileSystem& files, Log log);
 
   int port() const { return http_.port(); }
   // "http://127.0.0.1:8080"
   std::string url() const;
-  // Serves until stop(). Then builds stop at a checkpoint, requests in progress finish, and it
+  // Serves until stop(). Then stops builds at a checkpoint, finishes requests in progress, and
   // returns.
   void run();
-  // From any thread.
+  // May be called from any thread.
   void stop();
 
  private:
   // Runs until the service stops.
   void clean_up_periodically();
   Response answer(Request& request);
-  // Counts every request, and logs those that try to change something.
+  // Counts every request. Logs requests for changes.
   void record(const Request& request, int status, double start_s);
 
   const ServerConfig config_;
@@ -49,14 +49,14 @@ class Service {
   AccessControl access_;
   JobQueue queue_;
   SceneStore scenes_;
-  ClockGuard clock_;  // of the retention of uploads
+  ClockGuard clock_;  // for the retention of uploads
   TaskResolver tasks_;
   HttpServer http_;
   Dispatcher dispatcher_;
   Context context_;
   Router router_{context_};
   std::mutex stop_mutex_;
-  std::condition_variable stop_wake_;  // draining_ has become true
+  std::condition_variable stop_wake_;  // notified when draining_ becomes true
 };
 
 }  // namespace voxdag::server

@@ -1,5 +1,5 @@
-// Shows one finished DAG in a browser on this machine: what `voxdag view` runs. It listens on the
-// loopback only, reads that file and writes nothing. If the file is replaced, the new one is shown.
+// Shows one finished DAG in a browser on this machine, for `voxdag view`. It listens only on the
+// loopback, reads this file and writes nothing. If the file is replaced, the new one is shown.
 // Thread-safe.
 #pragma once
 
@@ -16,14 +16,14 @@ namespace voxdag::server {
 
 class ViewService {
  public:
-  // Opens the file and listens; port 0 is any free one. `log` gets what fails. Throws Error.
+  // Opens the file and listens; port 0 means any free port. `log` receives failures. Throws Error.
   ViewService(const std::string& path, int port, FileSystem& files, Log log);
 
   // "http://127.0.0.1:40123/"
   std::string url() const;
   // Serves until stop().
   void run();
-  // From any thread.
+  // May be called from any thread.
   void stop() {
     stopping_.cancel();
     http_.stop();

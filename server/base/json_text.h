@@ -6,7 +6,8 @@
 
 namespace voxdag::server {
 
-// The value on one line. Bytes that are not UTF-8 are replaced, since texts come from scenes.
+// Returns the value on one line. Replaces bytes that are not UTF-8, because texts may come from
+// scenes.
 template <class Json>
 std::string json_text(const Json& value) {
   return value.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -1,5 +1,5 @@
-// Files of the data folder other than the stores, and their deletion. Only files that the service
-// marked are ever removed, so a store that was lost or restored from a backup costs no file.
+// Files of the data folder other than the stores, and their deletion. Only files marked by the
+// service are ever removed. So no file is lost if a store is lost or restored from a backup.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@
 
 namespace voxdag::server {
 
-// The name that something has once its deletion has begun. No scene and no job has such a name.
+// Suffix of names whose deletion has begun. Scenes and jobs never have such a name.
 inline constexpr const char* kDeleted = ".deleted";
 
-// True if a folder exists and has any entry.
+// True if the folder exists and is not empty.
 bool has_entries(FileSystem& files, const std::string& path);
 
 // A file that must keep its name while it is open.

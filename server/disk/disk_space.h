@@ -1,9 +1,9 @@
-// The free space on the data folder's disk. A reserve is kept free, and uploads reserve a few
-// megabytes ahead of their writes. So no two uploads count on the same bytes, and a slow upload
+// The free space on the data folder's disk. A part is always kept free. Uploads reserve a few
+// megabytes ahead of their writes. So two uploads never count on the same bytes, and a slow upload
 // does not exclude others. Thread-safe.
 //
-// A ballast file protects against other programs that fill the disk to the last byte: without it
-// the databases could not even record a deletion.
+// A ballast file protects against other programs that fill the disk completely: without it, the
+// databases could not even record a deletion.
 #pragma once
 
 #include <cstdint>
@@ -17,21 +17,21 @@ namespace voxdag::server {
 
 class DiskSpace {
  public:
-  // `min_free_bytes` are not used, nor a little for the databases in any case. Drops the
-  // ballast, since the databases need room to open.
+  // Keeps `min_free_bytes` free, and in any case a little for the databases. Drops the ballast,
+  // because the databases need space to open.
   DiskSpace(FileSystem& files, const std::string& data_folder, uint64_t min_free_bytes);
 
   uint64_t free() const { return files_.free_space(folder_); }
   bool is_low() const { return free() < min_free_bytes_; }
-  // The disk space of one upload, for as long as this exists. Used by one thread.
+  // The disk space of one upload, reserved during the lifetime of this object. Used by one thread.
   class Reservation {
    public:
-    // `announced` bytes are to come, 0 if that is not known. Throws Error{kNoSpace} if they do not
-    // fit now; others may still take the space before they come.
+    // `announced`: the expected number of bytes, 0 if unknown. Throws Error{kNoSpace} if they do
+    // not fit now. Others may still use the space before the bytes arrive.
     Reservation(DiskSpace& disk, uint64_t announced);
     ~Reservation();
     Reservation(const Reservation&) = delete;
-    // Call before writing so many bytes. Reserves more when they are used up; throws
+    // Call it before writing `bytes`. If the reserved space is used up, reserves more; throws
     // Error{kNoSpace} if the disk is full by then.
     void use(uint64_t bytes);
 
@@ -41,8 +41,8 @@ class DiskSpace {
     uint64_t not_reserved_;  // announced, not yet reserved
   };
 
-  // Calls `act`, which deletes or cancels something. If the disk has no space to record that, which
-  // it may have done in part, it is called again without the ballast.
+  // Calls `act`, which deletes or cancels something. If the disk has no space to record this, drops
+  // the ballast and calls `act` again. The first call may have done a part of the work.
   template <class Act>
   auto with_ballast(const Act& act) {
     try {
@@ -52,19 +52,19 @@ class DiskSpace {
     }
     return act();
   }
-  // Removes the ballast; false if it does not exist.
+  // Removes the ballast. Returns false if it does not exist.
   bool drop_ballast();
   // Restores the ballast if the disk has space for it.
   void restore_ballast();
 
  private:
-  // Throws Error{kNoSpace} if the larger of both is not free; reserves `bytes`.
+  // Throws Error{kNoSpace} unless max(bytes, expected) is free. Reserves `bytes`.
   void reserve(uint64_t bytes, uint64_t expected);
 
   FileSystem& files_;
   const std::string folder_;
   const uint64_t min_free_bytes_;
-  std::mutex mutex_;  // guards the next
+  std::mutex mutex_;  // guards the next member
   uint64_t reserved_bytes_ = 0;
   std::mutex ballast_mutex_;  // guards the ballast
 };

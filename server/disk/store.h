@@ -14,11 +14,12 @@ struct StoreFormat {
   int64_t application_id;  // PRAGMA application_id
   int64_t version;         // PRAGMA user_version
   const char* schema;
-  const char* upgrade = nullptr;  // SQL for a database of the version before; null: none exists
+  // SQL that upgrades a database of the previous version; null if there was no previous version.
+  const char* upgrade = nullptr;
 };
 
-// Opens a database, creating or upgrading its tables. Throws Error: kInvalidInput if it is new but
-// `may_create` is false, because the folders have files, or if it is no store of this kind;
+// Opens a database, creating or upgrading its tables. Throws Error: kInvalidInput if it is not a
+// store of this kind, or if it is new and `may_create` is false because the folders have files;
 // kUnsupportedVersion.
 SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool may_create);
 

@@ -1,6 +1,5 @@
-// Reads the body of a request from its connection. Memory is bounded whatever the client sends:
-// pieces are passed on as they arrive, and the lines between chunks have a limit. Used by one
-// thread.
+// Reads the body of a request from its connection. Memory is bounded for any client: data is passed
+// on as it arrives, and the lines between chunks have a limit. Used by one thread.
 #pragma once
 
 #include "server/http/connection/connection.h"
@@ -13,15 +12,15 @@ class BodyReader {
  public:
   BodyReader(Connection& connection, const RequestHead& head);
 
-  // As Request::read_body. A malformed chunk is BodyEnd::kBroken.
+  // Like Request::read_body. A malformed chunk is BodyEnd::kBroken.
   BodyEnd read(const Request::Sink& sink);
-  // True if the body was read to its end, so that another request may follow.
+  // True if the body was read to its end, so that another request can follow.
   bool is_complete() const { return complete_; }
 
  private:
   BodyEnd read_chunks(const Request::Sink& sink);
   BodyEnd pass(uint64_t bytes, const Request::Sink& sink);
-  // Reads a line without its CRLF; false if it is too long or the connection fails.
+  // Reads a line without its CRLF. Returns false if it is too long or the connection fails.
   bool read_line(std::string& line);
   BodyEnd failure() const;
 
@@ -30,7 +29,7 @@ class BodyReader {
   const bool chunked_;
   const bool expects_continue_;
   bool complete_;
-  size_t extra_bytes_ = 0;  // chunk extensions and trailers so far, which are ignored
+  size_t extra_bytes_ = 0;  // ignored bytes so far: chunk extensions and trailers
 };
 
 }  // namespace voxdag::server

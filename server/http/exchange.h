@@ -15,10 +15,10 @@ class Exchange {
  public:
   Exchange(Connection& connection, const std::string& address);
 
-  // Reads the head of the request; its body is read by Request::read_body. Throws Problem if it is
+  // Reads the head of the request. Request::read_body reads the body. Throws Problem if the head is
   // malformed, too large or too slow.
   Request& read_request(size_t max_header_bytes);
-  // Sends the answer. True if another request may follow; false if `last`.
+  // Sends the answer. Returns true if another request may follow, false if `last` is set.
   bool answer(Response response, bool last);
 
  private:
@@ -28,7 +28,7 @@ class Exchange {
 
   Connection& connection_;
   RequestHead head_;
-  std::optional<BodyReader> body_;  // once the head is read
+  std::optional<BodyReader> body_;  // set after the head is read
   Request request_;
 };
 

@@ -1,5 +1,5 @@
-// HTTP/1.1 on one port (docs/decisions/sockets.md). The handler runs on the thread of its
-// connection, so that many calls run concurrently.
+// HTTP/1.1 on one port (docs/decisions/sockets.md). The handler runs on the connection's thread, so
+// many calls run concurrently.
 #pragma once
 
 #include <functional>
@@ -13,29 +13,29 @@ namespace voxdag::server {
 
 struct HttpOptions {
   std::string address = "127.0.0.1";
-  int port = 8080;               // 0 for any free one
-  std::string certificate_file;  // "" for plain HTTP
+  int port = 8080;               // 0: any free port
+  std::string certificate_file;  // "": plain HTTP
   std::string key_file;
   HttpLimits limits;
 };
 
 class HttpServer {
  public:
-  // May throw Problem; any other exception is answered as the problem `internal`.
+  // May throw Problem. Any other exception is answered with the problem `internal`.
   using Handler = std::function<Response(Request&)>;
-  // Called with the status of an answer to a malformed request, which reaches no handler.
+  // Called with the status of an answer to a malformed request. Such a request reaches no handler.
   using OnRefused = std::function<void(int status)>;
 
-  // Listens, but accepts no connection yet. Throws as Listener and TlsContext do.
+  // Listens, but does not accept connections yet. Throws like Listener and TlsContext.
   HttpServer(
       const HttpOptions& options, Handler handler, OnRefused on_refused = [](int) {});
   ~HttpServer();
 
   int port() const;
   size_t connections() const;
-  // Serves until stop(), then waits up to `drain_s` for answers in flight.
+  // Serves until stop(), then waits up to `drain_s` for answers in progress.
   void run(double drain_s);
-  // Callable from any thread. Event streams must end by themselves.
+  // May be called from any thread. Event streams must end by themselves.
   void stop();
 
  private:

@@ -1,13 +1,14 @@
-// Runs the queue's jobs, each in a separate process, within the limits of number, memory and disk,
-// and stops, resumes and cleans up after them. Thread-safe.
+// Runs the queue's jobs, each in a separate process, within the limits of number, memory and disk.
+// Stops and resumes jobs, and cleans up after them. Thread-safe.
 //
-// Why processes: a build's memory limit holds for a process, a scene that crashes a build harms
-// nothing else, and a build can be stopped, killed and reniced without touching the threads that
-// answer requests. A process dies with the service; started again with the same task it resumes
-// from its work folder. The queue and the folders are therefore enough to continue after any crash.
+// Reasons for processes: a memory limit applies to a process; a scene that crashes a build harms
+// nothing else; and a build can be stopped, killed and reniced without touching the threads that
+// answer requests. A process dies with the service. Started again with the same task, it resumes
+// from its work folder. So the queue and the folders are enough to continue after any crash.
 //
-// What fails in a thread here ends neither the thread nor the service (Steps): a job that cannot be
-// handled fails, a folder that cannot be is left alone, and all else continues.
+// A failure in a thread here ends neither the thread nor the service (Steps). If a job cannot be
+// handled, the job fails. If a folder cannot be handled, it is left alone. All other work
+// continues.
 #pragma once
 
 #include <condition_variable>
@@ -33,29 +34,29 @@ namespace voxdag::server {
 
 class Dispatcher {
  public:
-  // Called whenever a job's process has ended, with the job as it is then.
+  // Called when a job's process has ended, with the job's state at that time.
   using OnRunEnded = std::function<void(const Job&)>;
 
-  // Repairs the queue and the folders after a crash of the last service, then starts jobs.
+  // Repairs the queue and the folders after a crash of the previous service, then starts jobs.
   Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& queue, TaskResolver& tasks,
              DiskSpace& disk, Log log, OnRunEnded on_run_ended);
   // Calls stop().
   ~Dispatcher();
 
-  // Stops every build at a checkpoint and waits for it, for at most JobLimits::stop_timeout_s. The
-  // jobs remain in the queue.
+  // Stops every build at a checkpoint and waits for all builds, up to JobLimits::stop_timeout_s.
+  // The jobs remain in the queue.
   void stop();
 
-  // Each throws RequestError: kNotFound, or kConflict for a job in another state.
+  // Each of these throws RequestError: kNotFound, or kConflict for a job in another state.
   Job cancel(const std::string& id);
   Job suspend(const std::string& id);
   Job resume(const std::string& id);
   Job retry(const std::string& id);
-  // Deletes the files first, so that a full disk can be emptied. What is interrupted then is
-  // finished later; until then the job cannot be tried again.
+  // Deletes the files first, so that it frees space on a full disk. An interrupted removal is
+  // finished later; until then the job cannot be retried.
   void remove(const std::string& id);
 
-  // Null unless the job's process runs.
+  // Null unless the job's process is running.
   std::shared_ptr<LiveJob> live(const std::string& id) const;
   size_t running() const;
   // Totals of all running jobs.
@@ -66,12 +67,12 @@ class Dispatcher {
   struct Worker {
     std::shared_ptr<LiveJob> live;
     std::thread thread;
-    bool recorded = false;  // what became of the job
+    bool recorded = false;  // the job's outcome is in the queue
     bool done = false;
-    // True if it will still record what becomes of the job.
+    // True if the worker will still record the job's outcome.
     bool runs() const { return !recorded && !done; }
   };
-  // Reserves the files of an ended job for the thread that removes them: other removals wait, and a
+  // Reserves the files of an ended job for the thread that removes them. Other removals wait, and a
   // retried job does not start.
   class FilesLock {
    public:
@@ -85,32 +86,32 @@ class Dispatcher {
   };
 
   bool stopping();
-  // Puts jobs in order that a crash, or a queue that could not be written, left behind.
+  // Repairs jobs that a crash, or an unwritable queue, left in a wrong state.
   void recover();
   void retire_old_jobs();
-  // Finishes deletions that a crash or an error has interrupted.
+  // Finishes deletions that a crash or an error interrupted.
   void finish_deletions();
   // Stops the job's tasks on the cluster, because no process follows them.
   void stop_tasks(const std::string& id);
   // True if the job no longer needs its work folder.
   void remove_work(const std::string& id);
 
-  // The thread that starts jobs.
+  // The loop of the thread that starts jobs.
   void dispatch();
   void start_ready_jobs();
-  // False if no job is ready, or if the limits leave no place, memory or disk for it.
+  // Returns false if no job is ready, or if the limits leave no slot, memory or disk space for it.
   bool start_next_job();
   void start_preview();
   void start_worker(const std::string& key, std::shared_ptr<LiveJob> live,
                     std::function<void(LiveJob&)> work);
   void join_finished();
 
-  // These run on the threads of `workers_`.
+  // The following functions run on the threads of `workers_`.
   void run_job(const Job& job, LiveJob& live);
   void record_outcome(const Job& job, LiveJob& live, const ChildProcess::End& end);
   void draw_preview(const Job& job, LiveJob& live);
-  // Runs a process to its end. Asks it to stop when `live` is to stop, and kills it after `max_s`,
-  // or JobLimits::stop_timeout_s after that request.
+  // Runs a process to its end. Requests it to stop when `live` has a stop request, and kills it
+  // JobLimits::stop_timeout_s later. Also kills it after `max_s`.
   ChildProcess::End run_child(const ChildProcess::Start& start, LiveJob& live, double max_s);
 
   const ServerConfig& config_;
@@ -123,22 +124,22 @@ class Dispatcher {
   Steps steps_;
   ClockGuard clock_;  // used by the thread that starts jobs
 
-  // Guards all below; held while a job's state and process change together, and not while files
-  // are removed.
+  // Guards all members below. Held while a job's state and process change together, but not while
+  // files are removed.
   mutable std::mutex mutex_;
   JobFolders folders_;
-  std::map<std::string, Worker> workers_;  // by job; the one named "preview" draws a picture
-  std::set<std::string> locked_;           // jobs of which a FilesLock exists
+  std::map<std::string, Worker> workers_;  // keyed by job; the worker "preview" draws a picture
+  std::set<std::string> locked_;           // jobs with a FilesLock
   std::condition_variable files_unlocked_;
-  double next_deletions_s_ = 0;  // in wall_seconds(); infinite if there is nothing to finish
+  double next_deletions_s_ = 0;  // in wall_seconds(); infinite if no deletion must be finished
   bool stops_ = false;
   bool recovered_ = false;
 
-  // Guards live_ alone, so that requests for progress wait for nothing else.
+  // Guards only live_, so that requests for progress wait for nothing else.
   mutable std::mutex live_mutex_;
-  std::map<std::string, std::shared_ptr<LiveJob>> live_;  // by job
+  std::map<std::string, std::shared_ptr<LiveJob>> live_;  // keyed by job
 
-  // Used by the thread that starts jobs alone.
+  // Used only by the thread that starts jobs.
   double next_retirement_s_ = 0;  // in wall_seconds()
   std::thread thread_;
 };

@@ -1,10 +1,10 @@
-// The folders of jobs, DATA/jobs/ID: which job each belongs to, and their deletion. Thread-safe for
+// The folders of jobs, DATA/jobs/ID: their assignment to jobs, and their deletion. Thread-safe for
 // different jobs.
 //
-// A deletion marks the folder by renaming it, then removes its files, the job's record and the
-// renamed folder: a crash in between loses neither, and a full disk can be emptied. Only folders
-// marked by a deletion are removed. A folder without a record is kept, because the queue may be an
-// old one.
+// A deletion first marks the folder by renaming it. Then it removes the folder's files, the job's
+// record and the renamed folder. A crash in between loses neither, and deletions work on a full
+// disk. Only folders marked by a deletion are removed. A folder without a record is kept, because
+// the queue may come from an old backup.
 #pragma once
 
 #include <string>
@@ -23,22 +23,22 @@ class JobFolders {
 
   JobFolder of(const std::string& id) const { return {path_ + "/" + id}; }
 
-  // Makes records of the folders that the queue does not know: jobs with a result have succeeded,
-  // others are suspended.
+  // Creates records for folders that the queue does not know. Jobs with a result have succeeded,
+  // all others are suspended.
   void adopt();
-  // Removes the work folders of jobs that need them no more.
+  // Removes the work folders of jobs that no longer need them.
   void clean_up();
   void remove_work(const std::string& id);
-  // Marks the folder of a job, if it has one: from now on the job is being deleted. This is
-  // fast unless an earlier deletion left files under that name.
+  // Marks the folder of a job, if it has one. From this call on the job is being deleted. This is
+  // fast unless an earlier deletion left files under the marked name.
   void mark(const std::string& id);
   bool is_marked(const std::string& id) const { return files_.exists(of(id).path + kDeleted); }
   std::vector<std::string> marked() const;
-  // Removes what mark() has marked and the job's record. Throws RequestError{kConflict} if the job
-  // has not ended.
+  // Removes the files marked by mark() and the job's record. Throws RequestError{kConflict} if the
+  // job has not ended.
   void remove_marked(const std::string& id);
-  // The same for a deletion interrupted by a crash or an error. The job is kept if it has not
-  // ended, or if it has a new folder.
+  // Like remove_marked(), for a deletion interrupted by a crash or an error. The job is kept if it
+  // has not ended, or if it has a new folder.
   void finish_deletion(const std::string& id);
 
  private:

@@ -1,4 +1,4 @@
-// What becomes of a job when its process has ended.
+// The new state of a job after its process has ended.
 #pragma once
 
 #include "server/config/config.h"
@@ -8,7 +8,8 @@
 
 namespace voxdag::server {
 
-// Seconds to wait after so many attempts that failed; they double.
+// Returns the seconds to wait after this number of failed attempts. The time doubles with each
+// attempt.
 double pause_s(const JobLimits& limits, unsigned attempts);
 
 // Changes the job, which may have been suspended, resumed or canceled since it started:

@@ -1,5 +1,5 @@
-// A job while its process runs: its progress, put together from the process's messages, and whether
-// it is to stop. Thread-safe.
+// A job while its process runs: its progress, collected from the process's messages, and a possible
+// stop request. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -20,20 +20,20 @@ class LiveJob {
   uint64_t memory_bytes() const { return memory_bytes_; }
 
   void apply(const Message& message);
-  // PROGRESS of docs/api.md, "" before the first stage. The text is made once per version.
+  // PROGRESS of docs/api.md; "" before the first stage. The text is created once per version.
   std::string progress_json() const;
-  // Counts messages.
+  // Number of messages so far.
   uint64_t version() const { return locked(version_); }
-  // Tasks of the last attempt; no value for a build without a cluster.
+  // Tasks of the last attempt; nullopt for a build without a cluster.
   std::optional<ClusterTasks> cluster_tasks() const { return locked(cluster_tasks_); }
   std::vector<std::string> warnings() const { return locked(warnings_); }
   std::optional<Failure> failure() const { return locked(failure_); }
   // JSON, or "".
   std::string result() const { return locked(result_); }
 
-  // Asks for an end; only the first call counts.
+  // Requests a stop. Only the first call counts.
   void stop();
-  // When stop() was called first (wall_seconds()), 0 if it was not.
+  // Time (wall_seconds()) of the first call of stop(); 0 if there was no call.
   double stop_requested_s() const { return locked(stop_requested_s_); }
 
  private:
@@ -52,7 +52,7 @@ class LiveJob {
 
   const uint64_t memory_bytes_;
   const double start_s_ = wall_seconds();
-  mutable std::mutex mutex_;  // guards all below
+  mutable std::mutex mutex_;  // guards all members below
   std::vector<Stage> stages_;
   SubvolumeTotals subvolumes_;
   Usage usage_;

@@ -1,4 +1,4 @@
-// From a request to the task of a process: scenes found, limits applied. Thread-safe.
+// Converts a request to the task of a process: finds its scenes and applies limits. Thread-safe.
 #pragma once
 
 #include <string>
@@ -13,19 +13,19 @@ namespace voxdag::server {
 
 class TaskResolver {
  public:
-  // Throws Error{kInvalidInput} for a scene root that is not there.
+  // Throws Error{kInvalidInput} for a scene root that does not exist.
   TaskResolver(const ServerConfig& config, SceneStore& scenes);
 
   // Throws RequestError: kNotFound for a scene that does not exist or is outside the configured
   // roots (with the same message), kConflict for an incomplete upload, kLimit for more memory than
-  // a job may have.
+  // a job may use.
   JobTask make(const JobRequest& request, JobTask::Kind kind);
-  // The scenes of a request that are uploads.
+  // Returns the scenes of a request that are uploads.
   static std::vector<std::string> uploads_of(const JobRequest& request);
 
-  // What all running jobs may have together.
+  // Memory limit of all running jobs together.
   uint64_t memory_bytes() const { return memory_bytes_; }
-  // What one job may have: as much as it asks for, or its share.
+  // Returns the memory of one job: the requested memory, or its share.
   uint64_t memory_of(const JobRequest& request) const;
 
  private:

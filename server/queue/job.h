@@ -1,4 +1,4 @@
-// A job as the queue stores it.
+// A job as stored in the queue.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ inline constexpr std::array<const char*, 7> kJobStateNames = {
 
 inline const char* state_name(JobState state) { return kJobStateNames[static_cast<size_t>(state)]; }
 std::optional<JobState> parse_state(std::string_view name);
-// A job in such a state changes only if somebody asks for it.
+// True for states that change only if a client requests it.
 inline bool has_ended(JobState state) { return state >= JobState::kCanceled; }
 
 struct JobError {
@@ -46,16 +46,16 @@ enum class Preview { kNone = 0, kReady = 1, kFailed = 2 };
 
 struct Job {
   std::string id;
-  int64_t number = 0;  // in the order of posting
+  int64_t number = 0;  // in the order of submission
   std::string name;
   JobState state = JobState::kQueued;
   std::string request;              // JSON: scene, resolution, options
-  std::vector<std::string> scenes;  // uploads that it needs until it has ended
+  std::vector<std::string> scenes;  // uploads that the job needs until it ends
   std::string posted_by;
   int priority = 0;
-  bool front = false;  // queued before others of its priority, since it was running already
+  bool front = false;  // queued before others of its priority, because it was already running
   unsigned attempts = 0;
-  unsigned interruptions = 0;  // runs in a row that ended because the service did
+  unsigned interruptions = 0;  // number of consecutive runs that ended because the service ended
   double created_s = 0, started_s = 0, finished_s = 0, not_before_s = 0;
   std::optional<JobError> error;
   std::vector<std::string> warnings;
@@ -64,13 +64,13 @@ struct Job {
   Preview preview = Preview::kNone;
 };
 
-// One change of a job's state; `number` counts the events of all jobs.
+// One change of a job's state. `number` counts the events of all jobs.
 struct JobEvent {
   int64_t number = 0;
   double at_s = 0;
   JobState state = JobState::kQueued;
   unsigned attempt = 0;
-  std::string error;  // code, "" for none
+  std::string error;  // code; "" for none
 };
 
 }  // namespace voxdag::server

@@ -24,7 +24,8 @@
 
 namespace voxdag::server {
 
-// 1 to 128 of A–Z a–z 0–9 . _ -, first a letter or digit, with the ending of a scene.
+// True for 1 to 128 of A–Z a–z 0–9 . _ -, first a letter or digit, with the file name ending of a
+// scene.
 bool is_scene_name(std::string_view name);
 // A regular expression of scene names, for the OpenAPI document.
 std::string scene_name_pattern();
@@ -46,23 +47,23 @@ struct UploadState {
 class SceneStore {
  public:
   // Finishes operations interrupted by a crash. Throws Error{kInvalidInput} if there are scenes
-  // without records, unless it may adopt them: then they get new records, and unfinished uploads
-  // start over.
+  // without records and `adopt` is false. With `adopt`, they get new records, and unfinished
+  // uploads start over.
   SceneStore(FileSystem& files, const std::string& folder, Log log, bool adopt = false);
 
   std::optional<Scene> find(const std::string& name);
-  // The first scenes whose names follow `after`, in the order of names.
+  // Returns the first scenes whose names follow `after`, sorted by name.
   std::vector<Scene> list(const std::string& after, size_t limit);
-  // The state of an unfinished upload.
+  // Returns the state of an unfinished upload.
   std::optional<UploadState> upload(const std::string& name);
-  // Removes a scene and its upload, the files first, so that a full disk can be emptied. False if
-  // there is neither. Throws RequestError{kConflict} if the scene is being uploaded.
+  // Removes a scene and its upload. Removes the files first, so that it frees space on a full disk.
+  // Returns false if neither exists. Throws RequestError{kConflict} if the scene is being uploaded.
   bool remove(const std::string& name);
   // Finishes removals that a crash or a full disk interrupted.
   void finish_removals();
-  // When the newest of the records was made (Unix time); 0 without any.
+  // Unix time of the newest record; 0 without records.
   double last_change_s();
-  // Removes uploads that received nothing since `before_s` (Unix time).
+  // Removes uploads that have received nothing since `before_s` (Unix time).
   void remove_stale_uploads(double before_s);
   std::string path(const std::string& name) const { return folder_ + "/files/" + name; }
   // Throws Error{kIo} if the database was removed or replaced.
@@ -74,7 +75,7 @@ class SceneStore {
   // Exclusive permission to write to a name.
   class NameLock {
    public:
-    // Throws RequestError{kConflict} if another one has it.
+    // Throws RequestError{kConflict} if another request has the permission.
     NameLock(SceneStore& store, const std::string& name);
     ~NameLock();
     NameLock(const NameLock&) = delete;
@@ -103,13 +104,14 @@ class SceneStore {
   FileSystem& files_;
   const std::string folder_;
   const Log log_;
-  std::mutex mutex_;  // guards all below
+  std::mutex mutex_;  // guards all members below
   SqlDatabase database_;
   const NamedFile file_;
-  std::set<std::string> busy_;  // names that a request writes to
+  std::set<std::string> busy_;  // names that requests are writing to
 };
 
-// The SHA-256 of the first `size` bytes of a file. Calls `check` often, which may throw to stop it.
+// Returns the SHA-256 of the first `size` bytes of a file. Calls `check` often; `check` may throw
+// to stop.
 std::string file_sha256(
     FileSystem& files, const std::string& path, uint64_t size,
     const std::function<void()>& check = [] {});

@@ -1,4 +1,4 @@
-// A finished DAG that viewers look at: its file, open. Thread-safe.
+// A finished DAG for viewers: its open file. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -15,12 +15,12 @@ namespace voxdag::server {
 
 class FileTileSource : public TileSource {
  public:
-  // Throws Error if the file is no valid DAG; only its header and checksum table are read.
-  // Unreadable pages do not end the process: while the file is opened they are an Error{kIo}.
-  // `manifests`, if given, caches manifests.
+  // Throws Error if the file is not a valid DAG. Reads only its header and checksum table.
+  // Unreadable pages do not end the process; while the file is being opened, they are an
+  // Error{kIo}. `manifests`, if given, caches manifests.
   FileTileSource(const std::string& path, const FileIdentity& identity,
                  std::shared_ptr<ManifestCache> manifests = nullptr);
-  // The same of a file that is mapped already.
+  // The same for a file that is already mapped.
   FileTileSource(const std::string& path, const FileIdentity& identity,
                  std::shared_ptr<const voxdag_reader::Bytes> bytes,
                  std::shared_ptr<ManifestCache> manifests = nullptr);
@@ -33,12 +33,12 @@ class FileTileSource : public TileSource {
   // Digest of the file's contents and of the version of tiles.
   const std::string& digest() const override { return digest_; }
   // The first call computes the cameras, which may take a second, or longer if the file is not in
-  // memory; others wait for it. If it is canceled, the next one begins again.
+  // memory. Other calls wait for it. If the first call is canceled, the next one starts again.
   const std::string& manifest(const CancelToken& cancel) const override;
   void expect_readable() const override;
-  // True if expect_readable() throws: the file is to be opened again.
+  // True if expect_readable() throws. The file must then be opened again.
   bool is_broken() const { return mapping_.is_damaged(); }
-  // A file that was removed still has its contents.
+  // Returns false for a removed file, because it still has its contents.
   bool was_overwritten() const override;
   bool is_first_damage() const override { return !has_damage_.exchange(true); }
 
@@ -47,16 +47,16 @@ class FileTileSource : public TileSource {
 
   const FileIdentity identity_;
   const std::shared_ptr<const voxdag_reader::Bytes> bytes_;
-  const WatchedMapping mapping_;  // from before the first byte is read
+  const WatchedMapping mapping_;  // created before the first byte is read
   const std::unique_ptr<voxdag_reader::File> file_;
   const CheckedBlocks blocks_;
   const query::DagView dag_;
   const std::string digest_;
-  const std::shared_ptr<ManifestCache> manifests_;  // or null
+  const std::shared_ptr<ManifestCache> manifests_;  // may be null
   mutable std::atomic<bool> has_damage_{false};
-  mutable std::mutex manifest_mutex_;  // guards the next while it is made
+  mutable std::mutex manifest_mutex_;  // guards manifest_ while it is being computed
   mutable std::string manifest_;
-  mutable std::atomic<bool> has_manifest_{false};  // manifest_ does not change any more
+  mutable std::atomic<bool> has_manifest_{false};  // manifest_ is final
 };
 
 }  // namespace voxdag::server

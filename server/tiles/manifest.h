@@ -1,4 +1,4 @@
-// The manifest of a DAG that viewers look at (docs/api.md).
+// The manifest of a DAG for viewers (docs/api.md).
 #pragma once
 
 #include <array>
@@ -17,11 +17,12 @@ struct GridPlace {
   double edge = 1;
 };
 
-// What all manifests have; `root` is the word offset of the root, none for a DAG without voxels.
+// Returns the members that all manifests have. `root` is the word offset of the root; nullopt for a
+// DAG without voxels.
 nlohmann::ordered_json manifest_of(const query::DagView& dag, const std::string& digest,
                                    const GridPlace& place, std::optional<uint64_t> root);
 
-// A named view of a DAG that is not empty. Throws as `views` does.
+// Returns a named view of a DAG that is not empty. Throws like `views`.
 nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& views,
                                  const query::DagView& dag, const GridPlace& place);
 

@@ -1,5 +1,5 @@
-// The manifests made last, by their digests, because to look for the cameras takes longer than to
-// open a file again. Thread-safe.
+// The most recent manifests, by digest. Finding the cameras takes longer than reopening a file.
+// Thread-safe.
 #pragma once
 
 #include <list>
@@ -32,8 +32,8 @@ class ManifestCache {
 
  private:
   const size_t max_;
-  std::mutex mutex_;                                        // guards the next
-  std::list<std::pair<std::string, std::string>> entries_;  // used last first
+  std::mutex mutex_;                                        // guards the next member
+  std::list<std::pair<std::string, std::string>> entries_;  // most recently used first
 };
 
 }  // namespace voxdag::server

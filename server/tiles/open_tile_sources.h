@@ -1,7 +1,7 @@
-// Caches the open files of viewers, so that a request need not open and check its file again: the
-// few most recently requested. A removed or replaced file is closed at its next request, by
-// close(), or by close_stale(), which must be called periodically. A file with an unreadable part
-// is opened again. The cache keeps manifests longer than files. Thread-safe.
+// Caches the most recently requested open files of viewers, so that requests need not open and
+// check them again. A removed or replaced file is closed by its next request, by close(), or by
+// close_stale(), which must be called periodically. A file with an unreadable part is opened again.
+// Manifests remain in the cache longer than files. Thread-safe.
 #pragma once
 
 #include <list>
@@ -18,11 +18,10 @@ class OpenTileSources {
  public:
   OpenTileSources(FileSystem& files, size_t max_open) : files_(files), max_open_(max_open) {}
 
-  // Throws Error{kNotFound}, or as FileTileSource. Requests that still use a file that is closed
-  // finish.
+  // Throws Error{kNotFound}, or like FileTileSource. Requests that still use a closed file finish.
   std::shared_ptr<const FileTileSource> open(const std::string& path);
   void close(const std::string& path);
-  // Closes files that were removed or replaced, or not requested for `max_idle_s`.
+  // Closes files that were removed or replaced, or were not requested for `max_idle_s`.
   void close_stale(double max_idle_s);
   size_t size() const;
 
@@ -33,7 +32,8 @@ class OpenTileSources {
     double used_s;
   };
   using Entries = std::list<Entry>;
-  // The entry of a file with this identity, moved to the front, or end().
+  // Returns the entry of a file with this identity after moving it to the front; end() if none
+  // exists.
   Entries::iterator find(const std::string& path, const FileIdentity& identity);
   bool is_current(const Entry& entry) const;
 
@@ -41,8 +41,8 @@ class OpenTileSources {
 
   FileSystem& files_;
   const size_t max_open_;
-  mutable std::mutex mutex_;  // guards the next
-  Entries entries_;           // used last first
+  mutable std::mutex mutex_;  // guards the next member
+  Entries entries_;           // most recently used first
   const std::shared_ptr<ManifestCache> manifests_ = std::make_shared<ManifestCache>(kMaxManifests);
 };
 

@@ -12,11 +12,11 @@
 
 namespace voxdag::server {
 
-// How many levels of nodes a tile has; docs/api.md says why.
+// Number of node levels in a tile; docs/api.md has the reason.
 inline constexpr uint32_t kTileLevels = 3;
-// How many tiles a request may ask for.
+// Maximum number of tiles per request.
 inline constexpr size_t kMaxTilesOfBatch = 64;
-// And how many color pages.
+// Maximum number of color pages per request.
 inline constexpr size_t kMaxColorPagesOfBatch = 256;
 
 class TileSource {
@@ -24,21 +24,21 @@ class TileSource {
   virtual ~TileSource() = default;
 
   virtual const query::DagView& dag() const = 0;
-  // The checksum blocks of its nodes, verified before they are read; may be null.
+  // The checksum blocks of the DAG's nodes, verified before they are read; may be null.
   virtual const CheckedBlocks* blocks() const { return nullptr; }
   // The file with the colors; may be null.
   virtual const voxdag_reader::File* colored_file() const { return nullptr; }
-  // 32 hex digits. The contents of an address of a DAG with this digest never change, and neither
-  // does the version of tiles.
+  // 32 hex digits. In a DAG with this digest, neither the contents of an address nor the version of
+  // tiles ever change.
   virtual const std::string& digest() const = 0;
-  // What a viewer needs to begin, as JSON (docs/api.md).
+  // Returns the data that a viewer needs to begin, as JSON (docs/api.md).
   virtual const std::string& manifest(const CancelToken& cancel) const = 0;
-  // Throws Error{kIo} if a part of the file could not be read since it was opened, because it
-  // was truncated or its disk failed: results made since then are wrong.
+  // Throws Error{kIo} if a part of the file could not be read since it was opened, because it was
+  // truncated or its disk failed. Results made since then are wrong.
   virtual void expect_readable() const {}
-  // True if its file was changed since it was opened, so that the read bytes may mix both versions.
+  // True if the file was changed after it was opened, so that the read bytes may mix both versions.
   virtual bool was_overwritten() const { return false; }
-  // To be called when damage is found. True for the first damage of this file, which is logged.
+  // Call it when damage is found. Returns true for the first damage of this file, which is logged.
   virtual bool is_first_damage() const { return true; }
 };
 

@@ -1,5 +1,5 @@
-// The files of the dashboard, which are compiled into the program (embed.cmake). In them,
-// "{{scene_suffixes}}" stands for the endings of the scene formats, "glb|gltf|ply".
+// The files of the dashboard, which are compiled into the program (embed.cmake). In these files,
+// "{{scene_suffixes}}" stands for the file name endings of the scene formats, "glb|gltf|ply".
 #pragma once
 
 #include <cstddef>
@@ -17,10 +17,10 @@ struct EmbeddedFile {
 extern const EmbeddedFile kEmbeddedFiles[];
 
 struct Asset {
-  std::string name;  // its URL path without the leading slash
+  std::string name;  // URL path without the leading slash
   std::string contents;
-  std::string type;  // for Content-Type
-  std::string etag;  // quoted
+  std::string type;  // value of Content-Type
+  std::string etag;  // in quotes
 };
 const std::vector<Asset>& embedded_assets();
 

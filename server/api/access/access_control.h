@@ -17,8 +17,8 @@ class AccessControl {
   // Reads the token file if one is configured. Throws as Tokens::read does.
   AccessControl(const ServerConfig& config, FileSystem& files);
 
-  // Returns who sends the request, and sets its `caller` as soon as that is known. Throws Problem
-  // unless that caller has the role `needed`.
+  // Returns the caller who sends the request. Sets request.caller as soon as the caller is known.
+  // Throws Problem unless the caller has the role `needed`.
   Caller admit(Request& request, Role needed);
 
  private:

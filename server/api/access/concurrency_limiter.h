@@ -1,5 +1,5 @@
-// Limits how many operations of a kind run concurrently, in all and for one client, so that no
-// client can keep all others out. Thread-safe.
+// Limits the number of concurrent operations of a kind, in total and per client, so that no client
+// can use up all of them. Thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,8 @@ class ConcurrencyLimiter {
   ConcurrencyLimiter(size_t max, size_t max_per_client)
       : state_(std::make_shared<State>()), max_(max), max_per_client_(max_per_client) {}
 
-  // A permit, released when the last copy of the pointer is destroyed; null if none is free.
+  // Returns a permit, which is released when the last copy of the pointer is destroyed; null if
+  // none is free.
   std::shared_ptr<void> acquire(const std::string& client) {
     {
       std::lock_guard lock(state_->mutex);
@@ -40,7 +41,7 @@ class ConcurrencyLimiter {
       if (--found->second == 0) by_client.erase(found);
     }
 
-    std::mutex mutex;  // guards the next
+    std::mutex mutex;  // guards the next member
     size_t in_use = 0;
     std::map<std::string, size_t> by_client;
   };

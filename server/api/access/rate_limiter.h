@@ -1,4 +1,4 @@
-// Rate limit per client: a token bucket that holds two seconds' worth. Thread-safe.
+// Rate limit per client: a token bucket with a capacity of two seconds of requests. Thread-safe.
 #pragma once
 
 #include <map>
@@ -12,7 +12,7 @@ class RateLimiter {
   // A rate of 0 means no limit.
   explicit RateLimiter(double per_s) : per_s_(per_s) {}
 
-  // Takes one token of the client's bucket; false if it is empty.
+  // Takes one token from the client's bucket. Returns false if the bucket is empty.
   bool take(const std::string& client, double now_s);
 
  private:
@@ -22,7 +22,7 @@ class RateLimiter {
   };
 
   const double per_s_;
-  std::mutex mutex_;  // guards the next
+  std::mutex mutex_;  // guards the next member
   std::map<std::string, Bucket> buckets_;
   double next_sweep_s_ = 0;
 };

@@ -15,24 +15,26 @@
 
 namespace voxdag::server {
 
-// Each role includes the ones before it.
+// Each role includes all roles before it.
 enum class Role { kNone, kRead, kSubmit, kAdmin };
 
-// "read", "submit" or "admin"; no value for anything else.
+// Parses "read", "submit" or "admin"; nullopt for anything else.
 std::optional<Role> parse_role(std::string_view name);
 
 struct Caller {
   Role role = Role::kNone;
-  std::string name;    // for the audit log
-  std::string client;  // shares limits: the name of a token, else an address
+  std::string name;  // for the audit log
+  // Limits are shared by all requests with this text: the name of a token, else an address.
+  std::string client;
 };
 
 class Tokens {
  public:
-  // Throws Error{kInvalidInput} with the number of a malformed line, or for a file without tokens.
+  // Throws Error{kInvalidInput} for a file without tokens, and with the line number for a malformed
+  // line.
   static Tokens read(FileSystem& files, const std::string& path);
 
-  // Runs in constant time, whether the token is known or not.
+  // Runs in constant time for known and unknown tokens.
   std::optional<Caller> find(std::string_view token) const;
 
  private:

@@ -8,12 +8,12 @@
 
 namespace voxdag::server {
 
-// True if the value of Accept-Encoding allows it.
+// True if the value of Accept-Encoding allows gzip.
 bool accepts_gzip(std::string_view accepted);
 // Throws Error{kOutOfMemory}.
 std::string gzip(std::string_view bytes);
 
-// Compresses the body of an answer if the client accepts that and it saves bytes.
+// Compresses the body of an answer if the client accepts it and this saves bytes.
 void pack(const Request& request, Response& response);
 
 }  // namespace voxdag::server

@@ -13,7 +13,8 @@ namespace voxdag::server {
 // "2026-11-21T07:00:00.123Z"; "" for 0.
 std::string time_text(double unix_s);
 
-// `live` may be null. `position` is the place in the queue from 1; 0 if the job is not queued.
+// `live` may be null. `position` is the position in the queue, counted from 1; 0 if the job is not
+// queued.
 std::string job_json(const Job& job, const LiveJob* live, uint64_t position, unsigned max_attempts);
 
 }  // namespace voxdag::server

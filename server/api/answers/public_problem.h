@@ -7,9 +7,9 @@
 
 namespace voxdag::server {
 
-// A Problem is unchanged, and a RequestError keeps its message. An Error keeps its code, with a
-// fixed text in place of its message, which may hold paths of the server. Anything else is `busy`
-// (no memory) or `internal`.
+// A Problem is returned unchanged, and a RequestError keeps its message. An Error keeps its code,
+// but its message is replaced by a fixed text, because it may contain paths of the server. Anything
+// else becomes `busy` (no memory) or `internal`.
 Problem public_problem(const std::exception& error);
 
 }  // namespace voxdag::server

@@ -1,4 +1,4 @@
-// What the request handlers share: references to the parts of the service, which Service owns.
+// The data that request handlers share: references to the parts of the service, which Service owns.
 #pragma once
 
 #include <atomic>
@@ -42,11 +42,11 @@ struct Context {
   PartialViews partial{files, 16};
   // Canceled when the service stops.
   CancelToken stopping = {};
-  // Held while a job that uses scenes is added or tried again, and while a scene that no job uses
-  // is replaced or removed: neither may happen between the other's check and its change.
+  // Held while a job that uses scenes is added or retried, and while an unused scene is replaced or
+  // removed. So neither happens between the other's check and its change.
   std::mutex scene_mutex = {};
-  // Uploads that dry runs read, guarded by scene_mutex. They may be replaced, which leaves the old
-  // file to those that read it, but not removed.
+  // Uploads that dry runs read, guarded by scene_mutex. They must not be removed. They may be
+  // replaced, because readers keep the old file.
   std::multiset<std::string> planned_scenes = {};
 };
 

@@ -25,7 +25,7 @@ class Metrics {
   void count_request(int status, double wall_s);
   void count_uploaded(uint64_t bytes) { uploaded_bytes_ += bytes; }
   void count_downloaded(uint64_t bytes) { downloaded_bytes_ += bytes; }
-  // Counts an ended run of a job by the state it left the job in.
+  // Counts the end of a job's run by the job's new state.
   void count_run(const Job& job);
 
   // `jobs`: number of jobs by state.
@@ -34,11 +34,11 @@ class Metrics {
  private:
   static constexpr std::array<double, 8> kBoundsS = {0.001, 0.005, 0.01, 0.05, 0.1, 0.5, 1, 10};
 
-  mutable std::mutex mutex_;  // guards all but the atomics
+  mutable std::mutex mutex_;  // guards all members except the atomics
   std::map<int, uint64_t> requests_;
   std::array<uint64_t, kBoundsS.size() + 1> durations_{};
   double duration_sum_s_ = 0;
-  std::map<std::string, uint64_t> runs_;  // by state
+  std::map<std::string, uint64_t> runs_;  // keyed by state
   uint64_t voxels_ = 0, result_bytes_ = 0;
   double build_wall_s_ = 0, build_cpu_s_ = 0;
   std::atomic<uint64_t> uploaded_bytes_{0}, downloaded_bytes_{0};

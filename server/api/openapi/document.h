@@ -7,7 +7,7 @@
 
 namespace voxdag::server {
 
-// Throws std::logic_error if a route names an unknown schema, status or path parameter.
+// Throws std::logic_error if a route uses an unknown schema, status or path parameter.
 std::string openapi_document(const Router& router);
 
 }  // namespace voxdag::server

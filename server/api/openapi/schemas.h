@@ -1,4 +1,4 @@
-// JSON schemas of the bodies of requests and answers (docs/api.md), by name.
+// JSON schemas of request and answer bodies (docs/api.md), by name.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// The routes by which a viewer gets a DAG in tiles; docs/api.md.
+// The routes for reading a DAG in tiles; docs/api.md.
 #pragma once
 
 #include <functional>
@@ -10,7 +10,7 @@
 
 namespace voxdag::server {
 
-// The DAG that a call asks for, and a permit to do so, null if none is needed.
+// The DAG requested by a call, and a permit for it. The permit is null if none is needed.
 struct TileAccess {
   std::shared_ptr<const TileSource> dag;
   std::shared_ptr<void> permit;
@@ -18,8 +18,8 @@ struct TileAccess {
 // Throws Problem for an unknown job or file, or if no permit is free.
 using OpenTiles = std::function<TileAccess(const Call&)>;
 
-// True if tiles are compressed for clients that accept it. It halves their bytes, at about 80 MB/s
-// of one core: a gain on a network, a loss on the loopback.
+// kGzip compresses tiles for clients that accept it. This halves their bytes, at about 80 MB/s per
+// core: faster on a network, slower on the loopback.
 enum class Packing { kNone, kGzip };
 
 enum class Colors { kNone, kServed };
@@ -27,15 +27,15 @@ enum class Colors { kNone, kServed };
 struct TileRoutes {
   std::string base;     // "/api/v1/jobs/{id}"
   std::string id;       // part of the operations' ids
-  std::string subject;  // begin of the operations' summaries
+  std::string subject;  // start of the operations' summaries
   std::string manifest_schema;
   Packing packing = Packing::kGzip;
   Colors colors = Colors::kServed;
 };
 
-// Adds BASE/tiles, BASE/tiles/batch and BASE/tiles/{level}/{offset}, and BASE/tiles/colors if they
-// are served. Manifests in the making are given up when `stopping` is canceled; it must outlive the
-// router.
+// Adds BASE/tiles, BASE/tiles/batch, BASE/tiles/{level}/{offset} and, if colors are served,
+// BASE/tiles/colors. When `stopping` is canceled, manifests that are being computed are abandoned.
+// `stopping` must outlive the router.
 void add_tile_routes(Router& router, const TileRoutes& routes, const OpenTiles& open,
                      const CancelToken& stopping);
 

@@ -21,12 +21,12 @@ struct IntegerRange {
 struct Parameter {
   std::string name;
   std::string description;
-  std::string pattern = {};  // regular expression of its value; "" for any text
+  std::string pattern = {};  // regular expression for the value; "" for any text
   std::optional<IntegerRange> integer = {};
   bool is_required = false;
 };
 
-// A request's body, or one of the bodies that an answer can have.
+// A request's body, or one possible body of an answer.
 struct Content {
   std::string type;         // media type
   std::string schema = {};  // name of a schema in openapi/schemas.h; "" for bytes, text or any JSON
@@ -39,16 +39,16 @@ struct Answer {
   std::vector<Parameter> headers = {};
 };
 
-// A request to which access was granted.
+// A request whose caller has the required role.
 struct Call {
   Request& request;
   Caller caller;
   std::vector<std::string> names;  // values of the {...} segments of the pattern
 
-  // The value of a query parameter; "" if it is missing.
+  // Returns the value of a query parameter; "" if it is missing.
   std::string query(const std::string& name) const;
-  // The value of a query parameter with an IntegerRange. Throws Problem (400) if it is not in the
-  // range.
+  // Returns the value of a query parameter with an IntegerRange. Throws Problem (400) if the value
+  // is outside the range.
   uint64_t query_integer(const Parameter& parameter) const;
 };
 
@@ -56,18 +56,18 @@ struct Route {
   std::string method;
   std::string pattern;  // "/api/v1/jobs/{id}/dag". A GET route also answers HEAD.
   Role role = Role::kRead;
-  // A route without an id is not in the document.
+  // Operation id. A route without an id is not in the document.
   std::string id = {};
   std::string summary = {};
   std::string tag = {};
-  // The query parameters that the router accepts. It answers any other with 400.
+  // The query parameters that the router accepts. It rejects all others with 400.
   std::vector<Parameter> query = {};
   bool accepts_any_query = false;
   std::vector<Parameter> headers = {};
   std::optional<Content> body = {};
   bool is_body_required = true;
   std::vector<Answer> answers = {};
-  // Statuses of its problems, in addition to every route's (kCommonProblems).
+  // Statuses of the route's problems, in addition to those of all routes (kCommonProblems).
   std::vector<int> problems = {};
 };
 

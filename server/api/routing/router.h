@@ -1,4 +1,4 @@
-// Routes requests to handlers and checks the role that each needs.
+// Routes requests to handlers and checks each route's required role.
 #pragma once
 
 #include <functional>
@@ -25,17 +25,18 @@ class Router {
 
   void add(Route route, Handler handler);
   void add(Route route, PlainHandler handler);
-  // Throws Problem: 404, 405 with Allow, and as `access` and the handler do.
+  // Calls the handler of the request's route. Throws Problem: 404, 405 with Allow, and the problems
+  // of `access` and the handler.
   Response route(Request& request, AccessControl& access) const;
 
   std::vector<Route> routes() const;
-  // False if the request's route does not list this status.
+  // Returns false if the request's route does not list this status.
   bool is_documented(const Request& request, int status) const;
 
  private:
   struct Entry {
     Route route;
-    std::vector<std::string> segments;  // of the pattern
+    std::vector<std::string> segments;  // segments of the pattern
     PlainHandler handler;
   };
   Context* const context_ = nullptr;
@@ -45,8 +46,8 @@ class Router {
 Response json_response(int status, std::string body);
 // 204
 Response no_content();
-// The body of a request. Throws Problem: 413 if it is larger than `max_bytes`, 415 if its content
-// type is not JSON, 400 or 408 if it ends early.
+// Reads the body of a request. Throws Problem: 413 if it is larger than `max_bytes`, 415 if its
+// content type is not JSON, 400 or 408 if it ends early.
 std::string read_json_body(Request& request, uint64_t max_bytes);
 // Throws Problem (400) if there is a body.
 void expect_no_body(const Request& request);

@@ -1,6 +1,6 @@
-// The open connections, within their limits. When the table is full, the connection that has waited
-// longest for its client is closed in favor of the new one, so that clients which do nothing, or
-// little, cannot keep others out. Thread-safe.
+// The open connections, within their limits. If the table is full, a new connection replaces the
+// one that has waited longest for its client. So clients that send little or nothing cannot keep
+// others out. Thread-safe.
 #pragma once
 
 #include <condition_variable>
@@ -19,7 +19,7 @@ class ConnectionTable {
   struct Entry {
     int socket;
     std::string client;
-    bool waiting;           // for its client
+    bool waiting;           // for the client
     bool between_requests;  // waits for a request or the rest of its header
     double waiting_since_s;
     bool evicted;
@@ -30,26 +30,27 @@ class ConnectionTable {
 
   explicit ConnectionTable(const HttpLimits& limits) : limits_(limits) {}
 
-  // False if the client has too many connections, or the table is full and none is waiting. Takes
-  // up to a second while many evicted connections have yet to end. One thread calls it.
+  // Adds a connection. Returns false if the client has too many connections, or if the table is
+  // full and none is waiting. Takes up to a second while many evicted connections are still ending.
+  // One thread calls it.
   bool admit(int socket, const std::string& address, Place& place);
-  // The connection waits for its client since then (in wall_seconds()).
+  // Records that the connection has waited for its client since `since_s` (wall_seconds()).
   void set_waiting(Place place, double since_s, bool between_requests);
   void set_working(Place place);
-  // Must be called before the socket is closed.
+  // Call it before closing the socket.
   void remove(Place place);
 
   size_t size() const;
   // Closes the connections that wait for a request.
   void close_waiting();
-  // Closes all connections and aborts answers in flight.
+  // Closes all connections and aborts answers in progress.
   void close_all();
 
  private:
   bool evict_one();
 
   const HttpLimits& limits_;
-  mutable std::mutex mutex_;  // guards all below
+  mutable std::mutex mutex_;  // guards all members below
   std::condition_variable removed_;
   std::list<Entry> entries_;
   std::map<std::string, size_t> by_client_;
@@ -57,8 +58,8 @@ class ConnectionTable {
 
 // 127.0.0.0/8 and ::1.
 bool is_loopback(const std::string& address);
-// What counts as one client: an IPv4 address, or the /64 of an IPv6 address, because each of its
-// 2^64 addresses is at one customer's disposal.
+// Returns the text that identifies a client: an IPv4 address, or the /64 of an IPv6 address,
+// because one customer has all 2^64 addresses of a /64.
 std::string client_of(const std::string& address);
 
 }  // namespace voxdag::server

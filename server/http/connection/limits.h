@@ -1,5 +1,5 @@
-// Limits of the listener, per client and in total. The times bound each phase of a connection, so
-// that a client which sends one byte now and then cannot occupy a connection for long.
+// Limits of the listener, per client and in total. The times limit each phase of a connection, so
+// that a client that sends very slowly cannot occupy a connection for long.
 #pragma once
 
 #include <cstddef>
@@ -8,14 +8,15 @@
 namespace voxdag::server {
 
 struct HttpLimits {
-  size_t max_connections = 512;     // beyond it the longest waiting one is closed for a new one
+  // If exceeded, the longest-waiting connection is closed for a new one.
+  size_t max_connections = 512;
   size_t max_per_client = 256;      // the loopback (a proxy) is exempt
   size_t max_header_bytes = 32768;  // request line and header fields together
   double header_timeout_s = 10;     // from a request's first byte to the end of its header
   double idle_timeout_s = 30;       // between requests
-  double grace_s = 20;              // how far a client may fall behind the minimum rate
-  double min_bytes_per_s = 1024;    // of a body or an answer
-  size_t max_requests = 10000;      // on one connection
+  double grace_s = 20;              // max time by which a client may be behind the minimum rate
+  double min_bytes_per_s = 1024;    // min rate of a body or an answer
+  size_t max_requests = 10000;      // requests per connection
 };
 
 }  // namespace voxdag::server

@@ -8,7 +8,7 @@ namespace voxdag::server {
 
 class Listener {
  public:
-  // Listens on an address ("127.0.0.1", "::1", "0.0.0.0", a name) and port, 0 for any free one.
+  // Listens on an address ("127.0.0.1", "::1", "0.0.0.0", a name) and port (0: any free port).
   // Throws Error{kInvalidInput} if the address does not belong to this machine, Error{kIo} if the
   // port is in use.
   Listener(const std::string& address, int port);
@@ -19,7 +19,7 @@ class Listener {
   // Calls on_connection(socket, client address) for every connection; the socket is non-blocking
   // and belongs to the callee. Returns after stop().
   void accept_all(const std::function<void(int socket, const std::string& address)>& on_connection);
-  // Callable from any thread and repeatedly. Connections not yet accepted are refused.
+  // May be called from any thread and repeatedly. Connections not yet accepted are refused.
   void stop();
 
  private:
@@ -28,7 +28,7 @@ class Listener {
   int port_ = 0;
 };
 
-// True if the address is reachable from this machine only.
+// True if the address is reachable only from this machine.
 bool is_loopback_name(const std::string& address);
 
 }  // namespace voxdag::server

@@ -1,5 +1,5 @@
-// A pool of threads that grows with the number of concurrent tasks: a task never waits for another
-// one to finish. The caller bounds the number of concurrent tasks. Thread-safe.
+// A pool of threads that grows with the number of concurrent tasks, so that a task never waits for
+// another one. The caller limits the number of concurrent tasks. Thread-safe.
 #pragma once
 
 #include <condition_variable>
@@ -17,13 +17,13 @@ class ThreadPool {
   // Waits for all tasks to finish.
   ~ThreadPool();
 
-  // `task` must not throw. Throws std::system_error if no thread can be started for it.
+  // `task` must not throw. Throws std::system_error if no thread can be started for the task.
   void run(std::function<void()> task);
 
  private:
   void run_tasks();
 
-  std::mutex mutex_;  // guards all below
+  std::mutex mutex_;  // guards all members below
   std::condition_variable wake_;
   std::deque<std::function<void()>> tasks_;
   std::vector<std::thread> threads_;

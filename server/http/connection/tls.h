@@ -1,4 +1,4 @@
-// TLS with certificate files over non-blocking sockets.
+// TLS with certificate files, over non-blocking sockets.
 #pragma once
 
 #include <sys/types.h>
@@ -12,15 +12,15 @@ struct ssl_st;
 
 namespace voxdag::server {
 
-// The TLS state of one connection; without one (default constructed), bytes pass unencrypted.
-// read() and write() return the number of bytes moved, 0 at the end of the stream, or one of the
-// negative constants. Used by one thread.
+// The TLS state of one connection. If default constructed, bytes pass unencrypted. read() and
+// write() return the number of bytes moved, 0 at the end of the stream, or one of the negative
+// constants. Used by one thread.
 class TlsSession {
  public:
   static constexpr ssize_t kNeedsRead = -1, kNeedsWrite = -2, kBroken = -3;
 
   TlsSession() = default;
-  // Returns 1 when the handshake is complete, else as read() does.
+  // Returns 1 when the handshake is complete, else the same values as read().
   ssize_t handshake();
   ssize_t read(int socket, char* data, size_t size);
   ssize_t write(int socket, const char* data, size_t size);
@@ -40,7 +40,7 @@ class TlsSession {
 class TlsContext {
  public:
   // PEM files: the chain beginning with the server's certificate, and its key. Throws
-  // Error{kInvalidInput} if they cannot be read or do not match. The process ignores SIGPIPE then.
+  // Error{kInvalidInput} if they cannot be read or do not match. Makes the process ignore SIGPIPE.
   TlsContext(const std::string& certificate_file, const std::string& key_file);
   TlsSession session(int socket) const;
 

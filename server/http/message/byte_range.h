@@ -22,16 +22,16 @@ struct RangeAnswer {
     kUnsatisfiable,  // 416
   };
   Kind kind = Kind::kWhole;
-  std::vector<ByteRange> ranges;  // for kPart, in the order requested
+  std::vector<ByteRange> ranges;  // for kPart, in the requested order
 };
 
-// Resolves a Range header for contents of `size` > 0 bytes. A header that is malformed, has another
-// unit, or asks for more than 16 ranges or for more bytes in total than `size` is ignored. Ranges
-// outside the contents are dropped; if none is left, the header is unsatisfiable.
+// Resolves a Range header for contents of `size` > 0 bytes. Ignores a header that is malformed, has
+// another unit, or requests more than 16 ranges or more than `size` bytes in total. Drops ranges
+// outside the contents; if no range remains, the result is kUnsatisfiable.
 RangeAnswer parse_ranges(std::string_view header, uint64_t size);
 
-// Parses the Content-Range of an upload, "bytes FIRST-LAST/TOTAL". False if it is malformed or not
-// FIRST <= LAST < TOTAL.
+// Parses the Content-Range of an upload, "bytes FIRST-LAST/TOTAL". Returns false unless it is
+// well-formed and FIRST <= LAST < TOTAL.
 bool parse_content_range(std::string_view header, ByteRange& range, uint64_t& total);
 
 }  // namespace voxdag::server

@@ -1,4 +1,4 @@
-// SHA-256 as the header fields Content-Digest and Repr-Digest carry it (RFC 9530).
+// SHA-256 in the header fields Content-Digest and Repr-Digest (RFC 9530).
 #pragma once
 
 #include <string>
@@ -8,9 +8,9 @@
 namespace voxdag::server {
 
 using voxdag::digest_field;
-// The SHA-256 of a Content-Digest or Repr-Digest header in hex. Throws RequestError{kInvalid} for a
-// header that is broken or has other algorithms only: a check that a client asks for is not
-// skipped.
+// Returns the SHA-256 of a Content-Digest or Repr-Digest header in hex. Throws
+// RequestError{kInvalid} for a header that is malformed or has only other algorithms, because a
+// check that the client requested must not be skipped.
 std::string parse_digest_field(const std::string& header);
 
 }  // namespace voxdag::server

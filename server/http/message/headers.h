@@ -13,12 +13,12 @@ struct HeaderLess {
 };
 using HeaderMap = std::multimap<std::string, std::string, HeaderLess>;
 
-// The value of the first field of this name, or "".
+// Returns the value of the first field with this name, or "".
 std::string header_value(const HeaderMap& headers, std::string_view name);
-// `text` without leading and trailing spaces and tabs.
+// Returns `text` without leading and trailing spaces and tabs.
 std::string_view trimmed(std::string_view text);
 bool equal_ignoring_case(std::string_view a, std::string_view b);
-// True if the value of If-None-Match has this entity tag. The comparison is weak.
+// True if the value of If-None-Match contains this entity tag. The comparison is weak.
 bool has_tag(std::string_view list, std::string_view tag);
 
 }  // namespace voxdag::server

@@ -16,7 +16,7 @@
 
 namespace voxdag::server {
 
-// How reading a body ended: complete, stopped by the sink, or cut off by the client.
+// How the reading of a body ended: complete, stopped by the sink, broken or too slow.
 enum class BodyEnd { kComplete, kStopped, kBroken, kTooSlow };
 
 struct Request {
@@ -25,29 +25,29 @@ struct Request {
   HeaderMap headers;
   std::string peer;    // the client's address
   std::string id;      // X-Request-Id of the answer, also in the log
-  std::string caller;  // the name of its token, once it is known
+  std::string caller;  // name of the caller's token, once it is known
   std::optional<uint64_t> content_length;
   bool has_body = false;  // a Content-Length above 0, or chunked
 
-  // Passes the body to `sink` in pieces, until that returns false. Called at most once; if the body
-  // is not read to its end, the connection is closed after the answer.
+  // Passes the body to `sink` in pieces until `sink` returns false. Called at most once. If the
+  // body is not read to its end, the connection is closed after the answer.
   using Sink = std::function<bool(std::string_view piece)>;
   std::function<BodyEnd(const Sink& sink)> read_body;
 
-  // True if the client has closed the connection; for handlers that take long.
+  // True if the client has closed the connection. For handlers that take long.
   std::function<bool()> client_has_left;
 
   std::string header(std::string_view name) const { return header_value(headers, name); }
 };
 
-// A piece of an answer from a file: a text, then a range of the file (may be empty).
+// A piece of an answer from a file: a text, followed by a range of the file, which may be empty.
 struct FilePiece {
   std::string text;
   ByteRange range;
 };
 
-// The source of an event stream. A call returns the next bytes to send, "" for none yet, or no
-// value at the end; it takes at most about a second.
+// The source of an event stream. A call returns the next bytes to send, "" for none yet, or nullopt
+// at the end. It takes at most about a second.
 using EventSource = std::function<std::optional<std::string>()>;
 
 struct Response {
@@ -56,7 +56,7 @@ struct Response {
   // At most one of body, file and next_event is set.
   std::string body;
   std::shared_ptr<ReadableFile> file;
-  std::vector<FilePiece> pieces;  // what to send of `file`
+  std::vector<FilePiece> pieces;  // parts of `file` to send
   EventSource next_event;
   // A permit of a ConcurrencyLimiter, released when the answer is sent.
   std::shared_ptr<void> permit;

@@ -1,6 +1,6 @@
-// What an answer says when a request fails: problem+json (RFC 9457). Handlers throw it.
+// The answer to a failed request: problem+json (RFC 9457). Handlers throw it.
 //
-// `detail` is shown to clients: it never holds paths of the server or texts of libraries.
+// `detail` is shown to clients, so it never contains paths of the server or texts of libraries.
 #pragma once
 
 #include <exception>
@@ -21,11 +21,11 @@ struct Problem : std::exception {
   std::string code;
   std::string detail;
   std::string state;     // state of a job that does not allow the request; "" otherwise
-  std::string log_text;  // for the log only; "" for nothing
+  std::string log_text;  // only for the log; "" for nothing
   HeaderMap headers;     // fields of the answer: Retry-After, Allow, Content-Range, ...
 };
 
-// The problem of an error code, with the status of docs/errors.md.
+// Returns the problem for an error code, with the status of docs/errors.md.
 Problem problem(ErrorCode code, std::string detail);
 Problem bad_request(std::string detail);
 Problem not_found(std::string detail);
@@ -35,7 +35,8 @@ Problem busy(std::string detail, int retry_after_s = 2);
 
 std::string problem_json(const Problem& problem);
 Response problem_response(const Problem& problem);
-// "Not Found"; "" for a status that this service does not use.
+// Returns the title of a status, such as "Not Found"; "" for a status that this service does not
+// use.
 const char* status_title(int status);
 
 }  // namespace voxdag::server

@@ -1,6 +1,6 @@
-// The head of an HTTP/1.1 request (RFC 9112): request line and header fields. The parser is strict:
-// what two readers could understand differently (a folded line, a blank before a colon, a lone LF,
-// two lengths) is an error, because a proxy in front may understand it the other way.
+// The head of an HTTP/1.1 request (RFC 9112): request line and header fields. The parser is strict.
+// Text that two parsers could interpret differently (a folded line, a blank before a colon, a lone
+// LF, two lengths) is an error, because a proxy in front may interpret it the other way.
 #pragma once
 
 #include <cstdint>

@@ -15,7 +15,7 @@ struct Target {
 };
 
 // Throws Problem (400) for malformed escapes, control characters, a repeated query parameter or a
-// target that is not a path. "." and ".." are not resolved: they are ordinary names, which no route
+// target that is not a path. "." and ".." are not resolved: they are ordinary names that no route
 // has.
 Target parse_target(std::string_view text);
 

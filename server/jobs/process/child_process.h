@@ -1,5 +1,5 @@
-// A child process: started, read line by line, asked to stop, waited for. It dies with this
-// process, however that ends, and inherits none of its open files.
+// A child process: starts it, reads its output line by line, requests its stop, and waits for it.
+// It dies with this process, even if this process crashes, and inherits none of its open files.
 #pragma once
 
 #include <sys/types.h>
@@ -18,18 +18,19 @@ class ChildProcess {
     std::string log_file;              // its standard error is appended to this file
     int nice = 0;
   };
-  // Must be called by a thread that lives until wait() has returned: the child is tied to it.
-  // Throws Error{kIo} if no process can be made. A program that cannot be run ends with status 127.
+  // Must be called by a thread that lives until wait() has returned, because the child dies with
+  // this thread. Throws Error{kIo} if no process can be created. If the program cannot be run, the
+  // child ends with status 127.
   explicit ChildProcess(const Start& start);
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
 
-  // Calls `use` for every line of its standard output until the output ends, and `tick` at least
-  // every tenth of a second; when `tick` returns true the child is killed.
+  // Calls `use` for every line of the child's standard output until the output ends, and `tick` at
+  // least every tenth of a second. When `tick` returns true, the child is killed.
   void read_lines(const std::function<void(std::string_view line)>& use,
                   const std::function<bool()>& tick);
-  // Sends SIGTERM, upon which a build stops at a checkpoint; a program that has not begun yet ends.
-  // From any thread.
+  // Sends SIGTERM. A build then stops at a checkpoint; a program that has not begun yet ends. May
+  // be called from any thread.
   void request_stop();
   void kill();
 

@@ -1,5 +1,5 @@
-// A file system that reads only the files it was given: an uploaded scene may name any file as its
-// buffers, by dots or through symbolic links. Everything else passes through.
+// A file system that reads only given files, because an uploaded scene may refer to any file as its
+// buffers, by dots or through symbolic links. All other calls are forwarded.
 #pragma once
 
 #include <string>
@@ -11,21 +11,21 @@ namespace voxdag::server {
 
 class ConfinedFiles : public ForwardingFiles {
  public:
-  // `readable`: files, or folders ending in '/' with all below them. What does not exist yet must
-  // be named without symbolic links and dots.
+  // `readable`: files, or folders with all files below them (ending in '/'). Paths that do not
+  // exist yet must not contain symbolic links or dots.
   ConfinedFiles(FileSystem& files, const std::vector<std::string>& readable);
 
-  // Opens a file under the name given, which is the one that errors name. Throws
-  // Error{kInvalidInput} for a file outside.
+  // Opens a file. Errors use the given name. Throws Error{kInvalidInput} if the file is not
+  // readable.
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override;
 
  private:
   std::vector<std::string> readable_;  // resolved
 };
 
-// The path without symbolic links and dots; "" if nothing exists there.
+// Returns the path without symbolic links and dots; "" if nothing exists there.
 std::string resolved_path(const std::string& path);
-// True if a resolved path is `place` or, if that ends in '/', below it.
+// True if a resolved path equals `place` or, if `place` ends in '/', is below it.
 bool is_within(const std::string& path, const std::string& place);
 
 }  // namespace voxdag::server

@@ -1,5 +1,5 @@
-// How a job's process reports: messages on standard output, at most a few per second, plain words
-// on standard error, and the file subvolumes.json, about once per second. Thread-safe.
+// Reports the progress of a job's process: messages on standard output, at most a few per second;
+// text on standard error; and the file subvolumes.json, about once per second. Thread-safe.
 #pragma once
 
 #include <condition_variable>
@@ -38,21 +38,21 @@ class ProgressPipe : public Progress {
   void finish(const std::string& result_json);
 
  private:
-  // Each is called with the mutex held; `now` sends even if the last message was just sent.
+  // Call these with the mutex held. `now`: send even if the last message was just sent.
   void send(const Message& message);
   void send_advance(bool now);
   void report_subvolumes(bool now);
-  // Reports changes that came too early after the last report, because the next change may be
-  // minutes away.
+  // Reports changes that came too soon after the last report, because the next change may be
+  // minutes later.
   void tick(const std::stop_token& end);
   void log(const std::string& text);
-  // Replaces subvolumes.json in one step. It is not synced, because it can be made again. Failures
-  // are ignored, because they must not make a build fail.
+  // Replaces subvolumes.json atomically. Does not sync it, because it can be created again. Ignores
+  // failures, because they must not fail the build.
   void write_subvolumes();
 
   FileSystem& files_;
   const std::string subvolumes_path_;
-  std::mutex mutex_;  // guards all below
+  std::mutex mutex_;  // guards all members below
   std::string stage_, unit_;
   uint64_t done_ = 0, total_ = 0;
   double stage_start_s_ = 0, last_advance_s_ = 0;

@@ -1,4 +1,4 @@
-// The subvolumes of a running build, put together from what its Progress reports.
+// The subvolumes of a running build, collected from its Progress calls.
 #pragma once
 
 #include <array>
@@ -38,7 +38,7 @@ class SubvolumeMap {
   uint64_t resolution_ = 0;
   std::array<double, 3> origin_{};
   double edge_ = 1;
-  std::map<int64_t, Entry> entries_;  // by id
+  std::map<int64_t, Entry> entries_;  // keyed by id
   SubvolumeTotals totals_;
 };
 

@@ -1,5 +1,5 @@
 // The folder of a job's files: DATA/jobs/ID. A job's process has this folder as its working
-// directory and uses the empty path, so that no message of its build names a folder of this
+// directory and uses an empty path here, so that no message of its build contains a folder of this
 // machine.
 #pragma once
 
@@ -8,7 +8,7 @@
 namespace voxdag::server {
 
 struct JobFolder {
-  std::string path;  // "" for the working directory
+  std::string path;  // "": the working directory
 
   std::string task() const { return file("task.json"); }  // the task of the job's process
   std::string log() const { return file("log"); }

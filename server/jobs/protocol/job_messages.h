@@ -22,7 +22,7 @@ struct StageBegun {
   std::string stage, unit;
   uint64_t total = 0;
 };
-// "stage_resumed": earlier attempts did so many units of the stage.
+// "stage_resumed": earlier attempts completed `done` units of the stage.
 struct StageResumed {
   uint64_t done = 0;
 };
@@ -32,7 +32,8 @@ struct StageAdvanced {
 };
 // "stage_ended"
 struct StageEnded {};
-// "subvolumes": their number, the number of built ones, and the totals of the built ones.
+// "subvolumes": the number of subvolumes, the number of built ones, and the totals of the built
+// ones.
 struct SubvolumeTotals {
   uint64_t built = 0, total = 0;
   uint64_t voxels = 0, nodes = 0, bytes = 0;
@@ -41,17 +42,17 @@ struct SubvolumeTotals {
 struct Usage {
   uint64_t memory_bytes = 0, disk_bytes = 0;
 };
-// "cluster_tasks": of a build on a cluster; members as of ClusterTasks.
+// "cluster_tasks": the tasks of a build on a cluster, with the members of ClusterTasks.
 using voxdag::ClusterTasks;
 // "warning"
 struct Warning {
   std::string text;
 };
-// "failure": the last message of a job that failed; `code` as in docs/errors.md, or "internal".
+// "failure": the last message of a failed job. `code` as in docs/errors.md, or "internal".
 struct Failure {
   std::string code, text;
 };
-// "result": the last message of a job that succeeded; `json` is one object.
+// "result": the last message of a successful job. `json` is one object.
 struct Result {
   std::string json;
 };
@@ -59,7 +60,7 @@ struct Result {
 using Message = std::variant<StageBegun, StageResumed, StageAdvanced, StageEnded, SubvolumeTotals,
                              Usage, ClusterTasks, Warning, Failure, Result>;
 
-// One line of JSON, without its end.
+// Returns one line of JSON, without the newline.
 std::string encode(const Message& message);
 std::optional<Message> decode(std::string_view line);
 

@@ -1,4 +1,4 @@
-// What a client asks to be built: the body of POST /jobs.
+// A client's request to build a scene: the body of POST /jobs.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace voxdag::server {
 struct JobRequest {
   std::string name;
   int priority = 0;
-  std::vector<std::string> scenes;  // names of uploads, or absolute paths
+  std::vector<std::string> scenes;  // names of uploads or absolute paths
   BuildSpec spec;                   // without scenes, output and work folder
   std::string text;                 // JSON of scene, resolution and options, as submitted
 };
@@ -29,7 +29,7 @@ void fields(Visitor& visit, JobRequest& request) {
   visit.object("options", [&](auto& options) { visit_job_options(options, request.spec); });
 }
 
-// Throws RequestError{kInvalid} naming the member that is unknown, missing or has a wrong value.
+// Throws RequestError{kInvalid} with the member that is unknown, missing or has a wrong value.
 JobRequest parse_job_request(std::string_view body);
 
 // The body of PATCH /jobs/{id}.

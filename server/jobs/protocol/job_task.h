@@ -1,4 +1,4 @@
-// What a job's process is to do: the file task.json in its folder.
+// The task of a job's process: the file task.json in its folder.
 #pragma once
 
 #include <cstdint>
@@ -15,14 +15,14 @@ struct JobTask {
   enum class Kind { kBuild, kPlan };
   Kind kind = Kind::kBuild;
   std::string request;                         // the text of a JobRequest
-  std::map<std::string, std::string> uploads;  // its scenes that were uploaded: name to path
+  std::map<std::string, std::string> uploads;  // its uploaded scenes: name to path
   std::vector<std::string> readable;  // files, and folders ending in '/', that scenes may refer to
-  uint64_t memory_bytes = 0;          // if the request does not say
-  unsigned threads = 0;               // if the request does not say
+  uint64_t memory_bytes = 0;          // unless the request has its own value
+  unsigned threads = 0;               // unless the request has its own value
   ClusterOptions cluster;             // as in ServerConfig
 };
 void write_task(FileSystem& files, const std::string& path, const JobTask& task);
-// Throws Error{kCorrupt} for a file that is no task.
+// Throws Error{kCorrupt} for a file that is not a task.
 JobTask read_task(FileSystem& files, const std::string& path);
 
 }  // namespace voxdag::server

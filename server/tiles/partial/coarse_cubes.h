@@ -1,6 +1,6 @@
-// A coarse view of an unfinished build: its built subvolumes with the occupied cells of a quarter
-// of their edge, read from the work folder at any time, even while another process builds there.
-// Not thread-safe.
+// A coarse view of an unfinished build: each built subvolume with its occupied cells of a quarter
+// of its edge. It is read from the work folder and can be updated at any time, even while another
+// process builds there. Not thread-safe.
 #pragma once
 
 #include <cmath>
@@ -16,17 +16,18 @@ namespace voxdag {
 
 struct CoarseCube {
   Cube cube;
-  // 4x4x4 cells, bits as the voxels of a brick (docs/format.md); voxels, for a cube of edge 4.
+  // 4x4x4 cells, with bits in the order of a brick's voxels (docs/format.md). For a cube of edge 4
+  // the cells are voxels.
   uint64_t brick = 0;
-  ArtifactRef artifact;  // from which it was read
+  ArtifactRef artifact;  // the artifact that it was read from
 };
 
 class CoarseCubes {
  public:
-  // Looks at the folder again, and reads the artifacts that are new since the last time. One that
-  // cannot be read is left out: it may be merged already and its bytes freed. After `max_read_s`
-  // the rest is left for the next times, but for one. Throws Error{kNotFound} if the folder has no
-  // job store, and as JobStore does.
+  // Reads the folder again, and reads new artifacts. An unreadable artifact is left out, because
+  // the merge may have freed its bytes. After `max_read_s`, and after at least one artifact, the
+  // remaining artifacts are left for the next calls. Throws Error{kNotFound} if the folder has no
+  // job store, and the errors of JobStore.
   void refresh(FileSystem& files, const std::string& work_folder, double max_read_s = HUGE_VAL);
 
   uint64_t total() const { return total_; }
@@ -38,7 +39,7 @@ class CoarseCubes {
  private:
   uint64_t total_ = 0, built_ = 0;
   std::map<SubvolumeId, CoarseCube> cubes_;
-  SubvolumeId next_ = 0;  // that is read first
+  SubvolumeId next_ = 0;  // subvolume to read first
 };
 
 }  // namespace voxdag

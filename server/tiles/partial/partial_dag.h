@@ -1,9 +1,9 @@
-// A job's built subvolumes as a DAG of the job's grid, for viewers: each is the
-// 4x4x4 cells of a coarse brick, and a cell with voxels is solid. Equal subtrees are one node, so
-// solid cells cost next to nothing at any resolution.
+// A job's built subvolumes as a DAG of the job's grid, for viewers. Each subvolume has the 4x4x4
+// cells of a coarse brick, and a cell with voxels is solid. Equal subtrees are one node, so solid
+// cells cost almost nothing at any resolution.
 //
-// It only grows: add() adds new nodes and a new root. So the contents of an address never change,
-// and a viewer keeps all of its tiles when the root changes. Used by one thread.
+// The DAG only grows: add() adds new nodes and a new root. So the contents of an address never
+// change, and a viewer keeps all of its tiles when the root changes. Used by one thread.
 #pragma once
 
 #include <cstdint>
@@ -20,13 +20,13 @@ class PartialDag {
  public:
   struct Part {
     Cube cube;
-    uint64_t brick = 0;  // its cells, bits as the voxels of a brick
+    uint64_t brick = 0;  // its cells, with bits in the order of a brick's voxels
   };
 
   explicit PartialDag(uint32_t grid_levels);
 
-  // Returns the word offset of the root of a DAG of these parts, which must not overlap; no value
-  // without parts. Throws Error{kCorrupt} if two overlap, or one is outside the grid.
+  // Returns the word offset of the root of a DAG of these parts; nullopt without parts. Throws
+  // Error{kCorrupt} if two parts overlap, or if one is outside the grid.
   std::optional<uint64_t> add(const std::vector<Part>& parts);
 
   // The words of each level, from the root's down to the bricks'.
@@ -36,10 +36,10 @@ class PartialDag {
  private:
   using Parts = std::vector<const Part*>;
   uint64_t add_parts(const Cube& cube, const Parts& parts);
-  // A cell with the cells of a coarse brick, of which level `level` has one; all solid.
+  // Adds a node of level `level` whose cells are those of a coarse brick, all solid.
   uint64_t add_coarse(uint32_t level, uint64_t brick);
   uint64_t add_solid(uint32_t level);
-  // One whose octants of the mask are solid.
+  // Adds a node whose octants in `mask` are solid.
   uint64_t add_octants(uint32_t level, uint32_t mask);
   uint64_t add_node(uint32_t level, uint32_t mask, const std::vector<uint64_t>& children);
   uint64_t add_brick(uint64_t brick);
@@ -47,14 +47,15 @@ class PartialDag {
 
   const uint32_t brick_level_;
   std::vector<std::vector<uint32_t>> levels_;
-  std::vector<std::map<std::vector<uint32_t>, uint64_t>> known_;  // by level: offsets of nodes
-  // The offsets of coarse bricks by level, and of solid cells, so that each is searched once.
+  std::vector<std::map<std::vector<uint32_t>, uint64_t>> known_;  // offsets of nodes, by level
+  // Offsets of coarse bricks by level, and of solid cells. They make one search per brick and cell
+  // enough.
   std::vector<std::map<uint64_t, uint64_t>> coarse_;
   std::vector<std::optional<uint64_t>> solid_;
   uint64_t word_count_ = 0;
 };
 
-// The DAG as it is now, for any thread; it does not change.
+// A copy of the DAG, for any thread; it does not change.
 class PartialDagCopy {
  public:
   explicit PartialDagCopy(const PartialDag& dag, uint32_t grid_levels);

@@ -42,17 +42,17 @@ class ReadLimiter {
   void note_read();
 
  private:
-  double next_s_ = 0;        // in wall_seconds(): one interval after the last reading
-  double idle_until_s_ = 0;  // until the CPU time charged is a small share of the wall time
+  double next_s_ = 0;        // in wall_seconds(): one interval after the last read
+  double idle_until_s_ = 0;  // until the charged CPU time is a small share of the wall time
 };
 
-// The DAG of the built subvolumes. It grows under one digest until it has too many nodes that no
-// root reaches; then it is made again under a new one. Used by one thread.
+// The DAG of the built subvolumes. It grows under one digest until too many of its nodes are
+// unreachable from any root. Then it is built again under a new digest. Used by one thread.
 class GrowingDag {
  public:
   GrowingDag(std::string job, uint64_t max_words) : job_(std::move(job)), max_words_(max_words) {}
 
-  // Adds the new cubes of `cubes`. Returns the root's word offset; no value if nothing is built.
+  // Adds the new cubes of `cubes`. Returns the root's word offset; nullopt if nothing is built.
   std::optional<uint64_t> add(const CoarseCubes& cubes, uint32_t levels);
   void clear() { nodes_.reset(); }
 
@@ -64,24 +64,24 @@ class GrowingDag {
     Nodes(uint32_t levels, std::string name) : dag(levels), digest(std::move(name)) {}
     PartialDag dag;
     const std::string digest;
-    uint64_t max_words = 0;  // the DAG is made again above this size
+    uint64_t max_words = 0;  // above this size the DAG is built again
   };
   const std::string job_;
   const uint64_t max_words_;
   std::unique_ptr<Nodes> nodes_;
 };
 
-// The answers to requests. Thread-safe; the lock is held briefly.
+// The answers to requests. Thread-safe; it holds its lock only briefly.
 class PublishedAnswers {
  public:
   std::shared_ptr<const std::string> json() const;
   std::shared_ptr<const TileSource> tiles() const;
-  // The last tiles set, even after clear(), if they have this digest; else null.
+  // Returns the last tiles set, even after clear(), if they have this digest; else null.
   std::shared_ptr<const TileSource> known(const std::string& digest) const;
 
   void set_json(std::string json);
   void set_tiles(std::shared_ptr<const TileSource> tiles);
-  // Returns whether tiles are still known.
+  // Returns true if tiles are still known.
   bool clear();
 
  private:
@@ -96,17 +96,17 @@ class PartialView {
       : files_(files), job_(job), nodes_(job, max_words) {}
 
   const std::string& job() const { return job_; }
-  // Both as PartialViews describes them.
+  // Both functions behave as documented at PartialViews.
   std::shared_ptr<const std::string> json(const JobFolder& folder, uint64_t resolution);
   std::shared_ptr<const TileSource> tiles(const JobFolder& folder, uint64_t resolution);
   std::shared_ptr<const TileSource> known(const std::string& digest) const {
     return answers_.known(digest);
   }
-  // True once the job's folder has disappeared before its tiles were requested.
+  // True if the job's folder disappeared before its tiles were requested.
   bool is_worthless() const { return is_worthless_; }
 
  private:
-  // The last answer while another thread reads the folder; otherwise a new one.
+  // Returns a new answer, or the last one if another thread is reading the folder.
   template <class Answer, class Update>
   Answer read(const JobFolder& folder, Answer (PublishedAnswers::*answer)() const,
               const Update& update);
@@ -125,10 +125,11 @@ class PartialView {
   ReadLimiter limiter_;
   CoarseCubes cubes_;
   uint64_t version_ = 0;          // number of successful readings
-  bool has_failed_ = false;       // the last reading
+  bool has_failed_ = false;       // true if the last read failed
   nlohmann::ordered_json frame_;  // the manifest's constant members; null before the plan exists
   GrowingDag nodes_;
-  uint64_t json_version_ = 0, tiles_version_ = 0, frame_version_ = 0;  // of the last updates
+  // Versions of the last updates.
+  uint64_t json_version_ = 0, tiles_version_ = 0, frame_version_ = 0;
 };
 
 }  // namespace voxdag::server
