@@ -1,7 +1,6 @@
 // The commands and their options. Each command file defines one function `add_<name>_command(line)`
-// that adds the command to the command line; main.cc calls them all and turns an Error into a
-// message and an exit status. CLI11, which takes seconds to compile, is included in command.cc
-// only.
+// that adds the command to the command line. main.cc calls all of them and turns an Error into a
+// message and an exit status. Only command.cc includes CLI11, which takes seconds to compile.
 #pragma once
 
 #include <array>
@@ -39,7 +38,8 @@ class Option {
   explicit Option(CLI::Option* option) : option_(option) {}
   Option required();
   Option group(const char* heading);
-  Option environment(const char* variable);  // gives the value if the command line does not
+  // Reads the value from this variable if the command line does not set it.
+  Option environment(const char* variable);
   Option show_default();
   Option positive();
   Option range(int low, int high);
@@ -58,8 +58,8 @@ class Option {
 class Command {
  public:
   explicit Command(CLI::App* app) : app_(app) {}
-  // A positional argument if `names` has no dashes. T is a number, a string, an optional double, or
-  // a vector of strings.
+  // Adds an option. It is a positional argument if `names` has no dashes. T is a number, a string,
+  // an optional double, or a vector of strings.
   template <class T>
   Option option(const char* names, T& value, const char* description);
   // An option of any type: `set` parses the text and throws Error if it is invalid. `value_name`
@@ -75,7 +75,7 @@ class Command {
   // Adds --config, a TOML or INI file of options that the command line does not give.
   void config_option();
   bool given(const char* option) const;
-  void hide();  // from the help
+  void hide();  // Hides the command from the help.
   void on_run(std::function<void()> run);
 
  private:
@@ -84,7 +84,7 @@ class Command {
 
 struct CommandContext {
   FileSystem& files;
-  CancelToken& cancel;  // set by Ctrl-C and SIGTERM
+  CancelToken& cancel;  // canceled by Ctrl-C and SIGTERM
   // Exit status of a command that succeeded; diff sets 1 if the files differ.
   int exit_status = 0;
 };
@@ -94,7 +94,7 @@ class CommandLine {
   explicit CommandLine(CommandContext& context);
   ~CommandLine();
   Command add(const char* name, const char* description);
-  // Parses the arguments and runs the command, whose exceptions come through. Returns the exit
+  // Parses the arguments and runs the command. Does not catch its exceptions. Returns the exit
   // status.
   int run(int argc, char** argv);
   CommandContext& context() { return context_; }
@@ -104,8 +104,9 @@ class CommandLine {
   std::unique_ptr<CLI::App> app_;
 };
 
-// Adds a command whose options set the members of a `State`. Two functions next to it are called:
-// declare(command, state) adds the options, and run(state, context) runs after they are parsed.
+// Adds a command whose options set the members of a `State`. declare(command, state) adds the
+// options, and run(state, context) runs after they are parsed. Both functions are found in the
+// namespace of `State`.
 template <class State>
 State& add_command(CommandLine& line, const char* name, const char* description) {
   Command command = line.add(name, description);
@@ -116,7 +117,7 @@ State& add_command(CommandLine& line, const char* name, const char* description)
 }
 
 void add_build_command(CommandLine& line);
-// Started by the engine of a cluster.
+// Adds the command that a cluster's engine starts.
 void add_build_batch_command(CommandLine& line);
 void add_stop_tasks_command(CommandLine& line);
 void add_plan_command(CommandLine& line);
@@ -129,7 +130,7 @@ void add_render_command(CommandLine& line);
 void add_extract_command(CommandLine& line);
 void add_export_command(CommandLine& line);
 void add_view_command(CommandLine& line);
-// Adds `serve`, `token`, and the hidden command that `serve` starts for each job.
+// Adds `serve`, `token`, and the hidden command that `serve` runs for each job.
 void add_serve_commands(CommandLine& line);
 void add_health_command(CommandLine& line);
 void add_submit_command(CommandLine& line);

@@ -26,7 +26,7 @@ class OptionDeclarer {
   }
   void object(const char*, const auto& visit_members) { visit_members(*this); }
 
-  // A declared option, for example to add one that needs it.
+  // Returns a declared option, for example to add an option that needs it.
   Option at(const std::string& field_name) const { return options_.at(field_name); }
 
  private:
@@ -48,14 +48,14 @@ class OptionDeclarer {
     }
   }
 
-  // "scene", "--hash-bits" or "-r,--resolution".
+  // Returns "scene", "--hash-bits" or "-r,--resolution".
   static std::string option_names(const Field& field) {
     if (field.is_positional) return field.name;
     const std::string separator = *field.shorthand ? "," : "";
     return field.shorthand + separator + option_name(field.name);
   }
 
-  // What --help shows in the place of a value.
+  // Returns the placeholder for a value in --help.
   template <class T>
   static const char* value_name(const Field& field) {
     using Value = typename OptionalValue<T>::type;

@@ -1,4 +1,4 @@
-// What commands write: JSON on standard output, and files.
+// The output of commands: JSON on standard output, and files.
 #pragma once
 
 #include <functional>
@@ -10,11 +10,12 @@
 
 namespace voxdag::cli {
 
-// Prints one line. Bytes that are not UTF-8, for example in a path, are printed as U+FFFD.
+// Prints the JSON on one line. Bytes that are not UTF-8, for example in a path, are printed as
+// U+FFFD.
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
 
-// Resolution, cells and bytes of one section.
+// Returns resolution, cells and bytes of one section.
 nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section);
 // Adds the facts of all sections of the file as the members `colors` and `attributes`. The latter
 // also has the names of materials.
@@ -28,11 +29,11 @@ struct OutputFile {
   std::string path;
   bool force = false;
   void declare_force(Command& command);
-  // Throws Error{kInvalidInput} if writing would destroy the `input`, or, without --force, a file
-  // that is not `is_own`. Also checks path + ".partial", the temporary name of
+  // Throws Error{kInvalidInput} if writing would destroy the `input` or, without --force, a file
+  // for which `is_own` returns false. Also checks path + ".partial", the temporary name of
   // write_file_atomically(), and that the folder exists.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
-  // The same for one name.
+  // Checks one name.
   void check(FileSystem& files, const std::string& name, const std::string& input,
              const IsOwnFile& is_own) const;
 };

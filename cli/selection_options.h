@@ -1,5 +1,4 @@
-// The options --region, --world, --level and --resolution of the commands that take a part of a
-// file.
+// The options --region, --world, --level and --resolution of commands that read a part of a file.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +12,7 @@
 namespace voxdag::cli {
 
 struct SelectionOptions {
-  std::string region;  // as typed; "" for the whole grid
+  std::string region;  // as typed; "" for the complete grid
   bool world = false;
   std::optional<uint64_t> level, resolution;
 

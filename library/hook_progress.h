@@ -12,7 +12,7 @@ namespace voxdag {
 
 class HookProgress : public Progress {
  public:
-  // `hooks` must outlive this.
+  // `hooks` must outlive this object.
   explicit HookProgress(const BuildHooks& hooks) : hooks_(hooks) {}
 
   void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override;
@@ -28,7 +28,7 @@ class HookProgress : public Progress {
   void report_if_due();
 
   const BuildHooks& hooks_;
-  std::mutex mutex_;  // guards everything below, and the calls
+  std::mutex mutex_;  // guards all members below, and the calls of hooks
   std::string stage_, unit_;
   uint64_t done_ = 0, total_ = 0;
   Clock::time_point next_report_{};

@@ -8,7 +8,7 @@
 
 namespace voxdag {
 
-// Throws Error{kLimit} for 2^63 triangles and more.
+// Throws Error{kLimit} for 2^63 or more triangles.
 std::unique_ptr<TriangleSource> chain_scenes(std::vector<std::unique_ptr<TriangleSource>> parts);
 
 }  // namespace voxdag

@@ -1,5 +1,5 @@
-// A charge to the memory budget for data whose size is known only while it is read. It grows in
-// steps, so that small additions cost no call to the budget. Not thread-safe.
+// A charge to the memory budget for data whose size becomes known while it is read. It grows in
+// steps, so that small additions do not call the budget. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +17,14 @@ class GrowingCharge {
   GrowingCharge(MemoryBudget& budget, std::string what)
       : charge_(budget, 0, what), what_(std::move(what)) {}
 
-  // Charges `bytes` in all, unless as many are charged already. Throws Error{kOutOfMemory} if they
-  // do not fit the budget.
+  // Increases the charge to a total of `bytes`, unless it is already larger. Throws
+  // Error{kOutOfMemory} if they do not fit the budget.
   void grow_to(uint64_t bytes) {
     if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
     throw Error(ErrorCode::kOutOfMemory, "out of memory: " + what_ + " needs over " +
                                              std::to_string(bytes) + " bytes of the budget");
   }
-  // Charges `bytes` more than all calls of add() before.
+  // Charges `bytes` in addition to all previous calls of add().
   void add(uint64_t bytes) { grow_to(added_ += bytes); }
 
  private:

@@ -1,6 +1,6 @@
-// A mesh in memory as a scene file: a file system in which one more path is a PLY file with the
-// mesh. All other paths pass through. The build reads it in windows like every scene file, and its
-// contents are made on the fly.
+// A mesh in memory as a scene file: a file system with one additional path, a PLY file with the
+// mesh. Calls for all other paths are forwarded. The build reads the mesh in windows like every
+// scene file, and its contents are generated on the fly.
 #pragma once
 
 #include <memory>
@@ -13,14 +13,14 @@ namespace voxdag {
 
 class MeshFiles : public ForwardingFiles {
  public:
-  // The path of the mesh; messages name it.
+  // The path of the mesh, as used in messages.
   static constexpr const char* kPath = "mesh in memory";
 
-  // Throws Error{kInvalidInput} for arrays of the wrong lengths. The mesh's arrays must outlive
-  // this and its files.
+  // Throws Error{kInvalidInput} for arrays of wrong lengths. The mesh's arrays must outlive this
+  // object and its files.
   MeshFiles(FileSystem& files, const Mesh& mesh);
 
-  // The identity of the mesh is unknown, so no build trusts an earlier reading of it.
+  // Opens the mesh. Its identity is unknown, so no build relies on data from an earlier read.
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override;
   bool exists(const std::string& path) override;
 

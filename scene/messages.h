@@ -7,16 +7,16 @@
 
 namespace voxdag {
 
-// Returns a text from the file for use in a message: control characters (one byte, or U+0080 to
+// Returns a text from the file for use in a message. Control characters (one byte, or U+0080 to
 // U+009F, which terminals also obey) and quotes are replaced, and the text is shortened to
 // `max_bytes`. So the text cannot forge a line of a log.
 std::string printable(std::string_view text, size_t max_bytes = 64);
 
-// The message of an exception of the JSON library, without the "[json.exception...] " that it
-// begins with; other messages as they are.
+// Returns the message of an exception of the JSON library without its prefix "[json.exception...]
+// ". Other messages are returned unchanged.
 std::string without_prefix(std::string message);
 
-// "16 \"name\"", or only the number of an object without a name.
+// Returns "16 \"name\"", or only the number if the object has no name.
 std::string numbered(int index, const std::string& name);
 
 // Throws Error{kInvalidInput}: "<scene file>: <what>".

@@ -1,4 +1,4 @@
-// From the numbers of scene files to the integers of surfaces; IEEE + - * and floor only.
+// Converts the numbers of scene files to the integers of surfaces. Uses only IEEE + - * and floor.
 #pragma once
 
 #include <algorithm>

@@ -24,7 +24,7 @@ struct SourceFile {
   bool operator==(const SourceFile&) const = default;
 };
 
-// Reads the triangles of a scene for one thread; any number of cursors may read at the same time.
+// Reads the triangles of a scene for one thread. Any number of cursors may read concurrently.
 class TriangleCursor {
  public:
   using Visitor = std::function<void(std::span<const RealTriangle>)>;
@@ -32,45 +32,46 @@ class TriangleCursor {
   using SurfaceVisitor = std::function<void(std::span<const SurfaceTriangle>)>;
 
   virtual ~TriangleCursor() = default;
-  // Calls `visit` with batches of 1 to 1024 triangles, all finite: those among the declared
-  // triangles [first, first + count) that skip_invalid does not drop, in the scene's order. Going
-  // back to earlier triangles takes longer. Throws Error naming scene file, node, mesh, primitive
-  // or accessor.
+  // Calls `visit` with batches of 1 to 1024 triangles, all finite, in the scene's order: the
+  // declared triangles [first, first + count), without those that skip_invalid drops. Going back to
+  // earlier triangles takes longer. Throws Error with scene file, node, mesh, primitive or
+  // accessor.
   virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
   // Does the same with each vertex snapped to `grid`.
   virtual void read_snapped(uint64_t first, uint64_t count, const Grid& grid, const Visitor& visit);
-  // Visits the triangles with their surfaces. The default: white, material 0.
+  // Visits the triangles with their surfaces. By default they are white and have material 0.
   virtual void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
-  // The bounds of the triangles that read() visits.
+  // Returns the bounds of the triangles that read() visits.
   virtual WorldBounds read_bounds(uint64_t first, uint64_t count);
 };
 
-// An image of a scene, as it is stored: a PNG or JPEG file, or anything that claims to be one. Its
-// bytes are `bytes` of those that [offset, offset + size) of the file hold, from `skip` on.
+// A stored image of a scene: a PNG or JPEG file, or anything that claims to be one. Its source is
+// the range [offset, offset + size) of the file. The image is `bytes` bytes of the source's
+// (decoded) contents, starting at `skip`.
 struct ImageSource {
-  std::string name;  // for messages: which image of which scene file
+  std::string name;  // name in messages: the image and its scene file
   SourceFile file;
   uint64_t offset = 0, size = 0;
-  // The file has base64 characters there, of which JSON may have escaped some.
+  // The source has base64 characters, some of which may be escaped by JSON.
   bool is_base64 = false;
-  bool is_data_uri = false;  // base64 that begins behind the first comma
+  bool is_data_uri = false;  // the base64 characters begin after the first comma
   uint64_t skip = 0;
-  uint64_t bytes = UINT64_MAX;  // fewer if there are fewer
-  std::string problem;          // why it cannot be read, if that is known; "" otherwise
+  uint64_t bytes = UINT64_MAX;  // fewer if the source has fewer
+  std::string problem;          // why it cannot be read, if known; "" otherwise
 };
 
 struct SceneMaterials {
   std::vector<Material> materials = {Material{}};  // at least one
-  std::vector<ImageSource> images;                 // those that materials use
-  std::vector<std::string> warnings;               // about materials and images only
-  std::vector<std::string> names;  // of the materials that the scene's files list, in their order
+  std::vector<ImageSource> images;                 // images that materials use
+  std::vector<std::string> warnings;               // only about materials and images
+  std::vector<std::string> names;  // names of the materials listed in the scene's files, in order
 
-  // Leaves the factors of materials alone.
+  // Removes the images, so that materials have only their factors.
   void drop_images() {
     for (Material& material : materials) material.image = Material::kNoImage;
     images.clear();
   }
-  // Appends a name, "", for the triangles without material, and gives them its number.
+  // Appends the name "" for triangles without material, and gives them its number.
   void name_unlisted() {
     for (Material& material : materials)
       if (material.number == Material::kNoNumber)
@@ -84,20 +85,21 @@ class TriangleSource {
   using Visitor = TriangleCursor::Visitor;
 
   virtual ~TriangleSource() = default;
-  // A cursor, one of `cursors` that share the memory. The source must outlive it.
+  // Returns a cursor. `cursors` is the number of cursors that share the memory. The source must
+  // outlive the cursor.
   virtual std::unique_ptr<TriangleCursor> open(unsigned cursors) = 0;
-  // Calls `visit` with all triangles, by batches as TriangleCursor::read() does.
+  // Calls `visit` with all triangles, in batches as in TriangleCursor::read().
   void for_each_batch(const Visitor& visit) { open(1)->read(0, declared_triangles(), visit); }
-  // Number of triangles that the scene declares, instances included: visited triangles and
+  // Number of triangles that the scene declares, including instances: visited triangles and
   // triangles that skip_invalid drops.
   virtual uint64_t declared_triangles() const = 0;
-  // What TriangleCursor::read_surfaces() refers to. Opens image files, but reads no image; one that
-  // cannot be opened is no error.
+  // The materials that TriangleCursor::read_surfaces() refers to. Opens image files, but reads no
+  // image. An image that cannot be opened is not an error.
   virtual SceneMaterials materials() const { return {}; }
-  // The number of those materials.
+  // Number of these materials.
   virtual uint32_t material_count() const { return 1; }
-  // All files that the triangles come from, with their identity when they were first opened. One
-  // that turns out to be another when it is opened again is an error.
+  // All files that the triangles come from, with their identity when they were first opened. If a
+  // file has a different identity when it is opened again, this is an error.
   virtual std::vector<SourceFile> files() const { return {}; }
   // Warnings for the user, one sentence each (ignored optional extensions, points and lines that
   // make no voxels).

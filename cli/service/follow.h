@@ -1,4 +1,4 @@
-// Follows a job of a server, with its progress on standard error.
+// Follows a job of a server and shows its progress on standard error.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace voxdag::cli {
 
-// Returns the JOB once it has ended: succeeded, failed or canceled. Throws Error{kCanceled} on
+// Returns the JOB after it has ended: succeeded, failed or canceled. Throws Error{kCanceled} on
 // Ctrl-C; the job itself continues.
 Json follow_job(ServiceClient& service, const std::string& id);
 
-// Throws the error of a job that failed or was canceled.
+// Throws an Error for a job that failed or was canceled.
 void check_succeeded(const Json& job);
 
 }  // namespace voxdag::cli

@@ -16,7 +16,7 @@ class ServiceOptions {
  public:
   void declare(Command& command);
   // Calls `action` with a client of the server. Throws Error{kInvalidInput} for a malformed URL or
-  // token file, and Error{kIo} for an answer that is not what docs/api.md says.
+  // token file, and Error{kIo} for an answer that differs from docs/api.md.
   void with_service(CommandContext& context,
                     const std::function<void(ServiceClient&)>& action) const;
 
@@ -26,7 +26,7 @@ class ServiceOptions {
   std::string url_, token_file_, ca_file_;
 };
 
-// Adds a command whose State has a member `service` of these options: run(state, client, context)
+// Adds a command whose State has a member `service` with these options. run(state, client, context)
 // is called with a client of the server.
 template <class State>
 State& add_service_command(CommandLine& line, const char* name, const char* description) {

@@ -1,5 +1,5 @@
-// Progress on standard error: a bar with rate and ETA on a terminal, a plain line every few seconds
-// and at the end of each stage otherwise. The bar is thread-safe.
+// Progress on standard error. On a terminal, it is a bar with rate and ETA; otherwise a plain line
+// every few seconds and at the end of each stage. The bar is thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +23,9 @@ struct StageView {
 // line otherwise. Not thread-safe.
 class ProgressLine {
  public:
-  // A quiet line shows warnings and notes only.
+  // A quiet line shows only warnings and notes.
   explicit ProgressLine(bool quiet = false);
-  // Ends an open line, so that later output starts on its own line.
+  // Ends an open line, so that later output starts on a new line.
   ~ProgressLine();
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
@@ -43,7 +43,7 @@ class ProgressLine {
   bool open_ = false;  // the line on the terminal will be redrawn
 };
 
-// A quiet bar shows warnings only.
+// A quiet bar shows only warnings.
 std::unique_ptr<Progress> make_progress_bar(bool quiet = false);
 
 }  // namespace voxdag::cli

@@ -29,7 +29,7 @@
 
 namespace voxdag {
 
-// The device and the algorithm that voxelize a part of the scene. kAuto takes a GPU where one is
+// The device and the algorithm that voxelize a part of the scene. kAuto uses a GPU if one is
 // present; kDefault is the backend's fastest method. All of them produce the same bytes.
 enum class BackendName { kAuto, kCpu, kCuda, kParallelHost };
 enum class MethodName { kDefault, kConsing, kPointers, kHashes };
@@ -57,15 +57,15 @@ struct BuildOptions {
   std::string output;
   std::string work_folder;
   bool keep_work = false;    // keep the work folder after success
-  bool restart = false;      // start over, whatever the work folder holds
+  bool restart = false;      // discard the job in the work folder and start over
   bool force = false;        // build although the estimate predicts a lack of memory or disk space
-  std::string cache_folder;  // of subvolumes shared between builds; "" for none
+  std::string cache_folder;  // folder for subvolumes shared between builds; "": none
   uint64_t cache_bytes = uint64_t{16} << 30;
 
   // Resources. Resident memory, without `mesh`, exceeds memory_bytes by at most 64 MiB.
   uint64_t memory_bytes = 0;    // from 64 MiB up; 0 for half of the machine's or the cgroup's
-  unsigned threads = 0;         // 0 for all that the process may use
-  uint64_t subvolume_edge = 0;  // voxels, a power of two; 0 for a choice by the plan
+  unsigned threads = 0;         // 0: all CPUs that the process may use
+  uint64_t subvolume_edge = 0;  // in voxels, a power of two; 0: chosen by the plan
   BackendName backend = BackendName::kAuto;
   MethodName method = MethodName::kDefault;
 };
@@ -79,7 +79,7 @@ struct BuildProgress {
 };
 
 // All members may be empty. The build calls the functions from its threads; calls never overlap.
-// They must not throw; a function that wants to end the build calls cancel() of the token.
+// They must not throw. To end the build, a function calls cancel() of the token.
 struct BuildHooks {
   std::function<void(const BuildProgress&)> on_progress;  // at most ten times a second
   std::function<void(std::string_view message)> on_warning;
@@ -89,19 +89,19 @@ struct BuildHooks {
 struct BuildResult {
   std::string output;
   std::string sha256;  // of the output, in hexadecimal digits
-  uint64_t bytes = 0;  // of the output
+  uint64_t bytes = 0;  // size of the output
   uint32_t grid_levels = 0;
   std::array<double, 3> origin{};  // the low corner of the grid, in the units of the scene
-  double edge = 0;                 // of the grid
-  uint64_t triangles = 0;          // that may touch the grid
+  double edge = 0;                 // edge of the grid
+  uint64_t triangles = 0;          // triangles that may touch the grid
   uint64_t dropped_outside = 0;    // triangles
   uint64_t dropped_invalid = 0;    // triangles
   uint64_t voxels = 0;
   uint64_t dag_nodes = 0;
   uint64_t subvolumes = 0;
-  uint64_t subvolumes_reused = 0;  // from an interrupted run, or from the cache
+  uint64_t subvolumes_reused = 0;  // taken from an interrupted run or from the cache
   double wall_s = 0, cpu_s = 0;
-  uint64_t peak_memory_bytes = 0;  // resident, of the whole process
+  uint64_t peak_memory_bytes = 0;  // resident memory of the complete process
   std::string json;                // the complete report, as `voxdag build --json` prints it
 };
 
@@ -114,12 +114,12 @@ struct EstimateRange {
   double low = 0, likely = 0, high = 0;
 };
 
-// What a build would take.
+// The estimated resources of a build.
 struct BuildPlan {
   uint64_t triangles = 0;
   EstimateRange voxels, dag_nodes;
-  EstimateRange file_bytes;    // of the output
-  EstimateRange disk_bytes;    // of the output and the work folder, at their peak
+  EstimateRange file_bytes;    // size of the output
+  EstimateRange disk_bytes;    // output and work folder at their peak
   EstimateRange memory_bytes;  // peak resident memory
   EstimateRange cpu_s, wall_s;
   uint64_t free_disk = 0;    // on the disk of the work folder; 0 if unknown

@@ -1,5 +1,5 @@
-// Cells of a file's grids. The grid of 2^grid_levels cells per edge has a cell set where any voxel
-// in it is set; a file's own grid_levels give its voxels.
+// Cells of a file's grids. In the grid of 2^grid_levels cells per edge, a cell is set if any voxel
+// in it is set. With the file's own grid_levels, cells are voxels.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace voxdag::query {
 
-// x, y and z in cells of a grid. An array of them is a table of three int64 columns.
+// x, y and z in cells of a grid. An array of positions is a table of three int64 columns.
 using Position = std::array<int64_t, 3>;
 
 // The half-open box low <= p < high of cells of a grid. It may extend beyond the grid.
@@ -18,7 +18,8 @@ struct Region {
   Position high{};
 
   bool empty() const { return low[0] >= high[0] || low[1] >= high[1] || low[2] >= high[2]; }
-  // True if the region has a cell of, or all of, the cube with that low corner and edge.
+  // intersects() is true if the region has at least one cell of the cube with this low corner and
+  // edge; contains() if it has all of them.
   bool intersects(const Position& corner, int64_t edge) const {
     for (size_t axis = 0; axis < 3; ++axis)
       if (corner[axis] >= high[axis] || corner[axis] + edge <= low[axis]) return false;
@@ -32,13 +33,13 @@ struct Region {
   friend bool operator==(const Region&, const Region&) = default;
 };
 
-// All cells of a grid of 2^grid_levels per edge.
+// Returns all cells of a grid of 2^grid_levels per edge.
 inline Region whole_grid(uint32_t grid_levels) {
   const int64_t edge = int64_t{1} << grid_levels;
   return {{0, 0, 0}, {edge, edge, edge}};
 }
 
-// The part of the region in that grid, or an empty region.
+// Returns the part of the region in this grid, or an empty region.
 inline Region cut_to_grid(const Region& region, uint32_t grid_levels) {
   const int64_t edge = int64_t{1} << grid_levels;
   Region cut;
@@ -58,7 +59,7 @@ struct Selection {
 // 4x4x4 cells of a grid. Cell (x, y, z) of the brick is bit 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0 of
 // the mask, where x1 and x0 are the high and the low bit of x.
 struct Brick {
-  Position low;  // its low corner, a multiple of 4, in cells
+  Position low;  // low corner in cells, a multiple of 4
   uint64_t mask;
 };
 

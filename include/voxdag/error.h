@@ -17,7 +17,7 @@ enum class ErrorCode {
   kOutOfMemory,         // the memory budget or the machine is too small
   kDevice,              // the GPU or its driver failed
   kCanceled,            // the user canceled the operation
-  kLimit,               // a limit of the format or of the arithmetic, named in the message
+  kLimit,               // a limit of the format or of the arithmetic; the message names the limit
 };
 
 // The message is one sentence that names the problem, the place (file, subvolume, scene node) and
@@ -40,7 +40,7 @@ class Error : public std::exception {
   std::string message_;
 };
 
-// The stable name of a code, as JSON reports carry it: "invalid_input", "no_space", ...
+// Returns the stable name of a code, as used in JSON reports: "invalid_input", "no_space", ...
 const char* error_name(ErrorCode code);
 
 }  // namespace voxdag

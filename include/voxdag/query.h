@@ -36,7 +36,7 @@ namespace voxdag::query {
 // Three coordinates in voxels; the grid is the cube [0, R]^3.
 using Coordinates = std::array<double, 3>;
 
-// sRGB, and alpha: 255 for a color, 0 where a cell has no color.
+// sRGB and alpha. Alpha is 255 for a color, 0 if the cell has no color.
 using Rgba = std::array<uint8_t, 4>;
 
 // A unit vector, or zeros.
@@ -46,19 +46,19 @@ inline constexpr uint32_t kNoMaterial = UINT32_MAX;
 
 struct RayLimits {
   double max_distance = std::numeric_limits<double>::infinity();  // in voxels
-  // A ray hits cells of at most this edge, in voxels, as one cell. Below 2: voxels.
+  // A ray hits cells of at most this edge, in voxels, as one cell. Values below 2 mean voxels.
   double stop_size = 0;
 };
 
 struct RayHit {
   double distance = 0;       // in voxels, from the origin to the face
-  Position cell{};           // in the grid of 2^grid_levels
-  uint32_t grid_levels = 0;  // of the cell's grid
-  // The normal of the face by which the ray entered: 0, 1, 2 for x, y, z, and 1 or -1. A ray that
-  // begins in the cell has distance 0, axis -1 and sign 0: no face.
+  Position cell{};           // cell in the grid of 2^grid_levels
+  uint32_t grid_levels = 0;  // levels of the cell's grid
+  // The normal of the face by which the ray entered: axis 0, 1, 2 for x, y, z, and sign 1 or -1. A
+  // ray that begins in the cell has distance 0 and no face: axis -1 and sign 0.
   int8_t axis = -1;
   int8_t sign = 0;
-  bool hit = false;  // without a hit, the other members have no meaning
+  bool hit = false;  // if false, the other members have no meaning
 };
 
 struct Nearest {
@@ -76,7 +76,7 @@ class DagFile {
   // Default limit of the memory for the node counts that count() stores, in bytes.
   static constexpr uint64_t kDefaultMemory = uint64_t{1} << 30;
 
-  // Opens and maps the file, which must not become shorter while it is open. count() uses at most
+  // Opens and maps the file, which must not be shortened while it is open. count() uses at most
   // `memory_bytes`. Throws Error{kNotFound}, Error{kIo}, Error{kUnsupportedVersion}, or
   // Error{kCorrupt} for a damaged header.
   explicit DagFile(const std::string& path, uint64_t memory_bytes = kDefaultMemory);
@@ -90,12 +90,12 @@ class DagFile {
   // The low corner of the grid and the length of its edge, in the units of the scene.
   Coordinates origin() const;
   double edge() const;
-  uint64_t voxels() const;     // set ones
-  uint64_t svo_nodes() const;  // nodes of the octree without sharing, bricks included
-  uint64_t dag_nodes() const;  // bricks included
+  uint64_t voxels() const;     // set voxels
+  uint64_t svo_nodes() const;  // nodes of the octree without sharing, including bricks
+  uint64_t dag_nodes() const;  // nodes of the DAG, including bricks
   uint64_t file_bytes() const;
 
-  // set[i] becomes 1 if cell points[i] is set, and 0 if it is not or is outside the grid.
+  // Sets set[i] to 1 if cell points[i] is set; to 0 if it is not set or outside the grid.
   void lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
               unsigned threads = 1) const;
 
@@ -108,7 +108,7 @@ class DagFile {
   bool has_alphas() const;
   bool has_normals() const;
   bool has_materials() const;
-  // colors[i] becomes the color of cell points[i], and zeros if the cell is not set.
+  // Sets colors[i] to the color of cell points[i]; to zeros if the cell is not set.
   void colors(std::span<const Position> points, uint32_t grid_levels, std::span<Rgba> colors,
               unsigned threads = 1) const;
   // Linear, 0 to 255; 0 for a cell that is not set.
@@ -120,48 +120,51 @@ class DagFile {
   // Indices into material_names(); kNoMaterial for a cell that is not set.
   void materials(std::span<const Position> points, uint32_t grid_levels,
                  std::span<uint32_t> materials, unsigned threads = 1) const;
-  // The last one, "", is for triangles without a material. Empty without the attribute.
+  // The last name, "", is for triangles without a material. Empty if the file does not have the
+  // attribute.
   const std::vector<std::string>& material_names() const;
 
-  // The first set cell on each ray. Directions have any length except 0; all numbers are finite,
-  // and limits are not negative. A cell includes its faces, so no ray passes between two cells that
-  // share one. Rays close to their predecessors, such as rays of neighboring pixels, are faster.
+  // Finds the first set cell on each ray. Directions may have any length except 0. All numbers must
+  // be finite, and limits must not be negative. A cell includes its faces, so no ray passes between
+  // two cells that share a face. Rays close to their predecessors, such as rays of neighboring
+  // pixels, are faster.
   void rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
             const RayLimits& limits, std::span<RayHit> hits, unsigned threads = 1) const;
 
-  // The region as a dense array, 1 for each set cell: position p is at
-  // ((p.x - low.x) * ny + p.y - low.y) * nz + p.z - low.z. `cells` has the region's size.
+  // Writes the region as a dense array, with 1 for each set cell. Position p is at ((p.x - low.x) *
+  // ny + p.y - low.y) * nz + p.z - low.z. `cells` has the region's size.
   void box(const Selection& selection, std::span<uint8_t> cells) const;
 
-  // The set cells of the region, in Morton order: stores as many as fit and returns how many the
-  // region has.
+  // Stores the set cells of the region, in Morton order, up to the size of `positions`. Returns the
+  // number of set cells in the region.
   uint64_t positions(const Selection& selection, std::span<Position> positions) const;
 
-  // Calls `visit` for each brick with set cells in the region, in Morton order; masks are cut to
-  // the region.
+  // Calls `visit` for each brick with set cells in the region, in Morton order. Masks are clipped
+  // to the region.
   void bricks(const Selection& selection, const std::function<void(const Brick&)>& visit) const;
 
-  // The number of set cells in the region. The first count in a grid reads every node of its levels
-  // once, and stores a number for each.
+  // Returns the number of set cells in the region. The first count in a grid reads every node of
+  // its levels once, and stores a number for each.
   uint64_t count(const Selection& selection) const;
 
-  // For each point the nearest set cell, from center to center, at most `max_distance` cells away.
-  // Among equally near cells, the first in Morton order. Points may be outside the grid, with
-  // coordinates of at most kMaxCoordinate.
+  // Finds the nearest set cell for each point, from center to center, at most `max_distance` cells
+  // away. Among equally near cells, it is the first in Morton order. Points may be outside the
+  // grid, with coordinates of at most kMaxCoordinate.
   void nearest(std::span<const Position> points, uint32_t grid_levels, double max_distance,
                std::span<Nearest> cells, unsigned threads = 1) const;
 
-  // The cell that contains a point of the scene's space; it may be outside the grid, at most 2^62
-  // cells away. A point on a boundary between cells, up to rounding, counts as on it.
+  // Returns the cell that contains a point of the scene's space. The cell may be outside the grid,
+  // at most 2^62 cells away. A point counts as on a boundary between cells if it is within rounding
+  // error of it.
   Position world_to_cell(const Coordinates& world, uint32_t grid_levels) const;
-  // The cells that the half-open box of the scene's space touches. An infinite side ends with the
-  // grid.
+  // Returns the cells that the half-open box of the scene's space touches. An infinite side ends at
+  // the border of the grid.
   Region world_to_region(const Coordinates& low, const Coordinates& high,
                          uint32_t grid_levels) const;
 
-  // A node of level `level` with the `tile_levels` (1 to 5) levels below it, for viewers, in the
-  // format of docs/format.md, "Tiles". The root is at level 0, offset 0; a tile has the offsets of
-  // the tiles below it. Throws Error{kNotFound} if no node can be at that word offset.
+  // Returns a node of level `level` with the `tile_levels` (1 to 5) levels below it, for viewers,
+  // in the format of docs/format.md, "Tiles". The root is at level 0, offset 0. A tile has the
+  // offsets of the tiles below it. Throws Error{kNotFound} if no node can be at that word offset.
   std::vector<uint32_t> tile(uint32_t tile_levels, uint32_t level, uint64_t offset) const;
 
   // The file itself, for voxdag_reader.h. It lives as long as this object.

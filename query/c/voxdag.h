@@ -61,7 +61,7 @@ typedef struct voxdag_facts {
   uint32_t materials;    /* the number of materials */
   double origin[3];      /* the low corner of the grid in the units of the scene */
   double edge;           /* of the grid, in the units of the scene */
-  uint64_t voxels;       /* set ones */
+  uint64_t voxels;       /* set voxels */
   uint64_t svo_nodes;    /* nodes of the octree without sharing */
   uint64_t dag_nodes;
   uint64_t bytes; /* of the file */

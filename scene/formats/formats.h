@@ -17,9 +17,9 @@ namespace voxdag {
 
 struct SceneFormat {
   std::string_view name;                      // "glTF"
-  std::span<const std::string_view> endings;  // of file names, ".glb"
-  // True if the file begins like this format. nullptr for the format that reads, or refuses, files
-  // that no other format recognizes.
+  std::span<const std::string_view> endings;  // file name endings, such as ".glb"
+  // True if the file begins like this format. Null for the one format that is used if no other
+  // format recognizes the file; its reader refuses invalid files.
   bool (*sniff)(const ReadableFile& file);
   // Opens one file as open_scene() does.
   std::unique_ptr<TriangleSource> (*open)(FileSystem& files, std::unique_ptr<ReadableFile> file,
@@ -31,15 +31,16 @@ std::span<const SceneFormat> scene_formats();
 
 // True if the name ends like the files of a format.
 bool has_scene_ending(std::string_view name);
-// All endings, with `separator` between them and `last_separator` before the last one.
+// Returns all endings, with `separator` between them and `last_separator` before the last one.
 std::string list_scene_endings(const std::string& separator = ", ",
                                const std::string& last_separator = " or ");
 
 // Opens scene files, each of any format, as one scene: the triangles of the first file, then the
-// triangles of the next. Contents decide the format, not names. Geometry is read in windows charged
-// to `budget`; images are never read. Opening checks the structure, streaming checks the contents;
-// `cancel` is checked between batches. Throws Error{kInvalidInput}, {kNotFound}, {kLimit} or
-// {kOutOfMemory} naming the file. The references must outlive the scene.
+// triangles of the next. The format is determined by the contents, not the name. Geometry is read
+// in windows charged to `budget`; images are never read. Opening checks the structure, streaming
+// checks the contents; `cancel` is checked between batches. Throws Error{kInvalidInput},
+// {kNotFound}, {kLimit} or {kOutOfMemory} with the name of the file. The references must outlive
+// the scene.
 std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
                                            const SceneOptions& options, MemoryBudget& budget,
                                            const CancelToken& cancel);

@@ -9,15 +9,15 @@
 
 namespace voxdag {
 
-// Positions in kCityMaterials.
+// Indices into kCityMaterials.
 enum CityMaterial : uint32_t { kGround, kBuildings, kPlants, kCars };
 
-// Parts stored once: a stretch of wall with a window in it for each of four directions, a tree, a
-// car along x and one along z.
+// Parts stored once: a piece of wall with a window for each of four directions, a tree, and a car
+// along x and one along z.
 struct CityParts {
   explicit CityParts(SceneBuilder& scene);
-  uint32_t window[4];  // facing +z, +x, -z, -x; unit size, the pane set back by 1
-  uint32_t tree;       // unit height, standing on the origin
+  uint32_t window[4];  // facing +z, +x, -z, -x; unit size; the pane is set back by 1
+  uint32_t tree;       // unit height, with its base at the origin
   uint32_t car[2];
 };
 
@@ -26,7 +26,7 @@ struct Lot {
   Vec3 center;  // on the ground
   double width = 0;
   uint32_t floors = 0;
-  Rgba8 wall = kWhite, roof = kWhite;  // in a city with colors
+  Rgba8 wall = kWhite, roof = kWhite;  // used in a city with colors
 };
 
 void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, Random& random);

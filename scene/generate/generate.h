@@ -1,7 +1,7 @@
-// Scenes generated from a seed: any size, streamed to a .glb in a few MB of memory, the same bytes
-// on every machine. For that, the generators use only integers, + - * / and sqrt of IEEE doubles
-// (compiled without fused multiply-add) and their own random numbers, never the mathematical
-// library. docs/generate.md describes the kinds; tests pin a digest of each.
+// Scenes generated from a seed. They can have any size, are streamed to a .glb in a few MB of
+// memory, and have the same bytes on every machine. So the generators use only integers, + - * /
+// and sqrt of IEEE doubles (compiled without fused multiply-add) and their own random numbers,
+// never the math library. docs/generate.md describes the kinds; tests pin a digest of each.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ enum class SceneKind { kCity, kMenger, kTerrain, kSoup, kSpheres };
 class SceneBuilder;
 struct GenerateOptions;
 
-// A material of a scene with colors. It is multiplied with the colors of the vertices.
+// A material of a scene with colors. It is multiplied by the colors of the vertices.
 struct SceneMaterial {
   const char* name;
   float base_color[3];  // linear
@@ -30,12 +30,13 @@ struct SceneKindInfo {
   SceneKind kind;
   const char* name;
   const char* summary;
-  uint64_t default_triangles;  // 0 for the kind that is sized by its level
+  uint64_t default_triangles;  // 0 for the kind whose size is given by its level
   void (*make)(const GenerateOptions& options, SceneBuilder& scene);
-  std::span<const SceneMaterial> materials;  // none for a kind that has no colors
+  std::span<const SceneMaterial> materials;  // empty for a kind without colors
 };
 std::span<const SceneKindInfo> scene_kinds();
-// Throws Error{kInvalidInput} listing the known names for another one.
+// Returns the kind with this name. Throws Error{kInvalidInput} with the list of names for any other
+// name.
 const SceneKindInfo& scene_kind(std::string_view name);
 const SceneKindInfo& scene_kind(SceneKind kind);
 
@@ -43,31 +44,31 @@ struct GenerateOptions {
   SceneKind kind = SceneKind::kCity;
   uint64_t seed = 1;
   // The number of triangles: exact for soup, rounded down to a square for terrain, approximate for
-  // city and spheres. 0 is the kind's default.
+  // city and spheres. 0: the kind's default.
   uint64_t triangles = 0;
-  // menger only: how often the cube is subdivided, 0 to 5.
+  // menger only: number of subdivisions of the cube, 0 to 5.
   uint32_t level = 3;
   // city and spheres: repeated parts are stored once and placed by EXT_mesh_gpu_instancing.
   bool instances = false;
-  // city only, not with instances: materials and colors of vertices. The triangles are the same.
+  // city only, not with instances: materials and vertex colors. The triangles are the same.
   bool colors = false;
 };
 
 struct GenerateReport {
-  uint64_t triangles = 0;         // every instance counted
-  uint64_t stored_triangles = 0;  // in the file
+  uint64_t triangles = 0;         // including every instance
+  uint64_t stored_triangles = 0;  // triangles in the file
   uint64_t instances = 0;
   uint64_t bytes = 0;
 };
 
-// Writes the scene to `path` atomically. The scene is generated twice: first to count it, since a
-// .glb begins with its description, then to write it. Throws Error: kInvalidInput for an option
-// that the kind does not have, kLimit for a scene that does not fit a .glb (4 GiB).
+// Writes the scene to `path` atomically. Generates the scene twice: first to count its elements,
+// because a .glb begins with their description, then to write it. Throws Error: kInvalidInput for
+// an option that the kind does not have, kLimit for a scene that does not fit in a .glb (4 GiB).
 GenerateReport generate_scene(FileSystem& files, const std::string& path,
                               const GenerateOptions& options, Progress& progress,
                               const CancelToken& cancel);
 
-// Whether the file is a scene that generate_scene() wrote, or a part of one from its begin on.
+// True if the file is a scene written by generate_scene(), or the beginning of one.
 bool is_generated_scene(const ReadableFile& file);
 
 }  // namespace voxdag

@@ -23,16 +23,15 @@ inline constexpr uint64_t kMaxGlbBytes = UINT32_MAX;
 
 class GlbLayout : public BlockSink {
  public:
-  // `progress` is advanced by the triangles of meshes.
+  // Advances `progress` by the triangles of meshes.
   GlbLayout(Progress& progress, const CancelToken& cancel) : progress_(progress), cancel_(cancel) {}
   void mesh(const MeshBuilder& mesh) override;
   void part(const MeshBuilder& mesh) override;
   void instances(uint32_t part, std::span<const Float3> translations,
                  std::span<const Float3> scales) override;
 
-  // The text of the JSON chunk, padded to a multiple of 4 with spaces. `generator` becomes the
-  // asset's generator.
-  // `materials`: those that meshes have, none without colors.
+  // Returns the text of the JSON chunk, padded to a multiple of 4 with spaces. `generator` becomes
+  // the asset's generator. `materials` are the materials of meshes; empty without colors.
   std::string json_text(const std::string& generator,
                         std::span<const SceneMaterial> materials) const;
   uint64_t bin_bytes() const { return bin_bytes_; }
@@ -44,7 +43,7 @@ class GlbLayout : public BlockSink {
   enum class Kind : uint8_t { kMesh, kPart, kInstances };
   struct Block {
     Kind kind;
-    uint32_t part;    // that a block of instances places
+    uint32_t part;    // part that a block of instances places
     uint32_t first;   // number of vertices or of instances
     uint32_t second;  // number of indices
     Float3 low, high;
@@ -64,7 +63,7 @@ class GlbLayout : public BlockSink {
   uint64_t instance_count_ = 0;
 };
 
-// Bytes of an array of `count` indices in the file.
+// Returns the bytes of an array of `count` indices in the file.
 inline uint64_t padded_index_bytes(uint64_t count) { return (2 * count + 3) / 4 * 4; }
 
 }  // namespace voxdag

@@ -17,7 +17,7 @@ namespace voxdag {
 
 class GlbWriter : public BlockSink {
  public:
-  // Writes the header and `json` immediately. `progress` is advanced by stored triangles.
+  // Writes the header and `json` immediately. Advances `progress` by stored triangles.
   GlbWriter(FileSystem& files, const std::string& path, const std::string& json, uint64_t bin_bytes,
             Progress& progress, const CancelToken& cancel);
   // Removes the partial file unless finish() has returned.
@@ -28,7 +28,7 @@ class GlbWriter : public BlockSink {
   void instances(uint32_t part, std::span<const Float3> translations,
                  std::span<const Float3> scales) override;
 
-  // Syncs the file, renames it, syncs the folder. Returns the size of the file.
+  // Syncs the file, renames it and syncs the folder. Returns the size of the file.
   uint64_t finish();
 
  private:

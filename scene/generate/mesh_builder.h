@@ -18,7 +18,7 @@ inline Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b
 inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec3 operator*(const Vec3& a, double s) { return {a.x * s, a.y * s, a.z * s}; }
 
-// Red, green, blue, alpha: linear, as glTF wants the colors of vertices.
+// Linear red, green, blue and alpha, as glTF requires for vertex colors.
 using Rgba8 = std::array<uint8_t, 4>;
 constexpr Rgba8 kWhite{255, 255, 255, 255};
 
@@ -27,8 +27,8 @@ inline Float3 rounded(const Vec3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
-// A rotation about the y axis whose cosine and sine are quotients of integers. They come from
-// Pythagorean triples, since sin() differs between machines.
+// A rotation about the y axis. Its cosine and sine are quotients of integers from Pythagorean
+// triples, because sin() differs between machines.
 struct Turn {
   double cosine = 1, sine = 0;
 };
@@ -39,13 +39,13 @@ struct MeshBuilder {
   static constexpr uint32_t kMaxTriangles = 131072;
 
   std::vector<Float3> positions;
-  std::vector<Rgba8> colors;  // of the vertices; empty in a scene without colors
+  std::vector<Rgba8> colors;  // colors of the vertices; empty in a scene without colors
   std::vector<uint16_t> indices;
 
   uint32_t vertices() const { return static_cast<uint32_t>(positions.size()); }
   uint32_t triangles() const { return static_cast<uint32_t>(indices.size() / 3); }
 
-  // Color of vertices added later; without it the mesh has no colors.
+  // Color of vertices added later. If it is not set, the mesh has no colors.
   std::optional<Rgba8> color;
   uint32_t material = 0;
 
@@ -53,7 +53,7 @@ struct MeshBuilder {
     positions.push_back(rounded(p));
     if (color) colors.push_back(*color);
   }
-  // Returns the index of the first.
+  // Adds vertices and returns the index of the first.
   uint32_t add_vertices(std::initializer_list<Vec3> corners);
   void add_triangle(uint32_t a, uint32_t b, uint32_t c);
   // Adds a triangle with 3 new vertices.

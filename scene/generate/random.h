@@ -20,18 +20,18 @@ class Random {
   }
 
   uint64_t bits() { return mix_bits(state_ += kStep); }
-  // A number from 0 to count - 1.
+  // Returns a number from 0 to count - 1.
   uint32_t below(uint32_t count) {
     return static_cast<uint32_t>((static_cast<uint128>(bits()) * count) >> 64);
   }
-  // A number from low to high, both included.
+  // Returns a number from low to high, inclusive.
   int between(int low, int high) {
     return low + static_cast<int>(below(static_cast<uint32_t>(high - low + 1)));
   }
   bool chance(uint32_t percent) { return below(100) < percent; }
-  // A multiple of 2^-24 in [0, 1).
+  // Returns a multiple of 2^-24 in [0, 1).
   double unit() { return static_cast<double>(bits() >> 40) * 0x1p-24; }
-  // A multiple of 2^-23 in [-1, 1).
+  // Returns a multiple of 2^-23 in [-1, 1).
   double signed_unit() { return 2.0 * unit() - 1.0; }
 
  private:

@@ -16,11 +16,11 @@ namespace voxdag {
 class BlockSink {
  public:
   virtual ~BlockSink() = default;
-  // 1 to MeshBuilder::kMaxTriangles triangles in world space.
+  // Receives 1 to MeshBuilder::kMaxTriangles triangles in world space.
   virtual void mesh(const MeshBuilder& mesh) = 0;
-  // The next part, numbered from 0; precedes its instances.
+  // Receives the next part. Parts are numbered from 0 and precede their instances.
   virtual void part(const MeshBuilder& mesh) = 0;
-  // Instances of one part, each of which maps p to p * scale + translation.
+  // Receives instances of one part. Each maps p to p * scale + translation.
   virtual void instances(uint32_t part, std::span<const Float3> translations,
                          std::span<const Float3> scales) = 0;
 };
@@ -35,12 +35,12 @@ class SceneBuilder {
   // Material of the following additions. Has no effect without colors.
   void paint(uint32_t material, const Rgba8& color) { paint_ = {material, color}; }
 
-  // A mesh of the current paint that `vertices` and `triangles` more fit into: the current one, or
-  // an empty one after it was passed to the sink. At most MeshBuilder::kMaxVertices and
-  // MeshBuilder::kMaxTriangles.
+  // Returns a mesh of the current paint with space for `vertices` and `triangles` more: the current
+  // mesh, or an empty one after passing the current one to the sink. At most
+  // MeshBuilder::kMaxVertices and MeshBuilder::kMaxTriangles.
   MeshBuilder& mesh_for(uint32_t vertices, uint32_t triangles);
   uint32_t add_part(MeshBuilder mesh);
-  // The part's colors are multiplied with the current paint's.
+  // Places a part. Its colors are multiplied by the current paint's color.
   void place(uint32_t part, const Vec3& translation, const Vec3& scale);
   // Passes the incomplete blocks to the sink.
   void finish();
@@ -64,15 +64,16 @@ class SceneBuilder {
   BlockSink& sink_;
   const bool instances_, colors_;
   Paint paint_;
-  std::array<MeshBuilder, kMaxMaterials> meshes_;  // by material; only the first one without colors
+  // By material; without colors only the first is used.
+  std::array<MeshBuilder, kMaxMaterials> meshes_;
   std::vector<Part> parts_;
 };
 
-// city.cc
+// Defined in city.cc.
 extern const std::array<SceneMaterial, 4> kCityMaterials;
 
-// The generators, one file each. A generator that runs again with the same options makes the same
-// calls: generate_scene() runs it twice.
+// The generators, one file each. A generator must make the same calls if it runs again with the
+// same options, because generate_scene() runs it twice.
 void make_city(const GenerateOptions& options, SceneBuilder& scene);
 void make_menger(const GenerateOptions& options, SceneBuilder& scene);
 void make_terrain(const GenerateOptions& options, SceneBuilder& scene);

@@ -1,6 +1,6 @@
 // Reads the triangles of one document in world space: node by node, primitive by primitive,
-// instance by instance. What was decoded of a primitive is used again by the next node or instance
-// that draws it. Not thread-safe.
+// instance by instance. The decoded data of a primitive is reused by the next node or instance that
+// draws it. Not thread-safe.
 #pragma once
 
 #include <functional>
@@ -23,7 +23,7 @@ namespace voxdag::gltf {
 
 struct ReaderOptions {
   bool skip_invalid = false;  // drops invalid triangles
-  unsigned readers = 1;       // that share the memory
+  unsigned readers = 1;       // number of readers that share the memory
 };
 
 class TriangleReader {
@@ -35,28 +35,28 @@ class TriangleReader {
                  MemoryBudget& budget, const CancelToken& cancel);
 
   // Visits the triangles of [first, first + count), numbered in the order in which the document
-  // declares them, in batches of up to 1024, in world space or snapped to the grid if there is one.
-  // Throws Error{kInvalidInput} naming node, mesh and primitive of an invalid triangle, unless
-  // `skip_invalid` drops it.
+  // declares them, in batches of up to 1024. They are in world space, or snapped to `grid` if it is
+  // not null. An invalid triangle is dropped if `skip_invalid` is set; otherwise throws
+  // Error{kInvalidInput} with its node, mesh and primitive.
   void read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit);
-  // Visits the same triangles in world space with their surfaces, in equal batches.
+  // Visits the same triangles in world space with their surfaces, in batches of the same size.
   void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
-  // The bounds of those triangles in world space.
+  // Returns the bounds of these triangles in world space.
   WorldBounds read_bounds(uint64_t first, uint64_t count);
 
  private:
   static constexpr size_t kBatchTriangles = 1024;
   static constexpr uint64_t kWindowTriangles = 4096;
 
-  // All instances of a primitive that a node draws.
+  // All instances of a primitive drawn by a node.
   struct Draw {
-    uint64_t first = 0, end = 0;  // numbers of its triangles
+    uint64_t first = 0, end = 0;  // range of its triangle numbers
     int node = -1;
     size_t primitive = 0;
-    uint64_t triangles = 0;  // of one instance
+    uint64_t triangles = 0;  // triangles per instance
     bool is_bound = false;
   };
-  // What the readers are set up for.
+  // The node, mesh and primitive that the readers are set up for.
   struct Binding {
     int mesh = -1;
     size_t primitive = 0;
@@ -90,28 +90,28 @@ class TriangleReader {
 
   std::optional<NodeWalk> walk_;
   Draw draw_;
-  std::optional<InstanceReader> instances_;  // of the draw
+  std::optional<InstanceReader> instances_;  // instances of the draw
   uint64_t instance_ = 0;
-  Transform world_;  // of the instance
+  Transform world_;  // world transform of the instance
 
   Binding binding_;
-  PageBuffer<Transform> joints_;  // of the skin in binding_; empty without one
+  PageBuffer<Transform> joints_;  // matrices of the skin in binding_; empty without one
   std::optional<VertexSource> vertices_;
   std::optional<CornerReader> corner_reader_;
   VertexCache cache_;
   uint64_t vertex_count_ = 0;
 
-  std::vector<uint32_t>
-      corners_;  // vertex indices of window_count_ triangles from window_first_ on
+  // Vertex indices of window_count_ triangles, starting at window_first_.
+  std::vector<uint32_t> corners_;
   uint64_t window_first_ = 0, window_count_ = 0;
-  UsedVertices used_vertices_;  // by the window's triangles; empty if not known
+  UsedVertices used_vertices_;  // vertices used by the window's triangles; empty if not known
 
   PageBuffer<RealTriangle> batch_;
   size_t batch_size_ = 0;
   const Visitor* visit_ = nullptr;
 
   std::optional<SurfaceReader> surface_reader_;  // set by the first read_surfaces()
-  PageBuffer<SurfaceTriangle> surfaces_;         // a batch of them
+  PageBuffer<SurfaceTriangle> surfaces_;         // one batch of surfaces
 };
 
 }  // namespace voxdag::gltf

@@ -1,4 +1,5 @@
-// The rows of an ASCII PLY file, word by word: a line each, blank ones aside. Not thread-safe.
+// The rows of an ASCII PLY file, read word by word. Each row is one line; blank lines are skipped.
+// Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +14,11 @@ class AsciiText {
   // The file must outlive the text.
   AsciiText(const ReadableFile& file, MemoryBudget& budget) : window_(file, budget) {}
 
-  // Moves to the line at `offset` or, if it is blank, to the next line with text.
+  // Moves to the line at `offset` or, if this line is blank, to the next line with text.
   void begin_row(uint64_t offset);
-  // The next word of the line, valid until the next call; empty at the end of the line.
+  // Returns the next word of the line, valid until the next call; empty at the end of the line.
   std::string_view word();
-  // Whether nothing but blanks is left of the line, which is passed over.
+  // Moves past the rest of the line. Returns true if it had only blanks.
   bool end_row();
   uint64_t offset() const { return offset_; }
 

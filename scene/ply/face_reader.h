@@ -1,5 +1,5 @@
-// The vertex indices of the triangles of a PLY file, three each, from any triangle on. Not
-// thread-safe.
+// Returns the vertex indices of the triangles of a PLY file, three each, starting at any triangle.
+// Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -14,9 +14,10 @@ class FaceReader {
   // The file must outlive the reader.
   FaceReader(const PlyFile& ply, MemoryBudget& budget) : ply_(ply), rows_(ply.open_faces(budget)) {}
 
-  // Reads the indices of triangles [first, first + count), which exist. They may be out of range.
+  // Reads the indices of triangles [first, first + count), which must exist. The indices may be out
+  // of range.
   void read(uint64_t first, uint64_t count, uint32_t* corners);
-  // The face that a triangle is of.
+  // Returns the face that contains a triangle.
   uint64_t face_of(uint64_t triangle);
 
  private:
@@ -26,7 +27,7 @@ class FaceReader {
 
   const PlyFile& ply_;
   const std::unique_ptr<Rows> rows_;
-  // The face that rows_ has read last, its first triangle, and the offset behind it.
+  // The face last read by rows_, its first triangle, and the offset after it.
   bool is_loaded_ = false;
   uint64_t face_ = 0, first_triangle_ = 0, next_offset_ = 0;
 };

@@ -1,4 +1,5 @@
-// A window over the bytes of a file that is read from front to back, with jumps. Not thread-safe.
+// A window over the bytes of a file that is read from front to back, with occasional jumps. Not
+// thread-safe.
 #pragma once
 
 #include <algorithm>
@@ -22,8 +23,8 @@ class FileWindow {
 
   const ReadableFile& file() const { return file_; }
 
-  // The bytes from `offset` on, `wanted` of them (at most kBytes) or more; fewer only where the
-  // file ends. Valid until the next call.
+  // Returns at least `wanted` bytes (at most kBytes) starting at `offset`; fewer only at the end of
+  // the file. Valid until the next call.
   std::span<const std::byte> at(uint64_t offset, size_t wanted) {
     if (offset >= file_.size()) return {};
     if (offset < begin_ || offset > end_ || end_ - offset < wanted) load(offset);
@@ -40,7 +41,7 @@ class FileWindow {
 
   const ReadableFile& file_;
   PageBuffer<std::byte> bytes_;
-  uint64_t begin_ = 0, end_ = 0;  // of the file, in bytes_
+  uint64_t begin_ = 0, end_ = 0;  // range of the file in bytes_
 };
 
 }  // namespace voxdag::ply

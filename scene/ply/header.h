@@ -1,4 +1,4 @@
-// The header of a PLY file: which elements it declares, and how the properties of each are stored.
+// The header of a PLY file: its elements, and how the properties of each are stored.
 #pragma once
 
 #include <cstddef>
@@ -22,9 +22,9 @@ constexpr bool is_integer(Type type) { return type < Type::kFloat; }
 
 struct Property {
   std::string name;
-  Type type = Type::kFloat;  // of a list: of its entries
+  Type type = Type::kFloat;  // for a list: type of its entries
   bool is_list = false;
-  Type count_type = Type::kUint8;  // of a list, an integer
+  Type count_type = Type::kUint8;  // for a list: type of the count, an integer
 };
 
 struct Element {
@@ -39,7 +39,7 @@ struct Header {
   uint64_t data_begin = 0;  // offset of the first element
 };
 
-// Reads the header of an open file. Throws Error{kInvalidInput} with the number of a broken line,
+// Reads the header of an open file. Throws Error{kInvalidInput} with the number of an invalid line,
 // Error{kLimit} for a header of over 64 KiB.
 Header read_header(const ReadableFile& file, MemoryBudget& budget);
 

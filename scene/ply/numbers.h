@@ -14,10 +14,10 @@
 
 namespace voxdag::ply {
 
-// Stands for an index that is negative or needs more than 32 bits. No vertex has it.
+// An index that is negative or needs more than 32 bits. No vertex has this index.
 constexpr uint32_t kNoVertex = std::numeric_limits<uint32_t>::max();
 
-// Calls body(T{}) with the C++ type of that name.
+// Calls body(T{}) with the C++ type for `type`.
 template <class Body>
 decltype(auto) with_type(Type type, const Body& body) {
   switch (type) {
@@ -40,7 +40,7 @@ decltype(auto) with_type(Type type, const Body& body) {
   }
 }
 
-// The number at `bytes`, which need not be aligned.
+// Returns the number at `bytes`, which need not be aligned.
 template <class T>
 T load(const std::byte* bytes, bool is_big_endian) {
   std::byte own[sizeof(T)];

@@ -1,6 +1,6 @@
 // An open PLY file: the positions of its vertices and faces in the file, and the number of
-// triangles. A polygon of n corners is the fan of n - 2 triangles around its first corner; fewer
-// than three corners make no triangle.
+// triangles. A polygon of n corners is the fan of n - 2 triangles around its first corner. A
+// polygon with fewer than three corners has no triangle.
 //
 // Rows of faces and all rows of ASCII files have no fixed size. So one pass over the file finds
 // every 1024th row, and any other row is found from there.
@@ -26,11 +26,11 @@ class PlyFile {
  public:
   static constexpr uint64_t kBlockRows = 1024;
 
-  // Throws Error{kInvalidInput} with the line, element or row of damage, Error{kLimit} for 2^32 or
-  // more vertices, Error{kOutOfMemory}.
+  // Throws Error{kInvalidInput} with the line, element or row of the damage, Error{kLimit} for 2^32
+  // or more vertices, Error{kOutOfMemory}.
   PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
-  // The first row of so many, and the number of its first triangle.
+  // The first row of a block, and the number of its first triangle.
   struct FaceBlock {
     uint64_t offset;
     uint64_t first_triangle;
@@ -45,9 +45,10 @@ class PlyFile {
   uint64_t vertices_begin() const { return vertices_begin_; }
   // Offsets of every kBlockRows-th vertex of an ASCII file.
   const std::deque<uint64_t>& vertex_blocks() const { return vertex_blocks_; }
-  // The properties x, y and z.
+  // Indices of the properties x, y and z.
   const std::array<size_t, 3>& axes() const { return axes_; }
-  // Properties red, green, blue and, if present, alpha. Empty unless all three colors exist.
+  // Indices of the properties red, green, blue and, if present, alpha. Empty unless all three
+  // colors exist.
   const std::vector<size_t>& colors() const { return colors_; }
 
   const std::deque<FaceBlock>& face_blocks() const { return face_blocks_; }
@@ -64,7 +65,7 @@ class PlyFile {
 
   const std::unique_ptr<ReadableFile> file_;
   Header header_;
-  size_t vertex_, face_;  // indices of elements; the number of elements if absent
+  size_t vertex_, face_;  // indices of the two elements; the number of elements if absent
   std::array<size_t, 3> axes_{};
   std::vector<size_t> colors_;
   size_t face_list_ = Rows::kNoList;

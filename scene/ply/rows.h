@@ -1,4 +1,4 @@
-// The rows of one element of a PLY file, passed over one by one, with the entries of one of its
+// Reads the rows of one element of a PLY file, one after another, with the entries of one of its
 // lists: the corners of faces. Not thread-safe.
 #pragma once
 
@@ -21,16 +21,16 @@ class Rows {
   static constexpr size_t kNoList = ~size_t{0};
 
   virtual ~Rows() = default;
-  // Reads the row at `offset` and returns the offset behind it. Throws Error{kInvalidInput} naming
-  // element and row if the row is broken or ends past the file, Error{kLimit} for more than
+  // Reads the row at `offset` and returns the offset after it. Throws Error{kInvalidInput} with
+  // element and row if the row is invalid or ends past the file, Error{kLimit} for more than
   // kMaxEntries.
   virtual uint64_t read(uint64_t row, uint64_t offset) = 0;
-  // The wanted list of the row that was read last; kNoVertex for an index that is negative.
+  // Returns the wanted list of the last row; kNoVertex for a negative index.
   std::span<const uint32_t> entries() const { return {entries_.data(), entry_count_}; }
 
  protected:
   Rows(const ReadableFile& file, const Element& element, MemoryBudget& budget);
-  // The number of entries, checked.
+  // Returns the number of entries after checking it.
   uint64_t checked_count(int64_t count, uint64_t row, bool is_wanted) const;
   [[noreturn]] void refuse(uint64_t row, const std::string& what) const;
 
@@ -40,8 +40,8 @@ class Rows {
   size_t entry_count_ = 0;
 };
 
-// `list` is the index of the wanted property, of integers, or kNoList. File and element must
-// outlive the rows.
+// `list` is the index of the wanted list property, which has integers, or kNoList. File and element
+// must outlive the rows.
 std::unique_ptr<Rows> open_rows(const ReadableFile& file, Format format, const Element& element,
                                 size_t list, MemoryBudget& budget);
 

@@ -1,5 +1,5 @@
-// The colors of the vertices of a PLY file, within a fixed amount of memory: blocks of consecutive
-// vertices, each cached in the one slot that its number maps to. Not thread-safe.
+// The colors of the vertices of a PLY file, within a fixed amount of memory. Blocks of consecutive
+// vertices are cached, each in the slot given by its number. Not thread-safe.
 //
 // Red, green and blue are sRGB and become linear light; alpha is linear. Reals are from 0 to 1,
 // ushort numbers from 0 to 65535 and all other integers from 0 to 255. Values outside are clamped.
@@ -18,13 +18,14 @@ class VertexColors {
  public:
   using Color = std::array<uint16_t, 4>;
 
-  // The caches of all `readers` take at most 1/kShareOfFree of the free budget.
+  // The caches of all readers together take at most 1/kShareOfFree of the free budget.
   static constexpr uint64_t kShareOfFree = 8;
 
-  // The file has colors; it and the budget must outlive this.
+  // The file must have colors. The file and the budget must outlive this object.
   VertexColors(const PlyFile& ply, unsigned readers, MemoryBudget& budget);
 
-  // In the terms of SurfaceCorner, valid until the next call; the vertex exists.
+  // Returns the color in the units of SurfaceCorner, valid until the next call. The vertex must
+  // exist.
   const Color& at(uint32_t vertex) {
     const uint64_t block = vertex / kBlockVertices;
     const size_t slot = static_cast<size_t>(block) & slot_mask_;

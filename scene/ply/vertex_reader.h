@@ -1,5 +1,5 @@
-// Numbers of the vertices of a PLY file: the values of some of their properties, such as positions.
-// Not thread-safe.
+// Reads the values of some properties, such as positions, of the vertices of a PLY file. Not
+// thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ class VertexReader : public PositionSource {
 
   uint64_t count() const override { return ply_.vertex_element().count; }
   // Writes one number per property for each vertex. Throws Error{kInvalidInput} with the vertex for
-  // text that is not a number.
+  // a text that is not a number.
   void read(uint64_t first, size_t count, double* out) override;
 
  private:
@@ -33,7 +33,7 @@ class VertexReader : public PositionSource {
   std::optional<FileWindow> window_;
   std::optional<AsciiText> text_;
   const std::vector<size_t> properties_;
-  std::vector<size_t> offsets_;  // of each of them in a row
+  std::vector<size_t> offsets_;  // offset of each property in a row
   size_t row_bytes_ = 0;
 };
 

@@ -16,7 +16,7 @@ class ImageBytes : public EncodedBytes {
  public:
   // Throws Error{kInvalidInput} if the file has changed since the scene was opened.
   ImageBytes(FileSystem& files, const ImageSource& source);
-  // Throws BrokenImage for text that is not base64.
+  // Throws BrokenImage for a text that is not base64.
   size_t read(std::span<std::byte> out) override;
 
  private:
@@ -25,9 +25,9 @@ class ImageBytes : public EncodedBytes {
   bool next_group();
 
   const std::unique_ptr<ReadableFile> file_;
-  uint64_t at_, end_;  // in the file
+  uint64_t at_, end_;  // range left in the file
   const bool is_base64_;
-  uint64_t left_;  // bytes of the image
+  uint64_t left_;  // bytes left of the image
   std::vector<std::byte> window_;
   size_t window_at_ = 0;
   bool has_ended_ = false;

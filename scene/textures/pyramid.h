@@ -15,22 +15,22 @@
 
 namespace voxdag {
 
-// The levels of an image of this size, the first page of the first being `first_page`.
+// Returns the levels of an image of this size. `first_page` is the first page of the first level.
 std::vector<TextureLevel> pyramid_levels(uint32_t width, uint32_t height, uint64_t first_page);
 
 class PyramidBuilder {
  public:
-  // Writes whole pages, from `first` on.
+  // Writes complete pages, starting at page `first`.
   using WritePages = std::function<void(uint64_t first, std::span<const uint64_t> texels)>;
 
   PyramidBuilder(std::span<const TextureLevel> levels, MemoryBudget& budget, WritePages write);
-  // Rows of the finest level, from the top; all of them must be added.
+  // Adds a row of the finest level. Rows are added from the top; all must be added.
   void add_row(std::span<const uint64_t> row) { add_row(0, row); }
 
  private:
   struct Stage {
-    PageBuffer<uint64_t> tiles;  // a row of them
-    PageBuffer<uint64_t> rows;   // the last three of the level, for the next one
+    PageBuffer<uint64_t> tiles;  // one row of tiles
+    PageBuffer<uint64_t> rows;   // the last three rows of the level, for the next level
     uint32_t added = 0;
   };
 

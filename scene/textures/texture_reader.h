@@ -1,6 +1,6 @@
-// Texels of the pyramids of a TextureSet, for one thread. They are read from memory if the pyramids
-// fit, and otherwise in pages of the scratch file. A reader caches as many pages as its memory
-// holds. Not thread-safe; any number of readers may be open.
+// Reads texels of the pyramids of a TextureSet, for one thread. They come from memory if the
+// pyramids fit, and otherwise from pages of the scratch file. A reader caches as many pages as its
+// memory can hold. Not thread-safe; any number of readers may be open.
 //
 // A level is cut into tiles of 32 x 32 texels, row by row. Tiles at the right and lower border are
 // padded. A tile is a page: its texels are stored row by row, eight bytes each.
@@ -39,7 +39,7 @@ struct TextureLevel {
 // The levels of all images. The levels of image i begin at first_level[i].
 struct TextureLayout {
   std::vector<TextureLevel> levels;
-  std::vector<uint32_t> first_level;  // one more than there are images
+  std::vector<uint32_t> first_level;  // number of images plus one
 };
 
 class TextureReader {
@@ -52,15 +52,15 @@ class TextureReader {
   TextureReader(const TextureLayout& layout, const ReadableFile& file, const uint32_t* checksums,
                 uint64_t memory_bytes, MemoryBudget& budget);
 
-  // An image has one level at least, and further ones of half the width and height, rounded down,
-  // until both are 1. Images that no material refers to have none.
+  // An image has at least one level. Each further level has half the width and height, rounded
+  // down, until both are 1. Images that no material refers to have no levels.
   uint32_t levels(uint32_t image) const {
     return layout_.first_level[image + 1] - layout_.first_level[image];
   }
   uint32_t width(uint32_t image, uint32_t level) const { return at(image, level).width; }
   uint32_t height(uint32_t image, uint32_t level) const { return at(image, level).height; }
 
-  // A level, for lookups one after the other. The reader must outlive it.
+  // One level, for many lookups. The reader must outlive it.
   class View {
    public:
     uint32_t width() const { return width_; }
@@ -72,7 +72,7 @@ class TextureReader {
       const uint64_t place = place_of(x, y);
       return texels_ ? texels_[place] : reader_.cached_texel(first_ + place);
     }
-    // To be called some time before texel().
+    // Call it some time before texel().
     void prefetch(uint32_t x, uint32_t y) const {
       if (texels_) __builtin_prefetch(&texels_[place_of(x, y)]);
     }
@@ -88,16 +88,16 @@ class TextureReader {
           height_(level.height) {}
 
     uint64_t place_of(uint32_t x, uint32_t y) const {
-      // The offsets of the tile and within it, along y and along x.
+      // Offsets of the tile and of the texel within it, along y and along x.
       const uint64_t row = (y >> kTileShift) * row_of_tiles_ + ((y % kTileEdge) << kTileShift);
       const uint64_t column = (uint64_t{x >> kTileShift} << 2 * kTileShift) + x % kTileEdge;
       return row + column;
     }
 
     TextureReader& reader_;
-    uint64_t first_;          // texel of the level, in the file
-    const uint64_t* texels_;  // of the level; null: in the file
-    uint64_t row_of_tiles_;   // texels
+    uint64_t first_;          // first texel of the level in the file
+    const uint64_t* texels_;  // texels of the level; null: in the file
+    uint64_t row_of_tiles_;   // texels in a row of tiles
     uint32_t width_, height_;
   };
   View view(uint32_t image, uint32_t level) { return View(*this, at(image, level)); }
@@ -108,7 +108,7 @@ class TextureReader {
 
  private:
   static constexpr uint64_t kNoPage = ~uint64_t{0};
-  // Neighbors across rows of tiles are powers of two apart, which must not meet in a slot.
+  // Neighbors in adjacent rows of tiles are powers of two apart and must not share a slot.
   static constexpr uint64_t kSpread = 0x9e3779b97f4a7c15ull;
 
   const TextureLevel& at(uint32_t image, uint32_t level) const {
@@ -123,7 +123,7 @@ class TextureReader {
   void load(uint64_t page, size_t slot);
 
   const TextureLayout& layout_;
-  const uint64_t* const all_ = nullptr;  // null: in the file
+  const uint64_t* const all_ = nullptr;  // all texels; null: in the file
   const ReadableFile* file_ = nullptr;
   const uint32_t* checksums_ = nullptr;
   int slot_shift_ = 63;

@@ -31,24 +31,24 @@ class TextureSet {
   // Texels of one image: 16384 x 16384.
   static constexpr uint64_t kMaxTexels = uint64_t{1} << 28;
 
-  // Decodes the images that materials refer to, on up to `threads` threads, and warns of those that
-  // cannot be read. Advances
-  // `progress` by one for each image, in a stage that the caller began. The scratch file is made at
-  // `path`, in a folder that exists, only if it is needed, and has this name for an instant only.
-  // Throws Error{kOutOfMemory} naming image and material, {kNoSpace}, {kIo}, {kCanceled}, and
-  // {kInvalidInput} for an image file that changed since the scene was opened. `files` and `budget`
-  // must outlive the set.
+  // Decodes the images that materials refer to, on up to `threads` threads, and warns about
+  // unreadable ones. Advances `progress` by one for each image, in a stage that the caller began.
+  // The scratch file is created at `path`, in an existing folder, only if it is needed; it has this
+  // name only for a moment. Throws Error{kOutOfMemory} with image and material, {kNoSpace}, {kIo},
+  // {kCanceled}, and {kInvalidInput} for an image file that changed since the scene was opened.
+  // `files` and `budget` must outlive the set.
   static std::unique_ptr<TextureSet> prepare(FileSystem& files, const SceneMaterials& materials,
                                              const std::string& path, unsigned threads,
                                              MemoryBudget& budget, Progress& progress,
                                              const CancelToken& cancel);
 
-  // Those of the scene, with `image` as kNoImage where it could not be read.
+  // The materials of the scene. `image` is kNoImage for unreadable images.
   const std::vector<Material>& materials() const { return materials_; }
-  // A reader for one thread, with a cache of about `memory_bytes`, unless all is in memory: then
-  // that is shared, and the reader itself takes none. The set must outlive it. Thread-safe.
+  // Returns a reader for one thread, with a cache of about `memory_bytes`. If all pyramids are in
+  // memory, they are shared and the reader takes no memory. The set must outlive the reader.
+  // Thread-safe.
   std::unique_ptr<TextureReader> open(uint64_t memory_bytes);
-  // Bytes of all pyramids, and whether they are in memory.
+  // Bytes of all pages, and true if they are in memory.
   uint64_t bytes() const { return pages_ * kPageBytes; }
   bool is_in_memory() const { return !file_; }
 
@@ -63,16 +63,16 @@ class TextureSet {
   uint64_t pages_ = 0;
   PageBuffer<uint64_t> memory_;
   std::unique_ptr<ReadableFile> file_;
-  PageBuffer<uint32_t> checksums_;  // of the pages in it
+  PageBuffer<uint32_t> checksums_;  // checksums of the pages in the file
 };
 
-// What TextureSet::bytes() would be. Reads the headers of the images.
+// Returns the value that TextureSet::bytes() would have. Reads the headers of the images.
 uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
                        const CancelToken& cancel);
 
-// Returns the SHA-256 of each image's stored bytes, as lower-case hex digits, or another text for
-// an image that cannot be read to its end. Reads all images, decodes none. Throws the same errors
-// as TextureSet::prepare().
+// Returns the SHA-256 of each image's stored bytes, as lower-case hex digits, or a different text
+// for an image that cannot be read to its end. Reads all images, but decodes none. Throws the same
+// errors as TextureSet::prepare().
 std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
                                        unsigned threads, const CancelToken& cancel);
 

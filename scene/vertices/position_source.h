@@ -1,4 +1,4 @@
-// The stored vertex positions of a mesh, the input of a VertexCache.
+// The stored vertex positions of a mesh: the input of a VertexCache.
 #pragma once
 
 #include <cstddef>

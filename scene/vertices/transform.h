@@ -1,17 +1,17 @@
-// Affine transforms of glTF nodes in IEEE doubles, with + - * / only and every association written
-// out, so that all machines get the same bits (docs/scenes.md gives the formulas to a reader).
+// Affine transforms of glTF nodes. Uses only + - * / of IEEE doubles, with every association
+// written out, so that all machines get the same bits. docs/scenes.md has the formulas.
 #pragma once
 
 #include <array>
 
 namespace voxdag {
 
-// Rows of the upper 3x4 part; the last row of the 4x4 matrix is 0 0 0 1.
+// The upper three rows of a 4x4 matrix. The last row is 0 0 0 1.
 struct Transform {
   double m[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
 };
 
-// First `inner`, then `outer`.
+// Returns the transform that applies `inner` first, then `outer`.
 inline Transform multiply(const Transform& outer, const Transform& inner) {
   Transform product;
   for (int i = 0; i < 3; ++i) {
@@ -40,8 +40,8 @@ inline void apply(const Transform& transform, const double* local, double* world
   }
 }
 
-// T * R * S. The quaternion (x, y, z, w) is taken as it is given, of unit length or (quantized
-// ones) nearly so, as every other reader of glTF takes it.
+// Returns T * R * S. The quaternion (x, y, z, w) is used without normalization, like in all other
+// readers of glTF. Quantized quaternions have only nearly unit length.
 inline Transform from_trs(const std::array<double, 3>& t, const std::array<double, 4>& r,
                           const std::array<double, 3>& s) {
   const double x = r[0], y = r[1], z = r[2], w = r[3];
@@ -57,8 +57,8 @@ inline Transform from_trs(const std::array<double, 3>& t, const std::array<doubl
   return transform;
 }
 
-// A column-major 4x4 matrix as glTF stores it. False if its last row is not 0 0 0 1 (to 2^-10,
-// which is what single-precision inverses leave) or a number is not finite.
+// Converts a column-major 4x4 matrix, as stored in glTF. Returns false if a number is not finite or
+// the last row is not 0 0 0 1 (within 2^-10, for inverses in single precision).
 inline bool from_columns(const double* columns, Transform& out) {
   const auto near = [](double value, double wanted) {
     return value - wanted <= 1.0 / 1024 && wanted - value <= 1.0 / 1024;

@@ -13,17 +13,17 @@ namespace voxdag {
 
 class UsedVertices {
  public:
-  // Finds the vertices of at least one corner.
+  // Finds the vertices of these corners. There must be at least one corner.
   void find(std::span<const uint32_t> corners);
   void clear() { vertices_.clear(); }
   bool is_empty() const { return vertices_.empty(); }
 
-  // Adds the positions of the vertices, of which there are `count` in all, to the bounds; false,
-  // and nothing added, if one may not exist or is not finite.
+  // Adds the positions of the vertices to `bounds`. Returns false, with the bounds unchanged, if a
+  // vertex is not finite or not below `count`, the number of vertices.
   bool add_to(WorldBounds& bounds, VertexCache& positions, uint64_t count) const;
 
  private:
-  // Duplicates are removed among indices that differ by less than this.
+  // Maximum range of indices in which duplicates are removed.
   static constexpr uint32_t kMaxRange = 65536;
 
   std::vector<uint32_t> vertices_;

@@ -11,17 +11,17 @@
 
 namespace voxdag::gltf {
 
-// Data that break their format. The message does not name the file.
+// Data that violate their format. The message does not name the file.
 struct BrokenData {
   std::string message;
 };
 
-// Decodes into `out` of view.decoded_bytes(). Throws BrokenData.
+// Decodes into `out`, which has view.decoded_bytes(). Throws BrokenData.
 void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compressed,
                     std::span<std::byte> out);
 
-// Passes the decoded bytes of a part to `write`, from the first to the last. Charges the decoder's
-// memory to `charge` before it is allocated, and keeps the charge. Overwrites `compressed`. Throws
+// Passes the decoded bytes of a part to `write`, from first to last. Charges the decoder's memory
+// to `charge` before it is allocated, and keeps the charge. Overwrites `compressed`. Throws
 // BrokenData, or Error{kOutOfMemory} for a part that does not fit the budget.
 void decode_draco(const DracoPart& part, std::span<std::byte> compressed, MemoryCharge& charge,
                   const std::function<void(std::span<const std::byte>)>& write);

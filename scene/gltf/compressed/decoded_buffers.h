@@ -23,24 +23,25 @@ namespace voxdag::gltf {
 
 class DecodedBuffers {
  public:
-  // Reads bytes [offset, offset + out.size()) of one of the file's own buffers.
+  // Reads bytes [offset, offset + out.size()) of one of the buffers stored in the file.
   using ReadFile = std::function<void(int buffer, uint64_t offset, std::span<std::byte> out)>;
 
-  // `scratch_path`: the temporary file, in an existing folder. "": in a new folder in
-  // temporary_parent(). The references must outlive this.
+  // `scratch_path`: the temporary file, in an existing folder; "": a file in a new folder in
+  // temporary_parent(). The references must outlive this object.
   DecodedBuffers(FileSystem& files, std::string scratch_path, const Document& document,
                  MemoryBudget& budget);
 
-  // Bytes [offset, offset + out.size()) of what buffer `buffer` decodes to, inside it. Throws
-  // Error{kInvalidInput} for data that do not hold it, {kOutOfMemory} where decoding does not fit
-  // the budget, {kNoSpace} where the decoded bytes do not fit the disk.
+  // Reads bytes [offset, offset + out.size()) of the decoded contents of buffer `buffer`, which
+  // must contain them. Throws Error{kInvalidInput} if the compressed data do not decode to them,
+  // {kOutOfMemory} if decoding does not fit the budget, {kNoSpace} if the decoded bytes do not fit
+  // the disk.
   void read(int buffer, uint64_t offset, std::span<std::byte> out, const ReadFile& read_file);
 
  private:
   struct Decoded {
     std::mutex mutex;
     std::atomic<bool> is_there = false;
-    uint64_t begin = 0;  // in the file
+    uint64_t begin = 0;  // in the temporary file
   };
 
   void decode(const BufferSource& buffer, uint64_t begin, const ReadFile& read_file);
@@ -53,12 +54,13 @@ class DecodedBuffers {
   const Document& document_;
   MemoryBudget& budget_;
   GrowingCharge charge_;
-  size_t first_ = 0;  // the document's first buffer that is not the file's own
+  size_t first_ = 0;  // the document's first buffer that is not stored in the file
   std::deque<Decoded> decoded_;
 
-  // Held shared by all that decode; alone by one that did not fit next to others.
+  // Held shared by all decoding threads; held exclusively to repeat a decoding that did not fit in
+  // memory next to others.
   std::shared_mutex decoding_;
-  std::mutex mutex_;  // guards the members below
+  std::mutex mutex_;  // guards all members below
   std::unique_ptr<WritableFile> writer_;
   std::unique_ptr<ReadableFile> reader_;
   uint64_t end_ = 0;

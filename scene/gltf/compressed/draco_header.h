@@ -1,5 +1,5 @@
-// The header of Draco mesh data (bitstream 2.2): the counts that decide the decoder's memory, read
-// before the decoder runs.
+// The header of Draco mesh data (bitstream 2.2), read before the decoder runs. Its counts determine
+// the decoder's memory.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 namespace voxdag::gltf {
 
 struct DracoHeader {
-  bool is_edgebreaker = false;  // false: the faces are stored one after the other
-  bool has_valences = false;    // edgebreaker with a context for each valence of a vertex
+  bool is_edgebreaker = false;  // false: the faces are stored one after another
+  bool has_valences = false;    // edgebreaker with one context per vertex valence
   uint64_t faces = 0;
   // Number of attributes with a separate connectivity table, because fewer corners share a value
   // than share a position. Edgebreaker only.
@@ -19,7 +19,7 @@ struct DracoHeader {
   size_t begin = 0;
 };
 
-// Reads the header, and removes metadata, which no vertex depends on. Throws BrokenData.
+// Reads the header, and removes metadata, which does not affect vertices. Throws BrokenData.
 DracoHeader read_draco_header(std::span<std::byte> data);
 
 }  // namespace voxdag::gltf

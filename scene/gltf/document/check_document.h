@@ -1,4 +1,4 @@
-// The checks of a document that need all of it.
+// Checks that need the complete document.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,12 @@
 
 namespace voxdag::gltf {
 
-// Establishes the invariants of Document, except that buffers are as long as they claim: nodes,
-// scenes, meshes, skins, instancing and accessors are checked. Throws Error{kInvalidInput} naming
-// the node, mesh and primitive, skin or accessor that breaks one.
+// Checks nodes, scenes, meshes, skins, instancing and accessors. Afterwards the invariants of
+// Document hold, except that buffers may be shorter than declared. Throws Error{kInvalidInput} with
+// the node, mesh and primitive, skin or accessor that violates one.
 void check_document(Document& document);
 
-// How an accessor is used, which determines the type it must have.
+// A use of an accessor, which determines the accessor's type.
 struct AccessorUse {
   std::string where;  // "mesh 0: primitive 2: POSITION"
   int components;
@@ -22,12 +22,13 @@ struct AccessorUse {
   std::vector<int> may_be_normalized = {};
 };
 
-// Checks that accessor `index`, unless it is -1, exists and has a type of the use, and that its
-// bytes are inside its view and the length that its buffer claims. Throws Error{kInvalidInput}.
+// Checks that accessor `index`, unless it is -1, exists and has a type of the use. Checks that its
+// bytes are inside its view and inside the declared length of its buffer. Throws
+// Error{kInvalidInput}.
 void check_accessor(const Document& document, int index, const AccessorUse& use);
-// Checks that an accessor that exists, or -1, has `count` elements.
+// Checks that an accessor has `count` elements. `index` must be -1 or an existing accessor.
 void check_count(const Document& document, int index, uint64_t count, const std::string& where);
-// The buffers that a checked accessor is read from.
+// Returns the buffers that a checked accessor is read from.
 std::vector<int> buffers_of(const Document& document, const Accessor& accessor);
 
 }  // namespace voxdag::gltf

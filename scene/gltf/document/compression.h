@@ -19,7 +19,7 @@ struct BufferView;
 struct Document;
 struct Primitive;
 
-// Bytes of one of the file's own buffers.
+// Bytes of a buffer stored in the file.
 struct CompressedBytes {
   int buffer = -1;
   uint64_t byte_offset = 0;
@@ -32,8 +32,8 @@ struct MeshoptView {
   enum class Filter { kNone, kOctahedral, kQuaternion, kExponential };
 
   CompressedBytes from;
-  uint64_t count = 0;   // elements
-  uint64_t stride = 0;  // bytes of each
+  uint64_t count = 0;   // number of elements
+  uint64_t stride = 0;  // bytes per element
   Mode mode = Mode::kAttributes;
   Filter filter = Filter::kNone;
 
@@ -55,11 +55,11 @@ struct DracoExtension {
 };
 
 // The decoded form of a Draco primitive: `corners` indices of 32 bits, then the attributes one
-// after the other, each packed. Attributes that positions do not depend on form a second part
-// without indices, so that reading geometry alone does not decode them.
+// after another, each packed. Attributes that do not affect positions form a second part without
+// indices, so that reading only geometry does not decode them.
 struct DracoPart {
   struct Attribute {
-    int id = -1;  // in the Draco data
+    int id = -1;  // id in the Draco data
     std::string name;
     int component_type = 0;
     int components = 0;
@@ -69,15 +69,15 @@ struct DracoPart {
   std::string where;  // "mesh 0: primitive 2"
   bool is_strip = false;
   uint64_t corners = 0;
-  bool has_indices = true;  // false: attributes alone
+  bool has_indices = true;  // false: only attributes
   uint64_t vertices = 0;
   std::vector<Attribute> attributes;
 
   uint64_t decoded_bytes() const;
 };
 
-// Throws Violation for a member that is missing or of a wrong type, or a layout that the extension
-// does not allow.
+// Throws Violation for a member that is missing or of a wrong type, or for a layout that the
+// extension does not allow.
 std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extension);
 std::shared_ptr<const DracoExtension> read_draco(const JsonElement& extension);
 
@@ -85,14 +85,14 @@ uint64_t heap_bytes(const DracoExtension& draco);
 
 // Adds a buffer for every compressed view without uncompressed bytes, and points the view at it.
 void place_meshopt_views(Document& document);
-// Does the same for a compressed primitive, whose accessors become copies that point at the buffer.
-// Call it before the primitive's accessors are checked. Throws Error{kInvalidInput}.
+// Adds such buffers for a compressed primitive. Its accessors become copies that point at the
+// buffer. Call it before the primitive's accessors are checked. Throws Error{kInvalidInput}.
 void place_draco_primitive(Document& document, Primitive& primitive, const std::string& where);
-// Does the same for the accessors of the primitive's surface, if the function above placed its
+// Adds a buffer for the accessors of the primitive's surface, if the function above placed its
 // positions. `set` is the n of the surface's TEXCOORD_n, if it has one.
 void place_draco_surface(Document& document, Primitive& primitive, int set);
-// Checks a buffer that was made by one of these. Throws Error{kInvalidInput}, also where voxdag was
-// built without the library.
+// Checks a buffer made by one of these functions. Throws Error{kInvalidInput}, also if voxdag was
+// built without the needed library.
 void check_compressed(const Document& document, const BufferSource& buffer,
                       const std::string& where);
 

@@ -25,7 +25,7 @@ namespace voxdag::gltf {
 
 struct DocumentMaterials;
 
-// Where the bytes of a buffer come from.
+// The source of a buffer's bytes.
 struct BufferSource {
   enum class Kind {
     kNone,      // no uri, and not the BIN chunk: only extensions can use it
@@ -33,12 +33,13 @@ struct BufferSource {
     kExternal,  // the file `uri`, percent-encoded and relative to the scene file
     kBase64,    // the base64 characters `range` of the scene file
     kMemory,    // the base64 in `characters`, with JSON escapes in the file: the URI at `range`
-    kDecoded,   // what `meshopt` or `draco` decodes to; no buffer of the file
+    kDecoded,   // the decoded bytes of `meshopt` or `draco`; not a buffer of the file
   };
   Kind kind = Kind::kNone;
   uint64_t byte_length = 0;
-  bool is_read = false;      // triangles use some of it; set by check_document()
-  bool is_fallback = false;  // for readers without EXT_meshopt_compression; never the BIN chunk
+  bool is_read = false;  // some triangles use it; set by check_document()
+  // A fallback for readers without EXT_meshopt_compression; never the BIN chunk.
+  bool is_fallback = false;
   FileRange range;
   std::string uri;
   std::string characters;
@@ -83,16 +84,16 @@ struct Accessor {
   bool normalized = false;
   bool is_sparse = false;
   Sparse sparse;
-  int same_as = -1;  // the accessor of the file that this is a copy of
+  int same_as = -1;  // original accessor if this is a copy
 };
 
-// The accessors JOINTS_n and WEIGHTS_n of one n: four influences per vertex.
+// The accessors JOINTS_n and WEIGHTS_n for one n: four influences per vertex.
 struct JointSet {
   int joints = -1;
   int weights = -1;
 };
 
-// Primitive modes that make triangles; smaller ones are points and lines.
+// Primitive modes with triangles. Smaller values are points and lines.
 enum Mode : int { kTriangleList = 4, kTriangleStrip = 5, kTriangleFan = 6 };
 
 // Material and attributes of a primitive's triangles. Set by resolve_materials().
@@ -108,7 +109,7 @@ struct Primitive {
   int indices = -1;
   std::vector<int> targets;  // POSITION of each morph target, -1 if it has none
   std::vector<JointSet> joint_sets;
-  int material = -1;                     // as the file has it, unchecked like the next two
+  int material = -1;                     // as in the file; unchecked, like the next two members
   int color = -1;                        // COLOR_0
   std::vector<int> texture_coordinates;  // TEXCOORD_n
   PrimitiveSurface surface;
@@ -123,7 +124,7 @@ struct Mesh {
   std::vector<double> weights;
 };
 
-// Accessors of EXT_mesh_gpu_instancing, -1 where one is absent.
+// Accessors of EXT_mesh_gpu_instancing; -1 for missing ones.
 struct Instancing {
   bool present = false;
   int translation = -1;
@@ -135,7 +136,7 @@ struct Node {
   std::string name;
   Transform local;
   std::vector<int> children;
-  std::vector<double> weights;  // empty: the mesh's
+  std::vector<double> weights;  // empty: the mesh's weights are used
   int parent = -1;
   int mesh = -1;
   int skin = -1;
@@ -145,7 +146,7 @@ struct Node {
 struct Skin {
   std::string name;
   std::vector<int> joints;
-  int inverse_bind = -1;  // -1: identities
+  int inverse_bind = -1;  // -1: identity matrices
 };
 
 struct Document {
@@ -153,13 +154,13 @@ struct Document {
       : path(std::move(scene_path)), charge(budget, "the structure of " + path) {}
 
   std::string path;
-  GrowingCharge charge;        // for the arrays
-  GrowingCharge model_charge;  // for the model
+  GrowingCharge charge;        // charge for the arrays
+  GrowingCharge model_charge;  // charge for the model
 
-  // tinygltf's reading of the asset, the extensions, materials, textures, samplers and images. Its
-  // other arrays are empty. Nothing of an image is loaded: a data: URI ends at its comma.
+  // The asset, the extensions, materials, textures, samplers and images, as read by tinygltf. Its
+  // other arrays are empty. No image is loaded: a data: URI ends at its comma.
   std::shared_ptr<tinygltf::Model> model;
-  std::vector<RawString> image_uris;  // for each image of the model; size 0 for one without uri
+  std::vector<RawString> image_uris;  // one per image of the model; size 0 for an image without uri
 
   bool quantized = false;  // KHR_mesh_quantization is used
   // Deques, because a growing vector would need its memory twice.
@@ -169,11 +170,11 @@ struct Document {
   std::deque<Mesh> meshes;
   std::deque<Skin> skins;
   std::deque<Node> nodes;
-  std::deque<std::vector<int>> scenes;                 // the root nodes of each
+  std::deque<std::vector<int>> scenes;                 // root nodes of each scene
   std::shared_ptr<const DocumentMaterials> materials;  // set by resolve_materials()
   int scene = -1;                                      // the default scene
-  std::vector<int> roots;             // of the scene to draw, set by check_document()
-  std::vector<std::string> warnings;  // the first few
+  std::vector<int> roots;             // roots of the scene to draw; set by check_document()
+  std::vector<std::string> warnings;  // only the first few
   uint64_t further_warnings = 0;
 
   // Adds "<path>: <what>" to the warnings.
@@ -186,7 +187,7 @@ struct Document {
   std::string name_skin(int skin) const;
 };
 
-// Bytes of one component; 0 if glTF 2.0 has no such component type.
+// Returns the bytes of one component; 0 if glTF 2.0 has no such component type.
 int component_bytes(int component_type);
 const char* component_name(int component_type);
 
@@ -194,9 +195,9 @@ inline uint64_t element_bytes(const Accessor& accessor) {
   return static_cast<uint64_t>(component_bytes(accessor.component_type) * accessor.components);
 }
 
-// Whole triangles of a primitive.
+// Returns the number of complete triangles of a primitive.
 uint64_t triangle_count(const Document& document, const Primitive& primitive);
-// How often the mesh of the node is drawn.
+// Returns the number of instances of the node's mesh.
 uint64_t instance_count(const Document& document, const Node& node);
 
 }  // namespace voxdag::gltf

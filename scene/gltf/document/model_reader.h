@@ -16,20 +16,20 @@ class ModelReader {
  public:
   ModelReader(const std::string& scene_path, MemoryBudget& budget);
 
-  // Adds an element of a section to the text. Throws Violation unless the members of the asset and
-  // the names of extensions that voxdag uses are strings, Error{kOutOfMemory} if the model would
+  // Adds an element of a section to the text. Throws Violation unless the asset's members and the
+  // names of extensions that voxdag uses are strings. Throws Error{kOutOfMemory} if the model would
   // not fit the budget.
   void add(const JsonElement& element);
   void add_image(const JsonElement& element);
 
   // Sets the model of the document and its image_uris. Materials, textures and samplers that
-  // tinygltf refuses are left out with a warning. Call once, after all elements were added.
+  // tinygltf refuses are left out with a warning. Call it once, after all elements were added.
   void parse(Document& document);
 
  private:
   std::string text_ = "{";
-  std::string section_;           // the last one in text_
-  bool section_is_open_ = false;  // its array needs a closing bracket
+  std::string section_;           // last section in text_
+  bool section_is_open_ = false;  // the section's array needs a closing bracket
   std::shared_ptr<tinygltf::Model> model_;
   std::vector<RawString> image_uris_;
   GrowingCharge model_charge_;

@@ -8,10 +8,10 @@
 
 namespace voxdag::gltf {
 
-// The document of an open scene file, not yet checked by check_document(). Throws
-// Error{kInvalidInput} for JSON that is broken or has a member of a wrong type, for another glTF
-// version, or a required extension that voxdag does not read; Error{kOutOfMemory} for a structure
-// that does not fit the budget.
+// Returns the document of an open scene file, not yet checked by check_document(). Throws
+// Error{kInvalidInput} for malformed JSON, a member of a wrong type, another glTF version, or a
+// required extension that voxdag does not support. Throws Error{kOutOfMemory} for a structure that
+// does not fit the budget.
 Document read_document(const ReadableFile& file, MemoryBudget& budget, const CancelToken& cancel);
 
 }  // namespace voxdag::gltf

@@ -1,5 +1,5 @@
-// The structs of a Document, each read from its element of the JSON. Members that voxdag does not
-// use are ignored. Throws Violation for a member that is missing or of a wrong type.
+// Reads the structs of a Document, each from its JSON element. Ignores members that voxdag does not
+// use. Throws Violation for a member that is missing or of a wrong type.
 #pragma once
 
 #include <vector>
@@ -11,21 +11,21 @@
 
 namespace voxdag::gltf {
 
-// A data: URI with JSON escapes is read from the scene file into memory; Error{kOutOfMemory} if it
-// does not fit the budget.
+// Reads a buffer. If it is a data: URI with JSON escapes, reads its characters into memory. Throws
+// Error{kOutOfMemory} if they do not fit the budget.
 BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_file,
                          MemoryBudget& budget);
 BufferView read_view(const JsonElement& element);
 Accessor read_accessor(const JsonElement& element);
 Mesh read_mesh(const JsonElement& element);
 Skin read_skin(const JsonElement& element);
-// Node `index` of the document, which gets a warning if the node is rotated by a quaternion far
-// from unit length. Throws Violation for a transform that is not affine or not finite.
+// Reads node `index` of the document. Adds a warning if its rotation quaternion is far from unit
+// length. Throws Violation for a transform that is not affine or not finite.
 Node read_node(const JsonElement& element, int index, Document& document);
-// The root nodes of a scene.
+// Returns the root nodes of a scene.
 std::vector<int> read_scene(const JsonElement& element);
 
-// Bytes that a struct owns outside of itself.
+// Returns the heap memory that a struct owns.
 inline uint64_t heap_bytes(const BufferView& view) {
   return view.meshopt ? sizeof(MeshoptView) : 0;
 }

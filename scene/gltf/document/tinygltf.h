@@ -1,5 +1,6 @@
-// tinygltf without its image decoders, in a namespace of voxdag: Draco's archive contains another
-// version, and so may a program that links voxdag. Two versions in one namespace crash.
+// tinygltf without its image decoders, in a namespace of voxdag. Draco's archive contains another
+// version of tinygltf, and programs that link voxdag may do so as well. Two versions in one
+// namespace would crash.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,5 +1,5 @@
-// The two containers of glTF 2.0: a GLB (a header, a JSON chunk, perhaps a BIN chunk), or the bare
-// JSON of a .gltf. The first bytes of a file tell which of them it is, not its name.
+// The two containers of glTF 2.0: a GLB (a header, a JSON chunk and an optional BIN chunk), or the
+// plain JSON of a .gltf. They are distinguished by the first bytes of the file, not by its name.
 #pragma once
 
 #include "core/io/file_system.h"

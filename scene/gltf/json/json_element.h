@@ -1,8 +1,8 @@
-// A value in the JSON of a scene file together with its place there, for reading it with checks.
-// What is not of the expected type throws Violation with a message like
-// "nodes[3].children[0] is -1, expected a whole number from 0 to 2147483647".
+// A value in the JSON of a scene file, with its position, for checked reading. A value of an
+// unexpected type throws Violation with a message like "nodes[3].children[0] is -1, expected a
+// whole number from 0 to 2147483647".
 //
-// An element refers to its value and to the element that it was found in; both must outlive it.
+// An element refers to its value and to its parent element. Both must outlive it.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,8 @@
 
 namespace voxdag::gltf {
 
-// A place in the JSON breaks the rules of glTF 2.0. The message does not name the scene file.
+// A violation of the rules of glTF 2.0 at a position in the JSON. The message does not name the
+// scene file.
 struct Violation {
   std::string message;
 };
@@ -26,22 +27,22 @@ class JsonElement {
   using Json = nlohmann::json;
   static constexpr int64_t kNoIndex = -1;
 
-  // Element `index` of the root's array `section`, or that section itself. `uri` describes the
+  // Element `index` of the root's array `section`, or the section itself. `uri` describes the
   // member "uri" of this value if it is a string.
   JsonElement(const Json& value, std::string_view section, int64_t index, const RawString& uri)
       : value_(value), key_(section), index_(index), uri_(&uri) {}
 
   const Json& value() const { return value_; }
-  // The name of the root's section, or of the member of the object around it.
+  // Returns the name of the root's section, or of the member in the parent object.
   std::string_view key() const { return key_; }
   bool is_in_array() const { return index_ != kNoIndex; }
   const RawString& uri() const { return *uri_; }
   // "nodes[3].children[0]"
   std::string path() const;
 
-  // The member of an object; empty if it is absent.
+  // Returns the member of an object; nullopt if it is absent.
   std::optional<JsonElement> find(const char* key) const;
-  // The member of an object, which must be there.
+  // Returns the member of an object, which must exist.
   JsonElement at(const char* key) const;
   // Calls `visit` with each element of an array.
   template <class Visit>

@@ -16,17 +16,17 @@ namespace voxdag::gltf {
 
 struct JsonSection {
   std::string name;
-  bool is_array;    // each element is read on its own; else the section is one element
-  bool is_checked;  // a Violation in it is reported; else it is ignored
+  bool is_array;    // each element is read separately; otherwise the section is one element
+  bool is_checked;  // a Violation in it is reported; otherwise it is ignored
   // May throw Violation. The element is valid during the call.
   std::function<void(const JsonElement&)> read;
 };
 
 // Passes the elements of `sections` to their readers in the order of the file. Returns the message
-// of the first Violation in a checked section, or "": reading continues after one, because a file
-// of another glTF version may violate anything before it names its version. Throws
-// Error{kInvalidInput} for a text that is no JSON, Error{kOutOfMemory} for an element that does not
-// fit the budget.
+// of the first Violation in a checked section, or "". Reading continues after a Violation, because
+// a file of another glTF version may violate anything before its version is read. Throws
+// Error{kInvalidInput} for a text that is not JSON, Error{kOutOfMemory} for an element that does
+// not fit the budget.
 std::string read_sections(const ReadableFile& file, FileRange json,
                           const std::vector<JsonSection>& sections, MemoryBudget& budget,
                           const CancelToken& cancel);

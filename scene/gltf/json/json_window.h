@@ -26,13 +26,13 @@ class JsonWindow : public std::streambuf {
   JsonWindow(const ReadableFile& file, FileRange json, MemoryBudget& budget,
              const CancelToken& cancel);
 
-  // The place in the file of the character that the parser sees next.
+  // Returns the position in the file of the character that the parser receives next.
   uint64_t position() const { return position_; }
-  // The string that ended last.
+  // Returns the last complete string.
   const RawString& last_string() const { return string_; }
 
  private:
-  // The next character that the parser sees.
+  // Returns the next character for the parser.
   int_type uflow() override;
   bool next(char& c);
   void track(char c);
@@ -46,17 +46,17 @@ class JsonWindow : public std::streambuf {
   GrowingCharge charge_;
   std::vector<char> window_;
   uint64_t window_begin_ = 0;  // position in the file of window_[0]
-  uint64_t position_ = 0;      // of the next character
+  uint64_t position_ = 0;      // position of the next character
 
   bool in_string_ = false;
   bool after_backslash_ = false;
-  int hex_digits_left_ = 0;       // of an escape \uXXXX
+  int hex_digits_left_ = 0;       // remaining digits of an escape \uXXXX
   bool in_escape_ = false;        // the last character is part of an escape
-  bool after_blank_ = false;      // the last character outside of strings is blank,
-  bool is_second_blank_ = false;  // and so is the one before it
+  bool after_blank_ = false;      // the last character outside of strings is blank
+  bool is_second_blank_ = false;  // the character before it is also blank
   uint64_t word_ = 0;             // characters of the number or literal so far
-  uint64_t collected_ = 0;  // characters that the parser has, which begins again with each string
-                            // or number
+  // Characters passed to the parser for the current string or number.
+  uint64_t collected_ = 0;
   RawString string_;
 };
 

@@ -13,13 +13,13 @@
 namespace voxdag::gltf {
 
 struct DocumentMaterials {
-  // The file's materials; one material for primitives without material, if there are any; then
-  // copies of the file's materials without image, for primitives without texture coordinates.
+  // In this order: the file's materials; one material for primitives without material, if there are
+  // any; copies of the file's materials without image, for primitives without texture coordinates.
   // `image` is an index into `images`.
   std::vector<Material> materials;
-  std::vector<TextureTransform> transforms;  // of each material's texture coordinates
-  std::vector<int> images;                   // indices in the model of the images in use
-  std::vector<std::string> warnings;         // the first few, and a line about the others
+  std::vector<TextureTransform> transforms;  // for each material's texture coordinates
+  std::vector<int> images;                   // indices of used images in the model
+  std::vector<std::string> warnings;         // the first few, and a line with the number of others
 };
 
 // Sets document.materials and the surfaces of its primitives. Call it once, after check_document().

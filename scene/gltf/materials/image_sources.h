@@ -8,7 +8,8 @@ namespace voxdag::gltf {
 
 struct Document;
 
-// Finds image `index` of the document's model and opens its file. Errors go to its `problem`.
+// Finds image `index` of the document's model and opens its file. Stores an error in the result's
+// `problem`.
 ImageSource find_image(FileSystem& files, const ReadableFile& scene_file, const Document& document,
                        int index);
 

@@ -10,15 +10,15 @@
 namespace voxdag::gltf {
 
 struct MaterialSource {
-  Material material;  // without image
-  int image = -1;     // of the model
+  Material material;  // the image is in the next member
+  int image = -1;     // index in the model
   int texcoord = 0;   // the n of TEXCOORD_n
   TextureTransform transform;
-  std::string problem;  // why its texture cannot be read, if it has one; "" otherwise
+  std::string problem;  // why its texture cannot be read; "" if it can or has none
 };
 
-// Material `index` of the model. KHR_materials_pbrSpecularGlossiness, where there is one, is used
-// instead of metallic-roughness. What is not of the type that it should be is ignored.
+// Reads material `index` of the model. If it has KHR_materials_pbrSpecularGlossiness, uses this
+// instead of metallic-roughness. Ignores members of a wrong type.
 MaterialSource read_material(const tinygltf::Model& model, int index);
 
 }  // namespace voxdag::gltf

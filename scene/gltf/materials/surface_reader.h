@@ -1,6 +1,6 @@
 // Reads the material, texture coordinates and colors of a primitive's triangles, within a fixed
-// amount of memory: blocks of consecutive vertices, each cached in the one slot that its number
-// maps to, as in VertexCache. Not thread-safe.
+// amount of memory. Blocks of consecutive vertices are cached, each in the slot given by its
+// number, as in VertexCache. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +16,19 @@ namespace voxdag::gltf {
 
 class SurfaceReader {
  public:
-  // The caches of all readers of a scene take at most 1/kShareOfFree of the free budget.
+  // The caches of all readers of a scene together take at most 1/kShareOfFree of the free budget.
   static constexpr uint64_t kShareOfFree = 8;
 
-  // One of `readers`, with room for `vertices` vertices, or fewer if its part of the share is
-  // smaller. The document's materials are resolved; the references must outlive the reader.
+  // Makes one of `readers` readers, with space for `vertices` vertices, or fewer if its part of the
+  // share is smaller. The document's materials must be resolved. The references must outlive the
+  // reader.
   SurfaceReader(const Document& document, BufferReader& buffers, uint64_t vertices,
                 unsigned readers);
 
   // Changes to another primitive of the document. Throws Error{kInvalidInput} if a buffer of its
-  // surface is shorter than it claims.
+  // surface is shorter than declared.
   void bind(const Primitive& primitive);
-  // Sets material and corners of a triangle of that primitive. Its vertices exist.
+  // Sets material and corners of a triangle of this primitive. Its vertices must exist.
   void read(const uint32_t* vertices, SurfaceTriangle& out) {
     out.material = material_;
     for (size_t k = 0; k < 3; ++k) out.corners[k] = is_plain_ ? SurfaceCorner{} : at(vertices[k]);
@@ -51,11 +52,11 @@ class SurfaceReader {
   const Document& document_;
   BufferReader& buffers_;
   uint32_t material_ = 0;
-  bool is_plain_ = true;  // no texture coordinates, no colors
+  bool is_plain_ = true;  // without texture coordinates and colors
   TextureTransform transform_;
   std::optional<AccessorReader> texture_coordinates_, colors_;
   size_t color_components_ = 4;
-  double color_scale_ = 1;  // of integers that are not normalized, as they should be
+  double color_scale_ = 1;  // for integers that are not normalized, although they should be
   uint64_t vertices_ = 0;
 
   PageBuffer<SurfaceCorner> corners_;

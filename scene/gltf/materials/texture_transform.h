@@ -1,5 +1,5 @@
-// KHR_texture_transform: offset + rotation * scale of texture coordinates, in IEEE doubles with
-// + - * / and fmod only, so that all machines get the same bits.
+// KHR_texture_transform: offset + rotation * scale of texture coordinates. Uses only + - * / and
+// fmod of IEEE doubles, so that all machines get the same bits.
 #pragma once
 
 #include <array>
@@ -9,10 +9,11 @@ namespace voxdag::gltf {
 struct SineCosine {
   double sine = 0, cosine = 1;
 };
-// Returns sine and cosine of an angle in radians, to about 2^-50; of 0 if it is not finite.
+// Returns sine and cosine of an angle in radians, to about 2^-50. An angle that is not finite
+// counts as 0.
 SineCosine sine_and_cosine(double angle);
 
-// Rows of a 2x3 matrix.
+// The rows of a 2x3 matrix.
 struct TextureTransform {
   double m[2][3] = {{1, 0, 0}, {0, 1, 0}};
 
@@ -23,8 +24,8 @@ struct TextureTransform {
   }
 };
 
-// First the scale, then the rotation, counterclockwise as an image with v downward shows it, then
-// the offset.
+// Returns the transform that scales first, then rotates (counterclockwise in an image whose v
+// points downward), then adds the offset.
 TextureTransform make_texture_transform(const std::array<double, 2>& offset, double rotation,
                                         const std::array<double, 2>& scale);
 

@@ -1,6 +1,6 @@
-// Decodes the elements of one accessor in windows: interleaved or packed, integers normalized or
-// not, with sparse replacements. Every 1024th index of a sparse accessor is kept in memory, to find
-// the replacements of a range. Not thread-safe.
+// Decodes the elements of one accessor in windows. They can be interleaved or packed, normalized
+// integers or not, and have sparse replacements. Every 1024th index of a sparse accessor is kept in
+// memory, to find the replacements of a range. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -22,9 +22,9 @@ class AccessorReader {
 
   uint64_t count() const { return accessor_.count; }
 
-  // Reads elements [first, first + count), as many numbers each as the accessor has components. A
-  // normalized integer c becomes max(c / the largest of its type, -1). T is double, or uint32_t for
-  // an accessor of unsigned integers.
+  // Reads elements [first, first + count), with one number per component. A normalized integer c
+  // becomes max(c / the maximum of its type, -1). T is double, or uint32_t for an accessor of
+  // unsigned integers.
   template <class T>
   void read(uint64_t first, size_t count, T* out);
 
@@ -39,7 +39,7 @@ class AccessorReader {
   BufferReader& buffers_;
   const Accessor& accessor_;
   const int index_;
-  std::vector<uint32_t> sparse_indices_;    // a window of the sparse indices
+  std::vector<uint32_t> sparse_indices_;    // one window of the sparse indices
   std::vector<uint32_t> sparse_directory_;  // every kSparseWindow-th sparse index
   MemoryCharge directory_charge_;
 };

@@ -20,7 +20,7 @@
 
 namespace voxdag::gltf {
 
-// The external files of a document that were opened so far. Thread-safe.
+// The external files of a document that have been opened. Thread-safe.
 class ExternalFiles {
  public:
   ExternalFiles(const std::string& scene_path, MemoryBudget& budget)
@@ -35,9 +35,9 @@ class ExternalFiles {
   GrowingCharge charge_;
 };
 
-// The path of the file that `uri`, percent-encoded (RFC 3986), names relative to the folder of the
-// scene file. Throws Error{kInvalidInput}, which begins with `where`, for anything but a relative
-// path.
+// Returns the path of the file that `uri` (percent-encoded, RFC 3986) names relative to the folder
+// of the scene file. Throws Error{kInvalidInput}, beginning with `where`, for anything but a
+// relative path.
 std::string resolve_uri(const std::string& scene_path, const std::string& uri,
                         const std::string& where);
 
@@ -45,28 +45,28 @@ class BufferReader {
  public:
   static constexpr size_t kWindowBytes = size_t{256} << 10;
 
-  // One of `readers` of the document. Adds the files that it opens to `external_files`. The
-  // references must outlive the reader.
+  // Makes one of `readers` readers of the document. Adds the files that it opens to
+  // `external_files`. The references must outlive the reader.
   BufferReader(FileSystem& files, const ReadableFile& scene_file, const Document& document,
                ExternalFiles& external_files, DecodedBuffers& decoded, MemoryBudget& budget,
                unsigned readers);
 
-  // Checks every buffer that is read: throws Error{kInvalidInput} if it has fewer bytes than it
-  // claims, Error{kNotFound} if an external file does not exist.
+  // Checks every buffer that is read. Throws Error{kInvalidInput} if it has fewer bytes than
+  // declared, Error{kNotFound} if an external file does not exist.
   void check_lengths();
 
-  // Bytes [offset, offset + size) of a buffer, at most kWindowBytes of them, inside it. Valid until
-  // the next call.
+  // Returns bytes [offset, offset + size) of a buffer, which must contain them; at most
+  // kWindowBytes. Valid until the next call.
   std::span<const std::byte> window(int buffer, uint64_t offset, size_t size);
 
-  // Does so with one buffer.
+  // Checks one buffer like check_lengths().
   void check_length(int buffer);
 
-  // What readers of the scene charge their own memory to.
+  // The budget to which readers of the scene charge their memory.
   MemoryBudget& budget() { return budget_; }
 
  private:
-  // Fills `out`, of any size, from `offset` of a buffer.
+  // Fills `out`, of any size, with the buffer's bytes from `offset`.
   void read(int buffer, uint64_t offset, std::span<std::byte> out);
   const ReadableFile& external(int buffer);
   std::span<const std::byte> decode_base64(int buffer, uint64_t offset, size_t size);
@@ -79,12 +79,14 @@ class BufferReader {
   MemoryBudget& budget_;
   const size_t max_open_;
   PageBuffer<std::byte> window_;
-  PageBuffer<std::byte> characters_;  // base64 of a window; empty until a buffer needs it
+  // Base64 characters of a window; empty until a buffer needs it.
+  PageBuffer<std::byte> characters_;
   struct OpenFile {
     int buffer;
     std::unique_ptr<ReadableFile> file;
   };
-  std::vector<OpenFile> open_;  // a few external files; the oldest is closed for another one
+  // A few external files; the oldest is closed when another one is opened.
+  std::vector<OpenFile> open_;
 };
 
 }  // namespace voxdag::gltf

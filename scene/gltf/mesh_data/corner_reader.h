@@ -1,6 +1,6 @@
-// The vertex indices of the triangles of a primitive, three each, out of triangle lists, strips and
-// fans, indexed or not. The winding of strips is not corrected: surfaces say where it is the other
-// way. Not thread-safe.
+// Returns the vertex indices of the triangles of a primitive, three each, from triangle lists,
+// strips and fans, indexed or not. Does not correct the winding of strips: surfaces mark their
+// flipped triangles. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ class CornerReader {
   void read_indices(uint64_t first, size_t count, uint32_t* out);
 
   const int mode_;
-  std::optional<AccessorReader> indices_;  // none: vertices in their own order
+  std::optional<AccessorReader> indices_;  // none: vertices are used in order
   std::vector<uint32_t> row_;              // consecutive indices of a strip or fan
 };
 

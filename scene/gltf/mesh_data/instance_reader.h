@@ -15,7 +15,8 @@ class InstanceReader {
   InstanceReader(const Document& document, BufferReader& buffers, const Node& node);
 
   uint64_t count() const { return count_; }
-  // T * R * S of an instance, relative to the node. Fast if called in the order of the instances.
+  // Returns T * R * S of an instance, relative to the node. Fast if called in the order of the
+  // instances.
   Transform at(uint64_t instance);
 
  private:

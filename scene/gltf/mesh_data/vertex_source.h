@@ -15,24 +15,24 @@
 
 namespace voxdag::gltf {
 
-// The matrices of a skin's joints at rest: global transform of the joint times inverse bind matrix.
-// The transform of the skinned node itself is not used (glTF 2.0, section 3.7.3.3). Throws
-// Error{kInvalidInput} for an inverse bind matrix that is not affine, Error{kOutOfMemory} naming
-// the skin for more joints than fit the budget of `buffers`.
+// Returns the matrices of a skin's joints at rest: global transform of the joint times inverse bind
+// matrix. The transform of the skinned node itself is not used (glTF 2.0, section 3.7.3.3). Throws
+// Error{kInvalidInput} for an inverse bind matrix that is not affine, Error{kOutOfMemory} with the
+// skin if its joints do not fit the budget of `buffers`.
 PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buffers, int skin);
 
 class VertexSource : public PositionSource {
  public:
   // `weights` are the node's, else the mesh's; `joints` are empty for a node without a skin. All
-  // arguments must outlive the source. Throws Error{kOutOfMemory} for more targets and joint sets
-  // than fit the budget of `buffers`.
+  // arguments must outlive the source. Throws Error{kOutOfMemory} if the targets and joint sets do
+  // not fit the budget of `buffers`.
   VertexSource(const Document& document, BufferReader& buffers, const Primitive& primitive,
                std::span<const double> weights, std::span<const Transform> joints);
 
   uint64_t count() const override { return positions_.count(); }
 
   // Reads the positions of vertices [first, first + count), three doubles each. A vertex whose
-  // joints do not exist becomes NaN, so that it is refused only if a triangle uses it.
+  // joints do not exist becomes NaN. So it is refused only if a triangle uses it.
   void read(uint64_t first, size_t count, double* out) override;
 
  private:
@@ -49,7 +49,7 @@ class VertexSource : public PositionSource {
   void skin(uint64_t first, size_t count, double* positions);
   void blend(const uint32_t* joints, const double* weights, Transform& sum) const;
 
-  MemoryCharge charge_;  // for targets_ and influences_
+  MemoryCharge charge_;  // charge for targets_ and influences_
   AccessorReader positions_;
   std::vector<Target> targets_;
   std::vector<Influences> influences_;
