@@ -52,7 +52,7 @@ void print(const BuildReport& r) {
 
 constexpr const char* kMergeJobFlag = "--cluster-merge-job";
 
-// This process's command line without the program name.
+// Returns this process's command line without the program name.
 std::vector<std::string> own_arguments() {
   std::ifstream line("/proc/self/cmdline");
   std::vector<std::string> words;
@@ -65,7 +65,8 @@ std::vector<std::string> own_arguments() {
   return words;
 }
 
-// The merge job gets the user's --memory and --threads. Without them it gets as much as a task.
+// The merge job gets the user's --memory and --threads. Without these options it gets the resources
+// of a task.
 ClusterOptions::MergeJobOptions merge_job(const BuildCommand& command, const BuildSpec& spec) {
   ClusterOptions::MergeJobOptions job;
   job.arguments = own_arguments();
@@ -88,7 +89,7 @@ void take_allocation(RunOptions& run) {
   if (run.memory_bytes == 0 && given.memory_bytes > 0)
     run.memory_bytes = batch_budget(given.memory_bytes);
   if (run.threads == 0) run.threads = given.cpus;
-  // An earlier attempt at this job may be dying on another node.
+  // An earlier attempt at this job may still be ending on another node.
   run.lock_wait_s = 300;
   run.restart = false;
 }

@@ -13,8 +13,8 @@ namespace {
 
 constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
 
-// Sets options that the command line does not give from a TOML or INI file. CLI11 reads such files
-// for the whole program only, not for one command.
+// Sets options that the command line does not give from a TOML or INI file. CLI11 supports such
+// files only for the whole program, not for one command.
 void read_config_file(const std::string& path, CLI::App& command) {
   std::istringstream text(read_small_file(system_files(), path, kMaxConfigBytes));
   for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_config(text)) {
@@ -28,8 +28,8 @@ void read_config_file(const std::string& path, CLI::App& command) {
   }
 }
 
-// Returns "" for a valid number, otherwise a message. CLI11's own conversion is not enough: it
-// turns -4 into 2^64 - 4 and reports no expectation.
+// Returns "" for a valid number, otherwise a message. CLI11's own conversion turns -4 into 2^64 -
+// 4, and its errors have no expectation.
 template <class T>
 std::string integer_problem(const std::string& text) {
   if (parse_numbers<T, 1>(text, ',')) return "";
@@ -130,7 +130,7 @@ int CommandLine::run(int argc, char** argv) {
   try {
     app_->parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    // CLI11 reports --help and --version as errors of status 0.
+    // CLI11 reports --help and --version as errors with status 0.
     if (error.get_exit_code() == 0) return app_->exit(error);
     throw Error(ErrorCode::kInvalidInput, error.what());
   }

@@ -41,7 +41,7 @@ int report(ErrorCode code, const char* message) {
   return exit_status(code);
 }
 
-// Printed text may still be in a buffer. The command has failed if it cannot be written.
+// Flushes standard output. The command has failed if the buffered text cannot be written.
 void check_output() {
   errno = 0;
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return;

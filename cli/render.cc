@@ -23,7 +23,7 @@ constexpr int kMaxPictureEdge = 16384;
 struct RenderCommand {
   std::string input;
   OutputFile output;
-  std::string depth;  // "" for none
+  std::string depth;  // "": no depth map
   std::string view = "auto";
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
@@ -33,7 +33,7 @@ struct RenderCommand {
   bool json = false;
 };
 
-// The point that an option names in world space, in voxel units.
+// Returns the point that an option gives in world space, in voxel units.
 query::Vec parse_point(const std::string& text, const std::string& option,
                        const voxdag_reader::File& file) {
   const auto world = parse_list<double, 3>(option, text, ',', "three numbers X,Y,Z");
@@ -94,14 +94,14 @@ void check_outputs(const RenderCommand& command, FileSystem& files) {
     command.output.check(files, command.input, query::is_rendered_png);
   if (command.depth.empty()) return;
   const OutputFile depth{command.depth, command.output.force};
-  // An array does not say who wrote it.
+  // An array does not record the program that wrote it.
   depth.check(files, command.input, [](const ReadableFile&) { return false; });
 }
 
-// A size that is too large is an error before anything is done.
+// Refuses a size that is too large before any work is done.
 void check_memory(const RenderCommand& command) {
   const uint64_t limit = memory_limit(command.memory);
-  // The picture is written before the distances are measured.
+  // The picture is written before the distances are computed, so they are never in memory together.
   const uint64_t of_pixel =
       command.output.path.empty() ? query::kDepthBytesPerPixel : query::kRenderBytesPerPixel;
   const uint64_t bytes = of_pixel * static_cast<uint64_t>(command.options.width) *

@@ -19,7 +19,7 @@ struct StatusCommand {
   bool watch = false;
 };
 
-// The batches that are not built, by what their tasks do, and the last thing that went wrong.
+// Prints the unbuilt batches, grouped by the state of their tasks, and the last failure.
 void print(const ClusterState& cluster) {
   std::map<std::string, size_t> by_state, by_node;
   const OpenBatch* failed = nullptr;

@@ -36,7 +36,7 @@ Grid grid_of(const voxdag_reader::File& file) {
 
 struct Sample {
   query::SampleReport voxels;
-  std::optional<query::ColorSampleReport> colors;  // of a file that has attributes
+  std::optional<query::ColorSampleReport> colors;  // for a file with attributes
 };
 
 Sample check_against(const VerifyCommand& command, const voxdag_reader::File& file,

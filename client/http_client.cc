@@ -17,8 +17,8 @@ std::string lower_case(std::string_view name) {
   return lower;
 }
 
-// Bodies come as they are unless a caller asks otherwise: newer versions of httplib would ask for
-// compression.
+// Bodies are requested without encoding unless the caller sets it, because newer versions of
+// httplib would request compression.
 httplib::Headers to_httplib(const HeaderMap& headers) {
   httplib::Headers all(headers.begin(), headers.end());
   if (all.find("Accept-Encoding") == all.end()) all.emplace("Accept-Encoding", "identity");
@@ -165,7 +165,7 @@ void throw_if_problem(const ClientResponse& response) {
   if (response.status < 400) return;
   const auto json = nlohmann::json::parse(response.body, nullptr, false);
   std::string code, detail = "the server answered with status " + std::to_string(response.status);
-  // The answer may come from another server or a proxy.
+  // The answer may not be JSON of this service: it may come from another server or a proxy.
   const auto text = [&](const char* name, const std::string& otherwise) {
     const auto found = json.find(name);
     return found != json.end() && found->is_string() ? found->get<std::string>() : otherwise;

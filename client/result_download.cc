@@ -47,14 +47,14 @@ class Download {
   }
 
  private:
-  // 0 if the partial file is longer than the result.
+  // Returns the bytes present; 0 if the partial file is longer than the result.
   uint64_t bytes_present() const {
     if (!files_.exists(partial_)) return 0;
     const uint64_t bytes = files_.open_read(partial_)->size();
     return bytes <= size_ ? bytes : 0;
   }
 
-  // Sends one request. Returns the seconds that a busy server asks to wait for.
+  // Sends one request. Returns the seconds to wait that a busy server requested.
   double fetch_rest(uint64_t offset) {
     HeaderMap headers;
     if (offset > 0) {
@@ -64,7 +64,7 @@ class Download {
     std::unique_ptr<WritableFile> file;
     const auto begin = [&](const ClientResponse& head) {
       if (head.status >= 400) return true;
-      if (head.status != 206) offset = 0;  // the server sends the whole file
+      if (head.status != 206) offset = 0;  // the server sends the complete file
       guard_file(
           [&] { file = offset > 0 ? files_.open_write(partial_) : files_.create(partial_); });
       progress_.begin_stage("download", size_, "bytes");

@@ -65,7 +65,7 @@ class Upload {
     return bytes;
   }
 
-  // True if the server has the complete file. Sets offset_ to how many bytes it has.
+  // True if the server has the complete file. Sets offset_ to the number of bytes that it has.
   bool is_complete() {
     offset_ = 0;
     try {
@@ -85,10 +85,10 @@ class Upload {
     return false;
   }
 
-  // Sends the missing bytes in parts, so that a crash of the server loses one part at most. The
-  // first part is small: a server that rejects the scene can answer it, while it would close the
-  // connection within a large one. If no bytes are missing, an empty part finishes the upload.
-  // False if a retry is needed, for the reason in failure_.
+  // Sends the missing bytes in parts, so that a crash of the server loses at most one part. The
+  // first part is small, because a server that rejects the scene can then answer; within a large
+  // part it would close the connection. If no bytes are missing, an empty part finishes the upload.
+  // Returns false if a retry is needed, with the reason in failure_.
   bool send_rest() {
     progress_.begin_stage("upload", size_, "bytes");
     progress_.resume_at(offset_);
@@ -110,7 +110,7 @@ class Upload {
     return true;
   }
 
-  // No value if the connection broke.
+  // Returns nullopt if the connection broke.
   std::optional<ClientResponse> send_part(uint64_t end) {
     const uint64_t first = offset_;
     const std::string range =
@@ -139,8 +139,8 @@ class Upload {
   const uint64_t size_;
   std::string sha256_, name_;
   uint64_t offset_ = 0;       // bytes that the server has
-  bool file_failed_ = false;  // the last error is of the local file, not of the connection
-  std::string failure_;       // of the last attempt
+  bool file_failed_ = false;  // the last error came from the local file, not from the connection
+  std::string failure_;       // error of the last attempt
   double wait_s_ = 0;         // requested by a busy server
 };
 

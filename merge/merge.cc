@@ -21,7 +21,7 @@ class Merger {
          Checkpoint* checkpoint)
       : inputs_(inputs),
         context_(context),
-        // Passes before the final one also have the writer of a segment in memory.
+        // In passes before the final one, the writer of a segment is also in memory.
         pass_bytes_(context.plan.partition_bytes -
                     std::min(context.plan.partition_bytes, kSegmentWriterBytes)),
         pending_(inputs, narrow_words),
@@ -97,7 +97,7 @@ class Merger {
     }
     segment.finish();
     ++context_.report.passes;
-    recovery_.wait();  // so that the bytes which this pass merged are released soon
+    recovery_.wait();  // so that the bytes merged by this pass are released soon
     const bool due = recovery_.due();
     const std::vector<SurveyedArtifact> before = pending_.replace_all(merged, segment);
     if (due) recovery_.save_pass(segment, merged, before);
@@ -121,7 +121,7 @@ class Merger {
     ++context_.report.passes;
   }
 
-  // Rows of the levels above `level`.
+  // Returns the number of rows of the levels above `level`.
   static uint64_t rows_above(uint32_t level, std::span<const ArtifactReader> readers) {
     uint64_t rows = 0;
     for (const ArtifactReader& reader : readers)
@@ -160,7 +160,8 @@ ArtifactRef merge_to_artifact(const MergeInputs& inputs, FileSystem& files, Segm
   MergeProgress rows_merged(progress);
   const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
                              rows_merged, cancel, report};
-  // Positions in an artifact count rows, of which it has less than a level of the file has words.
+  // Positions in an artifact count rows. An artifact has fewer rows than a level of the file has
+  // words.
   const ArtifactRef merged = Merger(inputs, context, UINT64_MAX, nullptr).run(out);
   report.scratch_bytes += scratch.bytes_written();
   return merged;

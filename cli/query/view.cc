@@ -19,7 +19,7 @@ struct ViewCommand {
   bool json = false;
 };
 
-// Starts the user's browser, which is nobody's child: whatever becomes of it concerns it alone.
+// Starts the user's browser as a detached process, so that its end does not affect this process.
 void open_in_browser(const std::string& url) {
   const pid_t child = fork();
   if (child == 0) {

@@ -32,7 +32,7 @@ void log_line(const std::string& line) {
                line.c_str());
 }
 
-// The settings of the file, overridden by the options given.
+// Returns the settings of the file, overridden by the given options.
 server::ServerConfig settings(const ServeCommand& command, const Command& line, FileSystem& files) {
   server::ServerConfig config;
   if (!command.config_file.empty()) server::read_config(files, command.config_file, config);
@@ -49,7 +49,8 @@ server::ServerConfig settings(const ServeCommand& command, const Command& line, 
 }
 
 void serve(const ServeCommand& command, const Command& line, CommandContext& context) {
-  umask(0077);  // scenes and results are for clients with a token, not for all users of the machine
+  // Only clients with a token may read scenes and results, not all users of the machine.
+  umask(0077);
   server::Service service(settings(command, line, context.files), context.files, log_line);
   log_line("listening on " + service.url());
   run_until_canceled(

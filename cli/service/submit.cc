@@ -20,8 +20,8 @@ struct SubmitCommand {
   bool json = false;
 };
 
-// Uploads scenes that are local files and returns their names on the server; other names are scenes
-// of the server already.
+// Uploads scenes that are local files and returns their names on the server. Other names are scenes
+// already on the server.
 std::vector<std::string> upload(const std::vector<std::string>& scenes, FileSystem& files,
                                 ServiceClient& service) {
   const auto progress = make_progress_bar();

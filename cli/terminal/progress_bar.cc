@@ -45,7 +45,7 @@ std::string percent(double part) {
   return text;
 }
 
-constexpr double kMinPartForEstimate = 0.01;  // too little is done for an estimate of the time left
+constexpr double kMinPartForEstimate = 0.01;  // below this part, no remaining time is estimated
 
 class ProgressBar : public Progress {
  public:
@@ -66,7 +66,7 @@ class ProgressBar : public Progress {
   void advance(uint64_t count) override {
     done_ += count;
     std::unique_lock lock(mutex_, std::try_to_lock);
-    if (!lock) return;  // another thread is just showing it
+    if (!lock) return;  // another thread is showing it now
     const double now = wall_seconds();
     if (now - last_shown_s_ < line_.interval_s()) return;
     last_shown_s_ = now;
@@ -98,7 +98,7 @@ class ProgressBar : public Progress {
   }
 
   ProgressLine line_;
-  std::mutex mutex_;  // guards all below but done_
+  std::mutex mutex_;  // guards all members below except done_
   std::string stage_, unit_;
   uint64_t total_ = 0, resumed_at_ = 0;
   std::atomic<uint64_t> done_{0};

@@ -17,8 +17,8 @@ void* check_pages(void* pages, size_t bytes, std::string_view what) {
     throw Error(ErrorCode::kOutOfMemory, "out of memory: the system refused " +
                                              std::to_string(bytes) + " bytes for " +
                                              std::string(what));
-  // Huge pages spare random access to large tables most address translations. None reaches beyond
-  // the mapping, so no more becomes resident than is charged.
+  // With huge pages, random access to large tables needs far fewer address translations. No huge
+  // page extends beyond the mapping, so resident memory does not exceed the charge.
   if (bytes >= (size_t{2} << 20)) madvise(pages, bytes, MADV_HUGEPAGE);
   return pages;
 }

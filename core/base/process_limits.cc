@@ -17,10 +17,10 @@ namespace {
 uint64_t number_in(const std::string& path) {
   std::ifstream file(path);
   uint64_t bytes = 0;
-  return file >> bytes ? bytes : UINT64_MAX;  // "max" does not parse: no limit
+  return file >> bytes ? bytes : UINT64_MAX;  // "max" does not parse, which means no limit
 }
 
-// The lowest limit from the group at `path` up to the root of the hierarchy.
+// Returns the lowest limit of the groups from `path` up to the root of the hierarchy.
 template <class LimitOf>
 uint64_t min_up_from(const std::string& root, std::string path, const LimitOf& limit_of) {
   uint64_t lowest = UINT64_MAX;
@@ -60,7 +60,7 @@ uint64_t min_of_groups(const std::string& membership, const std::string& mount,
   return lowest;
 }
 
-// CPUs of a quota in microseconds per period, rounded up.
+// Returns the CPUs of a quota in microseconds per period, rounded up.
 uint64_t cpus(uint64_t quota, uint64_t period) {
   if (quota >= INT64_MAX || period == 0 || period >= INT64_MAX) return UINT64_MAX;
   return std::max<uint64_t>(1, (quota + period - 1) / period);
@@ -73,7 +73,7 @@ std::string own_membership() {
 
 constexpr const char* kCgroupMount = "/sys/fs/cgroup";
 
-// A size in the kernel's status of this process; 0 where it is absent.
+// Returns a size in the kernel's status of this process; 0 if it is absent.
 uint64_t status_bytes(const std::string& name) {
   std::ifstream status("/proc/self/status");
   std::string line;
@@ -105,7 +105,7 @@ uint64_t cgroup_cpus(const std::string& membership, const std::string& mount) {
         return file >> quota >> period ? cpus(quota, period) : UINT64_MAX;
       },
       [](const std::string& folder) {
-        // A quota of -1 means no quota; read as an unsigned number it is above all limits.
+        // A quota of -1 means no quota. Read as an unsigned number, it exceeds all limits.
         return cpus(number_in(folder + "cpu.cfs_quota_us"),
                     number_in(folder + "cpu.cfs_period_us"));
       });

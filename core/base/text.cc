@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kUnits[] = {"B", "KiB", "MiB", "GiB", "TiB", "PiB"};
 
-// How far to shift for a unit ("", "B", "K", "KiB", "kB", ...), or -1.
+// Returns the shift for a unit ("", "B", "K", "KiB", "kB", ...), or -1.
 int unit_shift(std::string unit) {
   if (unit.ends_with("B") || unit.ends_with("b")) unit.pop_back();
   if (unit.ends_with("i")) unit.pop_back();
@@ -20,7 +20,7 @@ int unit_shift(std::string unit) {
   return at == std::string::npos ? -1 : 10 * static_cast<int>(at + 1);
 }
 
-// The value of a hexadecimal digit, or -1.
+// Returns the value of a hexadecimal digit, or -1.
 int hex_digit(char c) {
   if (c >= '0' && c <= '9') return c - '0';
   if (c >= 'a' && c <= 'f') return c - 'a' + 10;

@@ -11,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-// True if the file system of the file at `path` can make no file any more.
+// True if the file system of the file at `path` cannot create more files.
 bool has_no_inodes(const std::string& path) {
   struct statvfs s {};
   return statvfs(parent_directory(path).c_str(), &s) == 0 && s.f_files > 0 && s.f_favail == 0;
@@ -41,7 +41,7 @@ bool has_no_inodes(const std::string& path) {
   const int reason = database ? sqlite3_system_errno(database) : 0;
   if (code == ErrorCode::kIo && (reason == ENOSPC || reason == EDQUOT || reason == EFBIG))
     code = ErrorCode::kNoSpace;
-  // SQLite tries again without creating the file, and then reports that it is not there.
+  // SQLite tries again without creating the file. Then it reports that the file does not exist.
   if ((result & 0xff) == SQLITE_CANTOPEN && has_no_inodes(path)) {
     code = ErrorCode::kNoSpace;
     message += ": the file system has no inodes left";
@@ -83,7 +83,7 @@ SqlStatement& SqlStatement::bind(int parameter, std::string_view text) {
 }
 
 SqlStatement& SqlStatement::bind(int parameter, std::span<const std::byte> bytes) {
-  // No bytes are an empty blob, not NULL.
+  // An empty span is an empty blob, not NULL.
   const void* data = bytes.empty() ? static_cast<const void*>("") : bytes.data();
   const int result =
       sqlite3_bind_blob64(statement_.get(), parameter + 1, data, bytes.size(), SQLITE_STATIC);
@@ -153,7 +153,8 @@ int64_t SqlDatabase::integer(const std::string& sql) {
 }
 
 SqlTransaction::SqlTransaction(SqlDatabase& database, Durable durable) : database_(database) {
-  // In WAL mode FULL syncs the log at each commit; NORMAL leaves it to the next that does.
+  // In WAL mode FULL syncs the log at each commit. NORMAL leaves the sync to the next commit with
+  // FULL.
   database_.execute(durable == Durable::kNow ? "PRAGMA synchronous = FULL"
                                              : "PRAGMA synchronous = NORMAL");
   database_.execute("BEGIN IMMEDIATE");
@@ -164,7 +165,8 @@ SqlTransaction::~SqlTransaction() {
   try {
     database_.execute("ROLLBACK");
   } catch (const Error&) {
-    // The connection is closed or already rolled back: nothing was committed either way.
+    // The connection is closed, or the transaction is already rolled back. Nothing was committed in
+    // either case.
   }
 }
 

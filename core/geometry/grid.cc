@@ -40,11 +40,11 @@ double largest_extent(const WorldBounds& bounds) {
   return extent;
 }
 
-// Two numbers per vector register, which every supported processor has.
+// Two numbers per vector register, available on every supported processor.
 using Pair = double __attribute__((vector_size(16)));
 
-// floor(x), and a whole number near x beyond 2^51, without a branch, because half of all are
-// rounded up.
+// Returns floor(x); beyond 2^51, a whole number near x. Has no branch, because half of all numbers
+// are rounded up.
 Pair floor_of(Pair x) {
   constexpr Pair kNoFraction = {0x1.8p52, 0x1.8p52};
   const Pair nearest = (x + kNoFraction) - kNoFraction;
@@ -109,7 +109,7 @@ Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_
 }
 
 void snap_vertices(const Grid& grid, std::span<double> coordinates) {
-  // Both are powers of two, so that the order of their multiplications does not matter.
+  // Both factors are powers of two, so the order of the multiplications does not matter.
   const double scale = 128.0 * static_cast<double>(grid.resolution());
   const auto& o = grid.origin;
   const Pair origins[3] = {{o[0], o[1]}, {o[2], o[0]}, {o[1], o[2]}};

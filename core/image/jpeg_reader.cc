@@ -1,5 +1,5 @@
-// The only place that calls libjpeg-turbo. Its errors are jumps: each function that calls it has
-// nothing to destroy.
+// Calls libjpeg-turbo; no other file does. Its errors are jumps, so functions that call it must
+// have nothing to destroy.
 #include <cstdio>
 // <jpeglib.h> needs FILE.
 #include <jerror.h>
@@ -16,7 +16,7 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kJpegStateBytes = uint64_t{1} << 20;
-// A file can repeat scans of a large image at the cost of a few bytes each.
+// Repeating the scan of a large image costs a file only a few bytes.
 constexpr int kMaxScans = 500;
 
 class JpegReader : public ImageReader {
@@ -39,9 +39,9 @@ class JpegReader : public ImageReader {
       const J_COLOR_SPACE space = jpeg_.jpeg_color_space;
       if (space != JCS_GRAYSCALE && space != JCS_YCbCr && space != JCS_RGB)
         throw BrokenImage{"is a JPEG image that is neither gray nor YCbCr nor RGB (CMYK, say)"};
-      // Not every version and build of the library decodes these. In the first scan of a lossless
-      // image, Ss is its predictor; the first scan of other images has the mean of each block, Ss =
-      // 0.
+      // Refuses images that not every version and build of the library decodes. In the first scan
+      // of a lossless image, Ss is its predictor. In other images the first scan has the mean of
+      // each block, so Ss is 0.
       if (jpeg_.arith_code || jpeg_.data_precision != 8 || jpeg_.Ss != 0)
         throw BrokenImage{"is a JPEG image with arithmetic coding, lossless or not of 8 bits"};
       if (use == ImageUse::kSize) return;
@@ -69,7 +69,7 @@ class JpegReader : public ImageReader {
     (*jpeg->err->format_message)(jpeg, self(jpeg).message_);
     std::longjmp(self(jpeg).jump_, 1);
   }
-  // Warnings are of damaged data, some harmless ones aside.
+  // All warnings are about damaged data, except for some harmless ones.
   static void on_message(j_common_ptr jpeg, int level) {
     const int code = jpeg->err->msg_code;
     if (level >= 0 || code == JWRN_EXTRANEOUS_DATA || code == JWRN_ADOBE_XFORM ||
@@ -85,7 +85,8 @@ class JpegReader : public ImageReader {
   static boolean fill(j_decompress_ptr jpeg) {
     JpegReader& reader = self(reinterpret_cast<j_common_ptr>(jpeg));
     size_t size = reader.source_->read(reader.buffer_, sizeof reader.buffer_);
-    if (size == 0) {  // as if the end were marked: what lacks more than that is found damaged
+    // Acts as if the end were marked; if more is missing, the image is reported as damaged.
+    if (size == 0) {
       reader.has_ended_ = true;
       reader.buffer_[0] = std::byte{0xff};
       reader.buffer_[1] = std::byte{JPEG_EOI};
@@ -115,8 +116,8 @@ class JpegReader : public ImageReader {
     jpeg_read_header(&jpeg_, TRUE);
     return true;
   }
-  // What it allocates: rows of blocks before and after upsampling and, if there are several scans,
-  // the coefficients of the whole image.
+  // Charges the decoder's allocations: rows of blocks before and after upsampling and, if there are
+  // several scans, the coefficients of the complete image.
   void charge_decoder(MemoryBudget& budget) {
     uint64_t bytes = kJpegStateBytes, coefficients = 0;
     for (int i = 0; i < jpeg_.num_components; ++i) {

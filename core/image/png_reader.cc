@@ -1,5 +1,4 @@
-// Reads with libpng. Its errors are jumps: each function that calls it has
-// nothing to destroy.
+// Reads with libpng. Its errors are jumps, so functions that call it must have nothing to destroy.
 #include <png.h>
 
 #include <bit>
@@ -53,7 +52,7 @@ class PngReader : public ImageReader {
     else if (!read_one(row.data()))
       fail();
     ++next_row_;
-    // The checksum behind the last row.
+    // Checks the checksum after the last row.
     if (next_row_ == height_ && !read_end()) fail();
   }
 
@@ -79,8 +78,8 @@ class PngReader : public ImageReader {
   bool read_header() {
     if (setjmp(png_jmpbuf(png_))) return false;
     png_set_read_fn(png_, this, on_read);
-    png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);  // checked here
-    // Texts, profiles and the like are passed over, of whatever size they are.
+    png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);  // this reader checks them
+    // Skips texts, profiles and similar chunks of any size.
     png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_set_chunk_malloc_max(png_, 0);
     png_read_info(png_, info_);
@@ -129,7 +128,7 @@ class PngReader : public ImageReader {
   png_infop info_ = nullptr;
   bool is_interlaced_ = false, lacks_memory_ = false;
   int passes_ = 1;
-  PageBuffer<std::byte> all_;  // of an interlaced image
+  PageBuffer<std::byte> all_;  // all rows of an interlaced image
   uint64_t next_row_ = 0;
   char message_[96] = {};
 };

@@ -15,10 +15,10 @@ OutputLock::OutputLock(FileSystem& files, const std::string& output, std::unique
 
 OutputLock::~OutputLock() {
   try {
-    // A file of that name that is not empty was not created by voxdag.
+    // A file with this name that is not empty was not created by voxdag.
     if (files_.open_read(path_)->size() == 0) files_.remove(path_);
   } catch (const Error&) {
-    // An empty file remains, which the next process that writes the output locks again.
+    // An empty file remains. The next process that writes the output locks it.
   }
 }
 

@@ -36,7 +36,7 @@ class Descriptor {
   ~Descriptor() { release(); }
   int get() const { return fd_; }
   int take() { return std::exchange(fd_, -1); }
-  // Returns errno of close(), or 0.
+  // Closes the descriptor and returns the errno of close(), or 0.
   int release() {
     const int fd = take();
     return fd >= 0 && ::close(fd) != 0 ? errno : 0;
@@ -55,7 +55,7 @@ int open_retrying(const std::string& path, int flags) {
 
 enum class Contents { kKeep, kEmpty };
 
-// Opens, or makes, a file that is about to be changed. A link of that name could lead to any file.
+// Opens or creates a file that will be changed. Refuses links, because they could lead to any file.
 int open_to_change(const char* call, const std::string& path, Contents contents) {
   const auto refuse = [&](const char* what) {
     throw Error(ErrorCode::kInvalidInput,
@@ -125,7 +125,8 @@ class PosixWritableFile : public WritableFile {
       data = data.subspan(static_cast<size_t>(n));
     }
   }
-  // Whole blocks only: of a part of one the system would write zeros, which frees nothing.
+  // Releases only complete blocks: the system would write zeros to a part of a block, which frees
+  // nothing.
   void release(uint64_t offset, uint64_t bytes) override {
     constexpr uint64_t kBlock = 4096;
     const uint64_t begin = (offset + kBlock - 1) / kBlock * kBlock;
@@ -201,7 +202,7 @@ class PosixFileSystem : public FileSystem {
       const std::string name = e->d_name;
       if (name == "." || name == "..") continue;
       struct stat s {};
-      if (lstat((path + "/" + name).c_str(), &s) != 0) continue;  // gone since
+      if (lstat((path + "/" + name).c_str(), &s) != 0) continue;  // removed since the listing
       entries.push_back(
           {name, S_ISDIR(s.st_mode), static_cast<uint64_t>(s.st_size),
            512 * static_cast<uint64_t>(s.st_blocks),
@@ -226,7 +227,8 @@ class PosixFileSystem : public FileSystem {
       if (errno != EWOULDBLOCK) fail("lock", path, errno);
       return nullptr;
     }
-    // Another holder may have removed the file between open and flock: its name is then unlocked.
+    // Another holder may have removed the file between open and flock. The lock is then on a file
+    // without a name.
     struct stat held {
     }, named{};
     const bool same = fstat(fd, &held) == 0 && stat(path.c_str(), &named) == 0 &&

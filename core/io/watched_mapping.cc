@@ -10,10 +10,10 @@
 namespace voxdag {
 namespace {
 
-// Read by the signal handler, which may take no lock.
+// The signal handler reads it and must not take a lock.
 struct Slot {
   std::atomic<bool> taken{false};
-  std::atomic<uintptr_t> begin{0}, end{0};  // no address is within while they change
+  std::atomic<uintptr_t> begin{0}, end{0};  // while they change, no address is inside
   std::atomic<bool> damaged{false};
 };
 Slot g_slots[WatchedMapping::kMaxWatched];
@@ -23,13 +23,13 @@ static_assert(std::atomic<uintptr_t>::is_always_lock_free &&
 uintptr_t g_page_bytes = 4096;
 struct sigaction g_before;
 
-// Maps a page of zeros where the fault was, and lets the read happen again.
+// Maps a page of zeros at the address of the fault and repeats the read.
 void on_bus_error(int number, siginfo_t* info, void* context) {
   const auto address = reinterpret_cast<uintptr_t>(info->si_addr);
   if (info->si_code == BUS_ADRERR) {
     for (Slot& slot : g_slots) {
       const uintptr_t begin = slot.begin, end = slot.end;
-      // Both are of one mapping, though the slot may go to another one now.
+      // Both values were from one mapping, even if the slot has been reused since.
       if (address < begin || address >= end || slot.begin != begin || slot.end != end) continue;
       slot.damaged = true;
       void* page = reinterpret_cast<void*>(address / g_page_bytes * g_page_bytes);
@@ -39,11 +39,11 @@ void on_bus_error(int number, siginfo_t* info, void* context) {
       return;
     }
   }
-  // Somebody else's.
+  // The fault belongs to another handler.
   if (g_before.sa_flags & SA_SIGINFO) return g_before.sa_sigaction(number, info, context);
   if (g_before.sa_handler != SIG_DFL && g_before.sa_handler != SIG_IGN)
     return g_before.sa_handler(number);
-  signal(SIGBUS, SIG_DFL);  // an access is repeated, and ends the process
+  signal(SIGBUS, SIG_DFL);  // the access is repeated and then ends the process
   const bool was_sent = info->si_code <= 0 || info->si_code == BUS_MCEERR_AO;
   if (was_sent) raise(number);
 }

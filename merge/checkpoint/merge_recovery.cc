@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// Releasing fewer bytes per call costs more than it gains.
+// Releasing fewer bytes per call is not worth the call.
 constexpr uint64_t kMinReleasedBytes = uint64_t{32} << 10;
 
 }  // namespace
@@ -138,7 +138,7 @@ std::vector<SegmentRange> MergeRecovery::newly_merged(std::span<const ArtifactRe
   for (size_t i = 0; i < readers.size(); ++i) {
     const ArtifactRef& ref = pending_.artifacts()[i].ref;
     if (is_pass_segment(ref.segment)) continue;
-    // The levels of an artifact are stored one after the other, the bricks first.
+    // The levels of an artifact are stored one after another, bricks first.
     uint64_t end = ref.offset;
     for (const ArtifactLevel& l : readers[i].levels())
       if (l.level >= level && !l.frames.empty())

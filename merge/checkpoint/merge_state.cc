@@ -73,7 +73,7 @@ namespace {
 constexpr uint64_t kMagic = 0x0a4752454d474456;  // "VDGMERG\n"
 constexpr uint32_t kVersion = 3;
 
-// Puts or gets the members of a description. `Derived` codes words, counts and texts.
+// Encodes or decodes the members of a description. `Derived` handles words, counts and texts.
 template <class Derived>
 class Coder {
  public:
@@ -125,7 +125,8 @@ class Get : public Coder<Get> {
   void word(T& word) {
     word = in_.get<T>();
   }
-  // Every item takes `min_bytes`, so a damaged count cannot allocate more than the bytes hold.
+  // Every item takes at least `min_bytes`. So a damaged count cannot allocate more memory than the
+  // bytes allow.
   void count(auto& items, size_t min_bytes) {
     const uint64_t n = in_.get<uint64_t>();
     if (n <= in_.left() / min_bytes)

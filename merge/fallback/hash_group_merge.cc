@@ -10,10 +10,10 @@ namespace {
 
 constexpr uint32_t kMaxEncodedWords = 1 + kMaxRowWords;  // a row in the scratch file: mask, words
 
-// The rows of the group that one run has.
+// The rows of the group in one run.
 struct GroupRun {
   size_t run = 0;
-  uint64_t first_row = 0;  // of the run
+  uint64_t first_row = 0;  // in the run
   uint64_t rows = 0;
   uint64_t begin_word = 0, end_word = 0;  // in the scratch file
 };
@@ -145,13 +145,14 @@ class GroupCursor {
   const RowFormat format_;
   PositionMaps& maps_;
   const uint64_t hash_;
-  std::span<uint32_t> buffer_;     // encoded rows
-  std::span<uint32_t> positions_;  // of an even number; the first `pending_` are not stored yet
-  uint64_t next_word_;             // the first word of the file that is not read yet
+  std::span<uint32_t> buffer_;  // encoded rows
+  // An even number of positions; the first `pending_` are not stored yet.
+  std::span<uint32_t> positions_;
+  uint64_t next_word_;  // first word of the file that is not read yet
   uint64_t rows_left_;
-  size_t at_ = 0, filled_ = 0;  // in buffer_
-  uint64_t stored_ = 0;         // rows
-  size_t pending_ = 0;          // words
+  size_t at_ = 0, filled_ = 0;  // positions in buffer_
+  uint64_t stored_ = 0;         // number of rows
+  size_t pending_ = 0;          // number of words
 };
 
 }  // namespace
@@ -164,7 +165,7 @@ LevelExtent merge_hash_group(const MergeContext& context, const LevelTask& task,
   const auto runs = group.runs();
 
   OrderedRowWriter out(task.output, task.format, first_position, context.budget);
-  // A multiple of 8, so that a quarter holds whole positions.
+  // A multiple of 8, so that a quarter has complete positions.
   const size_t each =
       std::clamp<uint64_t>(bytes / 2 / sizeof(uint32_t) / runs.size(), 128, 16384) / 8 * 8;
   PageBuffer<uint32_t> buffers(context.budget, each * runs.size() + kMaxRowWords,

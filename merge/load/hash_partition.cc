@@ -6,8 +6,8 @@
 namespace voxdag {
 namespace {
 
-// The fewest bits for which buckets of evenly spread hashes have `bucket_rows` rows, and for which
-// the table of bucket begins takes at most a byte or two per row.
+// Returns the smallest number of bits for which buckets of evenly spread hashes have about
+// `bucket_rows` rows. The table of bucket begins then takes at most one or two bytes per row.
 unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_t bucket_rows,
                             size_t slices) {
   const uint64_t max_buckets = std::max<uint64_t>(
@@ -20,7 +20,8 @@ unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_
 }  // namespace
 
 uint64_t HashPartition::bytes_for(const RowCount& count, uint32_t position_words) {
-  // Hash, mask, bucket begins (see choose_bucket_bits); words, and a bit for each during rewiring.
+  // Per row: hash, mask, bucket begins (see choose_bucket_bits) and position. Per child word: the
+  // word, and one bit during rewiring.
   return count.rows * (8 + 1 + 4 + 4 * position_words) + count.words * 4 + count.words / 8;
 }
 
@@ -79,7 +80,7 @@ void PartitionMemory::reserve(const RowCount& count, uint32_t position_words,
   if (rows <= hashes_.size() && words <= words_.size() &&
       position_words * rows <= positions_.size())
     return;
-  release();  // all columns, so that the peak is the size of one partition
+  release();  // frees all columns first, so that the peak is the size of one partition
   hashes_ = PageBuffer<uint64_t>(budget, rows, "a hash partition of the merge");
   masks_ = PageBuffer<uint8_t>(budget, rows, "a hash partition of the merge");
   words_ = PageBuffer<uint32_t>(budget, words, "a hash partition of the merge");

@@ -9,12 +9,12 @@
 namespace voxdag {
 namespace {
 
-// Frames of one work item when the maps are in memory: enough that the map of the run remains in
-// the thread's cache.
+// Frames per work item if the maps are in memory: enough that the run's map remains in the thread's
+// cache.
 constexpr size_t kFramesPerItem = 16;
 
-// Writes the positions that the map has for the children. The map may be wide though its level, and
-// so the words of its parents, turned out not to be.
+// Replaces children by their positions in the map. The map may be wide even if its level, and so
+// the words of its parents, turned out not to be wide.
 void replace_all(std::span<const uint32_t> children, const uint32_t* map, bool wide_map, bool wide,
                  uint32_t* out) {
   if (!wide_map) {
@@ -50,7 +50,8 @@ class HashPartition::Loader {
     }
   }
 
-  // Work items: frames of one slice each. A spilled map is loaded once for all frames of a slice.
+  // Returns the work items; each has frames of one slice. A spilled map is loaded once for all
+  // frames of a slice.
   std::vector<FrameSpan> items(std::vector<size_t>& slice_of_item) const {
     std::vector<FrameSpan> spans;
     for (size_t s = 0; s < partition_.slices_.size(); ++s) {
@@ -89,7 +90,7 @@ class HashPartition::Loader {
     MemoryCharge charge;
     Frame frame;
     PageBuffer<uint32_t> window;
-    std::vector<bool> replaced;  // for each child of a slice; see HashPartition::bytes_for()
+    std::vector<bool> replaced;  // one flag per child of a slice; see HashPartition::bytes_for()
   };
 
   // Copies a frame into the columns; without a map its children are unchanged.
@@ -117,14 +118,15 @@ class HashPartition::Loader {
       for (const uint32_t child : frame.children) out = put_position(out, child, true);
   }
 
-  // Loads the positions of so many rows of the slice's run.
+  // Loads the positions of `rows` rows of the slice's run, starting at row `first`.
   const uint32_t* load_window(Worker& worker, const RunSlice& slice, uint64_t first,
                               uint64_t rows) const {
     maps_->load(slice.run, first, {worker.window.data(), rows * maps_->position_words()});
     return worker.window.data();
   }
 
-  // The number of bucket begins, including the end of the last bucket, at or before this hash.
+  // Returns the number of buckets that begin at or before this hash, plus one if the hash is after
+  // the last bucket, for its end.
   size_t begins_up_to(uint64_t hash) const {
     const HashInterval& interval = partition_.interval_;
     if (hash < interval.first) return 0;
@@ -132,8 +134,8 @@ class HashPartition::Loader {
     return (hash >> partition_.bucket_bits_) - (interval.first >> partition_.bucket_bits_) + 1;
   }
 
-  // Sets the bucket begins after the first row of this frame, up to the first row of the
-  // next one.
+  // Sets the begins of all buckets from the first row of this frame up to the first row of the next
+  // frame.
   void mark_bucket_begins(size_t slice_index, const LevelRun& run, size_t f, const Frame& frame) {
     const RunSlice& slice = partition_.slices_[slice_index];
     size_t next = f == slice.frames.begin ? 0 : begins_up_to(frame.hashes.front());
@@ -163,7 +165,7 @@ class HashPartition::Loader {
                                              : hash > partition_.interval_.last;
   }
 
-  // For a map that is larger than the memory of a worker: loads it window by window.
+  // Replaces the children window by window, for a map that is larger than a worker's memory.
   void replace_by_windows(Worker& worker, const RunSlice& slice, const CancelToken& cancel) {
     const bool wide = partition_.format().wide;
     const uint64_t children = slice.size.words >> wide;
@@ -188,7 +190,7 @@ class HashPartition::Loader {
   HashPartition& partition_;
   const PositionMaps* const maps_;
   const bool spilled_;
-  uint64_t window_rows_ = 0;  // positions that a window holds
+  uint64_t window_rows_ = 0;  // positions per window
   std::vector<Worker> workers_;
 };
 

@@ -7,7 +7,7 @@
 namespace voxdag {
 namespace {
 
-// Where the map of each run begins, and the end of the last, in rows.
+// Returns the first row of each run's map, and the end of the last map.
 std::vector<uint64_t> begins_of(std::span<const uint64_t> rows) {
   std::vector<uint64_t> begins{0};
   for (const uint64_t count : rows) begins.push_back(begins.back() + count);

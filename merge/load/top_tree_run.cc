@@ -33,7 +33,7 @@ TopTreeRun::TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children, boo
   divide_into_frames();
 }
 
-// `children` in Morton order: siblings are adjacent, in child order.
+// `children` are in Morton order, so siblings are adjacent, in child order.
 void TopTreeRun::add_parents(const std::vector<PlacedNode>& children, uint32_t hash_bits) {
   for (size_t begin = 0, end; begin < children.size(); begin = end) {
     Node node;

@@ -16,7 +16,7 @@ namespace {
 
 // Rows that fit in a core's cache while they are sorted.
 constexpr uint64_t kBucketRows = 8192;
-// With many runs buckets are larger, so that the share of each run is worth a visit.
+// With many runs buckets are larger, so that each run has enough rows per bucket.
 constexpr uint64_t kMinBucketRowsPerRun = 16;
 
 // Walks the rows of one slice within one bucket.
@@ -84,7 +84,7 @@ class PartitionMerge {
            BucketSorter::bytes_for(size) <= context_.plan.worker_bytes;
   }
 
-  // One for each worker, large enough for every bucket that fits.
+  // Makes one sorter for each worker, large enough for every bucket that fits.
   void make_sorters() {
     RowCount max;
     for (size_t bucket = 0; bucket < partition_.bucket_count(); ++bucket) {
@@ -133,7 +133,7 @@ class PartitionMerge {
     end_turn({out.nodes(), out.end_position() - position_});
   }
 
-  // Called in the turn of the bucket that has this extent.
+  // Called in the turn of the bucket with this extent.
   void end_turn(const LevelExtent& bucket) {
     extent_.nodes += bucket.nodes;
     extent_.positions += bucket.positions;
@@ -164,19 +164,19 @@ class PartitionMerge {
   const LevelTask& task_;
   HashPartition& partition_;
   Turns turns_;        // of the buckets
-  uint64_t position_;  // of the next bucket, changed in turn
+  uint64_t position_;  // position of the next bucket; changed only in turn
   std::vector<BucketSorter> sorters_;
-  LevelExtent extent_;  // changed in turn
+  LevelExtent extent_;  // changed only in turn
 };
 
 uint64_t bucket_rows(const MergeContext& context, const LevelTask& task) {
   const uint64_t rows = std::max<uint64_t>(kBucketRows, kMinBucketRowsPerRun * task.runs.size());
-  // Half of a worker's memory, because buckets differ in size.
+  // Uses half of a worker's memory, because buckets differ in size.
   const uint64_t row_bytes = BucketSorter::bytes_for({1, task.format.max_words()});
   return std::min(rows, context.plan.worker_bytes / (2 * row_bytes));
 }
 
-// The words of a position that a partition holds until the partition is merged.
+// Returns the words of each row's position that a partition keeps until it is merged.
 uint32_t held_position_words(const LevelTask& task) {
   return task.maps.resident() ? 0 : task.maps.position_words();
 }
@@ -191,8 +191,9 @@ LevelExtent merge_partition(const MergeContext& context, const LevelTask& task,
   return PartitionMerge(context, task, partition, first_position).run();
 }
 
-// The plan has space for two frames of every run, so only a group of equal hashes that is longer
-// than that in some run may fail to fit. Throws Error{kOutOfMemory} if no run has one.
+// The plan has space for two frames of every run. So only a group of equal hashes that is longer
+// than two frames in some run may fail to fit. Throws Error{kOutOfMemory} if no run has such a
+// group.
 void check_group_is_large(const LevelTask& task, uint64_t hash) {
   for (const LevelRun* run : task.runs) {
     const FrameSpan frames = run->frames_within({hash, hash});

@@ -79,7 +79,7 @@ class Pass {
       memory_.release();
   }
 
-  // The most positions that rows can take: as if none of them were equal.
+  // Returns the maximum number of positions of rows, reached if no two are equal.
   uint64_t max_positions(const RowCount& rows) const {
     return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }
@@ -101,7 +101,7 @@ class Pass {
       memory_.reserve(max, 0, context_.budget);
   }
 
-  // Memory for a level in addition to its partition.
+  // Returns the memory for a level in addition to its partition.
   uint64_t bytes_besides_partition() const {
     return bytes_for_workers(context_.plan) + context_.plan.resident_bytes;
   }
@@ -117,7 +117,7 @@ class Pass {
         if (root.cube.level != level) continue;
         const uint64_t position = maps.at(run, root.index);
         done_.placed.push_back({root.cube, root.hash, position});
-        // Nobody asks for the index of a root in the global file.
+        // The index of a root in the global file is never used.
         root.index = static_cast<uint32_t>(position);
         done_.roots.push_back(root);
       }

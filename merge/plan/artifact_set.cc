@@ -73,7 +73,7 @@ uint64_t content_checksum(const ArtifactReader& reader) {
   return checksum64(std::as_bytes(std::span(words)));
 }
 
-// Memory a hash partition needs to hold any two neighboring frames.
+// Returns the memory that a hash partition needs to hold any two neighboring frames.
 uint64_t min_partition_bytes(const ArtifactReader& reader, bool wide) {
   uint64_t max = 0;
   for (const ArtifactLevel& level : reader.levels()) {
@@ -86,11 +86,11 @@ uint64_t min_partition_bytes(const ArtifactReader& reader, bool wide) {
   return max;
 }
 
-// Every artifact counts as at least this much, so that the budget also bounds the number of open
+// Minimum size that each artifact counts as, so that the budget also limits the number of open
 // runs.
 constexpr uint64_t kMinRunBytes = uint64_t{64} << 10;
 
-// The Morton code of the cube's low corner, in bricks of the largest grid.
+// Returns the Morton code of the cube's low corner, in bricks of the largest grid.
 uint64_t morton_code_of(const Cube& cube) {
   const uint64_t code = morton_encode(cube.position[0], cube.position[1], cube.position[2]);
   return code << 3 * (kMaxGridLevels - cube.level);

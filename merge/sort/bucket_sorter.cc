@@ -8,8 +8,8 @@ namespace {
 
 // A digit with more rows is sorted by comparison before the insertion sort runs over all rows.
 constexpr uint32_t kMaxInsertionRows = 32;
-// Every slice has a few rows in a bucket, somewhere in memory: they are prefetched this many slices
-// ahead.
+// In a bucket every slice has a few rows at scattered addresses. They are prefetched this many
+// slices ahead.
 constexpr size_t kSlicesAhead = 8;
 
 template <class T>
@@ -48,8 +48,8 @@ void BucketSorter::sort(const HashPartition& partition, size_t bucket, bool in_w
   emit_unique(in_words);
 }
 
-// Fills entries_ in the order of the hash. A digit is the highest bits of the hash below those that
-// all rows of the bucket share.
+// Fills entries_ in the order of the hash. The digit is the highest bits of the hash below the bits
+// that all rows of the bucket share.
 void BucketSorter::distribute(const HashPartition& partition, size_t bucket) {
   const auto slices = partition.slices();
   size_t rows = 0;
@@ -117,7 +117,7 @@ bool BucketSorter::same_row(const Entry& a, const Entry& b) const {
   return true;
 }
 
-// Rows of equal hash are mostly one row, or the same row of several runs.
+// Rows with equal hashes are usually a single row, or the same row in several runs.
 void BucketSorter::emit_unique(bool in_words) {
   unique_.clear();
   extent_ = 0;

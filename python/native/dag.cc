@@ -29,7 +29,7 @@ using Rows = nb::ndarray<Number, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu
 template <class Number>
 using Cells = nb::ndarray<Number, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
-// The rows of an array (N, 3) in place.
+// Returns the rows of an array (N, 3) without copying them.
 std::span<const Position> positions_of(const Rows<const int64_t>& rows) {
   return {reinterpret_cast<const Position*>(rows.data()), rows.shape(0)};
 }
@@ -103,7 +103,7 @@ void points(const query::DagFile& dag, const Position& low, const Position& high
   expect_length(found.shape(0), dag.positions({grid_levels, {low, high}}, positions_of(found)));
 }
 
-// The cell of each point of world space.
+// Finds the cell of each point of world space.
 void world_to_cells(const query::DagFile& dag, const Rows<const double>& points,
                     uint32_t grid_levels, const Rows<int64_t>& cells) {
   expect_length(cells.shape(0), points.shape(0));
@@ -121,7 +121,7 @@ std::pair<Position, Position> world_to_region(const query::DagFile& dag,
   return {region.low, region.high};
 }
 
-// The number of rows that points() fills, found by a walk over the region alone.
+// Returns the number of rows that points() fills, found by a walk over only the region.
 uint64_t point_count(const query::DagFile& dag, const Position& low, const Position& high,
                      uint32_t grid_levels) {
   const nb::gil_scoped_release released;
@@ -149,7 +149,7 @@ void nearest(const query::DagFile& dag, const Rows<const int64_t>& points, doubl
   }
 }
 
-// Fills the rows of the cells that have the attribute. `Number`: see attribute_types().
+// Fills the rows of the cells that have the attribute. For `Number`, see attribute_types().
 template <class Number>
 void values(const query::DagFile& dag, const std::string& name, const Rows<const int64_t>& points,
             uint32_t grid_levels, const nb::ndarray<Number, nb::c_contig, nb::device::cpu>& found) {
@@ -172,7 +172,7 @@ void values(const query::DagFile& dag, const std::string& name, const Rows<const
   });
 }
 
-// The name of each attribute, the components of its values and their numpy type.
+// Returns the name of each attribute, the number of components of its values, and their numpy type.
 std::vector<std::tuple<std::string, uint32_t, std::string>> attribute_types() {
   std::vector<std::tuple<std::string, uint32_t, std::string>> all;
   for (const AttributeTraits& row : kAttributeTable) {
@@ -185,7 +185,7 @@ std::vector<std::tuple<std::string, uint32_t, std::string>> attribute_types() {
   return all;
 }
 
-// Names are UTF-8, unless the scene had others.
+// Names are UTF-8, unless the scene's names were not.
 std::vector<nb::bytes> material_names(const query::DagFile& dag) {
   std::vector<nb::bytes> names;
   for (const std::string& name : dag.file().material_names())
@@ -193,7 +193,7 @@ std::vector<nb::bytes> material_names(const query::DagFile& dag) {
   return names;
 }
 
-// Nodes and bytes of each level.
+// Returns nodes and bytes of each level.
 std::vector<std::pair<uint64_t, uint64_t>> levels(const query::DagFile& dag) {
   std::vector<std::pair<uint64_t, uint64_t>> all;
   for (uint32_t l = 0; l <= dag.file().brick_level(); ++l) {

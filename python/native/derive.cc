@@ -72,7 +72,7 @@ std::string export_file(const PathText& path, const PathText& output, const std:
   });
 }
 
-// The files that an export would write.
+// Returns the files that an export would write.
 std::vector<PathText> export_paths(const std::string& format, const PathText& output) {
   std::vector<PathText> paths;
   for (std::string& path : query::export_paths(query::export_format(format), output.bytes))

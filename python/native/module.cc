@@ -1,4 +1,4 @@
-// The native half of the module voxdag; python/voxdag has the half that users see.
+// The native part of the module voxdag. python/voxdag is the part that users see.
 #include <nanobind/nanobind.h>
 
 #include "core/base/error.h"
@@ -11,7 +11,7 @@ namespace nb = nanobind;
 namespace voxdag::python {
 namespace {
 
-// voxdag.Error, which the Python half defines.
+// Raises voxdag.Error, which the Python part defines.
 void raise(const Error& error) {
   const nb::object type = nb::module_::import_("voxdag._error").attr("Error");
   const nb::object raised = type(message_text(error.message()), error_name(error.code()));

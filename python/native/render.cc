@@ -36,8 +36,8 @@ query::Vec in_voxels(const Point& point, const voxdag_reader::File& file) {
   return voxels;
 }
 
-// The renderer and the array of pixels must fit the limit. Checked first because an allocation of
-// too much memory can end the process.
+// Throws if the renderer and the array of pixels do not fit the limit. This is checked first,
+// because allocating too much memory can end the process.
 void check_memory(int width, int height, const std::string& memory) {
   const uint64_t limit = memory_of(memory);
   const uint64_t bytes = (query::kRenderBytesPerPixel + 3) * static_cast<uint64_t>(width) *
@@ -49,7 +49,7 @@ void check_memory(int width, int height, const std::string& memory) {
                     size_text(limit) + ": choose a smaller size, or more with memory=");
 }
 
-// Fills the pixels. Where there is no camera, the view decides where it is.
+// Fills the pixels. Without a camera, the named view determines it.
 void render(const PathText& path, const std::string& view, const std::optional<Point>& camera,
             const Point& target, std::optional<double> fov_degrees, int samples, bool gray,
             unsigned threads, nb::object progress, const Pixels& pixels) {

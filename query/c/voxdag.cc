@@ -22,7 +22,7 @@ struct voxdag_file {
 
 namespace {
 
-// Has a fixed size, so that reporting a lack of memory needs no memory.
+// Has a fixed size, so that reporting a lack of memory allocates nothing.
 thread_local std::array<char, 1024> last_error;
 
 void set_error(const char* text) {
@@ -46,11 +46,11 @@ voxdag_status status_of(voxdag::ErrorCode code) {
     case voxdag::ErrorCode::kLimit:
       return VOXDAG_LIMIT;
     default:
-      return VOXDAG_INTERNAL;  // a query frees no disk, cancels nothing and has no device
+      return VOXDAG_INTERNAL;  // queries use no disk space and no device, and cannot be canceled
   }
 }
 
-// Runs `ask`; no exception passes into C.
+// Runs `ask`. Catches all exceptions, because none may pass into C.
 template <class Ask>
 voxdag_status answer(const Ask& ask) {
   try {
@@ -158,7 +158,7 @@ voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts) {
     known.svo_nodes = dag.svo_nodes();
     known.dag_nodes = dag.dag_nodes();
     known.bytes = dag.file_bytes();
-    // Members that a later header has, and this library does not know, become 0.
+    // Sets members to 0 that were added in a later header and are unknown to this library.
     std::memset(facts, 0, known.struct_size);
     std::memcpy(facts, &known, std::min(known.struct_size, sizeof known));
   });

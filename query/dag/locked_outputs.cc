@@ -35,8 +35,8 @@ void refuse_replacing(FileSystem& files, const Outputs& outputs) {
     }
 }
 
-// True if the last writer was killed. A lock file that is not empty was not made by voxdag, and a
-// build's leftovers are kept, because the build can resume from them.
+// True if the last writer was killed. A lock file that is not empty was not created by voxdag. The
+// leftovers of a build are kept, because the build can resume from them.
 bool is_left_behind(FileSystem& files, const std::string& output) {
   const auto lock = open_if_there(files, OutputLock::path_of(output));
   return lock && lock->size() == 0 && !files.exists(output + ".work");
@@ -45,7 +45,7 @@ bool is_left_behind(FileSystem& files, const std::string& output) {
 void remove_leftovers(FileSystem& files, const Outputs& outputs) {
   for (const std::string& path : outputs.paths)
     if (open_if_there(files, partial_path(path))) files.remove(partial_path(path));
-  // Folders of make_temporary_folder().
+  // Random characters in the names of make_temporary_folder().
   constexpr size_t kRandomCharacters = 6;
   const std::string& output = outputs.paths[0];
   const std::string folder = parent_directory(output);
@@ -56,8 +56,9 @@ void remove_leftovers(FileSystem& files, const Outputs& outputs) {
       remove_tree(files, folder + "/" + entry.name);
 }
 
-// Refuses outputs before the lock exists: a process that is killed in between must not leave a lock
-// next to a temporary file that is not its own. Returns whether a killed process left its files.
+// Refuses outputs before the lock file exists. Otherwise a process killed in between would leave a
+// lock file next to another program's temporary file. Returns true if a killed process left its
+// files.
 bool check_outputs(FileSystem& files, const Outputs& outputs) {
   refuse_impossible(files, outputs);
   const bool left_behind = is_left_behind(files, outputs.paths[0]);

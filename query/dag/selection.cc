@@ -12,7 +12,7 @@ namespace voxdag::query {
 
 namespace {
 
-// A build snaps vertices to 1/256 of its voxels, so much finer differences are meaningless.
+// A build snaps vertices to 1/256 of its voxels, so differences below half of that are meaningless.
 constexpr double kMaxSnapCells = 1.0 / 512;
 constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
 

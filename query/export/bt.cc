@@ -1,10 +1,11 @@
-// OctoMap's binary octree (Hornung et al. 2013): a header of text, then two bytes for each inner
-// node, depth first. Bits 2i and 2i + 1 say what child i is: 01 (the first bit set) free, 10
-// occupied, 11 an inner node, 00 unknown. Child = x + 2y + 4z. Written directly, since the library
-// would hold all nodes in memory.
+// OctoMap's binary octree (Hornung et al. 2013): a text header, then two bytes for each inner node,
+// depth first. Bits 2i and 2i + 1 describe child i: 01 (the first bit set) free, 10 occupied, 11 an
+// inner node, 00 unknown. Child = x + 2y + 4z. Written directly, because the library would store
+// all nodes in memory.
 //
 // The octree has 16 levels, and the coordinates' origin is in its middle. The grid's low corner is
-// there, or, of a grid of 2^16 cells, at the low corner of the octree.
+// at the origin. A grid of 2^16 cells fills the octree, so its low corner is the octree's low
+// corner.
 #include <array>
 #include <cstdio>
 #include <optional>
@@ -21,19 +22,19 @@ namespace {
 constexpr uint32_t kOctoMapLevels = 16;
 enum BtChild : uint32_t { kUnknown = 0, kFree = 1, kOccupied = 2, kInner = 3 };
 
-// Walks the octree depth first. Cubes without voxels inside the region are free: the file does not
-// record the inside of objects.
+// Walks the octree depth first. Cubes without voxels inside the region are free, because the file
+// does not record the inside of objects.
 template <class Inner>
 class BtWalk {
  public:
-  // inner(bits) is called for each inner node, in order.
+  // Calls inner(bits) for each inner node, in order.
   BtWalk(const ExportJob& job, Inner& inner) : job_(job), inner_(inner) {}
   uint64_t nodes = 0, voxels = 0;
 
   void run() {
     const uint32_t levels = job_.selection.grid_levels;
     ++nodes;  // the root
-    // The octant of the origin, and then the low corner of each cube.
+    // First the octant of the origin, then the low corner of each cube.
     for (uint32_t level = kOctoMapLevels; level > levels; --level) {
       inner_(kInner << (level == kOctoMapLevels ? 14 : 0));
       ++nodes;
@@ -71,7 +72,7 @@ class BtWalk {
       bits |= state << 2 * octomap_child(i);
     }
     inner_(bits);
-    // Children follow in OctoMap's order, which is voxdag's with x and z exchanged.
+    // Children are in OctoMap's order: voxdag's order with x and z exchanged.
     for (int i = 0; i < 8; ++i) {
       const int ours = octomap_child(i);
       if (inner >> ours & 1)

@@ -44,8 +44,8 @@ std::string coarser_options(const ExportJob& job, uint32_t grid_levels) {
 
 void refuse_size(const ExportJob& job, const std::string& problem,
                  const std::function<bool(uint32_t grid_levels)>& fits, ErrorCode code) {
-  // From the coarsest grid up, so that only one grid that does not fit is visited; it may be very
-  // large.
+  // Starts with the coarsest grid, so that only one grid that does not fit is visited, which may be
+  // very large.
   uint32_t end = kBrickLevels;
   {
     ExportStage stage(job, "find a level that fits", job.selection.grid_levels - end, "levels");

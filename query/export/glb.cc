@@ -1,7 +1,8 @@
-// A surface as a binary glTF 2.0: the faces between set voxels and empty ones, coplanar faces
-// merged to rectangles, of one color where the file has colors. Positions are integer numbers of
-// cells from the low corner of the region, which floats hold exactly; the node places and scales
-// them. COLOR_0 is linear light, as glTF requires, in 16 bits: dark sRGB bytes need them.
+// A surface as a binary glTF 2.0. It has the faces between set and empty voxels. Coplanar faces are
+// merged to rectangles, which have one color each if the file has colors. Positions are integer
+// numbers of cells from the low corner of the region, which floats represent exactly. The node's
+// transform places and scales them. COLOR_0 is linear light, as glTF requires, in 16 bits, because
+// dark sRGB bytes need this precision.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -19,11 +20,11 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMaxGlbBytes = (uint64_t{1} << 32) - 1;  // its length is a u32
-constexpr uint64_t kMaxGlbJsonBytes = 4096;                 // and chunk headers
+constexpr uint64_t kMaxGlbJsonBytes = 4096;                 // including chunk headers
 constexpr uint64_t kQuadBytes = 4 * 3 * sizeof(float) + 6 * sizeof(uint32_t);
 constexpr uint64_t kQuadColorBytes = 4 * 4 * sizeof(uint16_t);
 
-// Bytes of a rectangle, and how many of them fit.
+// Returns the bytes of a rectangle.
 uint64_t quad_bytes(const ExportJob& job) {
   return kQuadBytes + (job.has_colors ? kQuadColorBytes : 0);
 }
@@ -32,14 +33,14 @@ uint64_t max_quads(const ExportJob& job, uint64_t max_bytes) {
 }
 
 struct GlbBrick {
-  uint64_t morton = 0;  // of its corner, in bricks
+  uint64_t morton = 0;  // Morton code of its corner, in bricks
   uint64_t mask = 0;
 };
 
 // A rectangle of faces: at `plane` of an axis, over [u0, u1) x [v0, v1) of the next two axes.
 struct GlbQuad {
   uint32_t plane = 0, u0 = 0, v0 = 0, u1 = 0, v1 = 0;
-  bool upward : 1 = false;  // it looks along the axis, or against it
+  bool upward : 1 = false;  // it faces along the axis, not against it
   uint8_t axis : 2 = 0;
   voxdag_reader::Rgb color;
 };
@@ -47,7 +48,7 @@ static_assert(sizeof(GlbQuad) == 24);
 
 class GlbSurface {
  public:
-  // Ends early, with more rectangles than `max_quads`, if there are more.
+  // Stops as soon as there are more than `max_quads` rectangles.
   GlbSurface(const ExportJob& job, uint64_t max_quads)
       : job_(job), max_quads_(max_quads), colors_(job.file) {
     const uint64_t count = count_bricks();
@@ -66,7 +67,7 @@ class GlbSurface {
  private:
   static constexpr const char* kMemory =
       "the surface (a smaller --region or a coarser --level needs less)";
-  // A face is sorted by plane, then v, then u: 21 bits each.
+  // Faces are sorted by plane, then v, then u, with 21 bits each.
   static constexpr int kCoordinateBits = 21;
   static constexpr uint64_t kCoordinateMask = (uint64_t{1} << kCoordinateBits) - 1;
 
@@ -103,7 +104,7 @@ class GlbSurface {
     return found != bricks_.end() && found->morton == morton ? found->mask : 0;
   }
 
-  // The faces of a brick that look into empty cells.
+  // Returns the faces of a brick that are next to empty cells.
   uint64_t exposed(const Position& corner, uint64_t mask, uint8_t axis, bool upward) const {
     Position next_to = corner;
     next_to[axis] += upward ? kBrickEdge : -kBrickEdge;
@@ -165,13 +166,13 @@ class GlbSurface {
     return color_of_cell(job_, colors_, cell);
   }
 
-  // Makes the longest runs of a color along u, and merges a run with the equal one of the row
-  // before.
+  // Makes the longest runs of one color along u, and merges a run with an equal run of the previous
+  // row.
   void merge(const std::vector<uint64_t>& faces, uint8_t axis, bool upward) {
-    std::vector<size_t> row, previous;  // quads of the current row and of the one before
+    std::vector<size_t> row, previous;  // rectangles of the current and of the previous row
     size_t candidate = 0;
     GlbQuad last{};
-    voxdag_reader::Rgb next;  // color of the face that the next run begins with
+    voxdag_reader::Rgb next;  // color of the first face of the next run
     if (!faces.empty()) next = color_of(faces[0], axis, upward);
     for (size_t i = 0; i < faces.size() && quads_.size() <= max_quads_;) {
       GlbQuad run;
@@ -229,7 +230,7 @@ class GlbSurface {
   uint64_t voxels_ = 0;
 };
 
-// The corners of a rectangle, counterclockwise as seen from outside.
+// Returns the corners of a rectangle, counterclockwise as seen from outside.
 std::array<std::array<float, 3>, 4> corners_of(const GlbQuad& quad) {
   const std::array<std::array<uint32_t, 2>, 4> around = {
       {{quad.u0, quad.v0}, {quad.u1, quad.v0}, {quad.u1, quad.v1}, {quad.u0, quad.v1}}};
@@ -292,7 +293,8 @@ std::string glb_json(const ExportJob& job, const std::vector<GlbQuad>& quads) {
   return json;
 }
 
-// Writes the colors of four vertices. Alpha keeps elements at multiples of four bytes.
+// Writes the colors of four vertices. Alpha is included because elements must start at multiples of
+// four bytes.
 void put_colors(voxdag_reader::Rgb color, ExportFile& file) {
   const auto& linear = linear_of_srgb();
   const std::array<uint16_t, 4> vertex = {linear[color.r], linear[color.g], linear[color.b], 65535};
@@ -336,7 +338,7 @@ ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
   const uint64_t quads = made->quads().size();
   if (quads > limit) {
     made.reset();  // the search below also needs memory
-    // Even if no faces are merged.
+    // Grids that fit even if no faces are merged.
     CellLimit cells(job, limit / 6);
     refuse_size(job,
                 "over " + count_text(limit) + " rectangles are needed" +

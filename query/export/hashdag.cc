@@ -20,17 +20,18 @@ namespace {
 
 constexpr uint64_t kMaxHashDagWords = uint64_t{1} << 32;  // of 32-bit indices
 constexpr uint64_t kMaxHashDagColors = (uint64_t{1} << 32) - 1;
-constexpr uint64_t kMaxCount = uint64_t{1} << 24;  // of the bits above the mask
+constexpr uint64_t kMaxCount = uint64_t{1} << 24;  // limit of the bits above the mask
 constexpr uint32_t kGray = 0xffb0b0b0;             // A, B, G, R
 constexpr uint64_t kHashDagHeaderBytes = 6 * sizeof(double) + sizeof(uint32_t) + sizeof(uint64_t);
 
-// A node of level L - 7 encloses 128^3 voxels at most, so that the count always fits; HashDAG takes
+// A node of level L - 7 encloses at most 128^3 voxels, so its count always fits. HashDAG supports
 // up to ten top levels, which are enough for L = 17.
 uint32_t top_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels > 7 ? grid_levels - 7 : 1, 1, 10);
 }
 
-// The nodes of the top levels of a coarser grid or of the DAG's own, at most.
+// Returns an upper bound of the nodes in the top levels, of a coarser grid or of the DAG's own
+// grid.
 uint64_t top_nodes(const SelectedDag& dag, uint32_t grid_levels) {
   uint64_t nodes = 0;
   for (uint32_t level = 0; level < std::min(top_levels(grid_levels), grid_levels - kBrickLevels);
@@ -62,13 +63,13 @@ class HashDagWriter {
     file_.put(dag_.word_count());
     ExportStage stage(job_, "export", dag_.node_count(), "nodes");
     NodeNumbers<uint64_t> below = write_bricks(stage);
-    // From the bricks up, since a node's count is the sum of its children's.
+    // Goes from the bricks up, because a node's count is the sum of its children's counts.
     for (uint32_t level = dag_.brick_level(); level-- > 0;) {
       NodeNumbers<uint64_t> counts(job_, dag_, level);
       write_level(level, below, counts, stage);
       below = std::move(counts);
     }
-    // A grid of one brick has no node whose count could be looked up.
+    // A grid of one brick has no node with a count.
     if (first_top_.empty()) enclosed_[0] = dag_.voxels();
   }
 

@@ -1,6 +1,5 @@
-// .npz: a ZIP archive of arrays in the format .npy 1.0, stored without compression, as
-// numpy.load() reads it. Sizes are in ZIP64 fields whatever they are, so that a header has one
-// form.
+// .npz: a ZIP archive of arrays in the format .npy 1.0, stored without compression, as numpy.load()
+// reads it. Sizes are always in ZIP64 fields, so that all headers have the same form.
 #include <array>
 #include <bit>
 #include <vector>
@@ -58,9 +57,9 @@ struct NpzMember {
 
 constexpr uint16_t kZip64Version = 45;
 
-// The fields that the local and the central header of a member have in common.
+// Puts the fields that a member's local and central header share.
 void put_member_fields(ByteSink& sink, const NpzMember& member, uint16_t extra_bytes) {
-  sink.put(kZip64Version);  // that is needed to read it
+  sink.put(kZip64Version);  // version needed to read it
   sink.put<uint16_t>(0);    // flags
   sink.put<uint16_t>(0);    // stored
   sink.put<uint16_t>(0);    // midnight
@@ -90,7 +89,7 @@ std::vector<std::byte> central_directory(std::span<const NpzMember> members, uin
   ByteSink sink(bytes);
   for (const NpzMember& member : members) {
     sink.put<uint32_t>(0x02014b50);
-    sink.put(kZip64Version);  // that made it
+    sink.put(kZip64Version);  // version that created it
     put_member_fields(sink, member, 28);
     sink.put<uint16_t>(0);  // comment
     sink.put<uint16_t>(0);  // disk
@@ -115,11 +114,11 @@ std::vector<std::byte> central_directory(std::span<const NpzMember> members, uin
   sink.put<uint64_t>(members.size());
   sink.put(directory_bytes);
   sink.put(offset);
-  sink.put<uint32_t>(0x07064b50);  // where that is
+  sink.put<uint32_t>(0x07064b50);  // locator of the ZIP64 end record
   sink.put<uint32_t>(0);
   sink.put(offset + directory_bytes);
   sink.put<uint32_t>(1);
-  sink.put<uint32_t>(0x06054b50);  // the end record, whose fields point to the above
+  sink.put<uint32_t>(0x06054b50);  // the end record; its fields refer to the ZIP64 record
   sink.put<uint32_t>(0);
   for (int i = 0; i < 2; ++i) sink.put(static_cast<uint16_t>(members.size()));
   sink.put(~uint32_t{0});
@@ -161,7 +160,7 @@ class NpzWriter {
     flush();
     require_written(job_, written / row_bytes, rows);
     member.crc = crc.value();
-    // Only now is the checksum known.
+    // The checksum is known only at this point.
     const uint64_t end = file_.size();
     file_.seek(member.offset);
     file_.write(local_header(member));
@@ -190,7 +189,7 @@ void visit_cells(const ExportJob& job, ExportStage& stage, const VisitCell& visi
   });
 }
 
-// numpy's name of a type, and its description in files.
+// numpy's name of a type, and the type's code in files.
 struct NumpyType {
   const char* name;
   const char* description;
@@ -238,7 +237,8 @@ std::string add_values(const ExportJob& job, uint64_t voxels, AttributeCursor& a
 
 ExportReport write_npz(const ExportJob& job) {
   ExportReport report;
-  // No limit of the format is in reach: 2^48 voxels have more bytes than file systems take.
+  // The limit of the format is never reached: 2^48 voxels have more bytes than file systems
+  // support.
   const uint64_t voxels = require_voxels(job, uint64_t{1} << 48, "an array takes");
   report.voxels = voxels;
   std::vector<AttributeCursor> attributes = exported_attributes(job);

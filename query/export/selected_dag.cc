@@ -19,12 +19,13 @@ uint64_t mix_bits(uint64_t x) {
   return x ^ x >> 32;
 }
 
-// An open-addressing table of slots, which have `hash` and `free()`.
+// An open-addressing table. Its slots have `hash` and `free()`.
 template <class Slot>
 class SlotTable {
  public:
   explicit SlotTable(MemoryBudget& budget) : budget_(budget) {}
-  // The slot that is_it(slot) is true for, or the free one to put it into, which counts as used.
+  // Returns the slot for which is_it(slot) is true. If none exists, returns the free slot for it,
+  // which then counts as used.
   template <class IsIt>
   Slot& find(uint64_t hash, const IsIt& is_it) {
     if (4 * (used_ + 1) > 3 * slots_.size()) grow();
@@ -64,7 +65,7 @@ struct NodeSlot {
 };
 
 struct MemoSlot {
-  uint64_t hash = 0;    // of source, bijective
+  uint64_t hash = 0;    // bijective hash of `source`
   uint64_t source = 0;  // offset in the file
   uint64_t offset = kNoNode;
   uint64_t voxels = 0;
@@ -75,7 +76,7 @@ struct MemoSlot {
 class BuiltLevel {
  public:
   explicit BuiltLevel(MemoryBudget& budget) : budget_(budget), table_(budget) {}
-  // The offset of an equal node, which is added if missing.
+  // Returns the offset of an equal node, which is added if it is missing.
   uint64_t offset_of(std::span<const uint32_t> node) {
     uint64_t hash = node.size();
     for (const uint32_t word : node) hash = mix_bits(hash ^ word) + word;
@@ -134,8 +135,8 @@ class DagBuilder {
   BuiltNode build(uint32_t depth, uint64_t content, const Position& corner) {
     const int64_t edge = int64_t{1} << (job_.selection.grid_levels - depth);
     if (!job_.selection.region.intersects(corner, edge)) return {};
-    // Only nodes completely inside the region are the same everywhere. A brick of the file has no
-    // offset here, and is one word of content anyway.
+    // Only nodes completely inside the region are the same at all their places. A brick of the file
+    // has no offset here, and its content is only one word.
     const bool is_brick = depth + kBrickLevels == job_.dag.grid_levels();
     if (is_brick || !job_.selection.region.contains(corner, edge))
       return build_node(depth, content, corner, edge);
@@ -143,7 +144,8 @@ class DagBuilder {
     const auto is_it = [&](const MemoSlot& slot) { return slot.source == content; };
     MemoSlot& known = memo_[depth].find(hash, is_it);
     if (!known.free()) return {known.offset, known.voxels};
-    // No node contains another node of its depth, so the table does not change below.
+    // A node never contains another node of its depth, so building the node does not change this
+    // table.
     const BuiltNode built = build_node(depth, content, corner, edge);
     known = {hash, content, built.offset, built.voxels};
     return built;

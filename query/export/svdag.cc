@@ -14,13 +14,13 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMaxSvdagWords = (uint64_t{1} << 32) - 1;  // its count has 32 bits
-// What 32-bit signed indices in the shaders of the viewers reach.
+// Maximum words for viewers whose shaders use 32-bit signed indices.
 constexpr uint64_t kMaxViewedWords = (uint64_t{1} << 31) - 1;
-constexpr uint32_t kLeafWords = 255;  // one for each mask of 8 voxels but 0
+constexpr uint32_t kLeafWords = 255;  // one for each nonzero mask of 8 voxels
 constexpr uint64_t kSvdagHeaderBytes = 7 * sizeof(float) + 4 * sizeof(uint32_t);
 
-// Where each brick begins among the words of all. A brick takes one word and one for each child, so
-// the beginnings are remembered for every 16th and counted from there.
+// Word index at which each brick begins. A brick takes one word plus one per child. The begin of
+// every 16th brick is stored, and the others are counted from there.
 class BrickOffsets {
  public:
   BrickOffsets(const ExportJob& job, const SelectedDag& dag)

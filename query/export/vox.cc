@@ -20,11 +20,12 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint32_t kModelLevels = 8;                         // 256^3 voxels
-constexpr uint64_t kMaxVoxBytes = (uint64_t{1} << 31) - 1;   // of a chunk: its size is an int32
+constexpr uint32_t kModelLevels = 8;  // 256^3 voxels
+// Maximum size of a chunk, which is an int32.
+constexpr uint64_t kMaxVoxBytes = (uint64_t{1} << 31) - 1;
 constexpr uint64_t kMaxVoxModels = (uint64_t{1} << 31) / 4;  // node ids are also int32
 constexpr uint32_t kMagicaVoxelEdge = 2048;                  // maximum of its editor
-constexpr uint64_t kModelBytes = 12 + 12 + 12 + 4;           // SIZE, and XYZI without voxels
+constexpr uint64_t kModelBytes = 12 + 12 + 12 + 4;  // SIZE chunk, and XYZI chunk without voxels
 constexpr uint64_t kChunkHeaderBytes = 12;
 
 // A chunk of the scene graph, built in memory.
@@ -70,7 +71,7 @@ VoxChunk shape_node(int32_t id, int32_t model) {
   return chunk;
 }
 
-// A voxel of the index i has the color i - 1.
+// A voxel with index i has color i - 1.
 VoxChunk palette_chunk(std::span<const voxdag_reader::Rgb> colors) {
   VoxChunk chunk("RGBA");
   for (size_t i = 0; i < 256; ++i) {
@@ -81,7 +82,8 @@ VoxChunk palette_chunk(std::span<const voxdag_reader::Rgb> colors) {
   return chunk;
 }
 
-// The voxels' colors, two passes: which there are, and what becomes of each.
+// The voxels' colors, in two passes: the first collects them, the second maps each to a palette
+// index.
 class VoxColors {
  public:
   // `voxels`: number of voxels to be added.
@@ -125,7 +127,7 @@ class VoxWriter {
         level_words_(dag.words(depth_).size()),
         models_(job, dag, depth_),
         charge_(job.budget, dag.node_count(depth_) * sizeof(uint64_t), "the models") {
-    // What is too large already need not be looked at node by node.
+    // If this lower bound is already too large, the nodes need not be visited.
     min_bytes_ = 4 + transform_node(0, 0, "0 0 0").size() + shape_node(0, 0).size();
     min_bytes_ *= count_instances(dag);
     if (min_bytes_ > kMaxVoxBytes) return;
@@ -133,12 +135,12 @@ class VoxWriter {
     find_instances(0, view_.root(), {0, 0, 0});
   }
 
-  // What the file will have, or anything over the limit if that is more.
+  // Returns the size of the file, or any number over the limit if it is larger.
   uint64_t bytes() const {
     return std::max(min_bytes_, 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_);
   }
   size_t instance_count() const { return instances_; }
-  // Voxels of all models, each counted once.
+  // Number of voxels of all models, each model counted once.
   uint64_t model_voxels() const {
     return std::accumulate(voxels_.begin(), voxels_.end(), uint64_t{0});
   }
@@ -181,7 +183,7 @@ class VoxWriter {
           depth_, [&](uint64_t offset, uint32_t, std::span<const uint32_t>) { visit(offset); });
   }
 
-  // What a view of the model's node calls its content.
+  // Returns the content of a model's node, as DagView defines it.
   uint64_t content_at(uint64_t offset) const {
     return depth_ + kBrickLevels == view_.grid_levels() ? view_.root() : offset;
   }
@@ -205,7 +207,7 @@ class VoxWriter {
     voxels_.reserve(dag.node_count(depth_));
     uint64_t total = 0;
     for_each_model_node(dag, [&](uint64_t offset) {
-      // What is too large already need not be counted to the end.
+      // If the total is already too large, counting can stop.
       if (4 * total > kMaxVoxBytes) return;
       models_[offset] = static_cast<uint32_t>(voxels_.size());
       uint64_t voxels = 0;
@@ -230,7 +232,7 @@ class VoxWriter {
                      visit);
   }
 
-  // The model of a node, given its content().
+  // Returns the model of a node with this content.
   uint32_t model_of(uint64_t content) {
     return depth_ + kBrickLevels == view_.grid_levels() ? 0 : models_[content];
   }
@@ -322,12 +324,12 @@ class VoxWriter {
 
   const ExportJob& job_;
   const DagView view_;
-  const uint32_t depth_;  // of the models' nodes
-  const int64_t edge_;    // of a model
+  const uint32_t depth_;  // depth of the models' nodes
+  const int64_t edge_;    // edge of a model
   const uint64_t level_words_;
   NodeNumbers<uint32_t> models_;
   MemoryCharge charge_;
-  std::vector<uint64_t> voxels_;  // of each model's node
+  std::vector<uint64_t> voxels_;  // voxels of each model's node
   uint64_t min_bytes_ = 0, models_bytes_ = 0;
   size_t instances_ = 0;
   uint64_t instance_bytes_ = 0;
@@ -340,7 +342,8 @@ ExportReport write_vox(const ExportJob& job) {
   VoxWriter writer(job, dag);
   const uint64_t bytes = writer.bytes();
   if (bytes > kMaxVoxBytes || writer.instance_count() > kMaxVoxModels) {
-    // Even if nothing is shared, and a fourth is left for models and instances.
+    // Grids that fit even if nothing is shared. A fourth of the size is left for models and
+    // instances.
     CellLimit cells(job, kMaxVoxBytes / 16 * 3);
     refuse_size(job,
                 size_text(bytes) + " or more are needed" +

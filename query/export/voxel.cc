@@ -15,11 +15,11 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kMaxVoxelWords = uint64_t{1} << 24;  // of a 24-bit index
+constexpr uint64_t kMaxVoxelWords = uint64_t{1} << 24;  // limit of a 24-bit index
 constexpr uint32_t kSolid = 0xff000000;
 constexpr uint64_t kFullBrick = ~uint64_t{0};
 
-// Child 4x + 2y + z as 4z + 2y + x, and the reverse.
+// Converts child 4x + 2y + z to 4z + 2y + x, and back.
 constexpr int reversed_child(int child) { return (child & 1) << 2 | (child & 2) | child >> 2; }
 
 uint64_t leaf_bits(uint64_t brick) {
@@ -85,7 +85,7 @@ class VoxelWriter {
   }
 
  private:
-  // Adds the words of the children. Returns the word of the node.
+  // Adds the words of the children. Returns the node's word.
   uint32_t add_node(uint32_t mask, std::span<const uint32_t> children,
                     NodeNumbers<uint32_t>& below) {
     std::array<uint32_t, 8> of_child{};

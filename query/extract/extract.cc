@@ -28,20 +28,22 @@
 namespace voxdag::query {
 namespace {
 
-// Minimum share of a worker, enough for every cube of a few bricks, and the worker's additional
-// memory: a segment to write, a window of the file, and pages retained for its next cube.
+// Minimum share of a worker, enough for every cube of a few bricks. kOutsideShareBytes is the
+// worker's additional memory: a segment to write, a window of the file, and pages retained for its
+// next cube.
 constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
 constexpr uint64_t kOutsideShareBytes =
     kSegmentWriterBytes + NodeReader::kMemoryBytes + ConsingMemory::kMinPageBytes;
 constexpr unsigned kMaxWorkers = 256;  // each has a file open
-// What a node takes while its cube is reduced, for a first guess at the number of cubes.
+// Memory of a node while its cube is reduced, for a first estimate of the number of cubes.
 constexpr uint64_t kBytesPerNode = 128;
-// So few nodes are reduced faster by one thread than by several that share none of the work.
+// Up to this number of nodes, one thread is faster than several threads that share none of the
+// work.
 constexpr uint64_t kFewNodes = uint64_t{1} << 17;
 constexpr uint64_t kPartsPerWorker = 4;
 constexpr uint64_t kMaxFirstParts = 4096;
 
-// A folder that is removed with its contents.
+// A folder that the destructor removes with its contents.
 class TemporaryWork {
  public:
   TemporaryWork(FileSystem& files, const std::string& prefix)
@@ -50,7 +52,7 @@ class TemporaryWork {
     try {
       remove_tree(files_, path_);
     } catch (const Error&) {
-      // What cannot be removed is of no use and does no harm.
+      // Remaining files are useless but harmless.
     }
   }
   TemporaryWork(const TemporaryWork&) = delete;
@@ -78,7 +80,7 @@ class Extraction {
     shape_ = {.grid_levels = report_.grid.levels, .hash_bits = file.hash_bits()};
   }
 
-  // before_publish() may throw if the output is not to appear.
+  // before_publish() may throw to prevent the output from appearing.
   ExtractReport run(const std::function<void()>& before_publish) {
     if (spec_.crop && crop_.level == 0 &&
         spec_.selection.region != whole_grid(spec_.selection.grid_levels))
@@ -115,7 +117,7 @@ class Extraction {
   }
 
  private:
-  // What one thread has, for all the cubes that it reduces.
+  // Data of one thread, for all cubes that it reduces.
   struct Worker {
     Worker(Extraction& all, unsigned id, uint64_t share_bytes)
         : share(share_bytes, &all.budget_),
@@ -139,7 +141,7 @@ class Extraction {
     return grid;
   }
 
-  // The cube in the new grid.
+  // Returns the position of a cube in the new grid.
   Cube in_new_grid(Cube cube) const {
     cube.level -= crop_.level;
     for (int axis = 0; axis < 3; ++axis) cube.position[axis] -= crop_.position[axis] << cube.level;
@@ -163,7 +165,7 @@ class Extraction {
   MemoryBudget budget_;
   std::unique_ptr<CheckedReader> source_;
   TemporaryWork work_;
-  std::mutex mutex_;  // of report_ and the lists of parts and artifacts
+  std::mutex mutex_;  // guards report_ and the lists of parts and artifacts
   ExtractReport report_;
 };
 
@@ -176,7 +178,7 @@ uint64_t Extraction::wanted_parts(unsigned workers, uint64_t share_bytes) const 
                     workers * kPartsPerWorker, kMaxFirstParts);
 }
 
-// The cube of the new grid, divided until there are about as many parts as wanted.
+// Divides the cube of the new grid until there are about `wanted` parts.
 std::vector<SelectedPart> Extraction::first_parts(Worker& worker, uint64_t wanted) const {
   if (file_.empty()) return {};
   std::vector<SelectedPart> parts{{}};

@@ -10,7 +10,8 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMaxNodeWords = 17;  // a child mask and eight wide offsets
-// Nodes with smaller gaps are read in one call, which costs about as much as reading these words.
+// Gaps of up to this many words are read together with the nodes around them: another call costs
+// about as much as reading these words.
 constexpr uint64_t kGapWords = 2048;
 
 }  // namespace

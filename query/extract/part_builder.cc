@@ -8,12 +8,12 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kNodesBetweenChecks = 4096;  // of the cancel token
+constexpr uint64_t kNodesBetweenChecks = 4096;  // checks of the cancel token
 // Expected new nodes in the level below a node: half of the average of surfaces.
 constexpr uint64_t kExpectedChildren = 2;
 constexpr uint64_t kPrefetchAhead = 8;  // nodes
 
-// Bit c is set if byte c of the mask is not 0.
+// Bit c of the result is set if byte c of the mask is not 0.
 uint8_t coarser_cells(uint64_t mask) {
   uint8_t cells = 0;
   for (int c = 0; c < 8; ++c)
@@ -68,7 +68,7 @@ void PartBuilder::read(uint32_t level, PartLevel& nodes, PartLevel& below, Child
                    });
 }
 
-// Nodes above the bricks of the selected grid.
+// Reads nodes above the bricks of the selected grid.
 void PartBuilder::read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below,
                              Children& children) {
   const int64_t child_edge = edge(level + 1);
@@ -99,7 +99,7 @@ void PartBuilder::read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below,
   nodes.release_entries();
 }
 
-// Nodes of the file that become bricks. What the region cuts away of these is left out later.
+// Reads nodes of the file that become bricks. Cells outside the region are left out later.
 void PartBuilder::read_all_children(uint32_t level, PartLevel& nodes, PartLevel& below,
                                     Children& children) {
   read(level, nodes, below, children, [&](uint64_t index, const voxdag_reader::Node& node) {
@@ -109,7 +109,7 @@ void PartBuilder::read_all_children(uint32_t level, PartLevel& nodes, PartLevel&
   });
 }
 
-// The occupied octants of each node or brick: the cells of the selected grid in it.
+// Returns the occupied octants of each node or brick, which are its cells of the selected grid.
 PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
   const uint32_t level = brick_level() + 1;
   const PartLevel::Sorted sorted = nodes.sort();
@@ -125,7 +125,7 @@ PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
   return cells;
 }
 
-// The masks of the bricks of the selected grid, before the region cuts them.
+// Returns the masks of the bricks of the selected grid, before the region cuts them.
 PooledArray<uint64_t> PartBuilder::read_bricks(PartLevel& bricks) {
   PooledArray<uint64_t> masks(memory_, bricks.size());
   if (selection_.grid_levels == file_.grid_levels()) {
@@ -225,7 +225,7 @@ SubDagSummary PartBuilder::build(const SelectedPart& part, const SubDagShape& sh
     built = build_nodes(l, levels[l - top].size(), children[l - top], built, tables);
     children[l - top] = {};
   }
-  // The tables count added nodes, shared nodes once.
+  // The tables count only added nodes, so shared nodes would be counted once.
   tables.counts() = built[0].counts;
   built = {};
   return emit_levels(tables, shape, sink);

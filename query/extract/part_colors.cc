@@ -25,11 +25,12 @@ using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 
 constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
-// What a thread has while it encodes a region: its cells, the next coarser ones and all colors.
+// Memory of one thread while it encodes a region: its cells, the next coarser cells, and all
+// colors.
 constexpr uint64_t kWorkerBytes =
     kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) +
     CheckedReader::kBlockBytes;
-// Encoded bytes of a region: colors, or values including the coarser levels.
+// Returns the encoded bytes of a region: colors, or values including the coarser levels.
 uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
   if (traits_of(attribute).is_color()) return kMaxRegionCells * 3 / 4;
   return kMaxRegionCells * 5 / 4 *
@@ -44,7 +45,7 @@ struct PlacedCube {
   uint64_t content = 0;  // see DagView
 };
 
-// The color n cells add up to that have this one.
+// Returns the sum of n cells with this color.
 ColorSum sum_of(const voxdag_reader::Rgb& rgb, uint64_t n) {
   ColorSum sum;
   const uint8_t channels[3] = {rgb.r, rgb.g, rgb.b};
@@ -54,17 +55,17 @@ ColorSum sum_of(const voxdag_reader::Rgb& rgb, uint64_t n) {
   return sum;
 }
 
-// Releases the pages of a mapped file whenever the process is larger than its budget. Thread-safe.
+// Releases the pages of a mapped file when the process exceeds its budget. Thread-safe.
 class ResidentPages {
  public:
   ResidentPages(const voxdag_reader::File& file, uint64_t limit_bytes, unsigned threads)
       : file_(file), limit_bytes_(limit_bytes), threads_(threads) {}
-  // To be called for each node that is read.
+  // Call it for each node that is read.
   void visit() const {
     thread_local uint64_t visits_left = 0;
     if (visits_left-- == 0) visits_left = check();
   }
-  // Returns how many nodes this thread can read before the process may have outgrown its budget.
+  // Returns the number of nodes that this thread can read before the process may exceed its budget.
   uint64_t check() const {
     const uint64_t bytes = resident_bytes();
     if (bytes > limit_bytes_) file_.release_pages();
@@ -73,7 +74,7 @@ class ResidentPages {
   }
 
  private:
-  // The system brings up to so much into memory for a page that is touched.
+  // Memory that the system may read in for one access to a page.
   static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
   static constexpr uint64_t kMinVisits = 512;  // 32 MiB
   const voxdag_reader::File& file_;
@@ -100,10 +101,10 @@ class PartColors {
   }
 
   uint32_t levels() const { return levels_; }
-  // The level of the file whose cubes are the regions of a tier of the part.
+  // Returns the level of the file whose cubes are the regions of a tier of the part.
   uint32_t region_level(uint32_t tier) const { return finest_of(tier) - depth_of(tier); }
 
-  // Compares what finds nodes and colors with its checksums.
+  // Verifies the checksums of the data that locate nodes and colors.
   void check_index() {
     std::vector<std::byte> block(CheckedReader::kBlockBytes);
     for (uint32_t l = 0; l <= std::min(finest_, file_.brick_level()); ++l) {
@@ -175,7 +176,7 @@ class PartColors {
                          morton_in_part(region_level(0), cube.code), cells);
   }
 
-  // Encodes a region of a tier above the finest; `morton` is the code in the part.
+  // Encodes a region of a tier above the finest tier. `morton` is its code in the part.
   EncodedRegion encode_coarse(uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
     const uint32_t level = region_level(tier);
     const uint64_t code = crop_code_ << 3 * (level - part_.crop.level) | morton;
@@ -196,7 +197,7 @@ class PartColors {
     return static_cast<uint64_t>(at - file_.data());
   }
 
-  // The low corner of a cube in cells of the selected grid, and its edge.
+  // Returns the edge of a cube in cells of the selected grid; corner() returns its low corner.
   int64_t edge(uint32_t level) const { return int64_t{1} << (part_.selection.grid_levels - level); }
   std::array<int64_t, 3> corner(uint32_t level, uint64_t code) const {
     uint32_t x, y, z;
@@ -222,7 +223,7 @@ class PartColors {
                    int index) const {
     return {cube.code << 3 | static_cast<uint64_t>(index), dag_.content(level, children, index)};
   }
-  // Calls visit(cube) for the cubes of a level in which anything is selected.
+  // Calls visit(cube) for the cubes of a level that have selected cells.
   template <class Visit>
   void walk(uint32_t level, const PlacedCube& cube, uint32_t target, const Visit& visit) const {
     if (!is_selected(level, cube)) return;
@@ -232,7 +233,7 @@ class PartColors {
       if (children.has(i)) walk(level + 1, child(level, cube, children, i), target, visit);
   }
 
-  // True if the bytes of a region equal the bytes of a region of the file.
+  // True if the region's bytes equal the bytes of a region in the file.
   bool is_copied(uint32_t tier, uint64_t code) const {
     const uint32_t finest = finest_of(tier);
     if (finest > section_.color_levels()) return false;
@@ -260,15 +261,14 @@ class PartColors {
     return copied;
   }
 
-  // Compares the colors that the cells of a cube have, down to level `finest`, with their
-  // checksums.
+  // Verifies the checksums of the colors of a cube's cells, down to level `finest`.
   void check_colors(uint32_t finest, uint32_t level, uint64_t code) {
     std::vector<std::byte> block(CheckedReader::kBlockBytes);
     for (uint32_t t = 0; t < section_.tier_count(); ++t) {
       const ColorTier& tier = section_.tier(t);
       const bool is_coarser = t > 0 && tier.finest_level < level;
       if (is_coarser || tier.region_level > finest) continue;
-      // The first region that has colors of the cube, and the first after it that has none.
+      // The first region with colors of the cube, and the first region after it without.
       const bool within = tier.region_level < level;
       const uint32_t between = within ? level - tier.region_level : tier.region_level - level;
       const uint64_t begin = within ? code >> 3 * between : code << 3 * between;
@@ -313,8 +313,8 @@ class PartColors {
   CheckedReader source_;
   const ResidentPages pages_;
   const CancelToken& cancel_;
-  const uint32_t levels_;  // of the part's color grid
-  const uint32_t finest_;  // the level of the file that has its cells
+  const uint32_t levels_;  // levels of the part's color grid
+  const uint32_t finest_;  // level of the file with the cells of this grid
   uint64_t crop_code_ = 0;
 };
 

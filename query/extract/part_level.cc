@@ -9,15 +9,14 @@ namespace {
 
 constexpr int kDigitBits = 11;
 constexpr uint64_t kDigits = uint64_t{1} << kDigitBits;
-// Fewer are sorted by comparing them.
+// Shorter lists are sorted by comparison.
 constexpr uint64_t kFewToSort = 1 << 12;
 
 uint64_t digit_of(const WantedNode& node, int shift) {
   return node.offset >> shift & (kDigits - 1);
 }
 
-// Moves the nodes to `to` in the order of one digit of their offsets; nodes of equal digit keep
-// their order.
+// Sorts the nodes stably into `to` by one digit of their offsets.
 void sort_by_digit(std::span<const WantedNode> from, WantedNode* to, int shift) {
   uint64_t next[kDigits] = {};
   for (const WantedNode& node : from) ++next[digit_of(node, shift)];

@@ -8,7 +8,7 @@
 namespace voxdag::query {
 namespace {
 
-// The cells of a brick whose coordinate on an axis has the given low or high bit.
+// Cells of a brick whose coordinate on an axis has the low or high bit set: kUpper[axis][bit].
 constexpr uint64_t kUpper[3][2] = {{0xf0f0f0f0f0f0f0f0ull, 0xffffffff00000000ull},
                                    {0xccccccccccccccccull, 0xffff0000ffff0000ull},
                                    {0xaaaaaaaaaaaaaaaaull, 0xff00ff00ff00ff00ull}};

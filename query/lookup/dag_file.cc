@@ -26,7 +26,7 @@
 namespace voxdag::query {
 namespace {
 
-// Items per batch of a thread: a multiple of a packet of rays.
+// Items per batch of a thread. It is a multiple of the rays in a packet.
 constexpr size_t kBatch = 4096;
 
 [[noreturn]] void refuse(const char* expected) {
@@ -45,8 +45,8 @@ void for_each_batch(unsigned threads, size_t items, const Body& body) {
   });
 }
 
-// Makes rays with directions of length 1, two per step: their divisions would otherwise take longer
-// than their walk through large cells.
+// Makes rays with directions of length 1, two per step, because their divisions would otherwise
+// take longer than the rays' walk through large cells.
 void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
                Ray* rays) {
   const DoublePair zero = DoublePair::of(0), one = DoublePair::of(1);
@@ -57,13 +57,13 @@ void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates
       alignas(16) const double o[2] = {origins[first][axis], origins[second][axis]};
       alignas(16) const double two[2] = {directions[first][axis], directions[second][axis]};
       d[axis] = DoublePair::load(two);
-      // Infinity and NaN are not 0 after this.
+      // For infinity and NaN, the sum is not 0.
       nothing = nothing + DoublePair::load(o) * zero + d[axis] * zero;
       largest = max(largest, absolute(d[axis]));
     }
     require(equal(nothing, zero) == 3 && less(zero, largest) == 3,
             "rays of finite numbers with directions that are not 0");
-    // The largest component first, so that no square overflows or vanishes.
+    // Divides by the largest component first, so that no square overflows or becomes 0.
     for (DoublePair& component : d) component = component / largest;
     const DoublePair scale = one / square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -88,7 +88,7 @@ RayHit as_ray_hit(const Hit& hit, const Ray& ray) {
   return out;
 }
 
-// The largest square whose root, as a double, is at most `distance`. Distances of more than 2^31 do
+// Returns the largest square whose root, as a double, is at most `distance`. Distances over 2^31 do
 // not occur.
 uint64_t largest_square(double distance) {
   if (distance >= 0x1p31) return uint64_t{1} << 62;
@@ -100,7 +100,7 @@ uint64_t largest_square(double distance) {
 
 }  // namespace
 
-// The file, and the tables that many questions make worthwhile.
+// The file, and tables that are worthwhile only for many queries.
 struct DagFile::State {
   State(const std::string& path, uint64_t memory_bytes)
       : file(open_global_file(path)), view(*file), budget(memory_bytes) {}
@@ -119,21 +119,22 @@ struct DagFile::State {
   std::array<std::unique_ptr<NodeCounts>, 21> counts_of;  // by grid levels; guarded by mutex
 };
 
-// Huge pages are requested by a call of this many questions, and the table of the top by this many
-// questions of all calls. Together they reach most of the nodes that later ones do.
+// A call with this many queries requests huge pages. The table of the top is created after this
+// many queries in total. These queries together reach most of the nodes that later ones need.
 constexpr size_t kManyQueries = size_t{1} << 14;
 
-// A few questions should not read parts of 2 MiB for each node, and neither should many about a
-// file that memory cannot hold.
+// For a few queries, reading 2 MiB for each node would be slow. The same is true for many queries
+// of a file that is larger than memory.
 void DagFile::State::prepare_for_queries(size_t count) {
   if (count < kManyQueries || file->file_bytes() > default_memory()) return;
-  // Pages in memory keep their size, and not every system has huge pages for files.
+  // Pages already in memory keep their size, and not every system supports huge pages for files.
   std::call_once(huge_pages, [&] {
     madvise(const_cast<unsigned char*>(file->data()), file->file_bytes(), MADV_HUGEPAGE);
   });
 }
 
-// Null for few questions, or if the top is damaged: then each descent reports the damage it meets.
+// Null for few queries, and if the top is damaged: then each descent reports the damage that it
+// finds.
 const TopCells* DagFile::State::top_cells(size_t points) {
   if ((points_looked_up += points) < kManyQueries || !TopCells::serve(view, view.grid_levels()))
     return nullptr;
@@ -197,15 +198,15 @@ const std::vector<std::string>& DagFile::material_names() const {
 
 namespace {
 
-// An attribute's section, and how build makes a file that has it.
+// An attribute's section, and the build option that adds the attribute.
 struct AttributeSource {
   const voxdag_reader::File& file;
   const voxdag_reader::ColorSection& section;
   const char* expected;
 };
 
-// values[i] becomes value_of(region, number) for the number of the cell in its region, and `none`
-// if the cell is not set.
+// Sets values[i] to value_of(region, number), where `number` is the cell's number in its region, or
+// to `none` if the cell is not set.
 template <class Value, class ValueOf>
 void read_attribute(const AttributeSource& source, std::span<const Position> points,
                     uint32_t grid_levels, Value none, std::span<Value> values, unsigned threads,

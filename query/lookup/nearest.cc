@@ -29,8 +29,8 @@ class NearestSearch {
     Position low;
   };
 
-  // Squared distance from the point to the nearest cell of a cube; exact, because both are
-  // integers.
+  // Returns the squared distance from the point to the nearest cell of a cube. It is exact because
+  // both are integers.
   uint64_t distance_to(const Position& low, int64_t edge) const {
     uint64_t squared = 0;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -44,8 +44,8 @@ class NearestSearch {
     return morton_encode(static_cast<uint32_t>(p[0]), static_cast<uint32_t>(p[1]),
                          static_cast<uint32_t>(p[2]));
   }
-  // True if a cube whose low corner, which has its lowest Morton code, is `low` may have a cell
-  // that is better than the best so far.
+  // True if a cube may have a better cell than the best so far. `low` is the cube's low corner,
+  // which has its lowest Morton code.
   bool may_improve(const Position& low, uint64_t squared) const {
     if (squared != best_.squared_distance) return squared < best_.squared_distance;
     return !best_.found || morton_of(low) < morton_of(best_.cell);

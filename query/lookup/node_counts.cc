@@ -21,7 +21,8 @@ NodeCounts::NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint
   }
 }
 
-// The nodes just above the cells need no number, nor do bricks: their masks have it.
+// No numbers are stored for bricks and for the nodes just above the cells, because their masks
+// contain them.
 void NodeCounts::store(const voxdag_reader::File& file, MemoryBudget& budget,
                        const CancelToken& cancel) {
   if (grid_levels_ < 2 || dag_.grid_levels() < 3) return;

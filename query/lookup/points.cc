@@ -7,10 +7,10 @@
 namespace voxdag::query {
 namespace {
 
-// Number of descents in flight that hides the latency of memory; more gain nothing (measured).
+// Number of concurrent descents that hides the latency of memory. More gain nothing (measured).
 constexpr size_t kGroup = 32;
 
-// Descents in groups of kGroup.
+// Runs descents in groups of kGroup.
 class Descents {
  public:
   Descents(const DagView& dag, const TopCells* top, uint32_t grid_levels)
@@ -23,7 +23,7 @@ class Descents {
     for (size_t i = 0; i < points.size(); ++i) {
       const auto [x, y, z] = points[i];
       set[i] = 0;
-      // A negative coordinate is a large one without its sign.
+      // As unsigned numbers, negative coordinates are large.
       if ((static_cast<uint64_t>(x) | static_cast<uint64_t>(y) | static_cast<uint64_t>(z)) >= edge)
         continue;
       Descent d = {dag_.root(), static_cast<uint32_t>(x), static_cast<uint32_t>(y),
@@ -44,7 +44,7 @@ class Descents {
     }
   };
 
-  // True if the descent's cell of the top has a child that it continues in.
+  // Returns true if the descent continues in a child of its cell of the top.
   bool begin_at_top(Descent& d) const {
     const uint32_t shift = grid_levels_ - TopCells::kLevels;
     const TopCells::Cell cell = top_->at(d.x >> shift, d.y >> shift, d.z >> shift);
@@ -54,7 +54,7 @@ class Descents {
     return true;
   }
 
-  // Leads all descents to their ends.
+  // Runs all descents to their ends.
   void finish(uint8_t* set) {
     const uint32_t brick_depth = dag_.grid_levels() - 2;
     for (uint32_t depth = top_ ? TopCells::kLevels : 0; depth < std::min(grid_levels_, brick_depth);
@@ -64,7 +64,8 @@ class Descents {
     count_ = 0;
   }
 
-  // Leads the descents from the nodes at `depth` to their children, and ends those without.
+  // Moves the descents from the nodes at `depth` to their children. Ends descents without such a
+  // child.
   void descend(uint32_t depth) {
     const std::span<const uint32_t> words = dag_.level(depth).words;
     const DagView::Level& below = dag_.level(depth + 1);
@@ -76,7 +77,7 @@ class Descents {
       if (d.content >= words.size()) dag_.corrupt(depth, d.content);
       const uint32_t mask = words[d.content];
       const uint32_t bit = 1u << d.child_index(shift);
-      // No branch: whether a descent ends can hardly be predicted.
+      // Has no branch, because the end of a descent is hard to predict.
       const uint64_t place = uint64_t{kPopcount8[mask & (bit - 1)]} << below.wide;
       const bool has_child = mask & bit;
       if (has_child && place + below.wide + 1 >= words.size() - d.content)
@@ -95,7 +96,8 @@ class Descents {
   // True if the cell at the end of a descent is set.
   bool ends_set(const Descent& d) const {
     if (grid_levels_ + 2 <= dag_.grid_levels()) return true;
-    const uint32_t voxel_levels = grid_levels_ + 2 - dag_.grid_levels();  // below the brick: 1 or 2
+    // Levels below the brick: 1 or 2.
+    const uint32_t voxel_levels = grid_levels_ + 2 - dag_.grid_levels();
     const uint64_t mask = dag_.grid_levels() == 2 ? d.content : dag_.brick(d.content);
     const uint64_t octant = mask >> (8 * d.child_index(voxel_levels - 1)) & 255;
     return voxel_levels == 1 ? octant != 0 : octant >> d.child_index(0) & 1;

@@ -24,8 +24,8 @@ bool RayWalk::run(double t_min, Hit& hit) {
 template <class Has, class EnterChild>
 inline bool RayWalk::cross(const double (&low)[3], double half, const double (&out)[3], double t,
                            const Has& has, const EnterChild& enter_child) {
-  double next[3];  // when the ray leaves the child
-  int index = 0;   // of the child, mirrored
+  double next[3];  // parameters at which the ray leaves the child
+  int index = 0;   // mirrored index of the child
   for (int axis = 0; axis < 3; ++axis) {
     const double middle = ray_.time_of(axis, low[axis] + half);
     const bool upper = t >= middle;
@@ -52,7 +52,7 @@ inline bool RayWalk::cross(const double (&low)[3], double half, const double (&o
 bool RayWalk::enter(uint32_t depth, const double (&low)[3], double half, uint64_t content,
                     const double (&out)[3], double t, Hit& hit) {
   if (steps_left_ == 0) {
-    t_max_ = -std::numeric_limits<double>::infinity();  // ends the cells above as well
+    t_max_ = -std::numeric_limits<double>::infinity();  // also ends the walk in the cells above
     return false;
   }
   --steps_left_;
@@ -67,7 +67,7 @@ bool RayWalk::enter(uint32_t depth, const double (&low)[3], double half, uint64_
       });
 }
 
-// The octants of a brick, and their voxels.
+// Casts the ray in the octants of a brick and in their voxels.
 bool RayWalk::enter_brick(uint64_t mask, const double (&low)[3], const double (&out)[3], double t,
                           Hit& hit) {
   const uint32_t voxel_depth = dag_.grid_levels();

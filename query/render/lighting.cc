@@ -9,13 +9,13 @@ constexpr double kSkyDistance = 1e30;
 constexpr Vec kSunlight{{3.6, 3.2, 2.6}};
 constexpr Vec kZenith{{0.62, 0.78, 1.00}}, kHorizon{{0.95, 0.98, 1.02}};
 constexpr Vec kGround{{0.40, 0.36, 0.31}};
-constexpr double kOpenFloor = 0.82;     // green light of an open sky on a floor
+constexpr double kOpenFloor = 0.82;     // green component of an open sky's light on a floor
 constexpr double kSunRadius = 0.006;    // at distance 1
 constexpr double kBounce = 0.42;        // share of light that an occluder reflects
 constexpr double kSkyWidening = 0.1;    // spread of the cones of rays to the sky
 constexpr double kSunWidening = 0.004;  // spread of the cones of rays to the sun
 
-// Dimensions of the sampler; the renderer uses 0 for the place within the pixel.
+// Dimensions of the sampler. The renderer uses 0 for the position within the pixel.
 constexpr uint64_t kSkyDimension = 1, kSunDimension = 2;
 
 Vec sky_color(const Vec& direction) {
@@ -90,8 +90,9 @@ double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
   return 1 - fade * (0.75 - 0.35 * open - 0.40 * (sees(s, sun_) ? 1 : 0));
 }
 
-// For a camera outside the scene the sun is over its left shoulder. Within a scene it has the one
-// of 48 positions all around, at three heights, that lights about a third of the visible surface.
+// For a camera outside the scene, the sun is over its left shoulder. Within a scene, 48 positions
+// in all directions at three heights are tried, and the sun gets the one that lights about a third
+// of the visible surface.
 void Lighting::place_sun(const std::vector<SurfaceHit>& seen, const Vec& back) {
   constexpr int kTurns = 16, kHeights = 3;
   constexpr double kLitTarget = 0.35;

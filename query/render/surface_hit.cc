@@ -5,7 +5,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr int kReach = 3;  // cells on each side of the hit one
+constexpr int kReach = 3;  // cells on each side of the hit cell
 
 Vec face_normal(const Hit& hit, const Vec& direction) {
   if (hit.axis < 0) return direction * -1.0;
@@ -14,7 +14,7 @@ Vec face_normal(const Hit& hit, const Vec& direction) {
   return normal;
 }
 
-// Weighted sums over the offsets of occupied cells from the hit one.
+// Weighted sums over the offsets of occupied cells from the hit cell.
 struct Moments {
   double weight = 0;
   Vec first;
@@ -49,8 +49,9 @@ Moments moments_around(const DagView& dag, const Hit& hit) {
   return m;
 }
 
-// The normal of the plane that best fits the occupied cells near the hit: the eigenvector of their
-// covariance's smallest eigenvalue. With too few cells for a plane, the normal of the entered face.
+// Returns the normal of the plane that best fits the occupied cells near the hit: the eigenvector
+// of their covariance's smallest eigenvalue. If there are too few cells for a plane, returns the
+// normal of the entered face.
 Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
   constexpr int kIterations = 8;
   const Vec face = face_normal(hit, direction), toward_eye = face - direction;
@@ -58,10 +59,10 @@ Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
   if (m.weight < 3) return face;
   Vec c[3];
   for (int i = 0; i < 3; ++i) c[i] = m.second[i] - m.first * (m.first[i] / m.weight);
-  // A regularization: without it the adjugate of a perfect plane's covariance could vanish.
+  // Regularization. Without it, the adjugate of a perfect plane's covariance could be zero.
   const double trace = c[0][0] + c[1][1] + c[2][2];
   for (int i = 0; i < 3; ++i) c[i] = c[i] * (1 / trace), c[i][i] += 1e-3;
-  // Inverse iteration with the adjugate, which is the inverse up to a factor.
+  // Inverse iteration with the adjugate, which equals the inverse up to a factor.
   const Vec adjugate[3] = {cross(c[1], c[2]), cross(c[2], c[0]), cross(c[0], c[1])};
   const double scale = 1 / (adjugate[0][0] + adjugate[1][1] + adjugate[2][2]);
   Vec n = toward_eye;
@@ -85,9 +86,9 @@ bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surfa
   const double cube = std::clamp((pixels - 5) / 8, 0.0, 1.0);
   const Vec face = face_normal(hit, ray.direction);
   s.normal = cube < 1 ? normalized(mix(plane_normal(dag, hit, ray.direction), face, cube)) : face;
-  // The offset clears the steps that the cells of a slope form.
+  // The offset is larger than the steps between the cells of a slope.
   s.start = ray.at(s.t) + s.normal * (s.size * 2.2 * (1 - cube)) + face * (s.size * 0.01);
-  // In a narrow place that point may be occupied; the way that the ray came is free.
+  // In a narrow place this point may be occupied. Then the path of the ray is used, which is free.
   if (caster.cast({s.start, s.normal}, {s.size, 0}, 0, 0, hit))
     s.start = ray.at(s.t - 1.5 * s.size);
   return true;

@@ -12,34 +12,34 @@ namespace {
 constexpr double kFar = 1e30;
 constexpr double kOutsideFov = 32, kInsideFov = 62;
 constexpr double kMinEnclosureOfRooms = 0.1;
-constexpr size_t kFewCells = 256;  // do not outline a scene
+constexpr size_t kFewCells = 256;  // fewer cells do not outline a scene
 
 struct NamedDirection {
   const char* name;
   Vec toward_eye;
 };
-// The front of a glTF scene is +z, up is +y; "iso" is to the right of the front, and above.
+// In a glTF scene, front is +z and up is +y. "iso" is to the right of the front, and above.
 const NamedDirection kDirections[] = {
     {"iso", {{0.62, 0.55, 1}}}, {"front", {{0, 0, 1}}}, {"back", {{0, 0, -1}}},
     {"left", {{-1, 0, 0}}},     {"right", {{1, 0, 0}}}, {"top", {{0, 1, 0}}},
 };
 
-// The width of rays that choose a view of a large grid. Its finer cells are all over the file,
-// which may have to be read from a disk, to the same effect.
+// Width of the rays that choose a view of a large grid. Finer cells would give the same view, but
+// are scattered over the file and may have to be read from disk.
 double finest_width(const DagView& dag) {
   constexpr int64_t kCells = 4096;
   return dag.resolution() > kCells ? static_cast<double>(dag.resolution() / kCells) : 0;
 }
 
-// Work that views may cost, in nodes and bricks read: a scene of dust, whose rays pass through
-// thousands of cells, or a damaged one must not keep a service busy for minutes. Sponza at 4096^3
-// takes 0.4, 3.6 and 1.4 million of them.
+// Limits of the work for views, in nodes and bricks read. A scene of dust, whose rays pass through
+// thousands of cells, or a damaged scene must not keep a service busy for minutes. Sponza at 4096^3
+// takes 0.4, 3.6 and 1.4 million steps.
 constexpr uint64_t kMaxEnclosureSteps = uint64_t{1} << 22;
-constexpr uint64_t kMaxSearchSteps = uint64_t{1} << 25;  // of each of its two passes
+constexpr uint64_t kMaxSearchSteps = uint64_t{1} << 25;  // for each of its two passes
 constexpr uint64_t kMaxBoxCells = uint64_t{1} << 25;
 
-// Rays that together take a limited number of steps. What was computed with a ray after the last
-// one is to be thrown away.
+// Rays that together take a limited number of steps. Discard results computed with a ray after the
+// last step.
 class LimitedRays {
  public:
   LimitedRays(const DagView& dag, uint64_t max_steps, const CancelToken& cancel)
@@ -57,13 +57,14 @@ class LimitedRays {
   uint64_t steps_left_, count_ = 0;
 };
 
-// How far one sees from places on the surface, as a share of the scene's diagonal; a place from
-// which one can see out of the scene counts as 0. Near 0 for an object, or for caves; more for
-// interiors.
+// Returns the mean, over places on the surface, of the longest free distance from the place, as a
+// share of the scene's diagonal. A place from which a ray leaves the scene counts as 0. The result
+// is near 0 for an object or for caves, and larger for interiors.
 double enclosure(const DagView& dag, const OccupiedCells& cells, const Box& box,
                  const CancelToken& cancel) {
   constexpr size_t kPlaces = 1000;
-  // Prime to kPlaces: the first places are all over the scene, if the steps are used up early.
+  // Coprime to kPlaces, so that the first places are spread over the scene even if the steps are
+  // used up early.
   constexpr size_t kStride = 381;
   LimitedRays rays(dag, kMaxEnclosureSteps, cancel);
   std::vector<Vec> directions;  // toward the 26 neighbors of a cell
@@ -89,15 +90,15 @@ double enclosure(const DagView& dag, const OccupiedCells& cells, const Box& box,
   return places == 0 ? 0 : sum / (static_cast<double>(places) * box.diagonal());
 }
 
-// How much there is to see, by a few rays: higher for long views with much detail, lower close to a
-// wall or where the camera looks out of the scene. A distance below `near` is too close.
+// Rates a view with a few rays. The score is higher for long views with much detail, and lower
+// close to a wall or if the camera looks out of the scene. A distance below `near` is too close.
 template <int kColumns, int kRows>
 double score(LimitedRays& rays, const Placement& placement, double width, double near) {
   constexpr double kRays = kColumns * kRows;
   const Camera camera(placement, kColumns, kRows);
   double depth[kRows][kColumns], sum = 0;
   int close = 0, out = 0, breaks = 0;
-  // Along a plane 1 / depth is linear.
+  // 1 / depth is linear along a plane.
   const auto bends = [](double a, double b, double c) {
     return std::fabs(1 / a - 2 / b + 1 / c) * b > 0.03;
   };
@@ -121,8 +122,8 @@ struct Trials {
   std::vector<Placement> placements;
   std::vector<double> scores;
 };
-// Some hundreds of random places in the lower half of the scene, with rough scores, until the steps
-// are used up.
+// Returns some hundred random places in the lower half of the scene, with rough scores. Stops when
+// the steps are used up.
 Trials rough_trials(const DagView& dag, const Box& box, double fov_degrees,
                     const CancelToken& cancel) {
   constexpr uint64_t kPlaces = 400;
@@ -149,11 +150,11 @@ Trials rough_trials(const DagView& dag, const Box& box, double fov_degrees,
   return trials;
 }
 
-// The best-scoring of random places. A quarter of the rays tells which of them could be that.
-// Nothing if the steps were used up before any was found.
+// Returns the best of some random places. A quarter of the rays preselects the candidates. nullopt
+// if the steps were used up before any was found.
 std::optional<Placement> inside_view(const DagView& dag, const Box& box, double fov_degrees,
                                      const CancelToken& cancel) {
-  constexpr double kRoughShare = 0.6;  // of the best rough score; lower could not be the best
+  constexpr double kRoughShare = 0.6;  // of the best rough score; places below cannot be the best
   const auto [trials, rough] = rough_trials(dag, box, fov_degrees, cancel);
   if (trials.empty()) return std::nullopt;
   const size_t first =
@@ -196,7 +197,7 @@ Box occupied_box(const DagView& dag, const CancelToken& cancel) {
     for (int axis = 0; axis < 3; ++axis) {
       if (cell.low[axis] >= box.low[axis] && cell.low[axis] + cell.edge <= box.high[axis]) continue;
       if (cells < kMaxBoxCells) return 0xffu;
-      add(cell);  // undivided
+      add(cell);  // the cell is not divided
       break;
     }
     return 0u;

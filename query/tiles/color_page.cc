@@ -12,7 +12,8 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint32_t kPageLevels = 3;  // levels below its root, if the cells are that small
+// Levels from a page's root to its cells, if the level has such small cells.
+constexpr uint32_t kPageLevels = 3;
 constexpr size_t kMaskWords = 16, kHeadWords = 1 + kMaskWords;
 constexpr uint64_t kBlockCells = 32;
 constexpr size_t kBlockWords = 4;
@@ -32,7 +33,7 @@ void check_address(const voxdag_reader::File& file, const ColorPageAddress& page
                                             std::to_string(edge) + " along each axis");
 }
 
-// A cell of the page by its Morton code within it.
+// Returns a cell of the page from its Morton code within the page.
 std::array<int64_t, 3> cell_of(const ColorPageAddress& page, uint32_t code) {
   std::array<int64_t, 3> cell;
   for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -52,7 +53,7 @@ uint32_t first_bit(const uint32_t* mask) {
 
 }  // namespace
 
-// A node is read when its children are requested, a brick when it is the content.
+// A node is read when its children are requested; a brick is its own content.
 DagView::Children ColorPages::children(uint32_t depth, uint64_t content) const {
   if (depth < file_->brick_level()) checked_file_.expect_intact(depth, content);
   return dag_->children(depth, content);
@@ -64,7 +65,8 @@ uint64_t ColorPages::content(uint32_t depth, const DagView::Children& children, 
   return dag_->content(depth, children, index);
 }
 
-// Sets the bits of the cells `below` levels under a cell at `depth`, in Morton order from `code`.
+// Sets the bits of the cells `below` levels under a cell at `depth`, in Morton order starting at
+// `code`.
 void ColorPages::set_bits(uint32_t depth, uint64_t content, uint32_t below, uint32_t code,
                           uint32_t* mask) const {
   if (below == 0) {
@@ -93,7 +95,7 @@ void ColorPages::set_mask(const ColorPageAddress& page, uint32_t* mask) const {
   set_bits(root, content, below, 0, mask);
 }
 
-// The entries of the directory that a search for the region of a cell reads, and all bytes of the
+// Verifies the directory entries that a search for the region of a cell reads, and all bytes of the
 // region.
 void ColorPages::check_region(const voxdag_reader::ColorTier& tier, uint32_t level,
                               const std::array<int64_t, 3>& cell) const {
@@ -132,7 +134,7 @@ std::vector<uint32_t> ColorPages::encode(const ColorPageAddress& address) {
   return words;
 }
 
-// The cells follow each other in their region, unless the page is larger than that.
+// The page's cells are consecutive in their region, unless the page is larger than the region.
 void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_t>& words) {
   const uint32_t level = address.level;
   const uint64_t count = words[0];

@@ -26,8 +26,8 @@ void check_address(const DagView& dag, const TileAddress& root, const CheckedBlo
                                           std::to_string(root.offset) + ": no node begins here");
 }
 
-// Appends the nodes of a level, with the numbers of their children in place of words, and numbers
-// the children. Returns the word of each node.
+// Appends the nodes of a level, with the numbers of their children in place of offsets, and assigns
+// numbers to the children. Returns the start word of each node.
 std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
                                 const std::vector<uint64_t>& offsets, OffsetTable& children,
                                 std::vector<uint32_t>& words) {
@@ -46,7 +46,7 @@ std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks,
   return starts;
 }
 
-// Replaces the numbers of children from word `begin` to `end` with their word offsets.
+// Replaces the children's numbers in words `begin` to `end` by their word offsets.
 void point_to(const std::vector<uint32_t>& child_starts, size_t begin, size_t end,
               std::vector<uint32_t>& words) {
   while (begin < end) {
@@ -72,8 +72,8 @@ void add_bricks(const DagView& dag, const CheckedBlocks* blocks,
   }
 }
 
-// The nodes for a coarse brick are scattered over the file: each loop prefetches the words that the
-// next one reads.
+// The nodes for a coarse brick are scattered over the file. So each loop prefetches the words that
+// the next loop reads.
 void add_cut_off(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
                  const std::vector<uint64_t>& offsets, std::vector<uint32_t>& words) {
   const NodeChecks checks(dag, level, blocks), child_checks(dag, level + 1, blocks);
@@ -99,7 +99,7 @@ void add_cut_off(const DagView& dag, const CheckedBlocks* blocks, uint32_t level
 }  // namespace
 
 uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level) {
-  const uint32_t below = grid_levels - kBrickLevels - level;  // levels below it, bricks included
+  const uint32_t below = grid_levels - kBrickLevels - level;  // levels below it, including bricks
   return level + (below - 1) % tile_levels + 1;
 }
 

@@ -20,10 +20,10 @@ using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 
 struct SampledRegion {
-  // By attribute, in the order of their numbers; those that the file has.
+  // One per attribute of the file, in the order of attribute numbers.
   std::array<ColorRegion, std::size(kAttributeTable)> stored;
   Cube cube;
-  std::vector<FixedSurface> surfaces;  // that may touch it
+  std::vector<FixedSurface> surfaces;  // surfaces that may touch the region
 };
 
 size_t index_of(Attribute attribute) { return static_cast<size_t>(attribute) - 1; }
@@ -42,7 +42,7 @@ std::vector<SampledRegion> draw_regions(const voxdag_reader::File& file, const C
   std::vector<SampledRegion> regions(drawn.size());
   for (size_t i = 0; i < drawn.size(); ++i) {
     SampledRegion& region = regions[i];
-    // All have the same regions.
+    // All attributes have the same regions.
     for (const Attribute attribute : attributes)
       if (!ColorSection::region(section_of(file, attribute).tier(0), drawn[i],
                                 region.stored[index_of(attribute)]))
@@ -76,7 +76,7 @@ void find_surfaces(TriangleSource& scene, const Grid& snap, const ColorGrid& gri
     const CellBox box(surface.position, grid.levels, grid.region_level());
     for (SampledRegion& region : regions) {
       if (!may_touch(box, region.cube)) continue;
-      bytes += 2 * sizeof(FixedSurface);  // vectors grow by halves
+      bytes += 2 * sizeof(FixedSurface);  // vectors may have twice the needed capacity
       if (bytes > charge.bytes() && !charge.try_resize(2 * bytes))
         throw Error(ErrorCode::kOutOfMemory,
                     "not enough memory for the triangles of the sampled color regions");
@@ -97,7 +97,7 @@ bool is_same(const EncodedRegion& baked, const ColorRegion& stored) {
          std::equal(bytes, bytes + baked.blocks.size(), stored.blocks);
 }
 
-// Difference of the finest cells' colors; both have the same number of cells.
+// Returns the difference of the finest cells' colors. Both regions have the same number of cells.
 ColorDiff difference(const EncodedRegion& baked, const ColorRegion& stored) {
   ColorRegion again;
   again.blocks = reinterpret_cast<const unsigned char*>(baked.blocks.data());
@@ -121,7 +121,7 @@ class RegionComparison {
                    const std::vector<ColoredCell>& cells, const std::vector<CellValues>& values)
       : file_(file), grid_(grid), cells_(cells), values_(values) {}
 
-  // True if all bytes are the same. Throws Error{kCorrupt} if they are not near each other.
+  // True if all bytes are equal. Throws Error{kCorrupt} if the values differ too much.
   bool compare(const SampledRegion& region, Attribute attribute) const {
     const ColorRegion& stored = region.stored[index_of(attribute)];
     const EncodedRegion baked = encode(region.cube, attribute, stored);

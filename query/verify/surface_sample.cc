@@ -16,9 +16,9 @@ namespace {
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}
-  // From (0, 1).
+  // Returns a number from (0, 1).
   double unit() { return (static_cast<double>(engine_() >> 11) + 0.5) * 0x1p-53; }
-  // From [0, count).
+  // Returns a number from [0, count).
   int64_t below(int64_t count) {
     return static_cast<int64_t>(engine_() % static_cast<uint64_t>(count));
   }
@@ -27,9 +27,9 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// Samples `size` items of a stream without replacement, with probability proportional to weight:
-// those with the smallest keys, which are exponentially distributed with the weight as rate
-// (Efraimidis & Spirakis 2006).
+// Samples `size` items of a stream without replacement, with probability proportional to weight. It
+// keeps the items with the smallest keys. Keys are exponentially distributed with the weight as
+// rate (Efraimidis & Spirakis 2006).
 class Reservoir {
  public:
   explicit Reservoir(size_t size) : size_(size) {}
@@ -99,7 +99,7 @@ std::vector<FixedTriangle> draw_triangles(TriangleSource& scene, const Grid& gri
   return drawn;
 }
 
-// The voxel under a random point of the triangle; none if the point is outside the grid.
+// Returns the voxel at a random point of the triangle; nullopt if the point is outside the grid.
 std::optional<std::array<int64_t, 3>> random_voxel(const FixedTriangle& t, const Grid& grid,
                                                    Random& random) {
   double p = random.unit(), q = random.unit();
@@ -152,7 +152,8 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
   Random random(seed);
   std::vector<SampleBox> boxes;
   for (const FixedTriangle& triangle : draw_triangles(scene, grid, random, progress, cancel)) {
-    constexpr int kTries = 16;  // a triangle may be mostly outside the grid
+    // A triangle may be mostly outside the grid, so several points are tried.
+    constexpr int kTries = 16;
     std::optional<std::array<int64_t, 3>> voxel;
     for (int i = 0; i < kTries && !voxel; ++i) voxel = random_voxel(triangle, grid, random);
     if (voxel) boxes.push_back(box_around(*voxel, grid, random));

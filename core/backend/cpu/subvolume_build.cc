@@ -5,8 +5,9 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr size_t kBatch = 256;       // triangles per read
-constexpr size_t kFewTriangles = 4;  // in a tile where the plane memo may be faster
+constexpr size_t kBatch = 256;  // triangles per read
+// Max triangles of a tile for which the plane memo may be faster.
+constexpr size_t kFewTriangles = 4;
 
 LatticeCube box_of(const SubvolumeTask& task) {
   LatticeCube box;

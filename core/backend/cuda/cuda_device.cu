@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kMinMajor = 8;  // compute capability of the oldest code in this build
 
-// Returns the runtime's numbers of the devices that can run this build. Without one, sets `problem`
-// to the reason.
+// Returns the runtime's numbers of the devices that can run this build. If there are no such
+// devices, sets `problem` to the reason.
 std::vector<int> usable_devices(std::string& problem) {
   int count = 0, driver = 0;
   const cudaError_t status = cudaGetDeviceCount(&count);
@@ -30,7 +30,8 @@ std::vector<int> usable_devices(std::string& problem) {
         major >= kMinMajor && pools)
       usable.push_back(device);
     else
-      cudaGetLastError();  // a failed query must not be taken for the failure of a later call
+      // Clears the error, so that it is not taken for the failure of a later call.
+      cudaGetLastError();
   }
   if (usable.empty())
     problem = "no usable CUDA device: expected compute capability 8.0 or later and memory pools";
@@ -117,7 +118,7 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   void* memory = nullptr;
   cudaError_t status = cudaMallocAsync(&memory, bytes, stream());
   if (status == cudaErrorMemoryAllocation) {
-    // The memory that the pool retains may be fragmented: return it to the device and try again.
+    // The memory retained by the pool may be fragmented: return it to the device and try again.
     cudaGetLastError();
     check_call(cudaStreamSynchronize(stream()), "cudaStreamSynchronize", where);
     check_call(cudaMemPoolTrimTo(pool_, 0), "cudaMemPoolTrimTo", where);
@@ -127,7 +128,7 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   return memory;
 }
 
-// CUB returns the thread's last error as its own, so none may remain.
+// CUB returns the thread's last error as its own result, so the last error must be cleared.
 void CudaDevice::release(void* memory) noexcept {
   if (cudaFreeAsync(memory, stream()) != cudaSuccess) cudaGetLastError();
 }

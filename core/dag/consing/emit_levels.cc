@@ -1,6 +1,7 @@
-// From tables to level arrays, from the bricks up. Each level takes three passes: child ids in
-// records are replaced by positions in the array below (in the order of adding, where neighbors are
-// neighbors), slots are sorted, and records are copied in that order and given their own positions.
+// Converts tables to level arrays, from the bricks up. Each level takes three passes. First, child
+// ids in records are replaced by positions in the array below; this uses the order in which records
+// were added, because neighbors in it are neighbors in memory. Second, slots are sorted. Third,
+// records are copied in the sorted order and get their positions.
 #include <algorithm>
 #include <cstring>
 
@@ -10,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-constexpr size_t kPrefetchAhead = 12;  // records
+constexpr size_t kPrefetchAhead = 12;  // in records
 
 class LevelEmitter {
  public:
@@ -99,8 +100,8 @@ class LevelEmitter {
       NodeTable::Record record = table.record(static_cast<uint32_t>(slots[i]));
       hashes_[i] = record.hash();
       masks_[i] = static_cast<uint8_t>(record.mask());
-      // Always eight: surplus ones are overwritten by the next node. Tables and arrays are large
-      // enough.
+      // Always copies eight children. The next node overwrites the surplus. Tables and arrays have
+      // space for them.
       std::memcpy(&children_[at], record.children(), 8 * sizeof(uint32_t));
       at += record.child_count();
       record.set_place(i);
@@ -114,7 +115,7 @@ class LevelEmitter {
   const uint32_t grid_levels_;
   const uint32_t hash_bits_;
   SubDagSink& sink_;
-  PooledArray<uint32_t> brick_places_;  // by brick id
+  PooledArray<uint32_t> brick_places_;  // indexed by brick id
   PooledArray<uint64_t> hashes_;        // of a level's nodes; masks of the bricks
   PooledArray<uint8_t> masks_;
   PooledArray<uint32_t> children_;

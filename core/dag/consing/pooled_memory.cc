@@ -13,7 +13,7 @@ namespace {
 constexpr char kWhat[] = "a subvolume";
 constexpr size_t kPage = size_t{4} << 10;
 constexpr size_t kLargestPower = size_t{4} << 20;
-// A subvolume has up to some hundred arrays; with a lower limit the small ranges, which are freed
+// A subvolume has up to some hundred arrays. With a lower limit, the small ranges, which are freed
 // last, would evict the large ones.
 constexpr size_t kMaxRanges = 1024;
 
@@ -91,8 +91,8 @@ PagePool::Pages PooledMemory::allocate(size_t bytes, bool zero) {
 
 void PooledMemory::grow(PagePool::Pages& pages, size_t bytes) {
   const size_t new_bytes = PagePool::range_bytes(bytes), more = new_bytes - pages.bytes;
-  // Where the system cannot move the pages, old and new ones exist for a moment; the charge is for
-  // one of them.
+  // If the system cannot move the pages, old and new pages exist for a moment. Only one of them is
+  // charged.
   charge(more);
   try {
     pages.data = grow_pages(pages.data, pages.bytes, new_bytes, kWhat);

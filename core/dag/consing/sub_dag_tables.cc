@@ -6,13 +6,13 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kBytesPerEntry = 80;  // of a table, at most, records included
+constexpr uint64_t kBytesPerEntry = 80;  // upper bound per entry of a table, including its record
 
 }  // namespace
 
 SubDagTables::SubDagTables(PooledMemory& memory, int size_log2, const TableSizes& expected)
     : memory_(memory), bricks_(memory) {
-  // Only so much that a cube which turns out smaller has room to spare.
+  // Reserves only an amount that also leaves space if the cube turns out to be smaller.
   uint64_t fits_budget = ConsingMemory::table_bytes(memory.budget.available());
   const auto reserve = [&](auto& table, int s) {
     const uint64_t bytes = expected.entries[s] * kBytesPerEntry;

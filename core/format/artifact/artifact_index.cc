@@ -55,7 +55,7 @@ void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std:
     corrupt(where, "a root's hash has bits beyond the hash bits");
 }
 
-// Reads the frames of one level, and advances `offset` from its first byte to past its last.
+// Reads the frames of one level. Advances `offset` from the level's first byte to past its last.
 void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& level,
                 uint64_t& offset, const std::string& where) {
   const std::string here = where + ", level " + std::to_string(level.level);
@@ -148,7 +148,7 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
     corrupt(where, std::to_string(index.shape.hash_bits) + " hash bits, expected 4 to 64");
   if (levels > index.shape.brick_level() + 1)
     corrupt(where, std::to_string(levels) + " levels are too many for the grid");
-  // So everything allocated below is bounded by the size of `bytes`.
+  // After this check, everything allocated below is limited by the size of `bytes`.
   if (bytes.size() !=
       kFixedBytes + roots * kRootBytes + levels * kLevelBytes + frames * kFrameBytes)
     corrupt(where, "the index is not as long as its counts say");

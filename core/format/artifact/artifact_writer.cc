@@ -20,8 +20,8 @@ struct ArtifactWriter::State {
   bool level_open = false;
   uint64_t child_rows = 0;  // rows of the level below the open one
   LastRow last;
-  // Rows of the frame that is not complete yet.
-  std::vector<uint64_t> values;  // hashes; on the brick level masks
+  // Rows of the incomplete frame.
+  std::vector<uint64_t> values;  // hashes; masks on the brick level
   std::vector<uint8_t> masks;
   std::vector<uint32_t> children;
 

@@ -15,10 +15,11 @@ namespace {
 // Level 1 makes artifacts an eighth smaller and a build 5 % slower.
 constexpr int kZstdLevel = -1;
 constexpr uint32_t kCompressedFlag = 0x80000000u;
-constexpr uint32_t kFramesToSkip = 15;  // after one in which a column shrank too little
+// Frames without compression after one in which a column shrank too little.
+constexpr uint32_t kFramesToSkip = 15;
 constexpr size_t kBrickColumn = 0, kMaskColumn = 1;
 
-// Byte `plane` of each value.
+// Returns byte `plane` of each value.
 template <class T>
 void extract_plane(std::span<const T> values, unsigned plane, std::byte* out) {
   const unsigned shift = 8 * plane;
@@ -50,8 +51,8 @@ ZSTD_DCtx* decompression_context() {
   return context.get();
 }
 
-// The `expected` bytes of a column, in `source` or decompressed into `buffer`; empty if there are
-// not that many.
+// Returns the `expected` bytes of a column, in `source` or decompressed into `buffer`. Empty if the
+// column has a different number of bytes.
 std::span<const std::byte> take_column(ByteSource& source, size_t expected,
                                        std::vector<std::byte>& buffer) {
   const uint32_t head = source.get<uint32_t>();

@@ -50,7 +50,7 @@ ArtifactRef SegmentWriter::append_index(uint64_t first, std::span<const std::byt
   ref.index_offset = size();
   ref.bytes = ref.index_offset + index.size() - first;
   ref.checksum = checksum64(index);
-  // An index that a reader would refuse must not be referred to.
+  // No reference may point to an index that readers would refuse.
   decode_index(index, ref, "artifact for segment " + std::to_string(id_));
   append(index);
   return ref;

@@ -19,13 +19,13 @@ struct CoarseRegion {
   Total total;
 };
 
-// A rule has `Sum`, which adds up the totals of the regions in a cell of a coarser tier, `Total`,
-// total_of() a region of tier 0, and encode() for a region of a coarser tier.
+// Requirements of a rule: `Sum` adds the totals of the regions in a cell of a coarser tier; `Total`
+// is total_of() a region of tier 0, and the result of encode() for a region of a coarser tier.
 class ColorRule {
  public:
   using Sum = WideSum;
   using Total = WideSum;
-  // For encode(), its arguments and its result included.
+  // Memory of encode(), including its arguments and its result.
   static constexpr uint64_t kBytesPerCell = 128 + sizeof(ColoredCell);
 
   explicit ColorRule(AttributeSectionWriter::EncodeColors encode) : encode_(std::move(encode)) {}
@@ -137,7 +137,7 @@ class AttributeSectionWriter::TiersOf : public Tiers {
     section_.add(tier, region);
     if (tier + 1 < section_.tier_count()) add_to_cell(tier + 1, region.morton >> 3, total);
   }
-  // `cell`: of the tier's finest level, the parent of a region of the tier before.
+  // `cell` is a cell of the tier's finest level: the parent of a region of the previous tier.
   void add_to_cell(uint32_t tier, uint64_t cell, const typename Rule::Total& total) {
     Open& open = open_[tier];
     const uint32_t bits = 3 * section_.region_levels(tier);

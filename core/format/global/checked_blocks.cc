@@ -26,7 +26,7 @@ uint64_t CheckedBlocks::size_of(uint64_t block) const {
   return std::min(kBlockBytes, bytes_ - block * kBlockBytes);
 }
 
-// Bytes behind the last block belong to no block.
+// Bytes after the last block belong to no block.
 void CheckedBlocks::compare_all(uint64_t place, uint64_t bytes) const {
   const uint64_t end = std::min(place + bytes, bytes_);
   for (uint64_t block = place / kBlockBytes; block * kBlockBytes < end; ++block)

@@ -24,7 +24,7 @@ namespace {
 
 constexpr uint64_t kAbsent = ~uint64_t{0};
 
-// Nodes of one level of the two files, by their word offsets.
+// Nodes of one level in the two files, by their word offsets.
 struct NodePair {
   uint64_t a = kAbsent, b = kAbsent;
   friend auto operator<=>(const NodePair&, const NodePair&) = default;
@@ -35,7 +35,7 @@ DiffReport operator+(const DiffReport& a, const DiffReport& b) {
   return {a.only_a + b.only_a, a.only_b + b.only_b};
 }
 
-// Pairs of nodes that were compared, with their results. Open addressing, at most 3/4 full.
+// Compared pairs of nodes, with their results. Open addressing, at most 3/4 full.
 class PairTable {
  public:
   explicit PairTable(MemoryBudget& budget) : budget_(&budget) { grow(64); }
@@ -52,7 +52,7 @@ class PairTable {
   }
 
  private:
-  // Offsets are stored plus one, so that absent is 0 and zeroed pages are free entries.
+  // Offsets are stored plus one. So an absent node is 0, and zeroed pages are free entries.
   struct Entry {
     uint64_t a1 = 0, b1 = 0;
     DiffReport report;
@@ -60,7 +60,7 @@ class PairTable {
     NodePair pair() const { return {a1 - 1, b1 - 1}; }
   };
 
-  // Index of the entry that has the pair, or of the free one where it belongs.
+  // Returns the index of the pair's entry, or of the free entry for it.
   size_t find_entry(const NodePair& pair, uint64_t hash) const {
     size_t at = hash & (entries_.size() - 1);
     while (entries_[at].taken() && entries_[at].pair() != pair)
@@ -105,7 +105,7 @@ class SharedPairTable {
     mutable std::mutex mutex;
     PairTable table;
   };
-  // By the high bits; a table takes the low ones.
+  // Selected by the high bits of the hash; a table uses the low bits.
   Part& part_of(uint64_t hash) const { return *parts_[hash >> 58]; }
 
   std::vector<std::unique_ptr<Part>> parts_;
@@ -119,7 +119,8 @@ class Differ {
     for (uint32_t level = 0; level < a.brick_level(); ++level) compared_.emplace_back(budget);
   }
 
-  // All threads compare pairs of one level and their subtrees; the levels above only add results.
+  // All threads compare pairs of one level and their subtrees. The levels above only add up
+  // results.
   DiffReport run() {
     std::vector<NodePair> pairs{{a_.empty() ? kAbsent : 0, b_.empty() ? kAbsent : 0}};
     const NodePair root = pairs[0];
@@ -131,10 +132,11 @@ class Differ {
   }
 
  private:
-  // Enough for any number of threads. The same for all, so that all find the same first error.
+  // Enough for any number of threads. The value does not depend on the threads, so the first error
+  // found does not either.
   static constexpr size_t kPairsToDivide = 16384;
 
-  // By the index of the child; both are absent where neither node has that child.
+  // Children by index. Both are absent if neither node has this child.
   std::array<NodePair, 8> children_of(uint32_t level, const NodePair& pair) const {
     const voxdag_reader::Node a = node(a_, level, pair.a), b = node(b_, level, pair.b);
     std::array<NodePair, 8> below;
@@ -143,7 +145,7 @@ class Differ {
     return below;
   }
 
-  // Each once.
+  // Returns the pairs of children, each once.
   std::vector<NodePair> pairs_below(uint32_t level, const std::vector<NodePair>& pairs) const {
     std::vector<NodePair> below;
     for (const NodePair& pair : pairs)
@@ -178,7 +180,7 @@ class Differ {
   }
   static uint64_t child(const voxdag_reader::Node& node, int index) {
     if (!(node.child_mask >> index & 1)) return kAbsent;
-    // No pointer of a damaged file means a child that is absent.
+    // In a damaged file a pointer may equal kAbsent. It must not count as an absent child.
     return std::min(voxdag_reader::File::child(node, index), kAbsent - 1);
   }
 
@@ -204,7 +206,8 @@ bool same_words(const voxdag_reader::Level& a, const voxdag_reader::Level& b, un
   return same;
 }
 
-// Equal words mean equal voxels. Files of the same voxels and hash bits have equal words.
+// True if all words are equal, which means equal voxels. Files with the same voxels and hash bits
+// have equal words.
 bool same_words(const voxdag_reader::File& a, const voxdag_reader::File& b, unsigned threads,
                 const CancelToken& cancel) {
   for (uint32_t l = 0; l <= a.brick_level(); ++l)

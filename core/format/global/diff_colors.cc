@@ -23,10 +23,10 @@ using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 using voxdag_reader::File;
 
-// The threads share the cubes of this level: at most 2^18.
+// The threads share the cubes of this level, which are at most 2^18.
 constexpr uint32_t kSharedLevel = 6;
 
-// A cube that both files have; its places as in cell_places.h.
+// A cube that both files have, with its places as in cell_places.h.
 struct CommonCube {
   uint64_t code = 0;
   std::array<uint64_t, 2> places{};
@@ -61,7 +61,7 @@ class ColorComparison {
   }
 
  private:
-  // Calls visit(cube) for the common cubes of level `target` in a cube, in Morton order.
+  // Calls visit(cube) for the common cubes of level `target` within a cube, in Morton order.
   template <class Visit>
   void walk(uint32_t level, const CommonCube& cube, uint32_t target, const Visit& visit) const {
     if (level == target) return visit(cube);

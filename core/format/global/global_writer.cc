@@ -21,7 +21,7 @@ namespace {
 constexpr uint64_t kReadBytes = uint64_t{1} << 20;
 static_assert(kReadBytes % kChecksumBlockBytes == 0);
 
-// The header page; fields that are not put are zero.
+// The header page. Fields that were not put are zero.
 class HeaderPage {
  public:
   template <class T>
@@ -54,18 +54,18 @@ void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const 
 class BlockChecksums {
  public:
   BlockChecksums() = default;
-  // Continues after whole blocks with these checksums.
+  // Continues after complete blocks with these checksums.
   explicit BlockChecksums(std::span<const uint64_t> whole_blocks)
       : checksums_(whole_blocks.begin(), whole_blocks.end()) {}
 
   void add(std::span<const std::byte> bytes);
-  // The checksums of all blocks; the last one covers its bytes so far.
+  // Returns the checksums of all blocks. The last one covers its bytes so far.
   std::vector<uint64_t> values() const;
 
  private:
-  std::vector<uint64_t> checksums_;  // of whole blocks
+  std::vector<uint64_t> checksums_;  // of complete blocks
   Checksum64 block_;                 // of the block after them
-  size_t filled_ = 0;                // bytes of that block
+  size_t filled_ = 0;                // bytes in that block so far
 };
 
 void BlockChecksums::add(std::span<const std::byte> bytes) {
@@ -89,7 +89,7 @@ std::vector<uint64_t> BlockChecksums::values() const {
 
 uint64_t bytes_of(const GlobalLevel& level) { return sizeof(uint32_t) * level.words; }
 
-// An attribute section that was written.
+// A written attribute section.
 struct Section {
   GlobalAttribute attribute;
   uint64_t offset = 0;
@@ -106,12 +106,12 @@ struct GlobalFileWriter::State {
   const uint32_t hash_bits;
   const uint64_t narrow_words;
   std::unique_ptr<WritableFile> file;  // none before the first level or the header
-  std::vector<GlobalLevel> levels;     // complete ones, from the bricks upwards
-  std::vector<Section> sections;       // complete ones
-  BlockChecksums block_checksums;      // of them and of the open level or section
-  uint64_t checksummed_words = 0;      // of the open level
+  std::vector<GlobalLevel> levels;     // complete levels, from the bricks upwards
+  std::vector<Section> sections;       // complete sections
+  BlockChecksums block_checksums;      // of the complete and open levels and sections
+  uint64_t checksummed_words = 0;      // words of the open level
   bool level_open = false;
-  uint64_t section_bytes = 0;  // of the open section
+  uint64_t section_bytes = 0;  // bytes of the open section
   bool section_open = false;
   bool retained = false;      // the partial file outlives the writer
   uint64_t end = kPageBytes;  // where the open level or section, the next one, or the table begins
@@ -123,7 +123,7 @@ struct GlobalFileWriter::State {
   void create_file() {
     if (!file) file = files.create(partial_path);
   }
-  // Pads what ends at byte `content_end` to whole pages.
+  // Pads a level or section that ends at byte `content_end` to complete pages.
   void pad(uint64_t content_end);
   void put_sections(HeaderPage& header) const;
   HeaderPage header(const VoxelCounts& counts, std::span<const std::byte> table) const;
@@ -146,7 +146,7 @@ GlobalFileWriter::~GlobalFileWriter() {
   try {
     state_->files.remove(state_->partial_path);
   } catch (const Error&) {
-    // The next writer empties the partial file.
+    // The next writer empties the remaining partial file.
   }
 }
 
@@ -319,7 +319,7 @@ HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
   return header;
 }
 
-// Returns the SHA-256 of the complete file, which must contain the written bytes.
+// Returns the SHA-256 of the complete file. Throws if the file does not contain the written bytes.
 std::string GlobalFileWriter::State::digest(const HeaderPage& header,
                                             std::span<const uint64_t> checksums, unsigned threads,
                                             const CancelToken& cancel) const {
@@ -335,7 +335,7 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   };
   add_expected(0, header.bytes());
   BlockChecksums read_back;
-  // The digest takes longest, so a separate thread digests a chunk while the next one is read.
+  // The digest takes longest. So a separate thread digests a chunk while the next chunk is read.
   std::vector<std::byte> chunk, digested_chunk;
   std::future<void> digested;
   for (uint64_t at = kPageBytes; at < end; at += kReadBytes) {
@@ -385,7 +385,7 @@ GlobalFileSummary GlobalFileWriter::seal(const VoxelCounts& counts, unsigned thr
   s.file->write_at(s.end, table);
   const HeaderPage header = s.header(counts, table);
   s.file->write_at(0, header.bytes());
-  // The file is read while the disk writes it.
+  // The file is read while the disk is still writing it.
   std::future<void> synced = run_in_background([&s] { s.file->sync(); });
   const GlobalFileSummary summary{s.end + table.size(),
                                   s.digest(header, checksums, threads, cancel)};
@@ -397,7 +397,7 @@ void GlobalFileWriter::publish() {
   State& s = *state_;
   s.file->close();
   s.files.rename(s.partial_path, s.path);
-  s.retained = true;  // it has its final name
+  s.retained = true;  // the file has its final name
   s.files.sync_directory(parent_directory(s.path));
 }
 

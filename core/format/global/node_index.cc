@@ -8,12 +8,12 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMaxNodeWords = 17;
-// Words that are nodes by chance begin no chain of so many.
+// Words that look like nodes by chance never form a chain of this length.
 constexpr int kConvincingNodes = 32;
 
 }  // namespace
 
-// 0 if no node can begin there.
+// Returns 0 if no node can begin there.
 uint64_t NodeIndex::words_of_node(uint64_t at) const {
   const uint32_t mask = level_.words[at];
   if (mask == 0 || mask > 255) return 0;
@@ -51,8 +51,8 @@ NodeIndex::Span NodeIndex::walk(uint64_t span, uint64_t begin) {
   return walked;
 }
 
-// Returns the number of nodes, once each span begins where the one before it ends. Sets
-// nodes_before_ where spans begin.
+// Adjusts the spans until each begins where the previous one ends, and returns the number of nodes.
+// Sets nodes_before_ at the begin of each span.
 uint64_t NodeIndex::join(std::span<Span> spans, const CancelToken& cancel,
                          const std::string& where) {
   uint64_t nodes = 0, at = 0;

@@ -91,7 +91,7 @@ class Verifier {
     if (level == file_.brick_level()) return Pointers::kNone;
     return file_.level(level + 1).pointer_bits == 64 ? Pointers::kWide : Pointers::kNarrow;
   }
-  // The node at a word where one begins.
+  // Returns the node that begins at this word.
   voxdag_reader::Node node(uint32_t level, uint64_t at) const {
     const uint32_t* const words = file_.level(level).words + at;
     return {*words, words + 1, pointers(level) == Pointers::kWide};
@@ -103,9 +103,9 @@ class Verifier {
   Progress& progress_;
   const CancelToken& cancel_;
   const uint64_t narrow_words_;
-  std::vector<NodeIndex> indexes_;  // of the levels checked so far
-  PageBuffer<uint64_t> hashes_;     // truncated, of the level checked last
-  PageBuffer<uint8_t> used_;        // by the level above it
+  std::vector<NodeIndex> indexes_;  // indexes of the levels checked so far
+  PageBuffer<uint64_t> hashes_;     // truncated hashes of the level checked last
+  PageBuffer<uint8_t> used_;        // flags of nodes used by the level above
 };
 
 void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what) const {
@@ -114,7 +114,7 @@ void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what
       broken(file_.path() + ": byte " + std::to_string(at), what + ", expected 0");
 }
 
-// The reader checked the fields that it needs; the others have fixed values.
+// The reader has checked the fields that it needs. All other fields must have fixed values.
 void Verifier::check_header() const {
   uint32_t node_order;
   std::memcpy(&node_order, file_.data() + kNodeOrderAt, sizeof(node_order));
@@ -148,7 +148,7 @@ void Verifier::check_header() const {
   check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "reserved");
 }
 
-// Sections of other kinds than this program knows are not valid.
+// Sections of kinds unknown to this program are not valid.
 void Verifier::check_attributes(bool has_attributes) const {
   if (!has_attributes) check_zeros(kAttributeCountAt, kLevelsAt, "attribute sections are reserved");
   uint64_t count;
@@ -164,7 +164,7 @@ void Verifier::check_attributes(bool has_attributes) const {
   check_zeros(kAttributesAt + kinds.size() * kAttributeEntryBytes, kFeaturesAt, "reserved");
 }
 
-// `entry`: of the attribute table.
+// `entry` is an index in the attribute table.
 void Verifier::check_section(size_t entry, Attribute attribute) const {
   const auto field = [&](size_t at) {
     uint64_t value;
@@ -184,7 +184,7 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
   if (field(kAttributeCellsAt) != cells || field(kAttributeFinestCellsAt) != finest_cells)
     broken(file_.path() + ": header", std::to_string(field(kAttributeCellsAt)) + " " + plural +
                                           ", the section has " + std::to_string(cells));
-  // Behind the names, up to the tier table.
+  // End of the padding that follows the names.
   const uint64_t end = field(kAttributeOffsetAt) + field(kAttributeBytesAt);
   if (traits_of(attribute).has_names()) {
     const voxdag_reader::ColorTier& last = section.tier(section.tier_count() - 1);
@@ -229,7 +229,7 @@ uint64_t Verifier::brick_hash(uint64_t at) const {
   return truncate_hash(hash_brick(file_.brick(at)), file_.hash_bits());
 }
 
-// Checks the children of the node and marks them as used.
+// Returns the node's hash. Checks its children and marks them as used.
 uint64_t Verifier::node_hash(uint32_t level, uint64_t at) {
   const voxdag_reader::Node parent = node(level, at);
   const int children = kPopcount8[parent.child_mask];
@@ -247,8 +247,8 @@ uint64_t Verifier::node_hash(uint32_t level, uint64_t at) {
   return truncate_hash(hash_node(parent.child_mask, child_hashes), file_.hash_bits());
 }
 
-// The hash of the last node before the span is computed again, since another thread may have that
-// span.
+// The hash of the last node before the span is computed again, because another thread may be
+// checking that span.
 void Verifier::check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& hashes) {
   const NodeIndex& index = indexes_[level];
   const bool bricks = level == file_.brick_level();
@@ -298,7 +298,8 @@ void Verifier::check_all_used(uint32_t level) const {
                });
 }
 
-// Counts how often each node occurs in the octree, from the root down, and from that the voxels.
+// Counts the occurrences of each node in the octree, from the root down, and computes the number of
+// voxels from them.
 void Verifier::check_counts() const {
   std::atomic<uint64_t> svo_nodes = 0, voxels = 0;
   PageBuffer<uint64_t> times(budget_, file_.empty() ? 0 : 1, "counts of a level");

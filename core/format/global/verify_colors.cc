@@ -24,8 +24,8 @@ class CellWalk {
  public:
   explicit CellWalk(const voxdag_reader::File& file) : file_(file) {}
 
-  // Calls visit(level, code) for all cells of the levels down to `finest`, a parent first. `code`
-  // is relative to the cube.
+  // Calls visit(level, code) for all cells of the levels down to `finest`, each parent before its
+  // children. `code` is relative to the cube.
   template <class Visit>
   void walk(uint32_t level, uint64_t place, uint64_t code, uint32_t finest, Visit& visit) const {
     visit(level, code);
@@ -36,8 +36,8 @@ class CellWalk {
         walk(level + 1, child_place_at(file_, level, place, i), 8 * code + static_cast<uint64_t>(i),
              finest, visit);
   }
-  // How many cells of level `target` a cube has; counts to `limit` and not much further. A few
-  // nodes that are shared a lot may have 8^20.
+  // Returns the number of cells of level `target` in a cube. Stops soon after `limit`, because a
+  // few nodes that are shared often can have 8^20 cells.
   uint64_t count(uint32_t level, uint64_t place, uint32_t target, uint64_t limit) const {
     if (level == target) return 1;
     uint64_t cells = 0;
@@ -47,7 +47,7 @@ class CellWalk {
         cells += count(level + 1, child_place_at(file_, level, place, i), target, limit - cells);
     return cells;
   }
-  // The place of a cube; false if it is not set.
+  // Sets `place` to the place of a cube. Returns false if the cube is not set.
   bool find(uint32_t level, uint64_t code, uint64_t& place) const {
     place = 0;
     for (uint32_t l = 0; l < level; ++l) {
@@ -74,7 +74,7 @@ class ColorVerifier {
     return cells_.count(0, 0, tier.region_level, tier.region_count) == tier.region_count;
   }
 
-  // The region is read; returns where the next one's data begin.
+  // Checks one region and returns it.
   ColorRegion check_region(const ColorTier& tier, uint64_t i) const {
     ColorRegion region;
     if (!ColorSection::region(tier, i, region)) fail(tier, i, "its counts or its place are wrong");
@@ -87,7 +87,7 @@ class ColorVerifier {
       fail(tier, i, "the DAG has no cells there");
     std::array<uint32_t, kRegionLevels + 1> counts{};
     std::vector<uint32_t> prefix[2];
-    std::vector<ValuedCell> finest;  // not of colors
+    std::vector<ValuedCell> finest;  // for attributes other than color
     const auto visit = [&](uint32_t level, uint64_t code) {
       const uint32_t coarser = tier.finest_level - level;
       if (coarser >= kPrefixLevels && coarser - kPrefixLevels < 2 && level > tier.region_level)
@@ -132,7 +132,7 @@ class ColorVerifier {
       if (region.blocks[at] != 0) fail(tier, i, "its padding is not 0");
   }
 
-  // `cells`: of the finest level, without their values.
+  // `cells` are the cells of the finest level, without their values.
   void check_values(const ColorTier& tier, uint64_t i, const ColorRegion& region,
                     std::vector<ValuedCell>& cells) const {
     const auto fail_at = [&](size_t at, const std::string& what) {
@@ -161,7 +161,8 @@ class ColorVerifier {
                "one");
   }
 
-  // The value of a cell of a tier's finest level, of the regions of the tier before that it has.
+  // Returns the value of a cell of a tier's finest level, computed from the regions of the previous
+  // tier in this cell.
   uint32_t value_from_below(const ColorTier& tier, uint64_t code) const {
     const ColorTier& below = section_.tier_of(tier.finest_level + 1);
     uint32_t children[8];

@@ -1,12 +1,13 @@
-// OpenVDB's .vdb and NanoVDB's .nvdb, by their own libraries: a grid of voxels that are on, and
-// where the file has colors a grid of linear light with the name that Houdini and Blender give it.
-// The libraries build them completely in memory, so their size is counted first.
+// Exports OpenVDB's .vdb and NanoVDB's .nvdb with these libraries: a grid of active voxels and, if
+// the file has colors, a grid of linear light with the name that Houdini and Blender use. The
+// libraries build the grids completely in memory, so their size is counted first.
 //
-// Half floats are converted without Imath's table, whose library would have to be linked.
+// Half floats are converted without Imath's table, because the table's library would have to be
+// linked.
 #define IMATH_HALF_NO_LOOKUP_TABLE
 #include <openvdb/openvdb.h>
 
-// NanoVDB's conversion needs the former first.
+// Must be included before NanoVDB's conversion.
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 #include <openvdb/io/Stream.h>
@@ -26,14 +27,14 @@
 namespace voxdag::query {
 namespace {
 
-// Bytes of a node with all of its pointers, in memory: a leaf of 8^3 voxels, and the nodes of 128^3
-// and 4096^3.
+// Memory of a node with all of its pointers: a leaf of 8^3 voxels, and the nodes of 128^3 and
+// 4096^3 voxels.
 struct VdbNodeBytes {
   uint64_t leaf, lower, upper;
 };
 constexpr VdbNodeBytes kOpenVdbBytes = {192, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kNanoVdbBytes = {96, 34 << 10, 272 << 10};
-// A color is three floats; a node has one, padded, or a pointer for each child.
+// A color is three floats. A node stores one color (padded) or a pointer for each child.
 constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
 // Minimum size of a leaf in a .vdb file, which stores the mask twice.
 constexpr uint64_t kVdbLeafBytes = 128;
@@ -58,8 +59,8 @@ auto with_vdb_errors(const ExportJob& job, const Work& work) {
   }
 }
 
-// A stream into an ExportFile. Streams swallow exceptions, and the libraries' errors do not name
-// the reason: check() rethrows the first exception.
+// A stream buffer that writes to an ExportFile. Streams swallow exceptions, and the libraries'
+// errors do not have the reason. So check() rethrows the first exception.
 class FileBuffer : public std::streambuf {
  public:
   FileBuffer(ExportFile& file, ExportStage& stage) : file_(file), stage_(stage) {}
@@ -69,7 +70,7 @@ class FileBuffer : public std::streambuf {
 
  protected:
   std::streamsize xsputn(const char* bytes, std::streamsize count) override {
-    // A complete grid may come in one call.
+    // A single call may pass a complete grid.
     constexpr size_t kPieceBytes = 1 << 20;
     const bool done = attempt([&] {
       std::string_view rest(bytes, static_cast<size_t>(count));
@@ -118,8 +119,8 @@ class FileBuffer : public std::streambuf {
   std::exception_ptr failure_;
 };
 
-// What the trees of a selection have and take in memory, or more bytes than `limit`: cubes follow
-// one another in Morton order, so that each is counted once. `steps` advances by bricks.
+// Counts the nodes and memory of the trees of a selection, or stops above `limit` bytes. Cubes come
+// in Morton order, so that each is counted once. `steps` advances by bricks.
 struct VdbSize {
   uint64_t voxels = 0, bytes = 0;
 };
@@ -176,7 +177,7 @@ template <class GridType>
 typename GridType::Ptr empty_vdb_grid(const ExportJob& job, const char* name) {
   auto grid = GridType::create();
   grid->setName(name);
-  // A voxel's index is where its center is.
+  // A voxel's index is its center.
   auto transform = openvdb::math::Transform::createLinearTransform(job.cell_edge());
   transform->postTranslate({job.world(0, 0.5), job.world(1, 0.5), job.world(2, 0.5)});
   grid->setTransform(transform);
@@ -214,7 +215,7 @@ openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job, uint64_t voxels) {
   });
 }
 
-// A file of `min_bytes` or more.
+// Writes a file of at least `min_bytes`.
 template <class Write>
 ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, uint64_t min_bytes,
                              const Write& write) {
@@ -252,12 +253,12 @@ ExportReport write_vdb(const ExportJob& job) {
     openvdb::GridPtrVec grids = {grid};
     if (job.has_colors) {
       grids.push_back(make_color_grid(job, voxels));
-      // Half floats tell all bytes of sRGB apart.
+      // Half floats can represent all sRGB bytes.
       grids.back()->setSaveFloatAsHalf(true);
     }
     const uint64_t min_bytes = grid->tree().leafCount() * kVdbLeafBytes;
     return write_grid_file(job, voxels, min_bytes, [&](std::ostream& stream) {
-      // Without a codec that some readers may lack: leaves are bits anyway.
+      // No codec is used, because some readers may lack it. Leaves consist of bits anyway.
       openvdb::io::Stream out(stream);
       out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
       out.write(grids);

@@ -19,7 +19,8 @@ void PlaneDirection::set_up(const Plane& plane) {
   buckets_per_unit_ = kBuckets / (static_cast<double>(span) + 1.0);
   int i = 0;
   for (int b = 0; b <= kBuckets; ++b) {
-    // The first value of this bucket may be above an f of the same bucket: the one before is not.
+    // The first value of this bucket may exceed an f of the same bucket. The previous value does
+    // not.
     while (i < kCorners && bucket(values_[i]) < b) ++i;
     bucket_[b] = static_cast<uint16_t>(std::max(i - 1, 0));
   }

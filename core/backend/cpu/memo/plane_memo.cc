@@ -10,7 +10,8 @@ namespace {
 
 constexpr int64_t kSmallNormal = 64;       // sum of magnitudes
 constexpr uint64_t kMinPlaneSlots = 1024;  // slots; a power of two
-constexpr uint64_t kSpareSlots = 64;  // more than are used before the next reserve_small_nodes()
+// More slots than are used before the next reserve_small_nodes().
+constexpr uint64_t kSpareSlots = 64;
 constexpr uint32_t kMaxPlanes = 1 << 20;
 
 // All inputs of small_node(): 24 + 1 + 5 + 28 bits, and one more so that no key is 0.
@@ -174,7 +175,7 @@ void PlaneMemo::reserve_small_nodes() {
     if (old[i].key != 0) small_slot(old[i].key) = old[i];
 }
 
-// The slot of a key, or the free slot where it belongs.
+// Returns the slot of a key, or the free slot for it.
 PlaneMemo::SmallNode& PlaneMemo::small_slot(uint64_t key) {
   uint64_t at = key * 0x9e3779b97f4a7c15ull >> 20;
   while (true) {

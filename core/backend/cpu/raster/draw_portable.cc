@@ -1,5 +1,5 @@
-// The portable rasterizer: brick after brick of the triangle's box, each voxel of a brick tested by
-// the integer tests of tile_triangle.h.
+// The portable rasterizer. It visits the bricks of the triangle's box one after another, and tests
+// each voxel of a brick with the integer tests of tile_triangle.h.
 #include <algorithm>
 
 #include "core/backend/cpu/raster/kernels.h"
@@ -45,7 +45,7 @@ uint64_t plane_mask(const VoxelOffsets<Int>& offsets, Int at_first, Int width) {
 }
 
 // Removes the voxels whose column along `axis` is on the outer side of an edge. Most edges cross
-// few bricks: one whose smallest value over the brick is not negative removes nothing.
+// few bricks. An edge whose smallest value over the brick is not negative removes nothing.
 template <class Edge>
 void cut_by_edges(const Edge (&edges)[3], int axis, const int (&brick)[3], uint64_t& mask) {
   const int p = (axis + 1) % 3, q = (axis + 2) % 3;
@@ -58,7 +58,7 @@ void cut_by_edges(const Edge (&edges)[3], int axis, const int (&brick)[3], uint6
   }
 }
 
-// The voxels of a brick within [first, last] along an axis, counted from the brick's first.
+// Returns the voxels of a brick within [first, last] along an axis, counted from the brick's first.
 uint64_t range_mask(int axis, int first, int last) {
   if (first <= 0 && last >= 3) return ~uint64_t{0};
   const int p = (axis + 1) % 3, q = (axis + 2) % 3;
@@ -83,7 +83,7 @@ uint64_t brick_mask(const TileTriangle<Coordinate>& t,
   return mask;
 }
 
-// False if the plane or an edge excludes the whole brick.
+// Returns false if the plane or an edge excludes the complete brick.
 template <class Coordinate>
 bool may_touch(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
   auto low = t.lowest, high = t.lowest;

@@ -1,4 +1,4 @@
-// Compiled for AVX2: nothing in here may run before the choice is made.
+// Compiled for AVX2: nothing in this file may run before the CPU was checked.
 #include "core/color/blocks/block_encoder.h"
 
 namespace voxdag {

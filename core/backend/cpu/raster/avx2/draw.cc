@@ -1,5 +1,4 @@
-// The rasterizer of draw_by_columns.h for AVX2, with the voxels of a brick as the bytes of two
-// vectors.
+// The rasterizer of draw_by_columns.h for AVX2. The voxels of a brick are the bytes of two vectors.
 #include <immintrin.h>
 
 #include "core/backend/cpu/raster/avx2/draw_by_columns.h"
@@ -34,7 +33,7 @@ inline constexpr ByteOrder<D> kByteOrder;
 template <int D>
 class Spread {
  public:
-  // The half of a column is the high bit of its q: for D = 1 that bit selects the vector of its
+  // The half of a column is the high bit of its q. For D = 1 this bit selects the vector of its
   // voxels, otherwise the half of a vector.
   VOXDAG_INLINE explicit Spread(HeightBounds bounds) {
     const __m256i halves[2] = {D == 1 ? _mm256_permute4x64_epi64(bounds, 0x44) : bounds,

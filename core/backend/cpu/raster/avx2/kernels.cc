@@ -54,7 +54,7 @@ int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbe
   return list_blocks_with(tile, groups, existing, numbers, keys, summarize);
 }
 
-// [set of four bricks]: their lanes, in halves of 32 bits, without gaps.
+// Lanes of a set of four bricks without gaps, in halves of 32 bits, indexed by the set.
 struct Packing {
   alignas(32) int32_t lanes[16][8] = {};
   constexpr Packing() {

@@ -1,5 +1,5 @@
-// The rasterizer of avx2/draw_by_columns.h for AVX-512, with the voxels of a brick as the bytes of
-// one vector.
+// The rasterizer of avx2/draw_by_columns.h for AVX-512. The voxels of a brick are the bytes of one
+// vector.
 #include <immintrin.h>
 
 #include "core/backend/cpu/raster/avx2/draw_by_columns.h"
@@ -8,10 +8,10 @@
 namespace voxdag::cpu {
 namespace {
 
-// By voxel of a brick.
+// Tables indexed by the voxel of a brick.
 template <int D>
 struct VoxelBytes {
-  alignas(64) uint8_t below[64] = {};  // where HeightBounds has the bounds of the voxel's column
+  alignas(64) uint8_t below[64] = {};  // index in HeightBounds of the bounds of the voxel's column
   alignas(64) uint8_t over[64] = {};
   alignas(64) uint8_t height[4][64] = {};  // above the floor of the first of four bricks
   alignas(64) uint8_t depth[4][64] = {};   // below the highest voxel of the four
