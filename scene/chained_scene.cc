@@ -30,7 +30,7 @@ void add_materials(SceneMaterials& all, SceneMaterials more) {
   std::ranges::move(more.warnings, std::back_inserter(all.warnings));
 }
 
-// Returns a visitor of triangles whose materials are numbered from `first_material` on. `visit`
+// Returns a visitor of triangles whose materials are numbered starting at `first_material`. `visit`
 // must outlive it.
 TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
                                                     const TriangleCursor::SurfaceVisitor& visit) {
@@ -43,7 +43,7 @@ TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
   };
 }
 
-// Reads the parts one after the other. Only one part's cursor is open, with the memory for all.
+// Reads the parts one after another. Only one part's cursor is open, and it has the memory for all.
 class ChainedCursor : public TriangleCursor {
  public:
   ChainedCursor(const std::vector<Part>& parts, unsigned cursors)

@@ -38,7 +38,7 @@ std::string ply_header(const Mesh& mesh, uint64_t vertices, uint64_t triangles) 
          "\nproperty list uchar uint vertex_indices\nend_header\n";
 }
 
-// A face: the number of corners, and their vertices.
+// A face: the number of corners, and their vertex indices.
 constexpr size_t kFaceBytes = 1 + 3 * sizeof(uint32_t);
 
 class MeshFile : public ReadableFile {
@@ -66,7 +66,7 @@ class MeshFile : public ReadableFile {
   }
 
  private:
-  // Reads at least one byte, at most to the end of the contiguous memory at `offset`.
+  // Reads at least one byte, at most to the end of the contiguous array at `offset`.
   size_t read_some(uint64_t offset, std::span<std::byte> out) const {
     if (offset < header_.size()) return copy(std::as_bytes(std::span(header_)), offset, out);
     if (offset < faces_begin_) return read_vertices(offset - header_.size(), out);
@@ -91,7 +91,7 @@ class MeshFile : public ReadableFile {
   const std::string path_ = MeshFiles::kPath;
   const Mesh mesh_;
   const std::span<const std::byte> positions_;
-  const size_t position_bytes_, vertex_bytes_;  // of one vertex
+  const size_t position_bytes_, vertex_bytes_;  // bytes per vertex
   const uint64_t vertices_;
   const std::string header_;
   const uint64_t faces_begin_, size_;

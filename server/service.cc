@@ -24,7 +24,7 @@ constexpr size_t kMaxLoggedChars = 200;
 ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
   check_config(config);
   files.make_directories(config.data_folder);
-  // Clients must not use up the files that jobs, transfers and stores need.
+  // Clients must leave enough file descriptors for jobs, transfers and stores.
   const uint64_t sockets = max_open_files() / 2;
   if (config.http.limits.max_connections > sockets) {
     log("connections are limited to " + std::to_string(sockets) + ", not " +
@@ -42,7 +42,7 @@ std::unique_ptr<FileLock> lock_folder(FileSystem& files, const std::string& fold
   return lock;
 }
 
-// A plan's folder is all that a service that crashed during a dry run leaves behind.
+// Removes the folders of plans, left by a service that crashed during a dry run.
 void remove_plans(FileSystem& files, const ServerConfig& config) {
   const std::string folder = config.data_folder + "/plans";
   if (!files.exists(folder)) return;
@@ -51,7 +51,7 @@ void remove_plans(FileSystem& files, const ServerConfig& config) {
       remove_tree(files, folder + "/" + entry.name);
 }
 
-// A target as the log shows it: no byte of it controls a terminal.
+// Returns a target for the log, without bytes that control a terminal.
 std::string shown(const std::string& path) {
   std::string text;
   for (const char c : path.substr(0, kMaxLoggedChars)) {
@@ -105,7 +105,7 @@ std::string Service::url() const {
 }
 
 void Service::run() {
-  // Builds stop while requests in progress finish.
+  // Stops builds while requests in progress finish.
   std::thread cleaner([this] {
     clean_up_periodically();
     dispatcher_.stop();
@@ -156,7 +156,7 @@ Response Service::answer(Request& request) {
     response = router_.route(request, access_);
   } catch (const std::exception& error) {
     const Problem problem = public_problem(error);
-    if (problem.detail != error.what())  // clients do not see this text
+    if (problem.detail != error.what())  // clients do not receive this text
       log_("request " + request.id + " " + request.method + " failed: " + error.what());
     if (!problem.log_text.empty())
       log_("request " + request.id + " " + request.method + " failed: " + problem.log_text);

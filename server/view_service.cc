@@ -11,7 +11,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kDrainS = 1;
-// The old and the new file, while one is replaced.
+// Two files while one is being replaced: the old and the new one.
 constexpr size_t kMaxOpen = 2;
 
 HttpOptions options(int port) {
@@ -49,8 +49,8 @@ std::string ViewService::url() const {
 }
 
 void ViewService::run() {
-  // The cameras are computed while a browser starts. If that fails, the request for them fails as
-  // well.
+  // The cameras are computed while a browser starts. If this fails, the request for them also
+  // fails.
   const std::jthread cameras([this, file = open_sources_.open(path_)] {
     try {
       file->manifest(stopping_);
@@ -65,7 +65,7 @@ Response ViewService::answer(Request& request) {
     return router_.route(request, access_);
   } catch (const std::exception& error) {
     const Problem problem = public_problem(error);
-    if (problem.detail != error.what())  // clients do not see this text
+    if (problem.detail != error.what())  // clients do not receive this text
       log_(request.method + " failed: " + error.what());
     if (!problem.log_text.empty()) log_(request.method + " failed: " + problem.log_text);
     return problem_response(problem);

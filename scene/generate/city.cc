@@ -9,9 +9,9 @@
 namespace voxdag {
 namespace {
 
-constexpr double kPitch = 64;         // from street to street
-constexpr double kBlock = 52;         // edge of a block, pavement included
-constexpr double kPavement = 0.1875;  // height
+constexpr double kPitch = 64;         // distance between streets
+constexpr double kBlock = 52;         // edge of a block, including the pavement
+constexpr double kPavement = 0.1875;  // height of the pavement
 constexpr double kBuilt = 48;         // edge of the area for lots
 // Measured triangles of an average block, from which the number of blocks is estimated.
 constexpr uint64_t kTrianglesPerBlock = 9900;
@@ -48,11 +48,12 @@ class City {
  private:
   void make_block(uint64_t column, uint64_t row) {
     Random random(seed_, {column, row});
-    paint_ = Random(seed_, {column, row, 1});  // apart, so that colors do not change the triangles
+    // A separate generator, so that colors do not change the triangles.
+    paint_ = Random(seed_, {column, row, 1});
     const Vec3 center{
         kPitch * (static_cast<double>(2 * column) - static_cast<double>(columns_ - 1)) / 2, 0,
         kPitch * (static_cast<double>(2 * row) - static_cast<double>(rows_ - 1)) / 2};
-    // A park is known as one after its street only; with colors, the ground waits for that.
+    // A park is only known after its street. With colors, the ground is added then.
     if (!scene_.has_colors()) make_ground(center, false);
     make_street(center, random);
     const bool is_park = random.chance(10);
@@ -61,7 +62,7 @@ class City {
     make_lots(center, centrality(column, row), random);
   }
 
-  // 1 in the middle of the city, 0 at its edge.
+  // Returns 1 in the middle of the city, 0 at its edge.
   double centrality(uint64_t column, uint64_t row) const {
     const auto off_middle = [](uint64_t i, uint64_t count) {
       const double middle = 0.5 * static_cast<double>(count - 1);
@@ -93,7 +94,7 @@ class City {
       }
   }
 
-  // Sides 0 and 1 run along x, 2 and 3 along z.
+  // Returns a place on a side. Sides 0 and 1 run along x, 2 and 3 along z.
   static Vec3 place(const Vec3& c, int side, double along, double across, double height) {
     return side < 2 ? Vec3{c.x + along, height, c.z + across}
                     : Vec3{c.x + across, height, c.z + along};
@@ -115,7 +116,7 @@ class City {
       }
   }
 
-  // One tower, four buildings or nine small ones.
+  // Adds one tower, four buildings or nine small ones.
   void make_lots(const Vec3& c, double central, Random& random) {
     const int across = central > 0.7 && random.chance(40)   ? 1
                        : central > 0.3 || random.chance(25) ? 2

@@ -10,7 +10,7 @@ constexpr double kWindowDepth = 0.25;
 constexpr double kSlabHeight = 0.5;
 constexpr Rgba8 kSlab{175, 172, 168, 255};
 
-// A storey or more of a building: walls made of bays, a window in each.
+// One or more storeys of a building. Its walls consist of bays with a window in each.
 struct Tier {
   double x = 0, z = 0;  // center
   double y = 0;
@@ -22,11 +22,11 @@ struct Tier {
   double top() const { return y + kFloorHeight * floors; }
 };
 
-// Adds a wall, its bays counted from the left end as seen from outside.
+// Adds a wall. Its bays are counted from the left end as seen from outside.
 void add_wall(SceneBuilder& scene, const CityParts& parts, const Tier& tier, uint32_t direction) {
   static constexpr int kAlong[4][2] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};
   const auto [ax, az] = kAlong[direction];
-  // Outwards is the wall's direction turned right: (-az, ax).
+  // The outward direction is the wall's direction turned right: (-az, ax).
   const double x = tier.x - (ax + az) * tier.half_x(), z = tier.z + (ax - az) * tier.half_z();
   const bool along_x = az == 0;
   const Vec3 scale = along_x ? Vec3{tier.bay, kFloorHeight, kWindowDepth}
@@ -39,7 +39,7 @@ void add_wall(SceneBuilder& scene, const CityParts& parts, const Tier& tier, uin
           scale);
 }
 
-// Adds the walls, and a slab on top that juts out.
+// Adds the walls, and a slab on top that projects beyond them.
 void add_tier(SceneBuilder& scene, const CityParts& parts, const Tier& tier, const Lot& lot) {
   scene.paint(kBuildings, lot.wall);
   for (uint32_t direction = 0; direction < 4; ++direction) add_wall(scene, parts, tier, direction);
@@ -49,7 +49,7 @@ void add_tier(SceneBuilder& scene, const CityParts& parts, const Tier& tier, con
                             {tier.x + x, tier.top() + kSlabHeight, tier.z + z});
 }
 
-// Adds a roof with a ridge along the longer side, its ends upright or sloping (a hip).
+// Adds a roof with a ridge along the longer side. Its ends are upright or sloping (a hip).
 void add_ridge_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double y = tier.top() + kSlabHeight;
   const bool along_x = tier.bays_x >= tier.bays_z;
@@ -80,7 +80,7 @@ void add_crown(SceneBuilder& scene, const Tier& tier, Random& random) {
                                {half * 0.6875, half * 1.25, half * 0.6875}, turn);
 }
 
-// Adds plant housings at odd angles, sometimes a mast.
+// Adds equipment boxes at odd angles, sometimes a mast.
 void add_flat_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double y = tier.top() + kSlabHeight;
   for (int i = random.between(1, 3); i > 0; --i) {
@@ -111,7 +111,7 @@ void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, R
   tier.bays_z = static_cast<uint32_t>(random.between(most * 5 / 8, most));
   const bool tall = lot.floors > 9;
   for (uint32_t left = lot.floors;;) {
-    // Tall buildings become narrower twice or more on their way up.
+    // Tall buildings become narrower two or more times toward the top.
     const bool last = !tall || left < 6 || tier.bays_x < 4 || tier.bays_z < 4;
     tier.floors = last ? left : left / 2 + random.below(left / 4);
     add_tier(scene, parts, tier, lot);

@@ -26,10 +26,10 @@ constexpr SceneKindInfo kKinds[] = {
 
 constexpr const char* kGenerator = "voxdag generate ";
 constexpr uint32_t kMaxMengerLevel = 5;
-// Bytes of a triangle of terrain, the kind that stores triangles most compactly.
+// Bytes per triangle of terrain, which is the most compact kind.
 constexpr uint64_t kMinBytesPerTriangle = 12;
 
-// Refuses sizes that are too large without counting; GlbLayout finds the rest.
+// Refuses sizes that are obviously too large without counting. GlbLayout refuses the others.
 void check_size(const GenerateOptions& options) {
   const bool is_menger = options.kind == SceneKind::kMenger;
   const bool fits =

@@ -32,7 +32,7 @@ json vectors(uint64_t count) {
   return {{"componentType", kFloat}, {"type", "VEC3"}, {"count", count}};
 }
 
-// A primitive of consecutive arrays.
+// Returns a primitive of consecutive arrays.
 json primitive(uint64_t positions, bool has_colors, uint32_t material) {
   if (!has_colors) return {{"attributes", {{"POSITION", positions}}}, {"indices", positions + 1}};
   return {{"attributes", {{"POSITION", positions}, {"COLOR_0", positions + 1}}},
@@ -106,8 +106,8 @@ void GlbLayout::add_bytes(uint64_t bytes) {
                     std::to_string(stored_triangles_) + " triangles; ask for fewer");
 }
 
-// The parts first, so that part p is mesh p; then one mesh of everything that is not instanced. One
-// node for that mesh, and one for each block of instances.
+// Parts come first, so that part p is mesh p. Then comes one mesh with everything that is not
+// instanced. There is one node for this mesh, and one for each block of instances.
 std::string GlbLayout::json_text(const std::string& generator,
                                  std::span<const SceneMaterial> materials) const {
   Arrays arrays;

@@ -1,5 +1,5 @@
-// Spheres of many sizes in a ball: octahedra with n^2 triangles per face, their vertices moved out
-// to the sphere. Larger spheres are finer.
+// Spheres of many sizes in a ball. They are octahedra with n^2 triangles per face, whose vertices
+// are moved out to the sphere. Larger spheres are finer.
 #include <cmath>
 
 #include "scene/generate/random.h"
@@ -9,9 +9,10 @@ namespace voxdag {
 namespace {
 
 constexpr double kBallRadius = 512;
-constexpr uint32_t kSizes = 7;  // radius 64 to 1 and a bit, 64 to 1 cuts an edge
+// Radii from 64 down to slightly over 1, edges in 64 down to 1 parts.
+constexpr uint32_t kSizes = 7;
 
-// Adds a face of the octahedron, its edges divided into n parts.
+// Adds a face of the octahedron with its edges divided into n parts.
 void add_face(MeshBuilder& mesh, int n, const Vec3& sign) {
   const uint32_t first = mesh.vertices();
   for (int i = 0; i <= n; ++i)

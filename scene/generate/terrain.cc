@@ -1,6 +1,6 @@
-// A fractal heightfield on a square of 1024 x 1024: octaves of gradient noise, ridged where the
-// land is high and smooth where it is low, its coordinates bent by two more so that valleys wind.
-// Each octave has half the wavelength of the one before, down to four cells of the field.
+// A fractal heightfield on a square of 1024 x 1024: octaves of gradient noise, ridged on high land
+// and smooth on low land. Its coordinates are bent by two more octaves, so that valleys wind. Each
+// octave has half the wavelength of the previous one, down to four cells of the field.
 #include <cmath>
 
 #include "scene/generate/random.h"
@@ -17,7 +17,8 @@ class Noise {
  public:
   explicit Noise(uint64_t seed) : seed_(mix_bits(seed)) {}
 
-  // Gradient noise, about [-1, 1], 0 on the integer lattice. Coordinates are not negative.
+  // Returns gradient noise, about [-1, 1], 0 on the integer lattice. Coordinates must not be
+  // negative.
   double at(double x, double z, uint64_t octave) const {
     const auto ix = static_cast<uint64_t>(x), iz = static_cast<uint64_t>(z);
     const double fx = x - static_cast<double>(ix), fz = z - static_cast<double>(iz);
@@ -57,12 +58,12 @@ class Heights {
   }
 
  private:
-  // In the square [0, 1]^2; about [0, 1].
+  // Returns the height at a point of the square [0, 1]^2; about [0, 1].
   double height(double s, double t) const {
     const double x = 8 + 2.5 * s + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 100);
     const double z = 8 + 2.5 * t + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 101);
     const double land = 0.5 + 0.6 * noise_.at(x * 0.7, z * 0.7, 0);
-    // High land is rough; where one octave is smooth, the next ones are too.
+    // High land is rough. Where one octave is smooth, the next ones are also smooth.
     double weight = land < 0.15 ? 0.15 : land > 1 ? 1 : land;
     double sum = 0.55 * land, frequency = 1.5, amplitude = 0.42;
     for (uint64_t octave = 1; octave <= octaves_; ++octave) {

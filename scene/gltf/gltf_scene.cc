@@ -23,7 +23,7 @@ Document read_checked(ReadableFile& file, MemoryBudget& budget, const CancelToke
   return document;
 }
 
-// The triangles that the scene declares, every instance counted.
+// Returns the number of triangles that the scene declares, including every instance.
 uint64_t count_triangles(const Document& document, MemoryBudget& budget) {
   uint128 total = 0;
   NodeWalk walk(document, budget);
@@ -89,7 +89,8 @@ class GltfScene : public TriangleSource {
   SceneMaterials materials() const override {
     const DocumentMaterials& listed = *document_.materials;
     SceneMaterials out{listed.materials, {}, listed.warnings, {}};
-    for (const Material& material : listed.materials)  // the file lists these first
+    // The first materials are the ones listed in the file.
+    for (const Material& material : listed.materials)
       if (material.number == out.names.size()) out.names.push_back(material.name);
     for (int image : listed.images)
       out.images.push_back(find_image(files_, *file_, document_, image));

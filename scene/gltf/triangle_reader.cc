@@ -19,7 +19,7 @@ uint64_t largest_vertex_count(const Document& document) {
   return largest;
 }
 
-// All coordinates of a vertex that is not finite are NaN.
+// If a vertex is not finite, all its coordinates are NaN.
 bool is_finite(const RealTriangle& triangle) {
   return !std::isnan(triangle.v[0][0]) && !std::isnan(triangle.v[1][0]) &&
          !std::isnan(triangle.v[2][0]);
@@ -94,8 +94,8 @@ WorldBounds TriangleReader::read_bounds(uint64_t first, uint64_t count) {
   return bounds;
 }
 
-// Calls body(first, count) for each part of the triangles that one instance declares, which is
-// placed.
+// Calls body(first, count) for each part of the triangles that one instance declares, after placing
+// the instance.
 template <class Body>
 void TriangleReader::for_each_instance(uint64_t first, uint64_t count, const Grid* grid,
                                        const Body& body) {
@@ -107,7 +107,7 @@ void TriangleReader::for_each_instance(uint64_t first, uint64_t count, const Gri
     const uint64_t of_instance = of_draw % draw_.triangles;
     const uint64_t n = std::min(end - first, draw_.triangles - of_instance);
     instance_ = of_draw / draw_.triangles;
-    // The joints of a skin place its vertices in world space already.
+    // The joints of a skin already place its vertices in world space.
     world_ = binding_.skin >= 0 ? Transform{} : walk_->global();
     const Node& node = document_.nodes[static_cast<size_t>(draw_.node)];
     if (node.instancing.present) world_ = multiply(world_, instances_->at(instance_));
@@ -117,7 +117,7 @@ void TriangleReader::for_each_instance(uint64_t first, uint64_t count, const Gri
   }
 }
 
-// Makes draw_ the one of the triangle.
+// Sets draw_ to the draw of this triangle.
 void TriangleReader::seek(uint64_t triangle) {
   if (!walk_ || triangle < draw_.first) {
     walk_.emplace(document_, budget_);
@@ -177,7 +177,7 @@ void TriangleReader::bind(const Node& node, size_t primitive_index) {
   binding_ = next;
 }
 
-// Calls body(corners, count) for each part of an instance's triangles that the window holds.
+// Calls body(corners, count) for each part of an instance's triangles that fits in the window.
 template <class Body>
 void TriangleReader::for_each_window(uint64_t first, uint64_t count, const Body& body) {
   while (count > 0) {
@@ -205,7 +205,7 @@ const uint32_t* TriangleReader::load_corners(uint64_t first, uint64_t count) {
   return &corners_[3 * static_cast<size_t>(first - window_first_)];
 }
 
-// False if a triangle of the window may be invalid; nothing is added then.
+// Returns false, without changing `bounds`, if a triangle of the window may be invalid.
 bool TriangleReader::add_bounds_of_window(WorldBounds& bounds) {
   if (used_vertices_.is_empty())
     used_vertices_.find({corners_.data(), 3 * static_cast<size_t>(window_count_)});
@@ -222,7 +222,7 @@ void TriangleReader::place_all(const uint32_t* corners, uint64_t count) {
   }
 }
 
-// The batch has room for them.
+// The batch must have space for them.
 void TriangleReader::place_all_surfaces(const uint32_t* corners, uint64_t count) {
   const bool is_mirrored = mirrors(world_);
   const bool is_strip =
@@ -247,7 +247,7 @@ void TriangleReader::flush() {
   batch_size_ = 0;
 }
 
-// False for a corner out of range or a vertex that is not finite in world space.
+// Returns false for a corner out of range or a vertex that is not finite in world space.
 bool TriangleReader::place(const uint32_t* corners, RealTriangle& out) {
   if (std::max({corners[0], corners[1], corners[2]}) >= vertex_count_) return false;
   for (int k = 0; k < 3; ++k) std::copy_n(cache_.at(corners[k]), 3, out.v[k]);

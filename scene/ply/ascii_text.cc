@@ -3,7 +3,7 @@
 namespace voxdag::ply {
 namespace {
 
-// Longer words are no numbers that a program writes. They are cut, and so refused.
+// Longer words are not numbers that a program writes. They are truncated, and so refused.
 constexpr size_t kMaxWord = 64;
 
 bool is_line_end(char c) { return c == '\n' || c == '\r'; }
@@ -39,7 +39,8 @@ bool AsciiText::end_row() {
   return true;
 }
 
-// 0 at the end of the file; a byte that is 0 is no blank and no digit, so it is refused as a word.
+// Returns 0 at the end of the file. A byte with the value 0 is neither a blank nor a digit, so it
+// is refused as a word.
 char AsciiText::peek() {
   const auto bytes = window_.at(offset_, 1);
   return bytes.empty() ? '\0' : static_cast<char>(bytes[0]);

@@ -24,7 +24,8 @@ uint64_t FaceReader::face_of(uint64_t triangle) {
   return face_;
 }
 
-// Reads the face of the triangle: from where the reader is, unless a later block has it.
+// Reads the face of the triangle. Starts at the current face, or at a later block if that is
+// nearer.
 void FaceReader::seek(uint64_t triangle) {
   const auto& blocks = ply_.face_blocks();
   const bool is_ahead = is_loaded_ && triangle >= first_triangle_;

@@ -8,13 +8,13 @@
 namespace voxdag::ply {
 namespace {
 
-// std::from_chars takes no plus sign.
+// std::from_chars does not accept a plus sign.
 std::string_view without_plus(std::string_view text) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   return text;
 }
 
-// In which a program that links this library may not be.
+// A program that links this library may use another locale.
 locale_t c_locale() {
   static const locale_t locale = newlocale(LC_ALL_MASK, "C", nullptr);
   return locale;
@@ -26,7 +26,7 @@ std::optional<double> parse_as(std::string_view text) {
   const char* const end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data(), end, value);
   if (parsed.ptr != end || parsed.ec == std::errc::invalid_argument) return std::nullopt;
-  // Too large, or too close to zero: strtod tells them apart.
+  // The number is too large or too close to zero. strtod distinguishes these cases.
   if (parsed.ec == std::errc::result_out_of_range)
     return static_cast<T>(strtod_l(std::string(text).c_str(), nullptr, c_locale()));
   return value;

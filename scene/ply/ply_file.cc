@@ -80,7 +80,7 @@ void PlyFile::find_face_list() {
     refuse("has faces whose property " + list.name + " is no list of integers");
 }
 
-// Finds the rows of an element that begins at this offset; returns where it ends.
+// Finds the rows of an element that begins at this offset. Returns the end of the element.
 uint64_t PlyFile::pass_over(size_t index, uint64_t begin, MemoryBudget& budget,
                             const CancelToken& cancel) {
   const Element& element = header_.elements[index];
@@ -122,7 +122,7 @@ uint64_t PlyFile::end_of_fixed_rows(const Element& element, uint64_t begin) cons
   return static_cast<uint64_t>(end);
 }
 
-// Notes the first row of a block.
+// Records the first row of a block.
 void PlyFile::note_row(size_t element, uint64_t offset) {
   if (element == face_) {
     charge_.add(sizeof(FaceBlock));

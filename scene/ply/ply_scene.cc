@@ -71,7 +71,7 @@ class PlyCursor : public TriangleCursor {
   }
 
  private:
-  // T: RealTriangle or SurfaceTriangle.
+  // T is RealTriangle or SurfaceTriangle.
   template <class T, class VisitBatch>
   void read_placed(uint64_t first, uint64_t count, const Grid* grid, PageBuffer<T>& batch,
                    const VisitBatch& visit) {
@@ -100,11 +100,11 @@ class PlyCursor : public TriangleCursor {
     return true;
   }
 
-  // False for a corner out of range or a vertex that is not finite.
+  // Returns false for a corner out of range or a vertex that is not finite.
   bool place(const uint32_t* corners, RealTriangle& out) {
     if (std::max({corners[0], corners[1], corners[2]}) >= vertices_.count()) return false;
     for (int k = 0; k < 3; ++k) std::copy_n(cache_.at(corners[k]), 3, out.v[k]);
-    // All coordinates of a vertex that is not finite are NaN.
+    // If a vertex is not finite, all its coordinates are NaN.
     return cache_.all_finite() ||
            !(std::isnan(out.v[0][0]) || std::isnan(out.v[1][0]) || std::isnan(out.v[2][0]));
   }
@@ -135,12 +135,12 @@ class PlyCursor : public TriangleCursor {
   std::vector<uint32_t> corners_;
   UsedVertices used_vertices_;
   PageBuffer<RealTriangle> batch_;
-  // Made by the first read_surfaces().
+  // Allocated by the first read_surfaces().
   PageBuffer<SurfaceTriangle> surfaces_;
   std::optional<VertexColors> colors_;
 };
 
-// A file without faces.
+// The cursor of a file without faces.
 class NoTriangles : public TriangleCursor {
  public:
   void read(uint64_t, uint64_t, const Visitor&) override {}

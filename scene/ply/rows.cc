@@ -68,7 +68,7 @@ class BinaryRows : public Rows {
 
  private:
   struct List {
-    size_t bytes_before;  // behind the list before it
+    size_t bytes_before;  // bytes between the previous list and this one
     Type count_type;
     size_t entry_bytes;
     bool is_wanted;
@@ -107,8 +107,8 @@ class BinaryRows : public Rows {
   const bool is_big_endian_;
   FileWindow window_;
   std::vector<List> lists_;
-  size_t bytes_before_ = 0;  // behind the last list
-  bool is_plain_ = false;    // read_plain() may read its rows
+  size_t bytes_before_ = 0;  // bytes after the last list
+  bool is_plain_ = false;    // true if read_plain() can read the rows
 };
 
 class AsciiRows : public Rows {

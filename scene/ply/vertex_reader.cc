@@ -8,7 +8,7 @@
 namespace voxdag::ply {
 namespace {
 
-// Every `stride`-th number of `out` from the rows of `row_bytes`.
+// Fills every `stride`-th number of `out` from rows of `row_bytes` bytes.
 template <class T, bool kBigEndian>
 void decode_property(const std::byte* bytes, size_t row_bytes, size_t count, size_t stride,
                      double* out) {

@@ -59,7 +59,7 @@ size_t ImageBytes::read_plain(std::span<std::byte> out) {
   return size;
 }
 
-// The next one of the text, its JSON escapes \/ and \u00xx undone.
+// Reads the next character of the text. Decodes the JSON escapes \/ and \u00xx.
 bool ImageBytes::next_character(char& c) {
   const auto raw = [&](char& out) {
     if (window_at_ == window_.size()) {

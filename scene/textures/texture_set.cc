@@ -20,7 +20,7 @@
 namespace voxdag {
 namespace {
 
-// Rows of pixels to texels: linear light by a table, alpha as it is.
+// Converts rows of pixels to texels: linear light by a table, alpha unchanged.
 class TexelRow {
  public:
   TexelRow(const ImageReader& image, MemoryBudget& budget)
@@ -62,7 +62,7 @@ std::string user_of(const SceneMaterials& materials, uint32_t image) {
   return ", the base color of material " + numbered(index, found->name) + ",";
 }
 
-// Runs `body` next to others and, if memory is short, again without others.
+// Runs `body` concurrently with others and, if memory is short, again alone.
 template <class Body>
 void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const Body& body) {
   try {
@@ -91,13 +91,14 @@ std::string image_digest(FileSystem& files, const ImageSource& source, const Can
       hash.add(std::span(buffer).first(size));
     }
   } catch (const BrokenImage&) {
-    hash.add(buffer);  // a decoder may ignore the damaged part
+    hash.add(buffer);  // a decoder may ignore a damaged part
     return "broken " + hash.finish();
   }
   return hash.finish();
 }
 
-// Throws Error{kInvalidInput} unless the file of an image is still the one that the scene found.
+// Throws Error{kInvalidInput} unless the file of an image is still the file found when the scene
+// was opened.
 void expect_unchanged(FileSystem& files, const ImageSource& source) {
   try {
     const ImageBytes opened(files, source);
@@ -154,7 +155,7 @@ uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, Memor
       for (const TextureLevel& level : pyramid_levels(image->width(), image->height(), 0))
         pages += level.pages();
     } catch (const BrokenImage&) {
-      // It has no pyramid.
+      // An unreadable image has no pyramid.
     }
   }
   return pages * kPageBytes;
@@ -185,7 +186,7 @@ class TextureSet::Builder {
       users_[i] = user_of(materials, static_cast<uint32_t>(i));
   }
 
-  // Finds the levels of all pyramids, and with them their pages.
+  // Finds the levels of all pyramids, and their pages.
   void measure(unsigned threads) {
     parallel_for(threads, levels_.size(), [&](unsigned, size_t i) {
       cancel_.check();
@@ -210,7 +211,7 @@ class TextureSet::Builder {
     writer_ = files_.create(path);
     set_->file_ = files_.open_read(path);
     set_->checksums_ = PageBuffer<uint32_t>(budget_, pages, "checksums of textures");
-    files_.remove(path);  // a file without a name ends with the process
+    files_.remove(path);  // a file without a name is removed when the process ends
   }
 
   void decode(unsigned threads, Progress& progress) {
@@ -220,7 +221,7 @@ class TextureSet::Builder {
     });
   }
 
-  // Drops unreadable images from the materials, with a warning each.
+  // Removes unreadable images from the materials, with a warning for each.
   std::unique_ptr<TextureSet> finish(Progress& progress) {
     for (const std::string& warning : materials_.warnings) progress.warn(warning);
     set_->materials_ = materials_.materials;
@@ -283,8 +284,9 @@ class TextureSet::Builder {
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   std::unique_ptr<TextureSet> set_;
-  std::unique_ptr<WritableFile> writer_;  // of the scratch file, if there is one
-  std::shared_mutex mutex_;               // held alone by an image that does not fit next to others
+  std::unique_ptr<WritableFile> writer_;  // writes the scratch file; null if none is needed
+  // Held exclusively by an image that does not fit in memory next to others.
+  std::shared_mutex mutex_;
   // For each image: the material that uses it, for messages ("": none), and why it is unreadable.
   std::vector<std::string> users_, problems_;
   std::vector<std::vector<TextureLevel>> levels_;

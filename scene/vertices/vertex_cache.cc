@@ -66,7 +66,7 @@ void VertexCache::load(uint64_t block, size_t slot) {
   block_in_slot_[slot] = block;
 }
 
-// The vertices of a block as the source gives them.
+// Reads the vertices of a block from the source, untransformed.
 void VertexCache::read(uint64_t block, std::span<double> out) {
   const uint64_t first = block * kBlockVertices;
   if (is_read_.empty()) return source_->read(first, out.size() / 3, out.data());

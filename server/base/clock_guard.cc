@@ -6,7 +6,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kMaxStepS = 3600;
-constexpr double kMaxPauseS = kSecondsPerDay;  // in which no service ran
+constexpr double kMaxPauseS = kSecondsPerDay;  // maximum time without a running service
 constexpr double kUncertainS = kSecondsPerDay;
 
 }  // namespace

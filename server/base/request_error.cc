@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-// The text for clients in place of the message of an Error.
+// Returns a text for clients that replaces the message of an Error.
 const char* public_text(ErrorCode code) {
   static constexpr std::pair<ErrorCode, const char*> kTexts[] = {
       {ErrorCode::kInvalidInput, "the request is invalid"},

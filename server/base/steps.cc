@@ -35,7 +35,7 @@ void Steps::report(const std::string& name, const char* reason) noexcept {
     }
     log_(line);
   } catch (...) {
-    // Nothing is left to say it with.
+    // The failure cannot be logged.
   }
 }
 

@@ -60,7 +60,8 @@ void fields(Visitor& visit, ServerConfig& c) {
     tls("key_file", c.http.key_file);
   });
   visit("jobs", c.jobs);
-  // Not the options of `build`: a service has a program path, and its names have no prefix.
+  // The cluster options of a service differ from the options of `build`: it has a program path, and
+  // the names have no prefix.
   visit.object("cluster", [&](auto& cluster) {
     cluster("engine", c.cluster.engine);
     cluster("tasks", c.cluster.tasks);

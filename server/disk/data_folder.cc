@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-// 0 for nothing.
+// Returns the inode of the file; 0 if none exists.
 uint64_t inode_of(const std::string& path) {
   struct stat found {};
   return stat(path.c_str(), &found) == 0 ? found.st_ino : 0;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr uint64_t kForDatabases = uint64_t{4} << 20;
 constexpr uint64_t kBallastBytes = uint64_t{1} << 20;
-// Size of one reservation of an upload.
+// Bytes that an upload reserves in one step.
 constexpr uint64_t kStepBytes = uint64_t{8} << 20;
 
 std::string ballast_of(const std::string& folder) { return folder + "/ballast"; }
@@ -71,7 +71,7 @@ void DiskSpace::restore_ballast() {
     file->sync();
     file->close();
   } catch (...) {
-    files_.remove(ballast_of(folder_));  // a part of it would not be enough
+    files_.remove(ballast_of(folder_));  // a part of the ballast would not be enough
     throw;
   }
 }

@@ -7,10 +7,10 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxLineBytes = 4096;
-constexpr size_t kSizeLineBytes = 18;  // the longest size of a chunk, and CRLF
+constexpr size_t kSizeLineBytes = 18;  // the longest chunk size in hex, and CRLF
 constexpr size_t kMaxExtraBytes = 16384;
 
-// The size of a chunk from its line, "1f40" or "1f40;extension"; no value if it is malformed.
+// Parses the size of a chunk from its line, "1f40" or "1f40;extension"; nullopt if it is malformed.
 std::optional<uint64_t> chunk_size(std::string_view line) {
   uint64_t size = 0;
   const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), size, 16);

@@ -11,7 +11,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kReadBytes = 256 << 10;  // of a file per write to the socket
+constexpr size_t kReadBytes = 256 << 10;  // bytes of a file per write to the socket
 
 std::string http_date() {
   const time_t now = time(nullptr);
@@ -102,7 +102,7 @@ bool Exchange::answer(Response response, bool last) {
 }
 
 bool Exchange::send_pieces(ReadableFile& file, const std::vector<FilePiece>& pieces) {
-  // The API limits the concurrent answers of this kind per client.
+  // The API limits the concurrent answers of this kind per client, so a large buffer is safe.
   connection_.allow_large_send_buffer();
   std::string buffer;
   for (const FilePiece& piece : pieces) {

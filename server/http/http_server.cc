@@ -20,7 +20,7 @@
 namespace voxdag::server {
 namespace {
 
-// Answers a connection over the limit, in one write that never blocks.
+// Answers a connection that exceeds the limit, in one nonblocking write.
 void send_busy(int socket) {
   const std::string body = problem_json(busy("too many connections"));
   const std::string text =
@@ -64,7 +64,7 @@ class HttpServer::Engine {
   }
 
  private:
-  // An exception (no memory, no thread) costs this connection only.
+  // An exception (no memory, no thread) only closes this connection.
   void accept(int socket, const std::string& address) try {
     ConnectionTable::Place place;
     if (draining_ || !table_.admit(socket, address, place)) {

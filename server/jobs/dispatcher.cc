@@ -16,12 +16,12 @@ namespace {
 
 constexpr const char* kPreview = "preview";
 constexpr double kMaxPreviewS = 900;
-constexpr int kPreviewNice = 5;  // on top of the builds'
+constexpr int kPreviewNice = 5;  // in addition to the builds' nice value
 constexpr double kMaxSleepS = 1;
 constexpr double kNoTimeLimitS = 1e9;
 constexpr double kRetireIntervalS = 300;
-constexpr double kDeletionIntervalS = 30;  // between attempts of one that failed
-constexpr size_t kMaxRetiredAtOnce = 100;  // so that jobs can start in between
+constexpr double kDeletionIntervalS = 30;  // between attempts of a failed deletion
+constexpr size_t kMaxRetiredAtOnce = 100;  // limited, so that jobs can start in between
 
 void sleep_s(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
@@ -101,7 +101,7 @@ void Dispatcher::dispatch() {
     if (stopping()) return;
     steps_.run("start jobs", [this] {
       std::lock_guard lock(mutex_);
-      if (stops_) return;  // nobody would stop what starts now
+      if (stops_) return;  // nothing would stop a worker started now
       if (!recovered_) recover();
       recovered_ = true;
       start_ready_jobs();
@@ -147,7 +147,7 @@ bool Dispatcher::start_next_job() {
   try {
     needed = tasks_.memory_of(parse_job_request(job->request));
   } catch (const RequestError& error) {
-    // Another version of this program wrote it, or it is damaged.
+    // The task was written by another version of this program, or is damaged.
     log_("job " + job->id + " failed: " + error.message());
     queue_.change(job->id, [&](Job& j) {
       j.state = JobState::kFailed;
@@ -258,12 +258,13 @@ void Dispatcher::run_job(const Job& job, LiveJob& live) {
 }
 
 void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProcess::End& end) {
-  // While the queue cannot be written, perhaps because the disk is full, the job counts as running:
-  // until it can, or until the service ends and the next one runs the job again.
+  // While the queue cannot be written, for example because the disk is full, the job counts as
+  // running. This ends when the queue becomes writable, or when the next service runs the job
+  // again.
   std::optional<Job> after;
   while (!steps_.run("record how job " + job.id + " ended", [&] {
     std::lock_guard lock(mutex_);
-    if (!queue_.find(job.id)) return;  // it was deleted
+    if (!queue_.find(job.id)) return;  // the job was deleted
     after = queue_.change(
         job.id, [&](Job& j) { apply_outcome(j, live, end, config_.jobs, unix_seconds()); });
     workers_.at(job.id).recorded = true;
@@ -332,7 +333,7 @@ void Dispatcher::retire_old_jobs() {
         remove(id);
         log_("job " + id + " removed by the retention rule");
       } catch (const RequestError&) {
-        // A client has deleted it or tried it again.
+        // A client has deleted or retried the job.
       }
     });
   }
@@ -371,7 +372,7 @@ Job Dispatcher::suspend(const std::string& id) {
     runs = worker != workers_.end() && worker->second.runs();
     if (runs) worker->second.live->stop();
   }
-  // A service that was killed may have left tasks of a job that is queued since.
+  // The job may have been queued again since a killed service left its tasks running.
   if (!runs) stop_tasks(id);
   return job;
 }
@@ -388,7 +389,7 @@ Job Dispatcher::resume(const std::string& id) {
 }
 
 Job Dispatcher::retry(const std::string& id) {
-  std::lock_guard lock(mutex_);  // no deletion begins
+  std::lock_guard lock(mutex_);  // while locked, no deletion can begin
   return queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kRunning) return;
     if (j.state != JobState::kQueued && j.state != JobState::kFailed &&
@@ -410,7 +411,7 @@ void Dispatcher::remove(const std::string& id) {
   stop_tasks(id);
   const FilesLock files_lock(*this, id);
   {
-    std::lock_guard lock(mutex_);  // no retry
+    std::lock_guard lock(mutex_);  // while locked, the job cannot be retried
     queue_.check_removable(id);
     folders_.mark(id);
   }
@@ -432,7 +433,7 @@ void Dispatcher::finish_deletions() {
   for (const std::string& id : folders_.marked()) {
     {
       std::lock_guard lock(mutex_);
-      if (locked_.contains(id)) continue;  // a client deletes it just now
+      if (locked_.contains(id)) continue;  // a client is deleting it now
     }
     const bool finished = steps_.run("delete job " + id, [&] {
       const FilesLock lock(*this, id);

@@ -13,7 +13,7 @@ bool is_job_id(const std::string& name) {
   return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-// The job whose deletion has begun in this folder; "" for none.
+// Returns the id of the job whose deletion has begun in this folder; "" if none exists.
 std::string marked_job(const DirectoryEntry& entry) {
   const std::string id = entry.name.substr(0, entry.name.find('.'));
   return entry.is_directory && is_job_id(id) && entry.name == id + kDeleted ? id : "";
@@ -57,9 +57,9 @@ void JobFolders::clean_up() {
     steps_.run("clean up jobs/" + entry.name, [&] {
       const auto job = queue_.find(entry.name);
       if (!job) foreign += " jobs/" + entry.name;
-      // The service may have been killed before it had stopped them.
+      // The service may have been killed before it stopped the tasks.
       else if (job->state == JobState::kSuspended || job->state == JobState::kFailed)
-        // None of the service's jobs has a job that merges.
+        // No job of the service uses a merge job.
         stop_cluster_tasks(files_, of(entry.name).work(), system_commands(), true);
       else if (has_ended(job->state) && job->state != JobState::kFailed)
         remove_work(entry.name);

@@ -50,11 +50,12 @@ void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
     return finish(job, JobState::kSucceeded, now_s);
   }
   const JobError error = error_of(live, end, now_s);
-  // A stopped process may end before it can handle the signal or report a reason.
+  // A stopped process may end before it handles the signal or reports a reason.
   const bool stopped = asked && (error.code == "canceled" || !live.failure());
   if (!stopped) job.error = error;
   if (job.state == JobState::kCanceling) return finish(job, JobState::kCanceled, now_s);
-  if (job.state != JobState::kRunning) return;  // suspended, and perhaps resumed already
+  // The job was suspended, and perhaps already resumed.
+  if (job.state != JobState::kRunning) return;
   if (stopped || error.code == "canceled") {
     job.state = JobState::kQueued;
     job.front = true;

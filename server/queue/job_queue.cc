@@ -17,9 +17,9 @@ namespace {
 
 constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 
-// Number of consecutive interrupted runs up to which a job restarts immediately, and up to which it
-// restarts at all. With the pauses in between, such a job has interrupted the service for over an
-// hour.
+// Number of consecutive interrupted runs after which a job no longer restarts immediately, and
+// after which it fails. With the pauses in between, a failing job has interrupted the service for
+// over an hour.
 constexpr unsigned kFreeInterruptions = 5;
 constexpr unsigned kMaxInterruptions = 15;
 
@@ -68,12 +68,12 @@ CREATE TABLE idempotency (
 CREATE INDEX idempotency_by_job ON idempotency (job);
 )sql";
 
-// "vdsv": the queue of a service.
+// Application id "vdsv": the queue of a service.
 const StoreFormat kQueueFormat = {
     "a queue", "jobs",  0x76647376,
     3,         kSchema, "ALTER TABLE job ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0"};
 
-// A row of the table `job`: the members without a type of SQL are JSON.
+// A row of the table `job`. Members that are not an SQL type are stored as JSON.
 struct JobRow {
   Job job;
   std::string scenes, error, warnings;
@@ -112,8 +112,8 @@ JobRow row_of(const Job& job) {
 
 constexpr const char* kNoRequest = R"({"scene":[],"resolution":0,"options":{}})";
 
-// The job that a statement of select_rows<JobRow>() stands at. What is damaged in the row is left
-// out, so that the job can be listed and deleted, and the service works with the others.
+// Returns the job in the current row of a statement of select_rows<JobRow>(). Leaves out damaged
+// members, so that the job can be listed and deleted, and the service can handle the other jobs.
 Job read_job(const SqlStatement& statement) {
   JobRow row = read_row<JobRow>(statement);
   Job& job = row.job;
@@ -151,7 +151,7 @@ std::optional<Job> find_job(SqlDatabase& database, const std::string& id) {
   return read_job(rows);
 }
 
-// Records the present state of the job as its newest event.
+// Records the current state of the job as its newest event.
 void write_event(SqlDatabase& database, const Job& job) {
   database
       .prepare("INSERT INTO job_event (job, at_s, state, attempt, error) VALUES (?, ?, ?, ?, ?)")
@@ -163,7 +163,7 @@ void write_event(SqlDatabase& database, const Job& job) {
       .run();
 }
 
-// Only states become part of the text of SQL; what callers give is bound.
+// Only names of states become part of the SQL text. All values from callers are bound.
 std::string states_in(const std::vector<JobState>& states) {
   std::string list;
   for (const JobState state : states)
@@ -346,7 +346,7 @@ void JobQueue::remove(const std::string& id) {
 
 std::optional<Job> JobQueue::next(double now_s, double max_wait_s,
                                   const std::set<std::string>& except) {
-  // `except` is small: at most the jobs that are just stopping.
+  // `except` is small: it has at most the jobs that are stopping.
   const auto jobs =
       query("WHERE " + states_in({JobState::kQueued}) +
                 " AND (not_before_s <= " + std::to_string(now_s) + " OR not_before_s > " +

@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t kMaxNameBytes = 128;
 
-// `total` is -1 while it is not known; `sha256` is "" until the upload is complete.
+// `total` is -1 while unknown. `sha256` is "" until the upload is complete.
 constexpr const char* kSceneSchema = R"sql(
 CREATE TABLE scene (
   name TEXT PRIMARY KEY, size INTEGER NOT NULL, sha256 TEXT NOT NULL, modified_s REAL NOT NULL
@@ -32,7 +32,7 @@ std::string make_folders(FileSystem& files, const std::string& folder) {
   return folder;
 }
 
-// "vdsc": the scenes of a service.
+// Application id "vdsc": the scenes of a service.
 const StoreFormat kSceneFormat = {"records of scenes", "scenes", 0x76647363, 0, kSceneSchema};
 
 Scene scene_of_row(const SqlStatement& row) {
@@ -103,7 +103,7 @@ void SceneStore::finish_all_publishing() {
       finish_publishing(f.name, f.size, f.sha256);
     } catch (const Error& error) {
       log_("scene " + f.name + ": failed to finish its upload: " + error.message());
-      if (error.is_corruption()) drop_upload(f.name);  // the client uploads it again
+      if (error.is_corruption()) drop_upload(f.name);  // the client must upload it again
     }
   }
 }
@@ -118,7 +118,7 @@ void SceneStore::finish_removals() {
       drop_scene(name);
       log_("scene " + name + ": finished a deletion that was interrupted");
     } catch (const RequestError&) {
-      // It is being uploaded; the next call retries.
+      // The scene is being uploaded. The next call retries.
     } catch (const std::exception& error) {
       log_("scene " + name + ": failed to finish its deletion: " + error.what());
     }
@@ -134,7 +134,7 @@ void SceneStore::adopt_scenes() {
   }
   for (const DirectoryEntry& entry : files_.list(folder_ + "/parts")) {
     if (entry.is_directory || !is_scene_name(entry.name) || upload(entry.name)) continue;
-    record(entry.name, {});  // nobody knows how much of it was synced
+    record(entry.name, {});  // the number of synced bytes is unknown
     log_("scene " + entry.name + ": adopted its unfinished upload, which starts over");
   }
 }
@@ -181,7 +181,7 @@ bool SceneStore::remove(const std::string& name) {
   const bool found = find(name).has_value();
   if (files_.exists(path(name))) {
     files_.rename(path(name), marked_path(name));
-    files_.create(marked_path(name))->close();  // frees its space
+    files_.create(marked_path(name))->close();  // an empty file, which frees the scene's space
   }
   drop_upload(name);
   drop_scene(name);
@@ -219,13 +219,13 @@ void SceneStore::remove_stale_uploads(double before_s) {
   for (const std::string& name : stale("*")) {
     try {
       const NameLock lock(*this, name);
-      if (stale(name).empty()) continue;  // a part has just arrived
+      if (stale(name).empty()) continue;  // a part has arrived in the meantime
       check_file();
       drop_upload(name);
       log_("scene " + name +
            ": removed its unfinished upload, to which nothing was added for long");
     } catch (const RequestError&) {
-      // It is being uploaded.
+      // The scene is being uploaded.
     }
   }
 }
@@ -268,7 +268,7 @@ void SceneStore::publish(const std::string& name, uint64_t size, const std::stri
         .run();
     transaction.commit();
   }
-  // What a deletion that failed halfway left is not this scene.
+  // The marked file is left over from a deletion that failed. It does not belong to this scene.
   if (files_.exists(marked_path(name))) files_.remove(marked_path(name));
   move_into_place(name, size, sha256);
 }
@@ -312,8 +312,8 @@ void SceneStore::put_scene(const std::string& name, uint64_t size, const std::st
   transaction.commit();
 }
 
-// The file goes first, so that a full disk can be emptied: a record without its file is an upload
-// that starts over.
+// Removes the file first, so that it frees space on a full disk. A record without its file is an
+// upload that starts over.
 void SceneStore::drop_upload(const std::string& name) {
   if (files_.exists(part_path(name))) files_.remove(part_path(name));
   std::lock_guard lock(mutex_);

@@ -7,7 +7,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kBufferBytes = 256 << 10;
-// What a power cut may cost a client: the bytes that it sends again.
+// Maximum bytes that a client must send again after a power cut.
 constexpr uint64_t kCheckpointBytes = uint64_t{64} << 20;
 
 RequestError wrong_offset(uint64_t expected) {
@@ -56,7 +56,7 @@ SceneUpload::~SceneUpload() {
     else
       store_.drop_upload(name_);
   } catch (const std::exception&) {
-    // The record still has an earlier offset, which is valid too.
+    // The record still has an earlier offset, which is also valid.
   }
 }
 

@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kHeaderBytes = 4096;
 constexpr size_t kDigestDigits = 32;
 
-// The header page has the checksum of the table of the checksums of all other bytes.
+// Digests the header page, which has the checksum of the checksum table for all other bytes.
 std::string digest_of(const voxdag_reader::File& file) {
   std::string text(reinterpret_cast<const char*>(file.data()), kHeaderBytes);
   text += "tiles 1 " + std::to_string(kTileLevels);
@@ -65,7 +65,7 @@ std::unique_ptr<voxdag_reader::File> FileTileSource::read_header(const std::stri
   try {
     return open_global_bytes(path, bytes_);
   } catch (const Error&) {
-    expect_readable();  // what zeros look like says nothing about the file
+    expect_readable();  // if pages were unreadable, the problem is not the file's format
     throw;
   }
 }
@@ -75,7 +75,8 @@ const std::string& FileTileSource::manifest(const CancelToken& cancel) const {
   const std::lock_guard lock(manifest_mutex_);
   if (has_manifest_) return manifest_;
   const auto known = manifests_ ? manifests_->find(digest_) : std::nullopt;
-  if (!known && !dag_.empty()) blocks_.expect_intact(dag_.level(0).words.data(), 8);  // the root
+  // Verifies the root.
+  if (!known && !dag_.empty()) blocks_.expect_intact(dag_.level(0).words.data(), 8);
   manifest_ = known ? *known : describe(*file_, dag_, digest_, cancel);
   expect_readable();
   if (manifests_ && !known) manifests_->keep(digest_, manifest_);

@@ -13,10 +13,11 @@ std::shared_ptr<const FileTileSource> OpenTileSources::open(const std::string& p
     const std::lock_guard lock(mutex_);
     if (const auto found = find(path, identity); found != entries_.end()) return found->file;
   }
-  // Outside of the lock: other files need not wait for this one's disk.
+  // Opens the file without the lock, so that requests for other files need not wait for its disk.
   auto file = std::make_shared<const FileTileSource>(path, identity, manifests_);
   const std::lock_guard lock(mutex_);
-  // Another request was faster: one file has one manifest, and its blocks are compared once.
+  // Another request opened the file first. Its object is used, so that one file has one manifest
+  // and its blocks are verified once.
   if (const auto found = find(path, identity); found != entries_.end()) return found->file;
   entries_.remove_if([&](const Entry& e) { return e.path == path; });
   entries_.push_front({path, file, wall_seconds()});

@@ -54,7 +54,7 @@ void DecodedBuffers::read(int index, uint64_t offset, std::span<std::byte> out,
   reader_->read_at(decoded.begin + offset, out);
 }
 
-// What does not fit while others decode may fit alone.
+// A buffer that does not fit in memory while others decode may fit alone.
 void DecodedBuffers::decode_within_budget(const BufferSource& buffer, uint64_t begin,
                                           const ReadFile& read_file) {
   const std::string where = document_.path + ": " + name_of(buffer) + ": ";
@@ -103,7 +103,7 @@ void DecodedBuffers::decode(const BufferSource& buffer, uint64_t begin, const Re
   if (charged > kTrimBytes) trim_heap();
 }
 
-// Makes room for `bytes` in the file, which is made for the first.
+// Reserves `bytes` in the file, which the first call creates.
 uint64_t DecodedBuffers::reserve(uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   if (!reader_) open_scratch();

@@ -1,5 +1,5 @@
-// Calls Draco's decoders, through a class derived from them that checks the memory of each step
-// before Draco allocates it. Only this file and draco_tables.cc include Draco.
+// Calls Draco's decoders through a derived class that checks the memory of each step before Draco
+// allocates it. Only this file and draco_tables.cc include Draco.
 #include "scene/gltf/compressed/codecs.h"
 
 #ifdef VOXDAG_HAS_DRACO
@@ -36,7 +36,7 @@ constexpr uint64_t kBytesPerFace = 128;
 constexpr uint64_t kBytesPerFaceOfTable = 64;
 constexpr uint64_t kMapBytesPerValue = 16;
 
-// Triangles of a strip per Draco face: degenerate triangles join the pieces of a strip.
+// Triangles of a strip per Draco face. Degenerate triangles join the pieces of a strip.
 constexpr uint64_t kMaxStripTrianglesPerFace = 8;
 
 constexpr size_t kWriteElements = 16384;
@@ -48,8 +48,8 @@ void charge_up_to(MemoryCharge& charge, uint64_t bytes) {
                                              "the memory budget leaves");
 }
 
-// A decoder of Draco that checks its memory before each step. No exception passes through Draco:
-// whoever calls Decode() throws `refusal`.
+// A Draco decoder that checks its memory before each step. No exception passes through Draco: the
+// caller of Decode() throws `refusal`.
 template <class Decoder>
 class BoundedDecoder : public Decoder {
  public:
@@ -107,13 +107,13 @@ class BoundedDecoder : public Decoder {
   const DracoHeader& header_;
   const uint64_t vertices_;
   MemoryCharge& charge_;
-  uint64_t table_bytes_ = 0;  // charged for the largest table
+  uint64_t table_bytes_ = 0;  // charge for the largest table
   const AdmitTable admit_table_ = [this](uint64_t bytes) {
     if (bytes <= table_bytes_) return;
     charge_up_to(charge_, charge_.bytes() + bytes - table_bytes_);
     table_bytes_ = bytes;
   };
-  draco::DecoderBuffer attributes_;  // the start of the attribute section
+  draco::DecoderBuffer attributes_;  // start of the attribute section
 };
 
 template <class Decoder>
@@ -121,7 +121,7 @@ void decode_mesh(const DracoPart& part, const DracoHeader& header, std::span<con
                  MemoryCharge& charge, draco::Mesh& mesh) {
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char*>(data.data()), data.size());
-  // Quantized values remain integers. write_dequantized() computes the positions, with operations
+  // Quantized values remain integers. write_dequantized() computes the positions with operations
   // that give the same result on every machine.
   draco::DecoderOptions options;
   for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::GENERIC})
@@ -161,7 +161,7 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
                  const Writer<uint32_t>::Write& write) {
   Writer<uint32_t> out(write);
   const uint64_t faces = mesh.num_faces(), triangles = part.corners / 3;
-  // The last face pads a strip: degenerate triangles also have a face.
+  // The last face pads the strip, because degenerate triangles also have a face.
   for (uint64_t i = 0; i < triangles; ++i) {
     const draco::Mesh::Face& face =
         mesh.face(draco::FaceIndex(static_cast<uint32_t>(std::min(i, faces - 1))));

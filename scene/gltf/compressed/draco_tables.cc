@@ -22,7 +22,7 @@ constexpr int kTagBits = 5, kMaxRawBits = 18, kMaxTag = 32;
 constexpr int kValenceContexts = 6;
 constexpr int kCreaseContexts = 4;
 constexpr uint64_t kOctahedralComponents = 2;
-constexpr uint64_t kTypeBytes = 4;  // of an attribute: use, number type, components, normalized
+constexpr uint64_t kTypeBytes = 4;  // per attribute: use, number type, components, normalized
 
 [[noreturn]] void refuse_damaged() { throw BrokenData{"its Draco data are damaged"}; }
 
@@ -69,7 +69,7 @@ class Walker {
     return static_cast<uint64_t>(std::max<int64_t>(buffer_.remaining_size(), 0));
   }
 
-  // Builds a table, and skips the symbols that it decodes.
+  // Builds a table and skips the symbols that it decodes.
   template <int kBits>
   draco::RAnsSymbolDecoder<kBits> open_symbols() {
     draco::DecoderBuffer ahead = buffer_;
@@ -90,8 +90,8 @@ class Walker {
     ((bits == kBits + 1 ? static_cast<void>(open_symbols<kBits + 1>()) : void()), ...);
   }
 
-  // Symbols that give the size of each entry's numbers, and the bits of these numbers. Draco stops
-  // at the end of the buffer without an error.
+  // Skips symbols that give the size of each entry's numbers, and the bits of these numbers. At the
+  // end of the buffer Draco stops without an error.
   void skip_tagged(uint64_t entries, uint64_t components) {
     auto tags = open_symbols<kTagBits>();
     uint64_t bits = 0;
@@ -128,7 +128,7 @@ uint64_t count_vertices(const CornerTable& table) {
   return count;
 }
 
-// Attributes that share an order of values.
+// Attributes with the same order of values.
 struct Group {
   bool is_per_corner = false;
   std::vector<uint8_t> coders;  // draco::SequentialAttributeEncoderType of each attribute
@@ -138,7 +138,7 @@ std::vector<Group> read_groups(Walker& walker, draco::MeshDecoder& decoder) {
   std::vector<Group> groups(walker.value<uint8_t>());
   if (decoder.GetCornerTable())
     for (Group& group : groups) {
-      walker.value<int8_t>();  // the number of its connectivity
+      walker.value<int8_t>();  // index of its connectivity
       group.is_per_corner = walker.value<uint8_t>() != draco::MESH_VERTEX_ATTRIBUTE;
       walker.value<uint8_t>();  // the traversal
     }
@@ -163,7 +163,7 @@ uint64_t count_entries(const Group& group, int first_attribute, draco::MeshDecod
   return count_vertices(*own);
 }
 
-// The numbers that undo a prediction: of wrapped differences, or of points of an octahedron.
+// Skips the numbers that undo a prediction, of wrapped differences or of points of an octahedron.
 void skip_transform(Walker& walker, int transform) {
   walker.skip(transform == draco::PREDICTION_TRANSFORM_NORMAL_OCTAHEDRON ? 4 : 8);
 }
@@ -194,7 +194,7 @@ void skip_prediction(Walker& walker, int method, int transform, const draco::Cor
   skip_transform(walker, transform);
 }
 
-// The values of an attribute that is coded as integers.
+// Skips the values of an attribute that is coded as integers.
 void skip_integers(Walker& walker, bool is_octahedral, uint64_t entries, uint64_t components,
                    const draco::CornerTable* table) {
   const int method = walker.value<int8_t>();

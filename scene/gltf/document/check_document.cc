@@ -40,7 +40,7 @@ void check_for_cycles(const Document& d) {
   }
 }
 
-// Sets the parents: every node has one at most, and none is its own ancestor.
+// Sets the parents. Every node has at most one parent, and none is its own ancestor.
 void link_parents(Document& d) {
   for (int i = 0; i < static_cast<int>(d.nodes.size()); ++i) {
     for (int child : d.nodes[static_cast<size_t>(i)].children) {
@@ -85,7 +85,7 @@ void choose_scene(Document& d) {
 // without bytes (all zeros), which could claim any count.
 constexpr uint64_t kMaxElements = uint64_t{1} << 32;
 
-// `count` elements of `bytes` each, the first at `offset` of a view.
+// `count` elements of `bytes` bytes each; the first is at `offset` of a view.
 struct Extent {
   int view;
   uint64_t offset;

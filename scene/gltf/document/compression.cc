@@ -73,8 +73,7 @@ const Accessor& at(const Document& d, int accessor) {
   return d.accessors[static_cast<size_t>(accessor)];
 }
 
-// Makes `accessor` a copy of itself whose elements begin at `offset` of a buffer; returns their
-// bytes.
+// Replaces `accessor` by a copy whose elements begin at `offset` of a buffer. Returns their bytes.
 uint64_t move_accessor(Document& d, int& accessor, int buffer, uint64_t offset) {
   Accessor copy = at(d, accessor);
   if (copy.same_as < 0) copy.same_as = accessor;
@@ -238,7 +237,7 @@ void place_draco_primitive(Document& d, Primitive& primitive, const std::string&
   const std::string what = where + ": KHR_draco_mesh_compression";
   const bool has_indices = primitive.indices >= 0;
   if (!exists(d, primitive.position) || (has_indices && !exists(d, primitive.indices)))
-    return;  // refused as in any primitive
+    return;  // refused later, like in any primitive
   const bool has_fallback =
       at(d, primitive.position).view >= 0 && (!has_indices || at(d, primitive.indices).view >= 0);
   if (has_fallback) return;
@@ -267,7 +266,7 @@ void place_draco_primitive(Document& d, Primitive& primitive, const std::string&
     add_attribute(d, r, *part);
   }
   const int buffer = add_part(d, part);
-  // The faces are a list whatever the mode was.
+  // The decoded faces are a triangle list, whatever the original mode was.
   primitive.mode = kTriangleList;
   const uint64_t corners = part->corners;
   move_accessor(d, primitive.indices, buffer, 0);

@@ -1,4 +1,4 @@
-// The only place that calls tinygltf.
+// Calls tinygltf; no other file does.
 #include "scene/gltf/document/model_reader.h"
 
 #include <algorithm>
@@ -18,12 +18,12 @@ constexpr size_t kMaxReasonBytes = 200;
 
 // Memory of an entry of a std::map, with the allocations of its key and value.
 constexpr uint64_t kBytesPerMember = 112;
-// The text grows by doubling; the strings of tinygltf's JSON tree are copies of it.
+// The text grows by doubling, and the strings in tinygltf's JSON tree are copies of it.
 constexpr uint64_t kTextCopies = 4;
 constexpr uint64_t kTreeBytesPerValue = 128;
 
-// Memory of the values below `value` in tinygltf's model: a Value for whatever stands in an
-// extension, a Parameter for the members of a material.
+// Returns the memory of the values below `value` in tinygltf's model: a Value for each value in an
+// extension, a Parameter for each member of a material.
 uint64_t model_bytes(const Json& value, bool is_in_extensions, uint64_t& values) {
   ++values;
   uint64_t bytes = is_in_extensions ? 3 * sizeof(tinygltf::Value) : 3 * sizeof(double);
@@ -39,7 +39,7 @@ uint64_t model_bytes(const Json& value, bool is_in_extensions, uint64_t& values)
   return bytes;
 }
 
-// Memory of an element in the model's arrays. A growing vector needs it twice.
+// Returns the memory of an element in the model's arrays. A growing vector needs it twice.
 uint64_t element_bytes(std::string_view section) {
   if (section == "materials") return 2 * sizeof(tinygltf::Material);
   if (section == "textures") return 2 * sizeof(tinygltf::Texture);
@@ -106,7 +106,8 @@ void ModelReader::add_image(const JsonElement& element) {
 }
 
 void ModelReader::parse(Document& document) {
-  text_ += section_is_open_ ? "]}  " : "}  ";  // tinygltf refuses texts of under four characters
+  // Padded, because tinygltf refuses texts of less than four characters.
+  text_ += section_is_open_ ? "]}  " : "}  ";
   std::string errors, warnings;
   bool is_loaded = false;
   std::vector<tinygltf::Image> images = std::move(model_->images);

@@ -18,8 +18,8 @@ namespace {
 constexpr std::string_view kRead[] = {"EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
                                       "KHR_draco_mesh_compression", "KHR_mesh_quantization"};
 
-// Prefixes of extension names for materials, lights, motion and metadata. No vertex depends on
-// them.
+// Prefixes of extension names for materials, lights, motion and metadata. They do not affect
+// vertices.
 constexpr std::string_view kHarmless[] = {
     "KHR_materials_",      "KHR_texture_",          "EXT_texture_", "MSFT_texture_",
     "KHR_lights_punctual", "EXT_lights_",           "KHR_xmp",      "KHR_animation_pointer",
@@ -27,7 +27,7 @@ constexpr std::string_view kHarmless[] = {
     "EXT_mesh_features",   "EXT_instance_features", "KHR_audio",    "KHR_techniques_webgl",
     "FB_geometry_metadata"};
 
-// Whether the geometry could be different if voxdag read the extension.
+// True if the geometry could be different if voxdag read the extension.
 bool may_change_geometry(const std::string& extension) {
   return std::ranges::find(kRead, extension) == std::end(kRead) &&
          std::ranges::none_of(kHarmless, [&](auto p) { return extension.starts_with(p); });
@@ -46,7 +46,7 @@ void check_version(const std::string& path, const tinygltf::Asset& asset) {
     refuse(path, "needs glTF version " + printable(asset.minVersion) + ", voxdag reads 2.0");
 }
 
-// The BIN chunk is the first buffer, if that has no uri.
+// The BIN chunk is the first buffer, if this buffer has no uri.
 void place_bin_chunk(const Container& container, Document& d) {
   if (!container.has_bin || d.buffers.empty()) return;
   BufferSource& first = d.buffers[0];
@@ -55,7 +55,7 @@ void place_bin_chunk(const Container& container, Document& d) {
   first.range = container.bin;
 }
 
-// Memory of check_document(), which follows the parents of all nodes.
+// Memory per node of check_document(), which follows the parents of all nodes.
 constexpr uint64_t kCheckBytesPerNode = 2 * sizeof(int);
 
 // Charges the elements of an array of the document and stores them.
@@ -131,7 +131,7 @@ Document read_document(const ReadableFile& file, MemoryBudget& budget, const Can
   for (const std::string& name : d.model->extensionsUsed)
     if (may_change_geometry(name))
       d.warn("the optional extension " + printable(name) + " is ignored");
-  trim_heap();  // the parse freed many small blocks
+  trim_heap();  // frees small blocks of the parser
   return d;
 }
 

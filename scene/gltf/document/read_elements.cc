@@ -14,7 +14,8 @@ int index_or_none(const JsonElement& object, const char* key) {
   return member ? member->as_index() : -1;
 }
 
-// Returns -1 for a value that is not an index. For members that do not affect the geometry.
+// Returns the index, or -1 for a value that is not an index. Used for members that do not affect
+// the geometry.
 int index_if_any(const JsonElement& element) {
   const auto& value = element.value();
   const bool is_index = value.is_number_unsigned() && value.get<uint64_t>() <= INT32_MAX;
@@ -129,7 +130,7 @@ std::array<double, N> numbers_or(const std::vector<double>& given, std::array<do
   return absent;
 }
 
-// A quaternion far from unit length is not a rotation, and readers disagree on its effect.
+// A quaternion far from unit length is not a rotation, and readers interpret it differently.
 bool is_unit(const std::vector<double>& q) {
   const double norm = ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3];
   return norm > 0.99 && norm < 1.01;
@@ -166,10 +167,10 @@ Instancing read_instancing(const JsonElement& node) {
           index_or_none(attributes, "SCALE")};
 }
 
-// The characters of a data: URI from `begin` on, without their JSON escapes.
+// Returns the characters of a data: URI from `begin`, without JSON escapes.
 std::string unescape(const ReadableFile& file, const RawString& uri, size_t begin,
                      MemoryBudget& budget) {
-  // The quoted text, and the parser's own copies, which grow by doubling.
+  // Copies of the text: the quoted text, and the parser's copies, which grow by doubling.
   constexpr uint64_t kCopies = 6;
   const MemoryCharge charge(budget, kCopies * uri.characters.size,
                             "a data: URI with JSON escapes in " + file.path());

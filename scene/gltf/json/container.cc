@@ -64,7 +64,7 @@ Container read_glb(const ReadableFile& file) {
   return container;
 }
 
-// White space, an opening brace or bracket, or a byte order mark and then one of these.
+// True for white space, an opening brace or bracket, or a byte order mark followed by one of these.
 bool may_be_json(const ReadableFile& file) {
   constexpr std::string_view kMark = "\xef\xbb\xbf";
   char text[4] = {};

@@ -16,10 +16,10 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr size_t kMaxParserReasonBytes = 300;
-// Values nested deeper inside an element are skipped; glTF nests about eight deep.
+// Values nested deeper than this inside an element are skipped. glTF nests about eight deep.
 constexpr size_t kMaxNesting = 32;
 
-// Memory of a value: its place in a growing array or in a map, and its own allocations.
+// Memory of a value: its space in a growing array or in a map, and its own allocations.
 constexpr uint64_t kBytesPerArrayElement = 3 * sizeof(Json);
 constexpr uint64_t kBytesPerObjectMember = 112;
 constexpr uint64_t kBytesPerContainer = 64;
@@ -46,7 +46,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
     if (skipped_depth_ == 0 && !skips_next_) element_bytes_ += v.size() + sizeof(string_t);
     return scalar(std::move(v));
   }
-  bool binary(binary_t&) override { return true; }  // never occurs in a text
+  bool binary(binary_t&) override { return true; }  // never called for text
 
   bool start_object(size_t) override { return start(Json::object()); }
   bool end_object() override { return end(); }
@@ -75,7 +75,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
   }
 
  private:
-  // Where the next value stands.
+  // Position of the next value.
   enum class Place { kSkipped, kRoot, kSection, kElement, kInElement };
 
   Place next_place() {
@@ -127,7 +127,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
     return true;
   }
 
-  // Where the value went.
+  // Inserts the value and returns its address.
   Json* insert(Place place, Json value) {
     if (place == Place::kElement) return &(element_ = std::move(value));
     Json& parent = *open_.back();
@@ -175,20 +175,21 @@ class SectionParser : public nlohmann::json_sax<Json> {
   const std::string& path_;
   const JsonWindow& window_;
   const std::vector<JsonSection>& sections_;
-  GrowingCharge charge_;  // for the largest element so far: the allocator may retain its memory
+  // For the largest element so far, because the allocator may retain its memory.
+  GrowingCharge charge_;
   std::set<std::string> seen_;
   std::string violation_;
 
   bool in_root_ = false;
   const JsonSection* section_ = nullptr;
   bool in_section_ = false;  // inside the array of *section_
-  int64_t index_ = 0;        // of the element within its section
+  int64_t index_ = 0;        // index of the element within its section
 
   Json element_;
-  std::vector<Json*> open_;  // the objects and arrays around the next value, within element_
+  std::vector<Json*> open_;  // objects and arrays that contain the next value, within element_
   uint64_t element_bytes_ = 0;
   RawString uri_;
-  std::string key_;  // of the next value, if that is a member
+  std::string key_;  // key of the next value, if it is a member
   bool skips_next_ = false;
   uint64_t skipped_depth_ = 0;  // open brackets of a value that is being skipped
 };

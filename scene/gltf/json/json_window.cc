@@ -9,9 +9,10 @@ namespace voxdag::gltf {
 namespace {
 
 constexpr size_t kWindowBytes = size_t{64} << 10;
-// Enough for every name and every path of a file.
+// Enough for every name and every path in a file.
 constexpr uint64_t kMaxShownCharacters = 4096;
-// The parser stores a string raw and decoded, in buffers that grow by doubling, and passes a copy.
+// The parser stores a string twice (raw and decoded), in buffers that grow by doubling, and passes
+// a copy.
 constexpr uint64_t kCopies = 6;
 constexpr uint64_t kMaxWordCharacters = 1024;  // of a number or literal
 
@@ -53,7 +54,7 @@ bool JsonWindow::next(char& c) {
   return true;
 }
 
-// Follows where strings begin and end.
+// Tracks where strings begin and end.
 void JsonWindow::track(char c) {
   if (in_string_) return track_in_string(c);
   track_outside_strings(c);
@@ -110,7 +111,7 @@ void JsonWindow::track_in_string(char c) {
   string_.characters.size += in_string_;
 }
 
-// Neither an escape nor a character of several bytes is withheld in part.
+// True if the character is withheld. Escapes and multi-byte characters are never withheld partly.
 bool JsonWindow::is_withheld(char c) {
   if (!in_string_) return is_second_blank_;
   if (string_.characters.size <= kMaxShownCharacters || in_escape_ || !is_plain(c)) return false;

@@ -101,7 +101,7 @@ class MaterialResolver {
     return document_.accessors[static_cast<size_t>(index)];
   }
 
-  // The use of a color accessor, with three or four components. The accessor may not exist.
+  // Returns the use of a color accessor, with three or four components. The accessor may not exist.
   AccessorUse color_use(int index) const {
     const bool exists = index >= 0 && static_cast<size_t>(index) < document_.accessors.size();
     return {where_ + ": COLOR_0",
@@ -109,7 +109,7 @@ class MaterialResolver {
             {kFloat, kUnsignedByte, kUnsignedShort},
             {kUnsignedByte, kUnsignedShort}};
   }
-  // Signed ones are of KHR_mesh_quantization.
+  // Signed numbers are allowed by KHR_mesh_quantization.
   AccessorUse texture_coordinate_use(int set) const {
     return {where_ + ": TEXCOORD_" + std::to_string(set),
             2,
@@ -153,7 +153,7 @@ class MaterialResolver {
 
   Document& document_;
   DocumentMaterials result_;
-  std::vector<int> texcoords_;  // of the file's materials
+  std::vector<int> texcoords_;  // TEXCOORD_n of the file's materials
   std::optional<uint32_t> plain_;
   std::map<uint32_t, uint32_t> without_image_;
   std::string where_;

@@ -11,7 +11,7 @@
 namespace voxdag::gltf {
 namespace {
 
-// A reference to a texture, wherever it stands.
+// A reference to a texture, in a material or in an extension.
 struct TextureUse {
   int texture = -1;
   int texcoord = 0;
@@ -59,7 +59,7 @@ TextureUse read_use(const tinygltf::TextureInfo& info) {
   return use;
 }
 
-// The same inside an extension.
+// Reads a reference inside an extension.
 TextureUse read_use(const tinygltf::Value& info) {
   TextureUse use{whole_number_or(info, "index", -1), whole_number_or(info, "texCoord", 0), {}};
   if (info.Has("extensions") && info.Get("extensions").Has("KHR_texture_transform"))

@@ -137,7 +137,7 @@ void AccessorReader::check_sparse_indices() {
   directory_charge_ = MemoryCharge(buffers_.budget(), windows * sizeof(uint32_t),
                                    document_.path + ": " + document_.name_accessor(index_));
   sparse_directory_.reserve(static_cast<size_t>(windows));
-  uint64_t next = 0;  // the smallest index that may follow
+  uint64_t next = 0;  // smallest allowed next index
   for (uint64_t k = 0; k < accessor_.sparse.count; k += kSparseWindow) {
     read_sparse_indices(k,
                         static_cast<size_t>(std::min(kSparseWindow, accessor_.sparse.count - k)));

@@ -11,13 +11,13 @@
 namespace voxdag::gltf {
 namespace {
 
-// Open files of all readers of a scene, at least one per reader.
+// Maximum open files of all readers of a scene together; each reader may have at least one.
 constexpr unsigned kMaxOpenFiles = 32;
 constexpr uint64_t kMapNodeBytes = 48;
-// A window that begins inside a group of three bytes and ends inside another.
+// A window may begin inside a group of three bytes and end inside another.
 constexpr size_t kMaxGroups = BufferReader::kWindowBytes / 3 + 2;
 
-// Base64 characters [begin, begin + out.size()) of a buffer.
+// Reads base64 characters [begin, begin + out.size()) of a buffer.
 void read_characters(const ReadableFile& scene_file, const BufferSource& buffer, uint64_t begin,
                      std::span<std::byte> out) {
   if (buffer.kind == BufferSource::Kind::kBase64)
@@ -31,7 +31,7 @@ uint64_t character_count(const BufferSource& buffer) {
   return buffer.kind == BufferSource::Kind::kBase64 ? buffer.range.size : buffer.characters.size();
 }
 
-// A colon before the first slash: "http://...", "file:...", "C:\...".
+// True if there is a colon before the first slash: "http://...", "file:...", "C:\...".
 bool has_scheme(const std::string& uri) {
   const size_t end = uri.find_first_of(":/");
   return end != std::string::npos && uri[end] == ':';

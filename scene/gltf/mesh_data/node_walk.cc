@@ -11,7 +11,7 @@ bool NodeWalk::next() {
   return false;
 }
 
-// One step of a depth-first walk: a child if there is one left, else the next root.
+// Takes one step of a depth-first walk: to the next child if one is left, else to the next root.
 bool NodeWalk::descend() {
   while (!path_.empty()) {
     Step& step = path_.back();
@@ -31,7 +31,7 @@ bool NodeWalk::descend() {
 
 void NodeWalk::enter(int node, const Transform& global) {
   path_.push_back({node, 0, global});
-  // A vector that grows has its old memory as well, half of the new.
+  // While a vector grows, its old memory also exists, which is half of the new memory.
   charge_.grow_to(path_.capacity() * sizeof(Step) * 3 / 2);
 }
 

@@ -20,7 +20,7 @@ class GlobalTransforms {
       : document_(document), charge_(budget, what) {}
 
   const Transform& of(int node) {
-    std::vector<int> chain;  // from the node up to an ancestor whose product is known
+    std::vector<int> chain;  // nodes from the given one up to an ancestor whose product is known
     for (int i = node; i >= 0 && !known_.contains(i); i = parent_of(i)) {
       charge_.add(kBytesPerNode);
       chain.push_back(i);
@@ -34,7 +34,7 @@ class GlobalTransforms {
   }
 
  private:
-  // In the map, whose table of buckets is copied when it grows, and in the chain.
+  // Memory in the map, whose table of buckets is copied when it grows, and in the chain.
   static constexpr uint64_t kBytesPerNode = sizeof(Transform) + 72;
 
   int parent_of(int node) const { return document_.nodes[static_cast<size_t>(node)].parent; }

@@ -9,7 +9,7 @@
 namespace voxdag::server {
 namespace {
 
-// Bounds the load of guessing; 256-bit tokens cannot be guessed at any rate.
+// Limits the load caused by guessing. 256-bit tokens cannot be guessed at any rate.
 constexpr double kWrongTokensPerSecond = 5;
 
 std::string without_port(const std::string& host) {
@@ -43,8 +43,8 @@ AccessControl::AccessControl(const ServerConfig& config, FileSystem& files)
   hosts_.insert(hosts_.end(), {"localhost", "127.0.0.1", "[::1]", config.http.address});
 }
 
-// Without tokens, access is limited to the loopback, but a browser on this machine lets any page
-// send requests there: under the page's host name (DNS rebinding) or as a cross-site request.
+// Without tokens, access is limited to the loopback. But a browser on this machine lets any page
+// send requests there, under the page's host name (DNS rebinding) or as cross-site requests.
 void AccessControl::check_site(const Request& request) const {
   const auto is_ours = [&](const std::string& host) {
     return std::any_of(hosts_.begin(), hosts_.end(),
@@ -53,8 +53,8 @@ void AccessControl::check_site(const Request& request) const {
   const std::string host = request.header("Host");
   if (!host.empty() && !is_ours(without_port(host)))
     throw Problem(403, "forbidden", "the Host header does not name this service");
-  // A page cannot read such an answer, but it could waste the service's time, and infer
-  // existing names from response times.
+  // A page cannot read this answer, but it could waste the service's time, and could infer existing
+  // names from response times.
   const auto& segments = request.target.segments;
   if (!segments.empty() && segments[0] == "api" && request.header("Sec-Fetch-Site") == "cross-site")
     throw Problem(403, "forbidden", "cross-site request: expected one of this service's pages");

@@ -6,7 +6,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kDepthS = 2;
-// Above this count, full buckets are dropped, because a new bucket is also full.
+// Above this count, full buckets are dropped: a new bucket would also be full.
 constexpr size_t kMaxBuckets = 10000;
 constexpr double kSweepIntervalS = 1;
 

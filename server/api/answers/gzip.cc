@@ -11,7 +11,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr int kLevel = 1;             // higher levels take twice the time for a few percent
-constexpr int kGzipWindow = 15 + 16;  // 32 KiB, with gzip's header
+constexpr int kGzipWindow = 15 + 16;  // window of 32 KiB, with gzip's header
 constexpr int kMemory = 8;
 
 // True if the parameters of an entry, "; q=0.5", exclude it.
@@ -48,7 +48,7 @@ std::string gzip(std::string_view bytes) {
   stream.avail_in = static_cast<uInt>(bytes.size());
   stream.next_out = reinterpret_cast<Bytef*>(out.data());
   stream.avail_out = static_cast<uInt>(out.size());
-  // In one call, since the output has room for the worst case.
+  // One call is enough, because the output has space for the worst case.
   deflate(&stream, Z_FINISH);
   out.resize(stream.total_out);
   deflateEnd(&stream);

@@ -8,7 +8,7 @@
 namespace voxdag::server {
 namespace {
 
-// A text as a JSON string, or a list of texts as an array.
+// Converts a text to a JSON string, or a list of texts to an array.
 template <class T>
 std::string as_json(const T& value) {
   return json_text(nlohmann::json(value));
@@ -32,7 +32,7 @@ std::string links(const std::string& self) {
   return text + ",\"preview\":\"" + self + "/preview.png\"}";
 }
 
-// The members of a stored request, whatever else a damaged record has.
+// Returns the members of a stored request, and nothing else that a damaged record may contain.
 std::string request_members(const std::string& request) {
   using nlohmann::ordered_json;
   const auto stored = ordered_json::parse(request, nullptr, false);
@@ -44,7 +44,7 @@ std::string request_members(const std::string& request) {
   return text.substr(1, text.size() - 2);
 }
 
-// `json` is JSON text already.
+// Returns the JSON text, or "null" if it is empty.
 std::string or_null(const std::string& json) { return json.empty() ? "null" : json; }
 
 }  // namespace

@@ -13,7 +13,7 @@
 namespace voxdag::server {
 namespace {
 
-// The values of the {...} segments of patterns.
+// Returns the parameters for the {...} segments of patterns.
 std::vector<Parameter> path_parameters() {
   return {
       {"id", "id of the job, 16 hex digits", "^[0-9a-f]{16}$"},
@@ -83,7 +83,7 @@ Json describe(const Parameter& parameter, const char* place) {
   return json;
 }
 
-// The names of the {...} segments.
+// Returns the names of the {...} segments.
 std::vector<std::string> path_names(const Route& route) {
   std::vector<std::string> names;
   for (const std::string& segment : parse_target(route.pattern).segments)
@@ -132,7 +132,7 @@ bool has_only_id_parameter(const Route& route) {
          std::none_of(route.answers.begin(), route.answers.end(), streams);
 }
 
-// The routes of one job, as links from the answer to the request that created it.
+// Returns the routes of one job, as links from the answer to the request that created the job.
 Json job_links(const std::vector<Route>& routes) {
   Json links = Json::object();
   for (const Route& route : routes)

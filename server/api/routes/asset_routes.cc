@@ -1,4 +1,4 @@
-// The embedded files.
+// Serves the embedded files.
 #include "core/format/checksum.h"
 #include "server/api/openapi/document.h"
 #include "server/api/routes/routes.h"

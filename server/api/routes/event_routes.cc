@@ -1,4 +1,4 @@
-// The server-sent events of a job.
+// Serves the server-sent events of a job.
 #include "core/base/clock.h"
 #include "core/base/text.h"
 #include "server/api/answers/job_json.h"
@@ -29,12 +29,12 @@ std::string state_data(const JobEvent& event) {
 // The event stream of one client for one job (docs/api.md, "Events of a job"). Used by one thread.
 class EventFeed {
  public:
-  // Sends the state changes after event `last_seen`; without it only the current state.
+  // Sends the state changes after event `last_seen`. Without a value, sends only the current state.
   EventFeed(Context& context, std::string id, std::optional<int64_t> last_seen)
       : context_(context), id_(std::move(id)), last_number_(last_seen.value_or(-1)) {}
 
-  // An EventSource: text to send, "" for nothing yet, no value at the end of the stream. Waits up
-  // to about a second.
+  // An EventSource: returns text to send, "" for nothing yet, nullopt at the end of the stream.
+  // Waits up to about a second.
   std::optional<std::string> next();
 
  private:
@@ -44,7 +44,7 @@ class EventFeed {
 
   Context& context_;
   const std::string id_;
-  int64_t last_number_ = -1;  // of the newest event sent; -1 before the first
+  int64_t last_number_ = -1;  // number of the newest event sent; -1 before the first
   bool started_ = false;
   bool ended_ = false;
   uint64_t seen_version_ = 0, seen_changes_ = 0, seen_progress_ = 0;
@@ -72,7 +72,7 @@ std::optional<std::string> EventFeed::next() {
 }
 
 void EventFeed::wait() {
-  // Wakes up in time for progress that came too soon after the last event.
+  // Wakes up when progress may be sent that came too soon after the last event.
   const double left_s = last_progress_s_ + kProgressIntervalS - wall_seconds();
   context_.queue.wait_for_change(seen_version_, left_s > 0 ? left_s : kMaxWaitS);
 }
@@ -83,7 +83,7 @@ void EventFeed::add_changes(std::string& text) {
     ended_ = true;
     return;
   }
-  // A new stream begins with the job itself, which makes its past state changes redundant.
+  // A new stream begins with the job itself, so its past state changes are not needed.
   const bool resumed = last_number_ >= 0;
   for (const JobEvent& event : context_.queue.events_after(id_, last_number_)) {
     if (resumed) text += event_text("state", state_data(event), event.number);

@@ -64,7 +64,7 @@ Response accepted(Context& context, const Job& job, bool replayed) {
   return response;
 }
 
-// The folder of a plan, removed with it.
+// The folder of a plan. The destructor removes it.
 class TemporaryTask {
  public:
   TemporaryTask(FileSystem& files, const std::string& path) : folder{path}, files_(files) {
@@ -74,7 +74,7 @@ class TemporaryTask {
     try {
       remove_tree(files_, folder.path);
     } catch (const std::exception&) {
-      // The service removes it at its next start.
+      // The next start of the service removes the remaining folder.
     }
   }
   const JobFolder folder;
@@ -83,7 +83,7 @@ class TemporaryTask {
   FileSystem& files_;
 };
 
-// The task of a dry run. Its scenes are not removed while this exists.
+// The task of a dry run. Its scenes are not removed during the lifetime of this object.
 class Plan {
  public:
   Plan(Context& context, const JobRequest& request)
@@ -111,9 +111,9 @@ Problem problem_of(const Failure& failure) {
   return Problem(500, "internal", "the plan failed");
 }
 
-// The estimate of a job without queuing it: runs the plan in a child process. Throws Problem: the
-// error of the scene or the request; 503 if too many plans run, the service stops, or this one
-// takes too long.
+// Returns the estimate of a job without queuing it: runs the plan in a child process. Throws
+// Problem: the error of the scene or the request; 503 if too many plans are running, the service is
+// stopping, or the plan takes too long.
 Response dry_run(Context& context, Call& call, const JobRequest& request) {
   const auto permit = context.plans.acquire(call.caller.client);
   if (!permit) throw busy("too many concurrent plans", 5);
@@ -159,7 +159,7 @@ Response post_job(Context& context, Call& call) {
   if (context.draining) throw busy("the service is stopping");
   std::lock_guard lock(context.scene_mutex);
   if (const auto known = context.queue.find_by_key(key)) return accepted(context, *known, true);
-  context.tasks.make(request, JobTask::Kind::kBuild);  // throws if the request cannot be built
+  context.tasks.make(request, JobTask::Kind::kBuild);  // throws if the requested build is invalid
   Job job;
   job.name = request.name;
   job.request = request.text;
@@ -188,7 +188,7 @@ JobFilter filter_of(const Call& call) {
 
 Response list_jobs(Context& context, Call& call) {
   JobFilter filter = filter_of(call);
-  const size_t limit = filter.limit++;  // one more shows whether there is a next page
+  const size_t limit = filter.limit++;  // one more, which shows if there is a next page
   std::vector<Job> jobs = context.queue.list(filter);
   std::string next = "null";
   if (jobs.size() > limit) {
@@ -223,7 +223,7 @@ Response delete_job(Context& context, Call& call) {
   const std::string result = context.dispatcher.folder(call.names[0]).result();
   context.open_sources.close(result);
   context.dispatcher.remove(call.names[0]);
-  // A tile may have been requested in between.
+  // A tile may have been requested since the file was removed.
   context.open_sources.close(result);
   context.partial.close(call.names[0]);
   return no_content();
@@ -237,12 +237,12 @@ Response retry_job(Context& context, Call& call) {
   if (job.state == JobState::kFailed || job.state == JobState::kCanceled)
     context.tasks.make(parse_job_request(job.request), JobTask::Kind::kBuild);
   const Job queued = context.dispatcher.retry(job.id);
-  // What it builds now may be another scene.
+  // The job may now build a different scene.
   if (has_ended(job.state)) context.partial.close(job.id);
   return json_response(202, to_json(context, queued));
 }
 
-// A handler that applies the action to a job.
+// Returns a handler that applies the action to a job.
 Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
   return [action](Context& context, Call& call) {
     expect_no_body(call.request);
@@ -250,7 +250,8 @@ Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
   };
 }
 
-// A handler of what frees disk space, even where none is left to record it.
+// Returns a handler of requests that free disk space. It works even if the disk has no space to
+// record them.
 Router::Handler freeing_space(Router::Handler handler) {
   return [handler = std::move(handler)](Context& context, Call& call) {
     return context.disk.with_ballast([&] { return handler(context, call); });

@@ -1,4 +1,4 @@
-// The results of a job: its file, report, preview, log and subvolumes.
+// Serves the results of a job: its file, report, preview, log and subvolumes.
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
@@ -27,8 +27,8 @@ Job finished_job(Context& context, Call& call) {
   return job;
 }
 
-// The name of the job or its first scene, reduced to characters that are safe in headers and
-// shells.
+// Returns the name of the job or of its first scene, reduced to characters that are safe in headers
+// and shells.
 std::string file_name(const Job& job) {
   const auto request = nlohmann::json::parse(job.request);
   std::string base = job.name;
@@ -50,7 +50,7 @@ std::string content_range(const ByteRange& range, uint64_t size) {
 
 RangeAnswer requested_ranges(const Request& request, const std::string& tag, uint64_t size) {
   const auto condition = request.headers.find("If-Range");
-  // An entity tag that differs, or a date, makes the answer the whole file.
+  // With a date or a different entity tag, the answer is the complete file.
   if (condition != request.headers.end() && trimmed(condition->second) != tag) return {};
   // Only GET has ranges (RFC 9110, 14.2).
   return request.method == "GET" ? parse_ranges(request.header("Range"), size) : RangeAnswer{};
@@ -66,8 +66,9 @@ void add_multipart(Response& response, const std::vector<ByteRange>& ranges, uin
   response.headers.emplace("Content-Type", "multipart/byteranges; boundary=" + boundary);
 }
 
-// A large file, which must not be empty: whole, one range or several (RFC 9110, sections 13 and
-// 14), as 200, 206 or 304. Its SHA-256 in hex is its ETag. Throws Problem (416).
+// Answers with a large file, which must not be empty: complete, one range or several ranges (RFC
+// 9110, sections 13 and 14), as 200, 206 or 304. Its SHA-256 in hex is its ETag. Throws Problem
+// (416).
 Response answer_with_file(const Request& request, std::shared_ptr<ReadableFile> file,
                           const std::string& sha256, const std::string& name) {
   const uint64_t size = file->size();

@@ -46,7 +46,7 @@ std::string checked_name(const Call& call) {
   return call.names[0];
 }
 
-// SCENE, with the headers that a client needs to resume an upload.
+// Returns SCENE, with the headers that a client needs to resume an upload.
 Response scene_response(Context& context, int status, const std::string& name) {
   const auto scene = context.scenes.find(name);
   if (!scene) throw not_found("no such scene");
@@ -64,15 +64,16 @@ void check_unused(Context& context, const std::string& name) {
     throw conflict("the scene is in use by a job that has not ended");
 }
 
-// The bytes of the scene that a request carries.
+// The part of a scene that a request contains.
 struct Part {
   uint64_t first = 0;
-  std::optional<uint64_t> end;    // no value for a chunked body
+  std::optional<uint64_t> end;    // nullopt for a chunked body
   std::optional<uint64_t> total;  // size of the scene, if known
   bool is_last(uint64_t offset) const { return !total || offset == *total; }
 };
 
-// N of "bytes */N", which finishes an upload that has all its bytes; no value for other headers.
+// Returns N of "bytes */N", which finishes an upload that has all its bytes; nullopt for other
+// headers.
 std::optional<uint64_t> total_of_empty_part(std::string_view header) {
   constexpr std::string_view kBegin = "bytes */";
   if (!header.starts_with(kBegin)) return {};
@@ -106,7 +107,7 @@ Part part_of(const Request& request) {
   return {range.begin, range.end, total};
 }
 
-// The bytes that are still to come, as far as the client has announced them.
+// Returns the bytes still to come, as far as the client has announced them.
 uint64_t announced_bytes(Context& context, const Part& part) {
   const uint64_t max_bytes = context.config.transfers.max_scene_bytes;
   const uint64_t size = part.total.value_or(0);
@@ -133,13 +134,14 @@ BodyEnd receive(Context& context, Call& call, const Part& part, DiskSpace::Reser
   return end;
 }
 
-// The SHA-256 in a digest header; "" without the header.
+// Returns the SHA-256 in a digest header; "" without the header.
 std::string digest_of(const Request& request, const char* name) {
   const auto found = request.headers.find(name);
   return found == request.headers.end() ? "" : parse_digest_field(found->second);
 }
 
-// A service that stops takes no new parts, and reads no scene to its end.
+// Refuses uploads while the service is stopping: it accepts no new parts, and does not read a scene
+// to its end.
 void check_running(const Context& context) {
   if (context.draining) throw busy("the service is stopping; resume at Upload-Offset");
 }
@@ -155,7 +157,7 @@ Response put_scene(Context& context, Call& call) {
   const std::string part_digest = digest_of(call.request, "Content-Digest");
   const std::string whole_digest = digest_of(call.request, "Repr-Digest");
   SceneUpload upload(context.scenes, name, part.first, part.total);
-  // Reserved now, because an upload that starts over has freed its old bytes.
+  // Reserved only here, because an upload that starts over has now freed its old bytes.
   DiskSpace::Reservation space(context.disk, announced);
   switch (receive(context, call, part, space, upload)) {
     case BodyEnd::kComplete:

@@ -14,7 +14,7 @@
 namespace voxdag::server {
 namespace {
 
-// True if the data folder can be written, tried at most once per second. Thread-safe.
+// True if the data folder is writable. Tested at most once per second. Thread-safe.
 class WriteProbe {
  public:
   // Creates and removes a file.

@@ -19,13 +19,13 @@ namespace {
 // Cache-Control of URLs with a digest: their contents never change.
 constexpr const char* kImmutable = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
-// Limits of the address of a node above the bricks (docs/format.md).
+// Limits for the address of a node above the bricks (docs/format.md).
 constexpr uint64_t kMaxLevel = 17, kMaxOffset = (uint64_t{1} << 40) - 1;
 // Answers of at least this size hold their permit until they are sent. Permits bound the work for
 // tiles and the memory of large answers; the number of connections bounds the memory of small ones.
 // So a client with a slow link does not delay other clients with the same token.
 constexpr size_t kLargeAnswer = 512 << 10;
-// Limits of the level of a color page, and of its position.
+// Limits for the level of a color page, and for its position.
 constexpr uint64_t kMaxColorLevel = 20, kMaxPage = (uint64_t{1} << 17) - 1;
 
 const Parameter kDigest = {"v", "digest of the manifest", "^[0-9a-f]{32}$", {}, true};
@@ -55,7 +55,7 @@ std::vector<uint32_t> make_tile(const TileSource& dag, const query::TileAddress&
     throw;
   } catch (const Error& error) {
     if (!error.is_corruption()) throw;
-    // The file is intact, so the offset belongs to no node.
+    // The file is intact, so no node is at this offset.
     throw not_found(error.message());
   }
 }
@@ -69,7 +69,7 @@ std::vector<uint32_t> make_page(query::ColorPages& pages, const query::ColorPage
   }
 }
 
-// LEVEL.OFFSET of a tile. Throws Problem with this status unless a file could have such a node.
+// Parses LEVEL.OFFSET of a tile. Throws Problem with `status` unless a file can have such a node.
 query::TileAddress parse_address(const std::string& text, int status) {
   const auto numbers = parse_numbers<uint64_t, 2>(text, '.');
   if (!numbers || (*numbers)[0] > kMaxLevel || (*numbers)[1] > kMaxOffset)
@@ -78,7 +78,7 @@ query::TileAddress parse_address(const std::string& text, int status) {
   return {static_cast<uint32_t>((*numbers)[0]), (*numbers)[1]};
 }
 
-// LEVEL.X.Y.Z of a color page.
+// Parses LEVEL.X.Y.Z of a color page.
 query::ColorPageAddress parse_page(const std::string& text) {
   const auto numbers = parse_numbers<uint64_t, 4>(text, '.');
   if (!numbers || (*numbers)[0] > kMaxColorLevel ||
@@ -88,7 +88,7 @@ query::ColorPageAddress parse_page(const std::string& text) {
   return {static_cast<uint32_t>(level), {x, y, z}};
 }
 
-// The addresses of a list, of which `name` is the parameter.
+// Parses the addresses in the list of the query parameter `name`.
 template <class Parse>
 auto parse_batch(const std::string& name, std::string_view list, size_t most, const Parse& parse) {
   std::vector<decltype(parse(std::string()))> addresses;
@@ -111,8 +111,8 @@ void check_digest(const Call& call, const TileSource& dag) {
                   "the file was replaced, or its tiles are made otherwise now: get the manifest");
 }
 
-// A response that clients can keep. `make` returns its bytes, which depend only on the digest and
-// `name`: the entity tag is a hash of both.
+// Returns a response that clients may cache. `make` returns its bytes, which depend only on the
+// digest and `name`. The entity tag is a hash of both.
 template <class Make>
 Response immutable_response(const Call& call, const TileSource& dag, const std::string& name,
                             const Make& make) {
@@ -122,7 +122,7 @@ Response immutable_response(const Call& call, const TileSource& dag, const std::
   response.headers.emplace("ETag", "W/\"" + tag + '"');
   response.headers.emplace("Vary", "Accept-Encoding, Authorization");
   const std::string known = call.request.header("If-None-Match");
-  // The existence of a tile, which "*" tests, is unknown before it is made.
+  // "*" tests if the tile exists, which is unknown until it is made.
   if (trimmed(known) != "*" && has_tag(known, '"' + tag + '"')) {
     response.status = 304;
     return response;
@@ -131,7 +131,8 @@ Response immutable_response(const Call& call, const TileSource& dag, const std::
   return response;
 }
 
-// The message names the file, which clients do not see.
+// Returns the problem for clients. It omits the error's message, which contains the name of the
+// file.
 Problem damaged(const TileSource& dag, const Error& error) {
   Problem result = problem(ErrorCode::kCorrupt,
                            "the requested part of the DAG or of its colors is damaged: "
@@ -146,11 +147,12 @@ void expect_unchanged(const TileSource& dag) {
     throw Problem(410, "gone", "the file was replaced while it was read: get the manifest");
 }
 
-// The answer, or an error, if the file was readable and unchanged throughout. Pages that cannot be
-// read are zeros, and a file that is being written is half old: both can make any answer or error.
+// Returns the answer, or throws the error, if the file was readable and unchanged all the time.
+// Unreadable pages are zeros, and a file that is being overwritten has old and new parts. Both can
+// cause any answer or error.
 template <class Answer>
 Response consistent_response(const Call& call, const TileSource& dag, const Answer& answer) {
-  dag.expect_readable();  // a damaged file is not read again
+  dag.expect_readable();  // a file known to be damaged is not read again
   try {
     Response response = answer(call, dag);
     expect_unchanged(dag);
@@ -184,8 +186,8 @@ Response get_tile(const Call& call, const TileSource& dag) {
   });
 }
 
-// The words that `make` returns for each address, after their length in bytes. Ends early if the
-// client has left, because disks may be slow; a service that stops closes all connections.
+// Returns the words from `make` for each address, each preceded by its length in bytes. Ends early
+// if the client has left, because disks may be slow. A stopping service closes all connections.
 template <class Addresses, class Make>
 std::string batch_of(const Call& call, const Addresses& addresses, const Make& make) {
   std::string bytes;
@@ -251,7 +253,7 @@ auto with_unfinished_job(Context& context, const Call& call, const Make& make) {
   try {
     return make(job.id, context.dispatcher.folder(job.id), resolution);
   } catch (const Error& error) {
-    // A new store has no tables yet, and a job that ends removes its store during the reading.
+    // A new store has no tables yet, and a job that ends removes its store while it is being read.
     const bool is_read = find_job(context.queue, call.names[0]).state != JobState::kSucceeded;
     if (is_read && !error.is_corruption() && error.code() != ErrorCode::kInvalidInput) throw;
     throw not_found("the subvolumes of the job are not known yet");
@@ -271,7 +273,7 @@ Response get_partial(Context& context, Call& call) {
 
 TileAccess open_unfinished_job(Context& context, const Call& call) {
   auto permit = tile_permit(context, call);
-  // Viewers can finish with the last tiles when the job ends.
+  // When the job ends, viewers can finish with the last tiles.
   auto dag = context.partial.known(find_job(context.queue, call.names[0]).id, call.query("v"));
   if (!dag)
     dag = with_unfinished_job(context, call, [&](const auto& id, const auto& folder, uint64_t r) {

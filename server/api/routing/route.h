@@ -67,7 +67,7 @@ struct Route {
   std::optional<Content> body = {};
   bool is_body_required = true;
   std::vector<Answer> answers = {};
-  // Statuses of the route's problems, in addition to those of all routes (kCommonProblems).
+  // Statuses of the route's problems, in addition to kCommonProblems.
   std::vector<int> problems = {};
 };
 

@@ -30,7 +30,7 @@ void check_query(const Request& request, const Route& route) {
       throw bad_request("unknown query parameter");
 }
 
-// HEAD is answered by the routes of GET.
+// Returns the method whose routes answer the request: GET for HEAD.
 std::string method_of(const Request& request) {
   return request.method == "HEAD" ? "GET" : request.method;
 }

@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kBufferBytes = 16384;
 constexpr double kLingerS = 1;
 constexpr size_t kLingerBytes = 1 << 20;
-constexpr double kSteadyRates = 8;  // times the minimum rate
+constexpr double kSteadyRates = 8;  // multiple of the minimum rate
 
 }  // namespace
 
@@ -63,7 +63,7 @@ double Connection::max_wait_s() const {
 }
 
 void Connection::count(uint64_t bytes, Pace& pace) const {
-  if (phase_ != Phase::kExchange) return;  // no bytes earn time there
+  if (phase_ != Phase::kExchange) return;  // in other phases, bytes do not extend the time
   const double earned_s = static_cast<double>(bytes) / limits_.min_bytes_per_s;
   pace.behind_minimum_s = std::max(0.0, pace.behind_minimum_s - earned_s);
   pace.behind_steady_s = std::max(0.0, pace.behind_steady_s - earned_s / kSteadyRates);
@@ -146,13 +146,13 @@ bool Connection::write(std::string_view bytes) {
 }
 
 void Connection::allow_large_send_buffer() {
-#ifdef SO_BUF_LOCK  // Linux 5.16
+#ifdef SO_BUF_LOCK  // available from Linux 5.16
   const int none = 0;
   setsockopt(socket_, SOL_SOCKET, SO_BUF_LOCK, &none, sizeof none);
 #endif
 }
 
-// Bytes that were not read yet, such as the last ones of a TLS session, may be before the end.
+// There may be unread bytes before the end, such as the last bytes of a TLS session.
 bool Connection::peer_disconnected() const {
   pollfd peer{socket_, POLLRDHUP, 0};
   return poll(&peer, 1, 0) > 0;
@@ -162,7 +162,7 @@ void Connection::linger() {
   if (error_ == ErrorState::kBroken) return;
   tls_.shutdown();
   if (shutdown(socket_, SHUT_WR) != 0) return;
-  table_.set_waiting(place_, 0, true);  // the first to be closed
+  table_.set_waiting(place_, 0, true);  // it is the first to be closed
   const double deadline = wall_seconds() + kLingerS;
   for (size_t bytes = 0; bytes < kLingerBytes;) {
     pollfd waiting{socket_, POLLIN, 0};

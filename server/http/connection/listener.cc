@@ -20,7 +20,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr int kBacklog = 512;
-// Kernel memory per connection for unread answers. The kernel doubles this for its bookkeeping.
+// Kernel memory per connection for unread answers. The kernel doubles this value for its
+// bookkeeping.
 constexpr int kSendBufferBytes = 128 << 10;
 
 struct FreeAddresses {
@@ -90,7 +91,8 @@ void Listener::accept_all(const std::function<void(int, const std::string&)>& on
     auto* generic = reinterpret_cast<sockaddr*>(&address);
     const int client = accept4(socket_, generic, &size, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (client < 0) {
-      // Out of file descriptors or memory: the client waits in the backlog until there are some.
+      // There are no free file descriptors or no memory. The client waits in the backlog until
+      // there are.
       if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM)
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
       continue;

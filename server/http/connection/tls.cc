@@ -74,7 +74,7 @@ TlsContext::TlsContext(const std::string& certificate_file, const std::string& k
     throw Error(ErrorCode::kInvalidInput, what);
   };
   if (!context_) fail("TLS: cannot initialize OpenSSL");
-  // OpenSSL's writes would end the process when a client has closed its connection.
+  // Otherwise OpenSSL's writes would end the process if a client has closed its connection.
   std::signal(SIGPIPE, SIG_IGN);
   SSL_CTX_set_min_proto_version(context_.get(), TLS1_2_VERSION);
   SSL_CTX_set_options(context_.get(), SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION);

@@ -11,7 +11,8 @@ namespace {
 
 constexpr size_t kMaxRanges = 16;
 
-// Digits only. A number over 64 bits saturates: it is beyond the end of any file.
+// Accepts only digits. A number over 64 bits becomes the maximum, which is past the end of any
+// file.
 std::optional<uint64_t> parse_number(std::string_view text) {
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return {};
   uint64_t value = 0;
@@ -21,7 +22,7 @@ std::optional<uint64_t> parse_number(std::string_view text) {
 
 enum class Parsed { kRange, kOutside, kMalformed };
 
-// "5-9", "5-" or "-4".
+// Parses "5-9", "5-" or "-4".
 Parsed parse_range(std::string_view text, uint64_t size, ByteRange& range) {
   const size_t dash = text.find('-');
   if (dash == std::string_view::npos) return Parsed::kMalformed;
@@ -40,8 +41,8 @@ Parsed parse_range(std::string_view text, uint64_t size, ByteRange& range) {
   return Parsed::kRange;
 }
 
-// Many small or overlapping ranges cost the server more than the client, and no download needs
-// them.
+// Returns false for many small or overlapping ranges: they cost the server more than the client,
+// and no download needs them.
 bool is_reasonable(const std::vector<ByteRange>& ranges, uint64_t size) {
   uint64_t bytes = 0;
   for (const ByteRange& range : ranges) bytes += range.size();

@@ -23,7 +23,7 @@ std::string parse_digest_field(const std::string& header) {
     const size_t comma = std::min(rest.find(','), rest.size());
     const std::string_view entry = trimmed(rest.substr(0, comma));
     rest.remove_prefix(std::min(comma + 1, rest.size()));
-    if (!entry.starts_with(kName)) continue;  // another algorithm
+    if (!entry.starts_with(kName)) continue;  // a different algorithm
     std::array<unsigned char, kDigestBytes + 1> bytes{};
     const std::string_view base64 = entry.substr(kName.size(), kBase64Chars);
     if (entry.size() != kName.size() + kBase64Chars + 1 || !entry.ends_with("=:") ||

@@ -19,8 +19,8 @@ namespace {
 constexpr int kTickMs = 100;
 constexpr size_t kMaxLineBytes = 4 << 20;
 
-// Blocks all signals of this thread while it exists. A child forked in that time receives pending
-// signals when it unblocks them.
+// Blocks all signals of this thread during its lifetime. A child forked in that time receives
+// pending signals when it unblocks them.
 class BlockedSignals {
  public:
   BlockedSignals() {
@@ -35,8 +35,8 @@ class BlockedSignals {
   sigset_t before_;
 };
 
-// The handlers of the parent belong to its program: here they would take the request to stop, and
-// the program that is run next would never learn of it.
+// The child inherits the parent's signal handlers. They would receive a stop request, and the
+// program that runs next would not learn of it.
 void drop_signal_handlers() {
   for (int signal = 1; signal < NSIG; ++signal) {
     struct sigaction action {};
@@ -47,12 +47,12 @@ void drop_signal_handlers() {
   }
 }
 
-// Runs in the child, between fork and exec: only async-signal-safe calls are allowed.
+// Runs in the child between fork and exec, where only async-signal-safe calls are allowed.
 [[noreturn]] void run_program(char* const* arguments, int output, const char* log_file, int nice,
                               pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // the parent died before the line above
-  setpgid(0, 0);                        // Ctrl-C on a terminal is for the service
+  setpgid(0, 0);                        // Ctrl-C on a terminal must only reach the service
   if (nice != 0) setpriority(PRIO_PROCESS, 0, nice);
   drop_signal_handlers();
   sigset_t none;
@@ -131,7 +131,7 @@ void ChildProcess::send(int signal) {
 
 ChildProcess::End ChildProcess::wait() {
   if (pid_ <= 0) return {};
-  // Waits without reaping, so that nobody signals a process id that has become free.
+  // Waits without reaping, so that no signal goes to a process id that has become free.
   siginfo_t info{};
   while (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
   }

@@ -12,8 +12,7 @@
 namespace voxdag::server {
 namespace {
 
-// A link that is changed between the check of a path and its opening must not let another file
-// through.
+// Compares the opened file with the checked path, because a link may have been changed in between.
 bool is_same_file(const std::string& resolved, const FileIdentity& opened) {
   struct stat found {};
   return lstat(resolved.c_str(), &found) == 0 && found.st_ino == opened.inode;
@@ -42,8 +41,7 @@ ConfinedFiles::ConfinedFiles(FileSystem& files, const std::vector<std::string>& 
 }
 
 std::unique_ptr<ReadableFile> ConfinedFiles::open_read(const std::string& path) {
-  // Missing and forbidden files give the same error, so that a scene cannot probe for files
-  // outside.
+  // Missing and forbidden files give the same error, so that a scene cannot probe for files.
   std::string resolved = resolved_path(path);
   std::error_code failure;
   if (resolved.empty()) resolved = std::filesystem::weakly_canonical(path, failure);

@@ -27,14 +27,14 @@ using nlohmann::ordered_json;
 constexpr uint64_t kMaxReportBytes = uint64_t{4} << 20;
 constexpr int kInternalExitStatus = 1;
 
-// Should memory run out, the system's OOM killer takes this process and not the service.
+// Makes the OOM killer choose this process instead of the service.
 void raise_oom_score() { std::ofstream("/proc/self/oom_score_adj") << 500; }
 
 void enter(const std::string& folder) {
   if (chdir(folder.c_str()) != 0) throw Error(ErrorCode::kIo, "the job's folder cannot be entered");
 }
 
-// Makes the uploads of a task appear in the working directory under their public names.
+// Links the uploads of a task into the working directory under their public names.
 void link_uploads(const JobTask& task) {
   for (const auto& [name, path] : task.uploads) {
     std::error_code failure;
@@ -46,7 +46,7 @@ void link_uploads(const JobTask& task) {
   }
 }
 
-// The scene's files, and the build's own files.
+// Returns a file system with the scene's files and the build's files.
 ConfinedFiles confined(FileSystem& files, const JobTask& task, const JobFolder& folder) {
   const std::string here = resolved_path(".") + "/";
   std::vector<std::string> readable = task.readable;
@@ -84,7 +84,7 @@ ordered_json levels_of(const std::string& path) {
   return levels;
 }
 
-// The members of a build's report that concern clients, and the sizes of the levels.
+// Returns the members of a build's report that are for clients, and the sizes of the levels.
 std::string result_json(const std::string& report_text, const std::string& output) {
   const auto report = ordered_json::parse(report_text);
   ordered_json result;
@@ -95,7 +95,7 @@ std::string result_json(const std::string& report_text, const std::string& outpu
   return result.dump();
 }
 
-// The report is written last: if it exists, only the removal of the work folder was interrupted.
+// The report is written last. If it exists, only the removal of the work folder was interrupted.
 std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildContext& context) {
   if (!context.files.exists(folder.report()))
     return result_json(report_json(run_build(spec, context)), spec.run.output);
@@ -112,7 +112,7 @@ std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progre
   const BuildContext context{readable, progress, cancel};
   const BuildSpec spec = spec_of(task, folder);
   if (task.kind == JobTask::Kind::kPlan) return estimate_json(plan_build(spec, context));
-  // What an earlier run has listed is of no use to this one, whose scene may be another.
+  // The list of an earlier run is useless now, because the scene may be different.
   if (!files.exists(WorkFolder::store_path(folder.work())) && !files.exists(folder.report()) &&
       files.exists(folder.subvolumes()))
     files.remove(folder.subvolumes());
@@ -146,7 +146,7 @@ int run_job(FileSystem& files, const std::string& path, const CancelToken& cance
   } catch (const std::system_error&) {
     return fail(ErrorCode::kOutOfMemory, "the system has no threads or memory left");
   } catch (const std::exception&) {
-    // Texts of libraries may name paths.
+    // Messages of libraries may contain paths.
     pipe.fail("internal", "a fault of the job's process");
     return kInternalExitStatus;
   }

@@ -16,14 +16,14 @@ namespace {
 
 constexpr double kAdvanceIntervalS = 0.25;
 constexpr double kSubvolumesIntervalS = 1;
-// Writing subvolumes.json takes at most this part of one core.
+// Maximum share of one core for writing subvolumes.json.
 constexpr double kMaxSubvolumesShare = 0.01;
 
 void write_all(int file, const std::string& text) {
   for (size_t at = 0; at < text.size();) {
     const ssize_t wrote = ::write(file, text.data() + at, text.size() - at);
     if (wrote < 0 && errno == EINTR) continue;
-    if (wrote <= 0) return;  // nobody reads it
+    if (wrote <= 0) return;  // nobody is reading
     at += static_cast<size_t>(wrote);
   }
 }
@@ -79,7 +79,7 @@ void ProgressPipe::set_subvolumes(uint64_t resolution, std::span<const Subvolume
   subvolumes_.set(resolution, all);
   subvolumes_changed_ = !all.empty();
   report_subvolumes(true);
-  next_subvolumes_s_ = 0;  // the first subvolume that begins is reported immediately
+  next_subvolumes_s_ = 0;  // the first subvolume is reported as soon as it begins
   if (!ticker_.joinable())
     ticker_ = std::jthread([this](const std::stop_token& end) { tick(end); });
 }
@@ -174,7 +174,8 @@ void ProgressPipe::write_subvolumes() {
     file->close();
     files_.rename(temporary, subvolumes_path_);
   } catch (const std::exception&) {
-    // The next attempt may succeed, also if memory ran out: nobody catches what tick() throws.
+    // The next attempt may succeed, even after a lack of memory. Nothing catches exceptions of
+    // tick().
   }
 }
 

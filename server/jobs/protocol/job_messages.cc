@@ -27,14 +27,14 @@ void from_json(const nlohmann::json&, StageEnded&) {}
 
 namespace {
 
-// In the order of the variant.
+// Names in the order of the variant.
 constexpr std::string_view kNames[] = {
     "stage_begun", "stage_resumed", "stage_advanced", "stage_ended", "subvolumes",
     "usage",       "cluster_tasks", "warning",        "failure",     "result"};
 constexpr size_t kKinds = std::variant_size_v<Message>;
 static_assert(std::size(kNames) == kKinds);
 
-// The library would convert other numbers.
+// True if all numbers are integers. The library would silently convert others.
 bool has_whole_numbers(const nlohmann::json& object, int depth) {
   for (const auto& member : object) {
     if (member.is_number() && !member.is_number_unsigned()) return false;
@@ -67,7 +67,7 @@ std::optional<Message> decode(std::string_view text) {
     if (!has_whole_numbers(line, 1)) return {};
     return message_of(line, std::make_index_sequence<kKinds>());
   } catch (const nlohmann::json::exception&) {
-    // A broken line is as good as none.
+    // A malformed line has no value.
   }
   return {};
 }

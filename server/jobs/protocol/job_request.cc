@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-// Sets the options that the body of a request gives.
+// Sets the options in the body of a request.
 template <class Options>
 FieldJson read_body(std::string_view body, Options& options) {
   FieldJson json = FieldJson::parse(body, nullptr, false);
@@ -16,7 +16,7 @@ FieldJson read_body(std::string_view body, Options& options) {
   return json;
 }
 
-// Runs `parse`. What it refuses is an invalid request.
+// Runs `parse` and converts its errors to invalid requests.
 auto as_request(const auto& parse) {
   try {
     return parse();

@@ -16,7 +16,7 @@
 namespace voxdag {
 namespace {
 
-// The rows of one artifact, a frame of each level in memory.
+// The rows of one artifact. One frame of each level is in memory.
 class ArtifactRows {
  public:
   ArtifactRows(std::shared_ptr<ReadableFile> segment, const ArtifactRef& ref)
@@ -24,7 +24,7 @@ class ArtifactRows {
 
   const ArtifactRef& ref() const { return ref_; }
 
-  // The occupied cells of a quarter of the cube's edge. Throws Error{kCorrupt}.
+  // Returns the occupied cells of a quarter of the cube's edge. Throws Error{kCorrupt}.
   uint64_t coarse_brick(const Cube& cube) {
     const auto roots = reader_.roots();
     const auto root = std::find_if(roots.begin(), roots.end(),
@@ -67,7 +67,7 @@ class ArtifactRows {
   uint64_t brick(uint32_t row) {
     return frame_of(reader_.shape().brick_level(), row).brick_masks[row % kFrameRows];
   }
-  // The child mask of a node, or which octants of a brick have voxels.
+  // Returns the child mask of a node, or the occupied octants of a brick.
   uint32_t children_of(uint32_t level, uint32_t row) {
     if (level < reader_.shape().brick_level()) return frame_of(level, row).masks[row % kFrameRows];
     return octants(brick(row));
@@ -91,7 +91,7 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, dou
   std::map<SubvolumeId, CoarseCube> cubes;
   std::erase_if(leaves, [&](const StoredSubvolume& leaf) {
     if (leaf.summary.empty()) return true;
-    // The job may have begun again: only the same artifact has the same cells.
+    // The job may have been restarted. Only the same artifact has the same cells.
     const auto known = cubes_.find(leaf.id);
     if (known == cubes_.end() || known->second.cube != leaf.cube ||
         known->second.artifact != leaf.artifact)
@@ -99,7 +99,8 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, dou
     cubes.insert(*known);
     return true;
   });
-  // Unreadable cubes are retried each time, so the list is rotated to reach the others.
+  // Unreadable cubes are retried each time. The list is rotated so that the others are also
+  // reached.
   std::rotate(leaves.begin(),
               std::find_if(leaves.begin(), leaves.end(),
                            [&](const StoredSubvolume& leaf) { return leaf.id >= next_; }),

@@ -9,7 +9,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr uint64_t kMaxWords = uint64_t{1} << 32;  // that pointers of 32 bits reach
+constexpr uint64_t kMaxWords = uint64_t{1} << 32;  // limit of 32-bit pointers
 
 bool is_within(const Cube& cube, const Cube& whole) {
   if (cube.level < whole.level) return false;
@@ -113,7 +113,7 @@ uint64_t PartialDag::add_words(uint32_t level, std::vector<uint32_t> words) {
   if (offset + words.size() > kMaxWords)
     throw Error(ErrorCode::kLimit,
                 "the built subvolumes have more nodes than pointers can address");
-  // The words come first: whatever fails later, a known offset has its words.
+  // Appends the words first, so that a known offset has its words even if a later step fails.
   all.insert(all.end(), words.begin(), words.end());
   word_count_ += words.size();
   known_[level].emplace(std::move(words), offset);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint64_t kMaxPlanBytes = uint64_t{1} << 30;
 
-// The planned subvolumes, as solid parts, from the list that the job's process wrote.
+// Returns the planned subvolumes as solid parts, from the list written by the job's process.
 std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, uint64_t resolution) {
   const uint32_t levels = levels_of_resolution(resolution);
   std::vector<PartialDag::Part> parts;
@@ -61,7 +61,7 @@ nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, ui
     const GridPlace place{plan.at("origin"), plan.at("edge")};
     nlohmann::ordered_json frame = {{"origin", place.origin}, {"edge", place.edge}};
     PartialDag nodes(levels);
-    // A DAG made in one step has one node on the root level.
+    // A DAG built by one call has one node on the root level.
     if (nodes.add(planned_parts(plan, resolution))) {
       const PartialDagCopy planned(nodes, levels);
       const CancelToken never;

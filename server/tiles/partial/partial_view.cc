@@ -133,7 +133,7 @@ void PartialView::refresh(const std::string& work_folder) {
     if (cubes_.total() == 0)
       throw Error(ErrorCode::kNotFound, "the subvolumes are not planned yet");
   } catch (const Error& error) {
-    // The job's process may have removed the folder during the reading.
+    // The job's process may have removed the folder while it was being read.
     if (error.code() != ErrorCode::kNotFound && files_.exists(WorkFolder::store_path(work_folder)))
       throw;
     restart();
@@ -143,7 +143,7 @@ void PartialView::refresh(const std::string& work_folder) {
   ++version_;
 }
 
-// The job may build another scene, elsewhere, when its folder exists again.
+// When its folder exists again, the job may build another scene with another grid.
 void PartialView::restart() {
   cubes_ = {};
   frame_ = nullptr;
@@ -160,7 +160,7 @@ void PartialView::update_json(uint64_t resolution) {
 
 void PartialView::find_frame(const JobFolder& folder, uint64_t resolution) {
   if (!frame_.is_null()) return;
-  // One attempt per reading of the folder.
+  // Tries only once per version of the folder.
   if (std::exchange(frame_version_, version_) == version_)
     throw Error(ErrorCode::kNotFound, "the subvolumes were not planned a moment ago");
   frame_ = read_frame(files_, folder, resolution);

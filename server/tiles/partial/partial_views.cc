@@ -76,13 +76,14 @@ std::shared_ptr<PartialView> PartialViews::view_of(const std::string& job,
     const std::lock_guard lock(mutex_);
     if (auto view = find(job)) return view;
   }
-  // Waiting jobs need no entry.
+  // Waiting jobs have no folder and need no entry.
   if (!files_.exists(WorkFolder::store_path(folder.work())))
     throw Error(ErrorCode::kNotFound, folder.work() + " has no job store");
   const std::lock_guard lock(mutex_);
   if (auto view = find(job)) return view;
   if (entries_.size() == max_jobs_) {
-    // A job that is being viewed keeps its entry: otherwise its viewers would take the next one's.
+    // A job that is being viewed keeps its entry. Otherwise its viewers' next requests would take
+    // the entry of another job.
     if (wall_seconds() - entries_.back().used_s < kMinIdleS) {
       RequestError busy(RequestError::Kind::kBusy, "too many running jobs are being viewed");
       busy.retry_after_s = kMinIdleS;
