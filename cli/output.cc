@@ -53,7 +53,7 @@ void OutputFile::check(FileSystem& files, const std::string& input, const IsOwnF
   const std::string folder = parent_directory(path);
   if (!files.exists(folder))
     throw Error(ErrorCode::kNotFound,
-                path + ": there is no folder " + folder + ": expected an existing one");
+                path + ": the folder " + folder + " does not exist: expected an existing folder");
 }
 
 void OutputFile::check(FileSystem& files, const std::string& name, const std::string& input,

@@ -15,7 +15,7 @@ uint32_t grid_levels(const SelectionOptions& options, const voxdag_reader::File&
     if (*options.level < kMinGridLevels || *options.level > file.grid_levels())
       throw Error(ErrorCode::kInvalidInput,
                   "--level " + std::to_string(*options.level) + ": expected 2 to " +
-                      std::to_string(file.grid_levels()) + ", the file's own");
+                      std::to_string(file.grid_levels()) + ", the level of the file");
     return static_cast<uint32_t>(*options.level);
   }
   if (!options.resolution) return file.grid_levels();
@@ -24,7 +24,7 @@ uint32_t grid_levels(const SelectionOptions& options, const voxdag_reader::File&
       cells > static_cast<uint64_t>(file.resolution()))
     throw Error(ErrorCode::kInvalidInput,
                 "--resolution " + std::to_string(cells) + ": expected a power of two from 4 to " +
-                    std::to_string(file.resolution()) + ", the file's own");
+                    std::to_string(file.resolution()) + ", the resolution of the file");
   return static_cast<uint32_t>(std::countr_zero(cells));
 }
 

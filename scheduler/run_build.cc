@@ -70,7 +70,7 @@ void report_scene(BuildJob& job, const IngestState& state) {
 void plan(BuildJob& job, const PreparedScene& scene) {
   if (const auto stored = job.start_over ? std::nullopt : job.store->job()) {
     if (stored->scene_digest != scene.digest())
-      job.refuse("its scene has other contents (digest " + stored->scene_digest.substr(0, 16) +
+      job.refuse("its scene has different contents (digest " + stored->scene_digest.substr(0, 16) +
                  ", now " + scene.digest().substr(0, 16) + ")");
     return;
   }

@@ -78,7 +78,7 @@ inline Attribute attribute_named(std::string_view name, const std::string& optio
     expected += (&row == std::end(kAttributeTable) - 1 ? " or " : ", ") + std::string(row.name);
   }
   throw Error(ErrorCode::kInvalidInput,
-              option + ": '" + std::string(name) + "' is no attribute: expected " + expected);
+              option + ": '" + std::string(name) + "' is not an attribute: expected " + expected);
 }
 
 }  // namespace voxdag

@@ -148,7 +148,10 @@ void SqlDatabase::execute(const std::string& sql) {
 
 int64_t SqlDatabase::integer(const std::string& sql) {
   SqlStatement statement = prepare(sql);
-  if (!statement.step()) throw Error(ErrorCode::kCorrupt, "database: no answer to " + sql);
+  if (!statement.step())
+    throw Error(ErrorCode::kCorrupt, std::string("database ") +
+                                         sqlite3_db_filename(handle_.get(), "main") +
+                                         ": expected a row for " + sql);
   return statement.integer(0);
 }
 

@@ -38,12 +38,14 @@ class JpegReader : public ImageReader {
       check_size(jpeg_.image_width, jpeg_.image_height);
       const J_COLOR_SPACE space = jpeg_.jpeg_color_space;
       if (space != JCS_GRAYSCALE && space != JCS_YCbCr && space != JCS_RGB)
-        throw BrokenImage{"is a JPEG image that is neither gray nor YCbCr nor RGB (CMYK, say)"};
+        throw BrokenImage{
+            "is a JPEG image that is neither gray nor YCbCr nor RGB (for example CMYK)"};
       // Refuses images that not every version and build of the library decodes. In the first scan
       // of a lossless image, Ss is its predictor. In other images the first scan has the mean of
       // each block, so Ss is 0.
       if (jpeg_.arith_code || jpeg_.data_precision != 8 || jpeg_.Ss != 0)
-        throw BrokenImage{"is a JPEG image with arithmetic coding, lossless or not of 8 bits"};
+        throw BrokenImage{
+            "is a JPEG image that is lossless, has arithmetic coding, or does not have 8 bits"};
       if (use == ImageUse::kSize) return;
       charge_decoder(budget);
       if (!start()) fail();

@@ -26,7 +26,7 @@ void refuse_inputs(FileSystem& files, std::span<const std::string> paths,
     const auto file = open_if_there(files, path);
     if (file && std::ranges::find(read, file->identity()) != read.end())
       throw Error(ErrorCode::kInvalidInput, path +
-                                                " is read and would be overwritten: expected "
+                                                " is an input and would be overwritten: expected "
                                                 "another output");
   }
 }
@@ -38,7 +38,7 @@ void refuse_foreign_file(FileSystem& files, const std::string& path,
   if (file && file->size() > 0 && !is_own(*file))
     throw Error(ErrorCode::kInvalidInput,
                 path +
-                    " exists and was not written by this command: expected a free name or that "
+                    " exists and was not written by this command: expected a free name or the name "
                     "of an earlier result" +
                     otherwise);
 }

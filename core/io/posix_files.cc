@@ -59,7 +59,7 @@ enum class Contents { kKeep, kEmpty };
 int open_to_change(const char* call, const std::string& path, Contents contents) {
   const auto refuse = [&](const char* what) {
     throw Error(ErrorCode::kInvalidInput,
-                path + " is " + what + ": expected a regular file of one name, or a free name");
+                path + " is " + what + ": expected a regular file with one name, or a free name");
   };
   const int fd = open_retrying(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK);
   if (fd < 0 && errno == ELOOP) refuse("a symbolic link");
@@ -67,7 +67,7 @@ int open_to_change(const char* call, const std::string& path, Contents contents)
   Descriptor opened(fd);
   struct stat s {};
   if (fstat(fd, &s) != 0) fail("stat", path, errno);
-  if (S_ISREG(s.st_mode) && s.st_nlink > 1) refuse("a file of several names (hard links)");
+  if (S_ISREG(s.st_mode) && s.st_nlink > 1) refuse("a file with several names (hard links)");
   if (!S_ISREG(s.st_mode) && !S_ISCHR(s.st_mode)) refuse("not a regular file");
   if (contents == Contents::kEmpty && s.st_size > 0 && ftruncate(fd, 0) != 0)
     fail("empty", path, errno);

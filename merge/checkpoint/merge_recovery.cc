@@ -32,7 +32,7 @@ PassProgress MergeRecovery::restore(GlobalFileWriter& out) {
 
 PassProgress MergeRecovery::resume(const MergeState& state, GlobalFileWriter& out) {
   if (state.inputs_checksum != pending_.inputs_checksum())
-    throw Error(ErrorCode::kCorrupt, "the saved state is of other subvolumes");
+    throw Error(ErrorCode::kCorrupt, "the saved state belongs to other subvolumes");
   context_.scratch.set_next_id(state.next_scratch_id);
   std::set<uint32_t> segments;
   for (const ArtifactRef& ref : state.intermediates)
@@ -49,7 +49,7 @@ PassProgress MergeRecovery::resume(const MergeState& state, GlobalFileWriter& ou
 
 PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, GlobalFileWriter& out) {
   if (state.output != out.path())
-    throw Error(ErrorCode::kInvalidInput, "the merge to resume has begun to write " + state.output +
+    throw Error(ErrorCode::kInvalidInput, "the interrupted merge was writing " + state.output +
                                               ", not " + out.path() +
                                               ": expected the same output, or --restart");
   if (!pending_.fit_at_once(context_.plan.partition_bytes))
@@ -57,8 +57,9 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
                 "out of memory: the interrupted merge used more memory: expected as much memory "
                 "as before (--memory), or --restart");
   if (state.narrow_words != out.narrow_words())
-    throw Error(ErrorCode::kCorrupt, "the merge to resume has wide levels from " +
-                                         std::to_string(state.narrow_words) + " words on, not " +
+    throw Error(ErrorCode::kCorrupt, "the interrupted merge has wide levels above " +
+                                         std::to_string(state.narrow_words) +
+                                         " words, this one above " +
                                          std::to_string(out.narrow_words()));
   auto file = std::make_unique<ScratchFile>(context_.scratch, state.map);
   saver_.add_named(file->path());

@@ -25,7 +25,7 @@ class Pass {
     }
     if (task_.is_final && done_.placed.size() != 1)
       throw Error(ErrorCode::kCorrupt,
-                  "an artifact holds the whole grid and others a part of it: "
+                  "one artifact covers the complete grid and others a part of it: "
                   "expected subvolumes that do not overlap");
     return std::move(done_.roots);
   }

@@ -38,8 +38,8 @@ class Opener {
     for (const ArtifactRoot& root : reader.roots()) {
       const ArtifactLevel* const level = reader.level(root.cube.level);
       if (!level || root.index >= level->rows)
-        throw Error(ErrorCode::kCorrupt,
-                    where + "a root on level " + std::to_string(root.cube.level) + " is not there");
+        throw Error(ErrorCode::kCorrupt, where + "a root on level " +
+                                             std::to_string(root.cube.level) + " does not exist");
     }
   }
 

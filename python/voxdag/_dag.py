@@ -349,5 +349,5 @@ def _rows(values: Any, dtype: Any, what: str) -> np.ndarray:
     if array.dtype.kind not in "fiu":
         raise Error(f"the {what} are {array.dtype}: expected numbers", "invalid_input")
     if dtype == np.int64 and array.dtype == np.uint64 and (array >> np.uint64(63)).any():
-        raise Error(f"the {what} are over 2^63: expected cells", "invalid_input")
+        raise Error(f"the {what} are over 2^63: expected smaller coordinates", "invalid_input")
     return np.ascontiguousarray(array, dtype=dtype)

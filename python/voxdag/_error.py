@@ -33,7 +33,7 @@ def path_text(path: Path) -> str:
     except UnicodeEncodeError:
         usable = False
     if not usable:
-        raise Error(f"the path {text!r}: expected one that a file can have", "invalid_input")
+        raise Error(f"the path {text!r}: expected a path that a file can have", "invalid_input")
     return text
 
 
@@ -45,5 +45,5 @@ def memory_text(memory: Union[int, str, None]) -> str:
 def thread_count(threads: int) -> int:
     """A number of threads, 0 for all."""
     if not 0 <= operator.index(threads) <= _MAX_THREADS:
-        raise Error(f"threads={threads}: expected 0, for all, to {_MAX_THREADS}", "invalid_input")
+        raise Error(f"threads={threads}: expected 0 (all) to {_MAX_THREADS}", "invalid_input")
     return operator.index(threads)

@@ -44,7 +44,7 @@ def render(
     if (camera is None) != (target is None):
         raise Error("expected a camera and a target, or neither", "invalid_input")
     if not isinstance(view, str):
-        raise Error(f"view {view!r}: expected its name", "invalid_input")
+        raise Error(f"view {view!r}: expected the name of a view", "invalid_input")
     if camera is not None and view != "auto":
         raise Error(f"a camera and the view {view!r}: expected one of them", "invalid_input")
     degrees = None if fov is None else _number(fov)

@@ -73,7 +73,7 @@ void refuse(const std::string& what) {
 }
 
 void expect_pointer(const void* pointer, const char* name) {
-  if (!pointer) refuse(std::string(name) + " is a null pointer: expected one to an object");
+  if (!pointer) refuse(std::string(name) + " is a null pointer: expected a pointer to an object");
 }
 
 std::span<const Position> positions_of(const int64_t (*cells)[3], size_t count) {
@@ -93,10 +93,10 @@ voxdag::query::RayLimits ray_limits_of(const voxdag_ray_limits* limits) {
   if (!limits) return {};
   const char* const bytes = reinterpret_cast<const char*>(limits);
   if (limits->struct_size < sizeof *limits)
-    refuse("limits of rays of struct_size " + std::to_string(limits->struct_size) +
+    refuse("voxdag_ray_limits has the struct_size " + std::to_string(limits->struct_size) +
            ": expected sizeof(voxdag_ray_limits)");
   if (std::any_of(bytes + sizeof *limits, bytes + limits->struct_size, [](char c) { return c; }))
-    refuse("limits of rays have members that libvoxdag.so " VOXDAG_VERSION " does not know");
+    refuse("voxdag_ray_limits has members that libvoxdag.so " VOXDAG_VERSION " does not know");
   return {limits->max_distance, limits->stop_size};
 }
 
@@ -140,7 +140,7 @@ voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts) {
     expect_pointer(file, "the file");
     expect_pointer(facts, "the place of the facts");
     if (facts->struct_size < offsetof(voxdag_facts, bytes) + sizeof facts->bytes)
-      refuse("facts of struct_size " + std::to_string(facts->struct_size) +
+      refuse("voxdag_facts has the struct_size " + std::to_string(facts->struct_size) +
              ": expected sizeof(voxdag_facts)");
     const voxdag::query::DagFile& dag = file->dag;
     voxdag_facts known{};

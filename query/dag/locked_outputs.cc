@@ -20,7 +20,7 @@ void refuse_impossible(FileSystem& files, const Outputs& outputs) {
     const std::string folder = parent_directory(path);
     if (!files.exists(folder))
       throw Error(ErrorCode::kNotFound,
-                  path + ": there is no folder " + folder + ": expected an existing one");
+                  path + ": the folder " + folder + " does not exist: expected an existing folder");
   }
 }
 

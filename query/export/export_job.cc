@@ -104,7 +104,7 @@ bool CellLimit::fits(uint32_t grid_levels) {
 
 void refuse_empty(const ExportJob& job) {
   throw Error(ErrorCode::kInvalidInput,
-              job.file.path() + ": the selection has no voxels: expected some to export");
+              job.file.path() + ": the selection has no voxels: expected a selection with voxels");
 }
 
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected) {

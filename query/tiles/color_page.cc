@@ -28,9 +28,9 @@ void check_address(const voxdag_reader::File& file, const ColorPageAddress& page
   const uint64_t edge = uint64_t{1} << (page.level - std::min(page.level, kPageLevels));
   for (const uint64_t c : page.position)
     if (c >= edge)
-      throw Error(ErrorCode::kNotFound, "page " + std::to_string(c) + " of level " +
-                                            std::to_string(page.level) + ": the grid has " +
-                                            std::to_string(edge) + " along each axis");
+      throw Error(ErrorCode::kNotFound,
+                  "position " + std::to_string(c) + " of a color page of level " +
+                      std::to_string(page.level) + ": expected 0 to " + std::to_string(edge - 1));
 }
 
 // Returns a cell of the page from its Morton code within the page.

@@ -37,7 +37,7 @@ void check_size(const GenerateOptions& options) {
                 : options.instances || options.triangles <= kMaxGlbBytes / kMinBytesPerTriangle;
   if (!fits)
     throw Error(ErrorCode::kLimit,
-                "the limit of a .glb is 4 294 967 295 bytes: ask for " +
+                "the limit of a .glb is 4 294 967 295 bytes: request " +
                     (is_menger ? "a level of at most " + std::to_string(kMaxMengerLevel)
                                : std::string("fewer triangles")));
 }
@@ -54,7 +54,8 @@ void check(const GenerateOptions& options) {
                 "colors and instances were both given, but instances of a part share one color: "
                 "expected one of them");
   if (options.kind == SceneKind::kMenger && options.triangles != 0)
-    throw Error(ErrorCode::kInvalidInput, "menger is sized by its level, not by triangles");
+    throw Error(ErrorCode::kInvalidInput,
+                "the size of menger is its level, not a number of triangles");
   check_size(options);
 }
 

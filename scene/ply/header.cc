@@ -104,22 +104,23 @@ class HeaderParser {
     if (parsed.ec != std::errc() || parsed.ptr != end)
       refuse("has the count " + printable(words[2]) + ", expected a number below 2^64");
     for (const Element& other : header_.elements)
-      if (other.name == element.name) refuse("names an element again");
+      if (other.name == element.name) refuse("repeats the name of an element");
     header_.elements.push_back(std::move(element));
   }
 
   void add_property(const std::vector<std::string_view>& words) {
     Property property;
-    if (header_.elements.empty()) refuse("is a property without an element");
+    if (header_.elements.empty()) refuse("declares a property before any element");
     property.is_list = words.size() > 1 && words[1] == "list";
     if (words.size() != (property.is_list ? 5 : 3))
       refuse("is neither \"property TYPE NAME\" nor \"property list TYPE TYPE NAME\"");
     if (property.is_list) property.count_type = type_of(words[2]);
     property.type = type_of(words[words.size() - 2]);
     property.name = words.back();
-    if (!is_integer(property.count_type)) refuse("counts the entries of a list by a float");
+    if (!is_integer(property.count_type))
+      refuse("has a float type for the count of a list, expected an integer type");
     for (const Property& other : header_.elements.back().properties)
-      if (other.name == property.name) refuse("names a property again");
+      if (other.name == property.name) refuse("repeats the name of a property");
     header_.elements.back().properties.push_back(std::move(property));
   }
 

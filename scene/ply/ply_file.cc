@@ -77,7 +77,7 @@ void PlyFile::find_face_list() {
     refuse("has faces without a property vertex_indices or vertex_index");
   const Property& list = face.properties[face_list_];
   if (!list.is_list || !is_integer(list.type))
-    refuse("has faces whose property " + list.name + " is no list of integers");
+    refuse("has faces whose property " + list.name + " is not a list of integers");
 }
 
 // Finds the rows of an element that begins at this offset. Returns the end of the element.

@@ -55,7 +55,7 @@ class TemporaryFolder {
         if (error.code() != ErrorCode::kNotFound) throw;
       }
     }
-    if (!lock_) throw Error(ErrorCode::kIo, path_ + ": expected a folder of this task alone");
+    if (!lock_) throw Error(ErrorCode::kIo, path_ + ": expected a folder that only this task uses");
   }
   ~TemporaryFolder() {
     try {

@@ -18,7 +18,7 @@ std::string this_program() {
   if (!std::filesystem::exists(path))
     throw Error(ErrorCode::kInvalidInput,
                 path +
-                    ": this program was replaced or removed while it runs: expected it, or its "
+                    ": this program was replaced or removed while running: expected it, or its "
                     "path on the nodes, for the tasks of the cluster");
   return path;
 }

@@ -85,7 +85,7 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
   if (!lock_)
     throw Error(ErrorCode::kIo, "the work folder " + path_ + " is in use by " +
                                     read_small_file(files_, lock_path, 1 << 12) +
-                                    ": expected to be the only build there");
+                                    ": expected no other build in this folder");
   const std::string holder = "process " + std::to_string(getpid()) + " on " + host_name();
   // create() empties the file, because the previous name may have been longer.
   files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
@@ -93,9 +93,10 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
 
 void WorkFolder::check_is_ours() const {
   const auto refuse = [&](const std::string& name) {
-    throw Error(ErrorCode::kInvalidInput, "the work folder " + path_ + " holds " + name +
-                                              ", which voxdag did not make: expected an empty "
-                                              "folder or that of an earlier build (--work)");
+    throw Error(ErrorCode::kInvalidInput,
+                "the work folder " + path_ + " holds " + name +
+                    ", which was not created by voxdag: expected an empty "
+                    "folder or the folder of an earlier build (--work)");
   };
   for (const DirectoryEntry& entry : files_.list(path_))
     if (!is_ours(entry)) refuse(entry.name);

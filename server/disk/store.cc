@@ -15,7 +15,7 @@ SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool 
     throw Error(ErrorCode::kInvalidInput,
                 path + ": expected " + format.records +
                     ", because the data folder has folders of " + format.files +
-                    ". Restore it from a backup, or start once with --adopt, which makes new "
+                    ". Restore it from a backup, or start once with --adopt, which creates new "
                     "records of the " +
                     format.files + " that are found");
   const bool is_old = format.upgrade && version == format.version - 1;

@@ -398,7 +398,8 @@ Job Dispatcher::retry(const std::string& id) {
     j.not_before_s = 0;
     if (j.state == JobState::kQueued) return;
     if (folders_.is_marked(id))
-      throw state_conflict(j, "the deletion of this job has begun: delete it again to end that");
+      throw state_conflict(
+          j, "the deletion of this job has begun: delete it again to finish the deletion");
     j.state = JobState::kQueued;
     j.attempts = j.interruptions = 0;
     j.front = false;

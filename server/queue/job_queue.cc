@@ -180,7 +180,7 @@ std::optional<Job> job_of_key(SqlDatabase& database, const IdempotencyKey& key) 
   if (!known.bind(0, key.key).step()) return {};
   if (known.text(1) != key.request)
     throw RequestError(RequestError::Kind::kKeyReused,
-                       "this Idempotency-Key came with another request before");
+                       "this Idempotency-Key was already used with a different request");
   return find_job(database, known.text(0));
 }
 

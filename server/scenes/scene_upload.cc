@@ -98,7 +98,7 @@ bool SceneUpload::finish(const std::string& part_digest, const std::string& whol
     else
       store_.record(name_, {first_, total_});
     throw RequestError(RequestError::Kind::kInvalid,
-                       "the part's bytes have another SHA-256 than Content-Digest says");
+                       "the SHA-256 of the part's bytes differs from Content-Digest");
   }
   checkpoint();
   done_ = true;
@@ -108,7 +108,7 @@ bool SceneUpload::finish(const std::string& part_digest, const std::string& whol
   if (!whole_digest.empty() && whole_digest != sha256_) {
     store_.drop_upload(name_);
     throw RequestError(RequestError::Kind::kInvalid,
-                       "the scene's bytes have another SHA-256 than Repr-Digest says");
+                       "the SHA-256 of the scene's bytes differs from Repr-Digest");
   }
   return true;
 }

@@ -115,7 +115,7 @@ TEST_F(Extract, RefusalsOfExports) {
     args.insert(args.end(), options.begin(), options.end());
     expect_error(2, why, args);
   };
-  refused("s.vdag is read and would be overwritten", {"-o", "s.vdag", "--force"});
+  refused("s.vdag is an input and would be overwritten", {"-o", "s.vdag", "--force"});
   refused("expected the name of a file", {"-o", ""});
   refused("64MiB", {"-o", "x.ply", "--memory", "1"});
   refused("low corner before", {"-o", "x.ply", "--region", "nan,0,0,1,1,1", "--world"});

@@ -129,8 +129,9 @@ TEST_F(UnusualInput, InputsThatAreNoFilesHaveOneStatus) {
 // A folder that is missing is noticed before the work is done.
 TEST_F(UnusualInput, AMissingOutputFolderIsNoticedFirst) {
   build();
-  expect_error(3, "there is no folder none", {"generate", "menger", "none/x.glb", "--level", "1"});
-  expect_error(3, "there is no folder none", {"render", "m.vdag", "-o", "none/x.png"});
+  expect_error(3, "the folder none does not exist",
+               {"generate", "menger", "none/x.glb", "--level", "1"});
+  expect_error(3, "the folder none does not exist", {"render", "m.vdag", "-o", "none/x.png"});
 }
 
 // Numbers are read exactly, and an error is one line that names the expectation.

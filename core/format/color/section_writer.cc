@@ -39,7 +39,7 @@ void SectionWriter::check(const Tier& tier, const EncodedRegion& region) const {
   if (region.blocks.size() != bytes ||
       region.prefix.size() != prefix_entries(tier.levels(), region.counts))
     fail(std::to_string(region.blocks.size()) + " bytes of blocks, expected " +
-         std::to_string(bytes) + "; or another number of prefixes than cells");
+         std::to_string(bytes) + ", or a number of prefixes that does not fit its cells");
 }
 
 void SectionWriter::add(uint32_t tier_index, const EncodedRegion& region) {

@@ -131,7 +131,7 @@ struct GlobalFileWriter::State {
                      unsigned threads, const CancelToken& cancel) const;
   [[noreturn]] void damaged(uint64_t at) const {
     throw Error(ErrorCode::kCorrupt, partial_path + " from byte " + std::to_string(at) +
-                                         " on differs from the written bytes");
+                                         " differs from the written bytes");
   }
 };
 
@@ -165,7 +165,7 @@ void GlobalFileWriter::resume(const GlobalFileProgress& progress) {
   const uint64_t whole_blocks = (end - kPageBytes) / kChecksumBlockBytes;
   if (written->size() < end || progress.levels.size() > s.brick_level() + 1 ||
       progress.checksums.size() < whole_blocks)
-    throw Error(ErrorCode::kCorrupt, s.partial_path + " does not hold the levels that were merged");
+    throw Error(ErrorCode::kCorrupt, s.partial_path + " does not contain the merged levels");
   BlockChecksums checksums(std::span(progress.checksums).first(whole_blocks));
   const uint64_t last_block = kPageBytes + whole_blocks * kChecksumBlockBytes;
   read_through(*written, last_block, end, CancelToken(),
@@ -250,7 +250,7 @@ void GlobalFileWriter::end_section(const GlobalAttribute& attribute) {
       (!s.sections.empty() && s.sections.back().attribute.kind >= attribute.kind))
     throw Error(ErrorCode::kCorrupt,
                 s.path + ": the section of attribute " + std::to_string(attribute.kind) + " has " +
-                    std::to_string(s.section_bytes) + " bytes, or is out of the order of kinds");
+                    std::to_string(s.section_bytes) + " bytes, or its kind is out of order");
   s.sections.push_back({attribute, s.end, s.section_bytes});
   s.pad(s.end + s.section_bytes);
   s.section_open = false;

@@ -77,14 +77,15 @@ class ColorVerifier {
   // Checks one region and returns it.
   ColorRegion check_region(const ColorTier& tier, uint64_t i) const {
     ColorRegion region;
-    if (!ColorSection::region(tier, i, region)) fail(tier, i, "its counts or its place are wrong");
+    if (!ColorSection::region(tier, i, region))
+      fail(tier, i, "its counts or its position are invalid");
     for (int at = 29; at < 32; ++at)
       if (tier.directory[32 * i + static_cast<uint64_t>(at)] != 0)
         fail(tier, i, "a reserved byte is not 0");
     uint64_t place;
     if (region.morton >> 3 * tier.region_level != 0 ||
         !cells_.find(tier.region_level, region.morton, place))
-      fail(tier, i, "the DAG has no cells there");
+      fail(tier, i, "the DAG has no cells in this region");
     std::array<uint32_t, kRegionLevels + 1> counts{};
     std::vector<uint32_t> prefix[2];
     std::vector<ValuedCell> finest;  // for attributes other than color
@@ -97,11 +98,14 @@ class ColorVerifier {
     };
     cells_.walk(tier.region_level, place, 0, tier.finest_level, visit);
     if (!std::equal(counts.begin(), counts.end(), region.counts))
-      fail(tier, i, "it does not have as many colors as the DAG has cells");
+      fail(tier, i, "its number of values differs from the DAG's number of cells");
     for (uint32_t table = 0; table < 2; ++table)
       for (uint64_t entry = 0; entry < region.prefix_count(table); ++entry)
         if (region.prefix(table, entry) != prefix[table][entry])
-          fail(tier, i, "prefix " + std::to_string(entry) + " is not the number of cells before");
+          fail(tier, i,
+               "prefix " + std::to_string(entry) + " is " +
+                   std::to_string(region.prefix(table, entry)) + ": expected " +
+                   std::to_string(prefix[table][entry]) + ", the number of cells before it");
     check_padding(tier, i, region);
     if (traits_.is_color())
       check_blocks(tier, i, region);
@@ -122,7 +126,7 @@ class ColorVerifier {
     for (uint64_t b = 0; b < blocks; ++b) {
       const auto there = static_cast<unsigned>(std::min<uint64_t>(32, region.cells - 32 * b));
       if (!is_canonical(region.blocks + 16 * b, there))
-        fail(tier, i, "block " + std::to_string(b) + " is not in the form of its mode");
+        fail(tier, i, "block " + std::to_string(b) + " is not in the canonical form of its mode");
     }
   }
   void check_padding(const ColorTier& tier, uint64_t i, const ColorRegion& region) const {
@@ -147,7 +151,7 @@ class ColorVerifier {
       if (tier.finest_level != section_.color_levels() &&
           value != value_from_below(tier,
                                     region.morton << 3 * (region.level_count - 1) | cells[at].code))
-        fail_at(at, "expected the value that follows from its children");
+        fail_at(at, "expected the value computed from its children");
     }
     const EncodedRegion expected = encode_values(traits_.attribute, region.block_bytes / 32,
                                                  region.level_count - 1, region.morton, cells);
@@ -156,9 +160,8 @@ class ColorVerifier {
     if (differing.first != expected.blocks.end())
       fail(tier, i,
            "byte " + std::to_string(differing.first - expected.blocks.begin()) +
-               " differs from the value that follows from the cell's children, or from 0 behind "
-               "the last "
-               "one");
+               " differs from the value computed from the cell's children, or is not 0 after "
+               "the last value");
   }
 
   // Returns the value of a cell of a tier's finest level, computed from the regions of the previous
@@ -170,11 +173,11 @@ class ColorVerifier {
     for (uint64_t i = ColorSection::lower_bound(below, code << 3); i < below.region_count; ++i) {
       ColorRegion region;
       if (!ColorSection::region(below, i, region))
-        fail(below, i, "its counts or its place are wrong");
+        fail(below, i, "its counts or its position are invalid");
       if (region.morton >> 3 != code || count == 8) break;
       children[count++] = region.value(region.cells - 1);
     }
-    if (count == 0) fail(tier, 0, "a cell has no regions below");
+    if (count == 0) fail(tier, 0, "a cell has no regions in the finer tier");
     return traits_.value_of_parent(std::span(children, count));
   }
 
@@ -209,7 +212,7 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
   for (uint32_t t = 0; t < section.tier_count(); ++t) {
     const ColorTier& tier = section.tier(t);
     if (!verifier.is_number_of_regions(tier))
-      verifier.fail(tier, tier.region_count, "the DAG has another number of regions");
+      verifier.fail(tier, tier.region_count, "the number of regions differs from the DAG's");
     progress.begin_stage("verify " + std::string(traits_of(attribute).plural), tier.region_count,
                          "regions");
     std::atomic<uint64_t> cells = 0;
@@ -219,17 +222,17 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
       uint64_t expected = 0;
       ColorRegion before;
       if (i > 0 && !ColorSection::region(tier, i - 1, before))
-        verifier.fail(tier, i - 1, "its counts or its place are wrong");
+        verifier.fail(tier, i - 1, "its counts or its position are invalid");
       if (i > 0) expected = before.first_unit + before.units();
       if (region.first_unit != expected || (i > 0 && region.morton <= before.morton))
-        verifier.fail(tier, i, "it does not follow the one before it");
+        verifier.fail(tier, i, "it does not follow the previous region");
       if (i + 1 == tier.region_count && region.first_unit + region.units() != tier.units)
-        verifier.fail(tier, i, "the data of the tier do not end with it");
+        verifier.fail(tier, i, "it is the last region, but the tier has data after it");
       cells += region.cells;
       progress.advance(1);
     });
     if (cells != tier.cell_count)
-      verifier.fail(tier, tier.region_count, "the tier names another number of cells");
+      verifier.fail(tier, tier.region_count, "the number of cells differs from the tier's");
     progress.end_stage();
   }
 }

@@ -73,7 +73,7 @@ void choose_scene(Document& d) {
     check_index(d, d.nodes.size(), root, where, "node");
     const int parent = d.nodes[static_cast<size_t>(root)].parent;
     if (parent >= 0)
-      refuse(d.path, where + ": " + d.name_node(root) + " is no root, its parent is " +
+      refuse(d.path, where + ": " + d.name_node(root) + " is not a root: its parent is " +
                          d.name_node(parent));
     if (seen[static_cast<size_t>(root)])
       refuse(d.path, where + ": " + d.name_node(root) + " is listed twice");
@@ -130,7 +130,7 @@ void check_extent(const Document& d, const Extent& extent, const std::string& wh
 void check_sparse(const Document& d, const Accessor& accessor, const std::string& where) {
   const Sparse& sparse = accessor.sparse;
   if (sparse.count > accessor.count)
-    refuse(d.path, where + " replaces " + std::to_string(sparse.count) + " of " +
+    refuse(d.path, where + " has " + std::to_string(sparse.count) + " sparse replacements for " +
                        std::to_string(accessor.count) + " elements");
   if (sparse.index_type != kUnsignedByte && sparse.index_type != kUnsignedShort &&
       sparse.index_type != kUnsignedInt)
@@ -261,7 +261,7 @@ void warn_of_leftovers(Document& d, const Primitive& primitive, const std::strin
   const int corners = primitive.indices >= 0 ? primitive.indices : primitive.position;
   if (primitive.mode != kTriangleList || at(d.accessors, corners).count % 3 == 0) return;
   d.warn(where + ": " + d.name_accessor(corners) +
-         " is no multiple of three, the corners left over are ignored");
+         " is not a multiple of three, the surplus corners are ignored");
 }
 
 void check_triangles(Document& d, Primitive& primitive, const std::vector<double>& weights,

@@ -47,15 +47,15 @@ void check_layout(const MeshoptView& view, const std::string& path) {
   if (!is_vertices && view.stride != 2 && view.stride != 4)
     violate(".byteStride is not 2 or 4, the sizes of indices");
   if (view.mode == MeshoptView::Mode::kTriangles && view.count % 3 != 0)
-    violate(".count is no multiple of three, as TRIANGLES need");
+    violate(".count is not a multiple of three, as TRIANGLES requires");
   if (view.count > uint64_t{1} << 32) violate(".count is over the limit of 2^32");
   using Filter = MeshoptView::Filter;
   if (view.filter == Filter::kNone) return;
   if (!is_vertices) violate(".filter is for ATTRIBUTES only");
   if (view.filter == Filter::kOctahedral && view.stride != 4 && view.stride != 8)
-    violate(".byteStride is not 4 or 8, as OCTAHEDRAL needs");
+    violate(".byteStride is not 4 or 8, as OCTAHEDRAL requires");
   if (view.filter == Filter::kQuaternion && view.stride != 8)
-    violate(".byteStride is not 8, as QUATERNION needs");
+    violate(".byteStride is not 8, as QUATERNION requires");
 }
 
 // Adds a buffer of decoded bytes to the document and returns its index.
@@ -312,7 +312,7 @@ void check_compressed(const Document& d, const BufferSource& buffer, const std::
   const auto index = static_cast<size_t>(from.buffer);
   if (from.buffer < 0 || index >= d.buffers.size() ||
       d.buffers[index].kind == BufferSource::Kind::kDecoded)
-    refuse(d.path, what + ": buffer " + std::to_string(from.buffer) + " is not there");
+    refuse(d.path, what + ": buffer " + std::to_string(from.buffer) + " does not exist");
   const BufferSource& source = d.buffers[index];
   const uint128 end = static_cast<uint128>(from.byte_offset) + from.byte_length;
   if (end > source.byte_length)

@@ -157,7 +157,7 @@ void Slurm::check(const std::vector<std::string>& options, double pause_s, Progr
           (name.size() == 2 && option.starts_with(name)))
         throw Error(ErrorCode::kInvalidInput,
                     "--cluster-options: " + option +
-                        " is not for the user: expected options such as --partition, --mem, --time "
+                        " is set by voxdag: expected options such as --partition, --mem, --time "
                         "(--cluster-running limits how many tasks run at a time)");
   // sbatch takes the first word that is not an option for a script, and the rest for its arguments.
   for (size_t i = 0; i < options.size(); ++i) {
@@ -172,7 +172,7 @@ void Slurm::check(const std::vector<std::string>& options, double pause_s, Progr
   for (bool is_first = true; tested.exit_status != 0 && may_be_starting(tested); is_first = false) {
     if (is_first)
       progress.warn("Slurm has no nodes for the tasks (" + trimmed(tested.error + tested.output) +
-                    "): asking again, in case that it has just been started");
+                    "): retrying, because Slurm may just have been started");
     std::this_thread::sleep_for(std::chrono::duration<double>(pause_s));
     cancel_.check();
     tested = run(command, "#!/bin/sh\nexit 0\n");

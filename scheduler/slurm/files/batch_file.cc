@@ -135,11 +135,11 @@ BatchFile::BatchFile(FileSystem& files, const std::string& path) : file_(files.o
   if (file_->size() < sizeof prologue) throw damaged("it is too short");
   file_->read_at(0, std::as_writable_bytes(std::span(&prologue, 1)));
   if (std::string_view(prologue.magic, sizeof prologue.magic) != kBatchMagic)
-    throw Error(
-        ErrorCode::kUnsupportedVersion,
-        path + ": it is no batch of this version: expected \"" + std::string(kBatchMagic) + "\"");
+    throw Error(ErrorCode::kUnsupportedVersion,
+                path + ": it is not a batch of this version: expected \"" +
+                    std::string(kBatchMagic) + "\"");
   if (prologue.header_bytes > std::min(kMaxHeaderBytes, file_->size() - sizeof prologue))
-    throw damaged("its header does not fit the file");
+    throw damaged("its header is longer than the file");
   std::string header(static_cast<size_t>(prologue.header_bytes), '\0');
   const auto header_bytes = std::as_writable_bytes(std::span(header));
   file_->read_at(sizeof prologue, header_bytes);

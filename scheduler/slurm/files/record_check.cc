@@ -32,20 +32,22 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
   const CompletionRecord record =
       decode_record(read_small_file(files, entry.path, kMaxRecordBytes));
   if (record.program != state.program)
-    throw Error(ErrorCode::kUnsupportedVersion, "it is of voxdag " + record.program + " on " +
-                                                    record.node + ": expected voxdag " +
+    throw Error(ErrorCode::kUnsupportedVersion, "it was written by voxdag " + record.program +
+                                                    " on " + record.node + ": expected voxdag " +
                                                     state.program);
   if (record.build != state.build || record.batch != entry.batch || record.attempt != entry.attempt)
-    refuse_record("it is of another build, batch or attempt");
+    refuse_record("it belongs to build " + record.build + ", batch " +
+                  std::to_string(record.batch) + ", attempt " + record.attempt + ": expected " +
+                  state.build + ", " + std::to_string(entry.batch) + ", " + entry.attempt);
   if (!std::ranges::equal(record.subvolumes, subvolumes, {}, &BuiltSubvolume::id,
                           &ExpectedSubvolume::id))
-    refuse_record("it names other subvolumes than the batch");
+    refuse_record("its subvolumes differ from the batch's");
   std::set<Cube> to_find;
   for (size_t i = 0; i < subvolumes.size(); ++i)
     if (!record.subvolumes[i].summary.empty()) to_find.insert(subvolumes[i].cube);
   if (to_find.empty()) return record;
   if (record.artifact.segment != ClusterFolder::segment_of(record.batch))
-    refuse_record("it names another segment");
+    refuse_record("it names the segment of another batch");
   const std::shared_ptr<ReadableFile> segment =
       files.open_read(segment_of_record(files, folder, record));
   if (segment->size() < record.segment_bytes)
@@ -53,7 +55,7 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
                   std::to_string(record.segment_bytes));
   const ArtifactReader artifact(segment, record.artifact);
   if (artifact.shape() != state.shape)
-    refuse_record("its artifact is of another grid or hash size");
+    refuse_record("its artifact has a different grid or hash size");
   check_roots(artifact, subvolumes, std::move(to_find));
   return record;
 }

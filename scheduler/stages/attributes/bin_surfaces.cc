@@ -134,7 +134,7 @@ BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning
   context.build.progress.end_stage();
   if (digest.hex() != binning.digest)
     throw Error(ErrorCode::kInvalidInput,
-                "the scene's triangles are not those that were built (digest " +
+                "the scene's triangles differ from the built triangles (digest " +
                     binning.digest.substr(0, 16) + ", now " + digest.hex().substr(0, 16) +
                     "): expected a scene that does not change during the build; start over "
                     "(--restart)");

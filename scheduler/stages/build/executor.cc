@@ -154,7 +154,7 @@ class Worker {
       throw Error(ErrorCode::kOutOfMemory,
                   "a subvolume of " + std::to_string(kSmallestEdge) +
                       " voxels per edge does not fit a worker's share of " +
-                      std::to_string(share_.limit()) + " bytes: give it more memory (--memory)");
+                      std::to_string(share_.limit()) + " bytes: expected more memory (--memory)");
     ++counts.split;
     return split_subvolume(whole, options_.shape.grid_levels, triangles_, jobs_, progress_,
                            cancel_);

@@ -32,7 +32,7 @@ void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
   if (std::ranges::none_of(reader.roots(), [&](const ArtifactRoot& root) {
         return contains(subvolume.cube, root.cube);
       }))
-    throw Error(ErrorCode::kCorrupt, "the artifact is that of another cube");
+    throw Error(ErrorCode::kCorrupt, "the artifact belongs to another cube");
   if (!reads_frames) return;
   Frame frame;
   for (const ArtifactLevel& l : reader.levels())

@@ -42,7 +42,7 @@ std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> sub
     if (is_new)
       artifacts.push_back(artifact);
     else if (first->second != artifact)
-      throw Error(ErrorCode::kCorrupt, "job.db: two artifacts lie at byte " +
+      throw Error(ErrorCode::kCorrupt, "job.db: two artifacts are at byte " +
                                            std::to_string(artifact.offset) + " of segment " +
                                            std::to_string(artifact.segment));
   }

@@ -4,6 +4,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/text.h"
 #include "core/format/checksum.h"
 #include "core/io/random_id.h"
 #include "server/api/answers/job_json.h"
@@ -141,10 +142,14 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
       [&] { return killed = killed || is_in_vain(); });
   child.wait();
   if (killed && context.draining) throw busy("the service is stopping");
-  if (killed && wall_seconds() <= deadline) throw bad_request("the client has left");
-  if (killed) throw busy("the plan exceeded its time limit", 60);
+  if (killed && wall_seconds() <= deadline)
+    throw bad_request("the client has closed the connection");
+  if (killed)
+    throw busy("the plan took longer than its limit of " +
+                   duration_text(context.config.jobs.plan_timeout_s),
+               60);
   if (failure) throw problem_of(*failure);
-  if (estimate.empty()) throw Problem(500, "internal", "the process of the plan crashed");
+  if (estimate.empty()) throw Problem(500, "internal", "the process that makes the plan crashed");
   return json_response(200, estimate);
 }
 
@@ -334,7 +339,7 @@ void add_action_routes(Router& router) {
 
 Job find_job(JobQueue& queue, const std::string& id) {
   auto job = queue.find(id);
-  if (!job) throw not_found("no such job: expected the id of a job that was not deleted");
+  if (!job) throw not_found("no such job: expected the id of an existing job");
   return std::move(*job);
 }
 

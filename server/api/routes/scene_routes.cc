@@ -81,7 +81,7 @@ std::optional<uint64_t> total_of_empty_part(std::string_view header) {
   uint64_t total = 0;
   const auto [end, error] = std::from_chars(header.data(), header.data() + header.size(), total);
   if (error != std::errc{} || end != header.data() + header.size() || total == 0)
-    throw bad_request("Content-Range: expected bytes */TOTAL, of a scene that is not empty");
+    throw bad_request("Content-Range: expected bytes */TOTAL with a TOTAL above 0");
   return total;
 }
 
@@ -94,7 +94,7 @@ Part part_of(const Request& request) {
     return part;
   }
   if (const auto whole = total_of_empty_part(header)) {
-    if (request.has_body) throw bad_request("Content-Range: bytes */TOTAL is of an empty body");
+    if (request.has_body) throw bad_request("Content-Range: bytes */TOTAL requires an empty body");
     return {*whole, whole, whole};
   }
   ByteRange range;
@@ -150,7 +150,7 @@ Response put_scene(Context& context, Call& call) {
   check_running(context);
   const std::string name = checked_name(call);
   const auto permit = context.uploads.acquire(call.caller.client);
-  if (!permit) throw busy("too many uploads, of this client or of all", 5);
+  if (!permit) throw busy("too many uploads, from this client or in total", 5);
   const Part part = part_of(call.request);
   const uint64_t announced = announced_bytes(context, part);
   check_unused(context, name);

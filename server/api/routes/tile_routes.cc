@@ -108,7 +108,7 @@ void check_digest(const Call& call, const TileSource& dag) {
     throw bad_request("'v': expected the digest of the manifest, 32 hex digits");
   if (digest != dag.digest())
     throw Problem(410, "gone",
-                  "the file was replaced, or its tiles are made otherwise now: get the manifest");
+                  "the file or the format of its tiles has changed: get the manifest again");
 }
 
 // Returns a response that clients may cache. `make` returns its bytes, which depend only on the
@@ -144,7 +144,7 @@ Problem damaged(const TileSource& dag, const Error& error) {
 void expect_unchanged(const TileSource& dag) {
   dag.expect_readable();
   if (dag.was_overwritten())
-    throw Problem(410, "gone", "the file was replaced while it was read: get the manifest");
+    throw Problem(410, "gone", "the file was replaced while being read: get the manifest again");
 }
 
 // Returns the answer, or throws the error, if the file was readable and unchanged all the time.
@@ -192,7 +192,7 @@ template <class Addresses, class Make>
 std::string batch_of(const Call& call, const Addresses& addresses, const Make& make) {
   std::string bytes;
   for (const auto& address : addresses) {
-    if (call.request.client_has_left()) throw bad_request("the client has left");
+    if (call.request.client_has_left()) throw bad_request("the client has closed the connection");
     const std::vector<uint32_t> words = make(address);
     append_words({static_cast<uint32_t>(words.size() * sizeof(uint32_t))}, bytes);
     append_words(words, bytes);

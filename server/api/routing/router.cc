@@ -27,7 +27,7 @@ void check_query(const Request& request, const Route& route) {
   if (route.accepts_any_query) return;
   for (const auto& [name, value] : request.target.query)
     if (std::ranges::find(route.query, name, &Parameter::name) == route.query.end())
-      throw bad_request("unknown query parameter");
+      throw bad_request("unknown query parameter '" + name.substr(0, 64) + "'");
 }
 
 // Returns the method whose routes answer the request: GET for HEAD.

@@ -30,7 +30,7 @@ std::string parse_digest_field(const std::string& header) {
         EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(base64.data()),
                         kBase64Chars) != kDigestBytes + 1)
       throw RequestError(RequestError::Kind::kInvalid,
-                         "a digest is broken: expected sha-256=:BASE64:");
+                         "a digest is malformed: expected sha-256=:BASE64:");
     return hex_text(std::span(bytes).first(kDigestBytes));
   }
   throw RequestError(RequestError::Kind::kInvalid,

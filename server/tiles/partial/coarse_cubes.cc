@@ -30,7 +30,8 @@ class ArtifactRows {
     const auto root = std::find_if(roots.begin(), roots.end(),
                                    [&](const ArtifactRoot& r) { return r.cube == cube; });
     if (root == roots.end())
-      throw Error(ErrorCode::kCorrupt, "an artifact has not the subvolume that its row names");
+      throw Error(ErrorCode::kCorrupt,
+                  "an artifact does not contain the subvolume of its row in the job store");
     const uint32_t bricks = reader_.shape().brick_level();
     if (cube.level == bricks) return brick(root->index);
     const Frame& frame = frame_of(cube.level, root->index);

@@ -122,7 +122,8 @@ Answer PartialView::read(const JobFolder& folder, Answer (PublishedAnswers::*ans
 void PartialView::refresh(const std::string& work_folder) {
   if (!limiter_.may_read()) {
     if (has_failed_)
-      throw Error(ErrorCode::kInvalidInput, work_folder + ": nothing could be read a moment ago");
+      throw Error(ErrorCode::kInvalidInput,
+                  work_folder + ": the last read failed, and the next one is not due yet");
     return;
   }
   const ReadLimiter::Charge charge(limiter_);
@@ -162,7 +163,7 @@ void PartialView::find_frame(const JobFolder& folder, uint64_t resolution) {
   if (!frame_.is_null()) return;
   // Tries only once per version of the folder.
   if (std::exchange(frame_version_, version_) == version_)
-    throw Error(ErrorCode::kNotFound, "the subvolumes were not planned a moment ago");
+    throw Error(ErrorCode::kNotFound, "the subvolumes are not planned yet");
   frame_ = read_frame(files_, folder, resolution);
 }
 

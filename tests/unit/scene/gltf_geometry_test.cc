@@ -185,7 +185,7 @@ TEST(GltfGeometry, LeftoverCornersAreNamedInAWarning) {
   OpenScene open(scene_of(scene, {{"attributes", {{"POSITION", positions}}}}).glb());
   EXPECT_EQ(open.triangles(), (std::vector<Corners>{kLower}));
   ASSERT_EQ(open.source->warnings().size(), 1u);
-  EXPECT_NE(open.source->warnings()[0].find("accessor 0 is no multiple of three"),
+  EXPECT_NE(open.source->warnings()[0].find("accessor 0 is not a multiple of three"),
             std::string::npos);
 }
 

@@ -168,7 +168,7 @@ TEST(GltfMeshopt, WhatDoesNotFitIsRefusedByName) {
   const Json same = Json::object();
   EXPECT_THAT(with({{"mode", "POINTS"}}, same), HasSubstr("expected ATTRIBUTES, TRIANGLES or"));
   EXPECT_THAT(with({{"filter", "ROUND"}}, same), HasSubstr("filter is ROUND, expected NONE"));
-  EXPECT_THAT(with({{"filter", "QUATERNION"}}, same), HasSubstr("not 8, as QUATERNION needs"));
+  EXPECT_THAT(with({{"filter", "QUATERNION"}}, same), HasSubstr("not 8, as QUATERNION requires"));
   EXPECT_THAT(with({{"filter", "OCTAHEDRAL"}}, same), HasSubstr("not 4 or 8, as OCTAHEDRAL"));
   EXPECT_THAT(with({{"byteStride", 10}}, same), HasSubstr("not a multiple of 4 up to 256"));
   EXPECT_THAT(with({{"byteStride", 16}}, same), HasSubstr("bufferView 1: its EXT_meshopt_compr"));
@@ -179,7 +179,7 @@ TEST(GltfMeshopt, WhatDoesNotFitIsRefusedByName) {
   EXPECT_THAT(with({{"buffer", 1}}, same), HasSubstr("buffer 1 has no uri"));
   EXPECT_THAT(with({{"byteLength", 1000}}, same), HasSubstr("do not hold 3600 elements"));
   EXPECT_THAT(with(same, {{"byteStride", 3}}), HasSubstr("not 2 or 4, the sizes of indices"));
-  EXPECT_THAT(with(same, {{"count", 20887}}), HasSubstr("no multiple of three"));
+  EXPECT_THAT(with(same, {{"count", 20887}}), HasSubstr("not a multiple of three"));
   EXPECT_THAT(with(same, {{"filter", "EXPONENTIAL"}}), HasSubstr("for ATTRIBUTES only"));
   EXPECT_THAT(with(same, {{"mode", "INDICES"}}), HasSubstr("do not hold 20886 elements"));
 }

@@ -287,7 +287,8 @@ TEST_F(BuildProtection, ABuildDoesNotDestroyItsScene) {
     inside.geometry.scenes = {text};
     const Error error = error_of([&] { run_build(inside, context()); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
-    EXPECT_NE(error.message().find("is read and would be"), std::string::npos) << error.message();
+    EXPECT_NE(error.message().find("is an input and would be"), std::string::npos)
+        << error.message();
     EXPECT_EQ(std::filesystem::file_size(folder_.file(name)), 36u);
     std::filesystem::remove(folder_.file(name));
   }

@@ -119,7 +119,7 @@ TEST_F(Cluster, BadOptionsAreRefusedBeforeTheSceneIsRead) {
     refused.run.cluster->submit_options = option;
     const Error error = error_of([&] { run_build(refused, context()); });
     EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
-    EXPECT_NE(error.message().find("is not for the user"), std::string::npos) << error.message();
+    EXPECT_NE(error.message().find("is set by voxdag"), std::string::npos) << error.message();
   }
   for (const char* option :
        {"script.sh", "--mem=8G script.sh", "-n1 script.sh", "-n 1 script.sh"}) {

@@ -322,7 +322,7 @@ TEST_F(ColorSectionTest, MissingRegionsAreNotCounted) {
   section.finish();
   writer.finish({uint64_t{1} << 60, svo_nodes});
   EXPECT_THAT(error_of([&] { verify(path_); }).message(),
-              HasSubstr("the DAG has another number of regions"));
+              HasSubstr("the number of regions differs from the DAG's"));
 }
 
 TEST_F(ColorSectionTest, NothingIsNotColored) {

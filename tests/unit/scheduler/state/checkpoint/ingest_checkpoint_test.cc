@@ -160,7 +160,7 @@ TEST_F(IngestCheckpointTest, KnowsItsSceneByContent) {
     FAIL() << "built another scene";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
-    EXPECT_NE(error.message().find("other contents"), std::string::npos) << error.what();
+    EXPECT_NE(error.message().find("different contents"), std::string::npos) << error.what();
   }
   std::filesystem::copy(folder_.file("first.glb"), scene(),
                         std::filesystem::copy_options::overwrite_existing);
