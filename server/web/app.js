@@ -10,7 +10,7 @@ import {problemBox} from "./views/parts.js";
 
 const main = document.getElementById("main");
 const signOut = document.getElementById("sign-out");
-let pageLifetime = new AbortController();  // aborts the requests of the page being left
+let pageLifetime = new AbortController();  // aborts the requests of the page that the user leaves
 
 // A page is a function (params, query, signal) -> {title, content}.
 const kRoutes = [

@@ -1,4 +1,4 @@
-// Requests to /api/v1. Every failure is a Problem, network failures included.
+// Requests to /api/v1. Every failure is a Problem, including network failures.
 
 const kTokenKey = "voxdag-token";
 
@@ -77,8 +77,8 @@ export function randomKey() {
       .join("");
 }
 
-// Resolves after `ms`, or immediately when `signal` aborts; with `untilVisible` not before the page
-// is visible.
+// Resolves after `ms`, or immediately when `signal` aborts. With `untilVisible`, does not resolve
+// before the page is visible.
 export function sleep(ms, signal, untilVisible = false) {
   return new Promise((resolve) => {
     const listening = new AbortController();
@@ -99,8 +99,8 @@ export function sleep(ms, signal, untilVisible = false) {
 }
 
 // Calls `update` repeatedly until `signal` aborts. `update` returns the pause in ms until the next
-// call; while the page is hidden, the next call waits until it is visible. onFailure(problem) is
-// called when `update` throws.
+// call. While the page is hidden, the next call waits until it is visible. Calls onFailure(problem)
+// when `update` throws.
 export async function poll(update, onFailure, signal) {
   while (!signal.aborted) {
     let pauseMs = 5000;

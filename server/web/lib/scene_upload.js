@@ -1,10 +1,10 @@
 // Uploads a scene in parts, each with its digest. The service stores complete parts, so that a lost
-// connection, a pause or a closed page loses one part at most.
+// connection, a pause or a closed page loses at most one part.
 
 import {authorization, Problem, request, sleep} from "./api.js";
 
 const kPartBytes = 8 << 20;
-const kMaxFailures = 6;  // in a row, each after a longer pause
+const kMaxFailures = 6;  // consecutive failures; each pause is longer than the previous one
 
 const kSuffixes = "{{scene_suffixes}}";  // the service fills this in: "glb|gltf|ply"
 export const kSceneEndings = kSuffixes.split("|").map((suffix) => `.${suffix}`);
@@ -52,7 +52,8 @@ export async function upload(file, name, onProgress, signal) {
   }
 }
 
-// The offset to resume at: bytes the service has of this file, if this browser sent them; else 0.
+// The offset to resume at: the number of this file's bytes that the service has, if this browser
+// sent them; else 0.
 async function resumeOffset(path, file, name, signal) {
   if (localStorage.getItem(keyOf(name)) !== fingerprintOf(file)) return 0;
   try {

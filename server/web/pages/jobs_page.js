@@ -1,4 +1,5 @@
-// All jobs, newest first, filtered by state; refreshed every other second while any is active.
+// The list of all jobs, newest first, filtered by state. It is refreshed every two seconds while
+// any job is active.
 
 import {getJson, poll} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";

@@ -29,7 +29,8 @@ class NewJob {
       }
     });
     this.error = h("div", {role: "alert"});
-    this.key = randomKey();  // one per state of the form: a double click creates one job
+    // One key per state of the form, so that a double click creates only one job.
+    this.key = randomKey();
     this.submit = h("button", {class: "primary"}, "Submit");
     this.element =
         h("form", {class: "stack", novalidate: true},
@@ -48,7 +49,7 @@ class NewJob {
     });
   }
 
-  // `like`: the id of a job whose scene and options are copied.
+  // `like`: id of a job whose scene and options are copied.
   async begin(like) {
     try {
       const model =

@@ -19,9 +19,9 @@ import {Panel} from "./panel.js";
 import {length, scale, subtract} from "./vector.js";
 
 const kDefaultFov = 35;
-const kPictureAspect = 16 / 9;  // of the views in the manifest
-const kSeenIntervalMs = 250;    // between two looks at how far away things are
-const kFirstSeenMs = 2000;      // until the first pick, which needs its own program
+const kPictureAspect = 16 / 9;  // aspect ratio of the views in the manifest
+const kSeenIntervalMs = 250;    // between two measurements of the visible distance
+const kFirstSeenMs = 2000;      // until the first pick, because a pick needs an additional program
 const kStatisticsIntervalMs = 500;
 const kNoPicture = "There is no picture yet.";
 const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s
@@ -70,7 +70,8 @@ export class Viewer {
     this.camera.set(this.firstCamera());
     this.followBookmark(location.hash);
     this.showMode();
-    // What is seen first need not be waited for: until then the target is as good.
+    // Starting does not wait for the distance of the visible surface. Until it is known, the
+    // distance of the target is used.
     this.seen.distance = this.camera.distance;
     this.seen.time = performance.now() + kFirstSeenMs;
     this.applyCamera();
@@ -92,7 +93,7 @@ export class Viewer {
     return camera ? this.fit(this.space.placement(camera)) : this.camera.get();
   }
 
-  // A scene that fits a wide picture is moved away until it fits a narrow one too.
+  // A scene that fits in a wide picture is moved away until it also fits in a narrow one.
   fit(placement) {
     const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
     const outside = placement.eye.some((c) => c < 0 || c > this.manifest.resolution);
@@ -216,7 +217,7 @@ export class Viewer {
     this.seen.distance = Math.max(1, hit ? hit.distance : free);
   }
 
-  // What the picture shows: {level, wire, clip, occlusion, shadows, color}, any of them.
+  // Sets some of the picture's options: {level, wire, clip, occlusion, shadows, color}.
   setOptions(changed) {
     Object.assign(this.options, changed);
     const {level, wire, clip, occlusion, shadows, color} = this.options;
@@ -258,7 +259,7 @@ export class Viewer {
     announce("The camera orbits around this place.");
   }
 
-  // The address bar follows, without an entry in the history for each motion.
+  // Updates the address bar without adding a history entry for each motion.
   bookmark() {
     if (this.bookmarkTimer) return;
     this.bookmarkTimer = setTimeout(() => {
@@ -270,7 +271,7 @@ export class Viewer {
         history.replaceState(null, "", fragment);
         this.fragment = fragment;
       } catch {
-        // Refused, as after too many changes: the address follows with a later motion.
+        // The browser refuses after too many changes. A later motion updates the address.
       }
     }, kBookmarkDelayMs);
   }
@@ -288,8 +289,8 @@ export class Viewer {
     };
   }
 
-  // Takes camera and options from the fragment of an address, which may have changed since. A
-  // camera that cannot be used is left out, which the page says until the camera moves.
+  // Takes camera and options from the fragment of an address, which may have changed. An invalid
+  // camera is ignored, and the page reports this until the camera moves.
   followBookmark(fragment) {
     if (fragment === this.fragment) return;
     const members = new URLSearchParams(this.bookmarks ? fragment.slice(1) : "");
@@ -326,8 +327,8 @@ export class Viewer {
     };
   }
 
-  // The drawing buffer is valid only until the browser has shown it, so this draws immediately
-  // before it reads.
+  // The drawing buffer is valid only until the browser has shown it. So this function draws
+  // immediately before it reads the buffer.
   savePicture() {
     if (!this.renderer.hasDrawn) return announce(kNoPicture);
     this.renderer.frame();

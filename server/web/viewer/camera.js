@@ -17,7 +17,7 @@ import {
 
 const kMaxPitch = 89.9 * Math.PI / 180;
 const kMinDistance = 1 / 64;  // voxels from the eye to the target
-const kFarthest = 32;         // edges of the grid from its center to the eye
+const kFarthest = 32;  // max distance of the eye from the grid's center, in edges of the grid
 
 export class Camera {
   constructor(resolution) {
@@ -29,7 +29,7 @@ export class Camera {
     });
   }
 
-  // Throws an Error with a message for people if no picture can be taken from there.
+  // Throws an Error with a message for users if no picture can be taken from this position.
   set({eye, target, fovDegrees}) {
     if (![...eye, ...target].every(Number.isFinite))
       throw new Error("A camera has finite coordinates.");
@@ -51,18 +51,19 @@ export class Camera {
     return pictureAxes(subtract(this.target, this.eye));
   }
 
-  // The width of a pixel at distance 1 in a picture of this height.
+  // Returns the width of a pixel at distance 1 in a picture of this height.
   pixelSpread(height) {
     return Math.tan(this.fovDegrees * Math.PI / 360) / (height / 2);
   }
 
-  // The unit direction through a point of the picture, in pixels from its upper left corner.
+  // Returns the unit direction through a point of the picture, in pixels from its upper left
+  // corner.
   direction(x, y, width, height) {
     const pixel = this.pixelSpread(height);
     return pictureDirection(this.axes(), (x - width / 2) * pixel, (height / 2 - y) * pixel);
   }
 
-  // Around the target: positive angles (radians) move the eye to the right and up.
+  // Rotates around the target. Positive angles (radians) move the eye to the right and up.
   orbit(yaw, pitch) {
     const at = spherical(subtract(this.eye, this.target));
     this.eye =
@@ -70,7 +71,7 @@ export class Camera {
             fromSpherical({...at, yaw: at.yaw + yaw, pitch: limitPitch(at.pitch + pitch)}));
   }
 
-  // Around the eye: positive angles look to the right and up.
+  // Rotates around the eye. Positive angles look to the right and up.
   turn(yaw, pitch) {
     const at = spherical(subtract(this.eye, this.target));
     this.target = subtract(
@@ -112,14 +113,14 @@ export class Camera {
     if (depth > kMinDistance) this.target = add(this.eye, scale(forward, depth));
   }
 
-  // The point of the ray through a pixel that is as far away, along the view, as the target.
+  // Returns the point on the ray through a pixel at the target's depth along the view.
   pointAtTarget(x, y, width, height) {
     const direction = this.direction(x, y, width, height);
     return add(this.eye, scale(direction, this.distance / dot(direction, this.axes().forward)));
   }
 }
 
-// The camera a share of the way between two, by the shorter arc.
+// Returns the camera at a fraction of the way between two cameras, by the shorter arc.
 export function between(from, to, share) {
   if (share >= 1) return to;
   const a = spherical(subtract(from.eye, from.target)), b = spherical(subtract(to.eye, to.target));

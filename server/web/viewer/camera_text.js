@@ -1,6 +1,7 @@
-// The camera as text: as the options of `voxdag render`, in scene units, and as a URL fragment.
+// Converts the camera to text: to the options of `voxdag render`, in scene units, and to a URL
+// fragment.
 
-const kDigits = 4;  // of a voxel, after the point
+const kDigits = 4;  // decimal places of a voxel
 
 const numberText = (value) => String(Number(value.toPrecision(6)));
 
@@ -9,7 +10,7 @@ export class GridSpace {
     Object.assign(this, {resolution, origin, edge});
     this.decimals = Math.min(Math.max(Math.ceil(-Math.log10(edge / resolution)) + kDigits, 0), 20);
   }
-  // A point in voxels as text in scene units.
+  // Returns a point in voxels as text in scene units.
   text(point) {
     return this.toScene(point).map((c) => String(Number(c.toFixed(this.decimals)))).join(",");
   }
@@ -31,8 +32,7 @@ export function cameraText(space, {eye, target, fovDegrees}) {
       `--fov ${numberText(fovDegrees)}`;
 }
 
-// Parses cameraText(), also from the middle of a command. Throws an Error that names a missing
-// option.
+// Parses cameraText(), even from the middle of a command. Throws an Error with the missing option.
 export function parseCameraText(space, text, defaultFov) {
   const option = (name) => new RegExp(`(?:^|\\s)--${name}[\\s=]+["']?([^\\s"']+)`).exec(text)?.[1];
   return parseCamera(space, option("camera"), option("target"), option("fov"), defaultFov);
@@ -42,7 +42,7 @@ export function cameraFragment(space, {eye, target, fovDegrees}) {
   return {camera: space.text(eye), target: space.text(target), fov: numberText(fovDegrees)};
 }
 
-// From the members of a fragment; null if it has no camera.
+// Parses a camera from the members of a fragment; null if they have no camera.
 export function parseCameraFragment(space, members, defaultFov) {
   if (!members.has("camera")) return null;
   return parseCamera(
@@ -70,7 +70,7 @@ function parseNumber(text, name) {
   return value;
 }
 
-// "&"-joined, with the commas legible.
+// Joins members with "&" and keeps commas readable.
 export function fragmentText(members) {
   return Object.entries(members)
       .filter(([, value]) => value !== null && value !== undefined)

@@ -40,7 +40,7 @@ export class ClipView {
     });
   }
 
-  // The other end gives way: a box has at least one voxel.
+  // Also moves the other end if necessary, because a box has at least one voxel.
   move(end, axis, value) {
     const {low, high} = this.box;
     if (end === "low") {
@@ -58,7 +58,7 @@ export class ClipView {
     this.onChange(this.enabled.checked ? {low: [...this.box.low], high: [...this.box.high]} : null);
   }
 
-  // The box as others see it; does not call onChange.
+  // Sets the box without calling onChange.
   set(clip) {
     this.enabled.checked = clip !== null;
     if (clip) this.box = {low: [...clip.low], high: [...clip.high]};

@@ -1,6 +1,6 @@
-// Mouse, touch and wheel on the canvas. One pointer orbits (or turns, when flying), the right
-// button, the middle one, Shift or a second finger pan, the wheel and two fingers zoom. What a
-// click means is up to the caller.
+// Mouse, touch and wheel input on the canvas. One pointer orbits (or turns, when flying). The right
+// button, the middle button, Shift or a second finger pan. The wheel and two fingers zoom. The
+// caller handles clicks.
 
 import {add, distance, dot, scale, subtract} from "./vector.js";
 
@@ -10,9 +10,9 @@ const kClickTimeMs = 600;
 const kDoubleTimeMs = 350;
 const kDoubleMovePx = 24;
 const kWheelZoom = 0.0016;  // per pixel of the wheel
-const kAnchorTimeMs = 400;  // one turn of the wheel zooms to one point
+const kAnchorTimeMs = 400;  // wheel events within this time zoom to the same point
 const kLinePx = 20;
-const kRecentMs = 80;  // the last part of a drag, whose speed starts the inertia
+const kRecentMs = 80;  // last part of a drag; its speed starts the inertia
 
 export class Controls {
   // handlers: pick(x, y) -> Promise of a position or null; onClick(x, y); onDoubleClick(x, y);
@@ -21,9 +21,9 @@ export class Controls {
     Object.assign(this, {canvas, camera, motion, handlers});
     this.pointers = new Map();
     this.recent = [];
-    this.press = null;  // since the first pointer went down
+    this.press = null;  // set while a pointer is down
     this.lastClick = null;
-    this.anchor = null;  // of the wheel
+    this.anchor = null;  // point that the wheel zooms to
     const listen = (name, listener, options = {}) =>
         canvas.addEventListener(name, (event) => listener.call(this, event), {signal, ...options});
     listen("pointerdown", this.handleDown);
@@ -44,11 +44,11 @@ export class Controls {
 
   handleDown(event) {
     this.canvas.focus({preventScroll: true});
-    event.preventDefault();  // no selection, no scrolling by the middle button
+    event.preventDefault();  // prevents selection, and scrolling with the middle button
     try {
       this.canvas.setPointerCapture(event.pointerId);
     } catch {
-      return;  // the pointer has been lifted already
+      return;  // the pointer has already been lifted
     }
     const at = this.position(event);
     this.motion.stop();
@@ -65,12 +65,12 @@ export class Controls {
       };
       if (pans) this.findPanDepth(at);
     } else if (this.press) {
-      this.press.moved = true;  // two fingers are no click
+      this.press.moved = true;  // two fingers are not a click
       this.findPanDepth(this.centerOfFingers().at);
     }
   }
 
-  // The grabbed point follows the pointer. Until it is known, the target is used.
+  // The grabbed point follows the pointer. Until it is known, the target is used instead.
   async findPanDepth(at) {
     const press = this.press;
     const point = await this.handlers.pick(...at);
@@ -162,7 +162,7 @@ export class Controls {
     else this.handlers.onClick(...at);
   }
 
-  // Zooms to the surface under the cursor; in the sky, to a point as far away as the target.
+  // Zooms to the surface under the cursor. In the sky, zooms to a point at the target's distance.
   handleWheel(event) {
     event.preventDefault();
     const at = this.position(event);

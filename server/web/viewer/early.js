@@ -1,5 +1,6 @@
 // Creates the graphics context and its programs, which takes longest, while the other modules of
-// the page still load. The page of a job does not, because a job may have nothing to draw yet.
+// the page are still loading. The page of a job does not do this, because a job may have nothing to
+// draw yet.
 
 import {createContext} from "./gl/gl_objects.js";
 import {Passes} from "./gl/passes.js";
@@ -10,7 +11,7 @@ let begun = null;
 function begin(canvas) {
   const source = new TileSource({base: "/api/v1/view"}), manifest = source.manifest();
   const beginMs = performance.now(), gl = createContext(canvas);
-  manifest.catch(() => {});  // reported where it is awaited
+  manifest.catch(() => {});  // reported where the promise is awaited
   if (!gl) return;
   const passes = gl.isContextLost() ? null : new Passes(gl),
         mine = {source, manifest, beginMs, gl, passes};

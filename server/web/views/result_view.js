@@ -50,7 +50,7 @@ function cubeText({origin, edge}) {
   return `from ${origin.map(short).join(", ")}, edge ${short(edge)}`;
 }
 
-// The picture, and below it the ways to look around.
+// The picture, and below it the ways to explore the result.
 function picture(job, signal) {
   const place = preview(job, signal);
   const error = h("p", {class: "bad", role: "alert"});

@@ -54,7 +54,7 @@ export class ColorStore {
     this.rounds = 0;
   }
 
-  // Stores a fetched page. Returns false if there is no room. Throws if the page is damaged.
+  // Stores a fetched page. Returns false if there is no space. Throws if the page is damaged.
   add({key, level, position}, pageWords, nowMs) {
     if (this.pages.has(key)) return true;
     const words = decodePage(pageWords), count = words.length / kBlockWords;
@@ -121,7 +121,7 @@ export class ColorStore {
     for (let at = this.next(free); words[4 * at + 3] !== 0; at = this.next(at)) {
       const home = this.homeOf(words.subarray(4 * at, 4 * at + 3));
       const mask = this.entries - 1;
-      // Its probe starts after the free entry.
+      // This entry's probe starts after the free entry, so it is not moved.
       if ((at - home & mask) < (at - free & mask)) continue;
       this.write(free, words.slice(4 * at, 4 * at + 4));
       free = at;

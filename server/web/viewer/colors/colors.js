@@ -6,9 +6,9 @@ import {ColorStore, pageKey} from "./color_store.js";
 const kMebibyte = 1 << 20;
 const kBudgetShare = 1 / 4;   // share of the budget of tiles and colors
 const kMinBytes = 96 * 1024;  // minimum for a pool and a hash table
-const kBytesPerVoxel = 1024;  // at worst a page for each voxel, and as many on coarser levels
+const kBytesPerVoxel = 1024;  // worst case: one page for each voxel, and as many on coarser levels
 const kBaseBelow = 2;  // levels from a wanted page to the coarser page that is requested first
-const kWanted = 2;     // minimum of the feedback's last word for a wanted page: 1 + its pixels
+const kWanted = 2;     // min value of the feedback's last word for a missing page: 1 + its pixels
 
 // Returns the part of the budget for the colors of a file.
 export function colorBudget(info, budgetBytes) {
@@ -47,7 +47,7 @@ export class Colors {
       const head = words[at], y = words[at + 1], z = words[at + 2], state = words[at + 3];
       if (state === 0) continue;
       if (state < kWanted) {
-        // Neighboring texels mostly use the same page.
+        // Neighboring texels usually use the same page.
         if (at > 0 && head === words[at - 4] && y === words[at - 3] && z === words[at - 2] &&
             words[at - 1] === state)
           continue;

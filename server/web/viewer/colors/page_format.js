@@ -1,7 +1,7 @@
 // Checks a color page (docs/format.md) and lays out its words for the GPU. Pages come from the
 // network: a damaged page is an error, never a wrong address.
 
-export const kBlockWords = 64;  // of the pool: 16 texels of four words
+export const kBlockWords = 64;  // words per block of the pool: 16 texels of four words
 const kMaskAt = 1, kMaskWords = 16;
 const kSingle = 1 << 24;       // flag of a page's first word: single colors follow, not blocks
 const kUsedBits = 0x011f03ff;  // all valid bits of the first word

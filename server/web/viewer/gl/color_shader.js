@@ -16,7 +16,7 @@ vec3 linear_of(uint color) {
 export const kColorSource = `${kColorState}
 uniform usampler2D u_page_texels, u_page_table;
 uniform uint u_page_mask;    // entries of the table - 1
-uniform int u_color_levels;  // of the finest colors; -1: none are shown
+uniform int u_color_levels;  // finest level with colors; -1: colors are off
 
 uvec4 page_texel(uint address) {
   return texelFetch(u_page_texels, ivec2(address & 4095u, address >> 12), 0);
@@ -31,7 +31,7 @@ uint popcount32(uint x) {
   return ((x + (x >> 4)) & 0x0f0f0f0fu) * 0x01010101u >> 24;
 }
 
-// Returns the number of the page's first block plus 1, or 0 if the page is not loaded.
+// Returns the page's first block number plus 1, or 0 if the page is not loaded.
 uint page_at(int level, ivec3 place) {
   uvec3 key = uvec3(place);
   key.x |= uint(level) << 20;
@@ -46,7 +46,7 @@ uint page_at(int level, ivec3 place) {
   return 0u;
 }
 
-// The color of cell i in a block of 16 bytes (docs/format.md).
+// Returns the color of cell i in a block of 16 bytes (docs/format.md).
 uint block_color(uvec4 block, uint i) {
   uvec3 a, b;
   uint weight, top;
@@ -70,7 +70,7 @@ uint block_color(uvec4 block, uint i) {
   return color.x | color.y << 8 | color.z << 16;
 }
 
-// The color of a cell by its Morton code within the page; 0 if the cell is not set.
+// Returns the color of a cell by its Morton code within the page; 0 if the cell is not set.
 uint color_in_page(uint first, uint code) {
   uint word = code >> 5, quarter = word >> 2, below = (1u << (code & 31u)) - 1u;
   uvec4 mask = page_texel(first + 1u + quarter);
@@ -96,8 +96,8 @@ uint spread_bits(int x) {
   return uint((x & 1) | (x & 2) << 2 | (x & 4) << 4);
 }
 
-// The color of the cell of 2^scale voxels with this low corner, or of the nearest coarser cell
-// whose page is loaded. For a cell that finer ones will replace, a page counts as missing only if
+// Returns the color of the cell of 2^scale voxels with this low corner, or of the nearest coarser
+// cell whose page is loaded. If finer cells will replace the cell, a page counts as missing only if
 // the color is much coarser.
 uint color_of_cell(ivec3 cell, int scale, bool is_final) {
   int wanted = min(u_levels - scale, u_color_levels);
@@ -115,8 +115,9 @@ uint color_of_cell(ivec3 cell, int scale, bool is_final) {
 }
 `;
 
-// One texel per block of u_block x u_block pixels: x and level, y, z of a page, and a number. It is
-// 0 without a page, 1 if the page is used, and otherwise 1 plus the number of pixels that miss it.
+// One texel per block of u_block x u_block pixels: x and level, y, z of a page, and a number. The
+// number is 0 without a page, 1 if the page is used, and otherwise 1 plus the number of pixels that
+// lack it.
 export const kColorFeedback = `#version 300 es
 ${kPrecision}${kCameraSource}${kColorState}
 uniform usampler2D u_hits, u_colors;
@@ -125,7 +126,7 @@ uniform int u_levels, u_color_levels, u_block;
 uniform ivec2 u_size, u_sample;
 layout(location = 0) out uvec4 o_page;
 
-// The page of a pixel's color. The hit is computed again and may be in a neighboring page.
+// Returns the page of a pixel's color. The hit is computed again and may be in a neighboring page.
 uvec3 page_of(ivec2 pixel, uvec4 g) {
   vec3 direction = direction_of(vec2(pixel) + 0.5 + u_jitter), p = direction * t_in(g);
   if (axis_in(g) < 3)

@@ -4,7 +4,7 @@ import {kQuad} from "./picture_shaders.js";
 
 export class WebGLUnavailable extends Error {}
 
-// Returns the context of a canvas, or null if the browser offers none.
+// Returns the context of a canvas, or null if the browser provides none.
 export function createContext(canvas) {
   return canvas.getContext("webgl2", {
     alpha: false,
@@ -137,7 +137,7 @@ const kTexelBytes = {
   R8: 1
 };
 
-// A framebuffer with textures of the formats, "RGBA32UI" and so on.
+// A framebuffer with textures of these formats, such as "RGBA32UI".
 export class Target {
   constructor(gl, width, height, formats) {
     this.gl = gl;
@@ -167,7 +167,8 @@ export class Target {
   }
 }
 
-// Resolves when the GPU has finished all commands; to false if `isOver()` before that.
+// Resolves to true when the GPU has finished all commands; to false if `isOver()` becomes true
+// before that.
 export async function gpuDone(gl, isOver) {
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();
@@ -181,7 +182,7 @@ export function pause() {
   return new Promise((resolve) => setTimeout(resolve, 4));
 }
 
-// The pixels in the lower left corner of an integer target, read without waiting for the GPU.
+// Reads the pixels in the lower left corner of an integer target without waiting for the GPU.
 export class AsyncReading {
   constructor(gl, target, width, height) {
     this.gl = gl;

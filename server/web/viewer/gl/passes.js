@@ -23,9 +23,9 @@ const kHitFormats = ["RGBA32UI"], kColoredHitFormats = ["RGBA32UI", "R32UI"],
       kLightFormats = ["R8", "R32UI", "R32UI"];
 const kSkyFormats = ["RGBA8"], kFeedbackFormats = ["RGBA32UI"];
 const kColorTexels =
-    1 << 17;  // texels of the color feedback, about; every visible page needs its own
+    1 << 17;  // approximate texels of the color feedback; every visible page needs one
 
-// The block of pixels of a feedback texel, and the pixel in it that is sampled.
+// Returns the block of pixels for a feedback texel, and the pixel in it that is sampled.
 function blocksOf(edge, seed) {
   return {u_block: edge, u_sample: [seed % edge, Math.floor(seed / edge) % edge]};
 }
@@ -105,7 +105,7 @@ export class Passes {
     return this.floats ? "RGBA16F" : "RGBA8";
   }
 
-  // Compiles the programs that the first picture does not need. Resolves to whether they can be
+  // Compiles the programs that the first picture does not need. Resolves to true if they can be
   // used.
   compileLater() {
     if (!this.later) {
@@ -144,7 +144,7 @@ export class Passes {
     });
   }
 
-  // True if the targets have this size already.
+  // True if the targets already have this size.
   hasTargets(width, height, full) {
     const {targets} = this;
     return targets?.width === width && targets.height === height &&
@@ -284,8 +284,8 @@ export class Passes {
     return reading.take();
   }
 
-  // Returns {place, wanted}. `place` is the one of the 48 places of the sun that lights a share of
-  // the last picture nearest to `share`. `wanted` maps the leaf addresses of tiles that would
+  // Returns {place, wanted}. `place` is one of the 48 positions of the sun: the one whose lit share
+  // of the last picture is nearest to `share`. `wanted` maps the leaf addresses of tiles that would
   // improve the choice to 1. Call compileLater() first.
   chooseSun(values, share) {
     const {gl, targets} = this, wanted = new Map();

@@ -75,14 +75,14 @@ const vec3 kGround = vec3(0.40, 0.36, 0.31);
 vec3 sky_color(vec3 direction) {
   return mix(kHorizon, direction.y >= 0.0 ? kZenith : kGround, sqrt(abs(direction.y)));
 }
-// Unit vectors as two numbers of 16 bits: an octahedron, unfolded.
+// Packs unit vectors into two numbers of 16 bits, by an unfolded octahedron.
 uint pack_normal(vec3 n) {
   n /= abs(n.x) + abs(n.y) + abs(n.z);
   vec2 folded = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
   vec2 p = n.z >= 0.0 ? n.xy : folded;
   return packSnorm2x16(p);
 }
-// The pixel among 2 x 2 that a sample of the sky's light is for.
+// Returns the pixel among 2 x 2 for which a sample computes the sky's light.
 ivec2 chosen_of_four(int frame) {
   return ivec2(frame & 1, (frame & 1) ^ (frame >> 1 & 1));
 }
@@ -118,7 +118,7 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
   s.cube = clamp((s.size / max(s.t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
   return s;
 }
-// The start of a ray clears the steps that the cells of a slope form.
+// The start of a ray is beyond the steps that the cells of a slope form.
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
 }
@@ -171,7 +171,7 @@ bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out
 }
 `;
 
-// The normal of each pixel, and whether it sees the sun.
+// Computes the normal of each pixel, and if it sees the sun.
 export const kLight = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform vec3 u_sun;          // unit vector toward the sun
 uniform bool u_shadows;
@@ -341,8 +341,8 @@ vec3 reflected(vec3 albedo, vec3 normal, vec3 sky, float sun) {
 }
 `;
 
-// Light from the sky is averaged over 4 x 4 samples on the same plane, on the floor over samples of
-// the floor.
+// The sky's light is averaged over 4 x 4 samples on the same plane. On the floor it is averaged
+// over samples of the floor.
 const kSkyFilter = `
 uniform usampler2D u_hits, u_normals;
 uniform sampler2D u_light, u_sky;

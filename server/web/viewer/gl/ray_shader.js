@@ -64,7 +64,7 @@ uint random_state = 1u;
 uint entered_count = 0u, entered_slot = 0u;  // a random one of the entered tiles
 #ifdef WIRE
 uniform int u_wire_scale;  // of the drawn cubes; -1: none
-uniform float u_wire_width;  // half of a line's, at distance 1
+uniform float u_wire_width;  // half the width of a line at distance 1
 bool wire = false;
 #endif
 #ifdef CELL
@@ -212,7 +212,8 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
     int changed = flipped.x | flipped.y | flipped.z;
     position = to;
     if (changed >> scale > 1) {
-      // The ray leaves the parent: up to the lowest node that both cells are in.
+      // The ray leaves the parent. Go up to the lowest node that contains both the old and the new
+      // cell.
       scale = int(floatBitsToUint(float(changed)) >> 23) - 127;
       if (scale >= u_levels) return false;
       position &= -1 << scale;

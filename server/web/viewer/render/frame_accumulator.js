@@ -13,7 +13,7 @@ export class FrameAccumulator {
     this.show = show;
     this.seed = 0;
     this.samples = 0;       // per pixel, of the current picture
-    this.hasDrawn = false;  // anything, in the current context
+    this.hasDrawn = false;  // true once anything was drawn in the current context
     this.drawing = null;    // the sample being drawn
     this.reading = null;    // the drawn sample whose feedback has not been read
   }
@@ -43,8 +43,8 @@ export class FrameAccumulator {
     this.drawPart(nowMs);
   }
 
-  // Draws the next part if the GPU has finished the last one. Returns true if no sample is being
-  // drawn any more.
+  // Draws the next part if the GPU has finished the last one. Returns true if the sample is
+  // complete.
   continue(nowMs, poolTextures) {
     const {drawing, context: {gl}} = this;
     if (gl.getSyncParameter(drawing.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;

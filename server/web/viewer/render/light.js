@@ -48,7 +48,7 @@ export class Light {
     this.setSun(0);
   }
 
-  // `place` is one of 48: 16 around, at three heights.
+  // `place` is one of 48: 16 directions at three heights.
   setSun(place) {
     const turn = this.turn - 2 * Math.PI * (place % 16) / 16,
           height = 0.65 + 0.25 * Math.floor(place / 16);
@@ -56,7 +56,8 @@ export class Light {
         [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
   }
 
-  // Adapts exposure and reach to a reading: slowly while the camera moves, quickly when it stands.
+  // Adapts exposure and reach to a reading: slowly while the camera moves, quickly when it is
+  // still.
   adjust(read, eye, moving) {
     const share = moving ? 0.15 : 0.5;
     const toward = (from, to, known) => known ? from * (to / from) ** share : to;

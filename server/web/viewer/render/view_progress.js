@@ -26,7 +26,7 @@ export class ViewProgress {
   }
 
   // Takes the reading of a frame of the current view. `isQuiet`: the frame was up to date, the
-  // camera stands, and no tile is on its way.
+  // camera is still, and no tile is in flight.
   takeReading(isQuiet, isFullSize) {
     if (isQuiet) this.quietReadings++;
     else if (this.needsRestartOnArrival) this.quietReadings = 0;

@@ -3,9 +3,10 @@
 
 import {TileError} from "../tile_source.js";
 
-export const kRoundsToKnow = 4;  // after this many readings an unmarked item is known to be unused
+// An item without a mark after this many readings is known to be unused.
+export const kRoundsToKnow = 4;
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
-const kMaxTries = 3;         // per item with unusable answers
+const kMaxTries = 3;         // per item, if its answers are unusable
 const kRefusedMs = 300000;   // until a refused item is requested again
 const kMaxFailures = 65536;  // remembered items
 const kMaxWarnings = 20;
@@ -51,7 +52,7 @@ export class Loader {
     this.requestedTotal = 0;
     this.outage = {count: 0, retryMs: 0};
     this.busy = {count: 0, retryMs: 0};
-    this.fullUntilMs = 0;  // no room until then; Infinity: until the next epoch
+    this.fullUntilMs = 0;  // there is no space until then; Infinity: until the next epoch
     this.trouble = null;   // {code, message} of the current outage
     this.failure = null;   // {code, message} of the error that ended loading
     this.refusal = null;   // {code, message} if some items were refused

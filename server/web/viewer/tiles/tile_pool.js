@@ -11,7 +11,7 @@ const kMaxRows = 4096;                        // addresses have 24 bits
 const kBlocksPerRow = kRowTexels / kBlockTexels;
 const kTexelBytes = kTexelWords * 4;
 const kFirstRows = 256;  // initial size of a growing pool: 16 MiB
-const kErrorFlags = 8;   // more than WebGL has
+const kErrorFlags = 8;   // upper bound of the number of WebGL's error flags
 
 export class TilePool {
   constructor(gl, budgetBytes) {
@@ -31,7 +31,7 @@ export class TilePool {
     this.texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.rows);
     this.table = this.createTexture(gl.R32UI, kTableWidth, this.tableRows);
     this.free = [];      // blocks that were used and released
-    this.nextBlock = 0;  // this one and those after it were never used
+    this.nextBlock = 0;  // this block and all later ones were never used
     this.freeSlots = [];
     this.nextSlot = 1;  // slot 0 means none
   }
