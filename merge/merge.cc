@@ -92,15 +92,15 @@ class Merger {
       const PassTask task{inputs_.shape, false, group.readers()};
       merged.push_back(writer.finish(run_merge_pass(context_, task, output, {}, {})));
       begin = end;
-      if (begin < pending_.size() && recovery_.due())
+      if (begin < pending_.size() && recovery_.is_due())
         recovery_.save_in_pass(segment, merged, begin);
     }
     segment.finish();
     ++context_.report.passes;
     recovery_.wait();  // so that the bytes merged by this pass are released soon
-    const bool due = recovery_.due();
+    const bool is_due = recovery_.is_due();
     const std::vector<SurveyedArtifact> before = pending_.replace_all(merged, segment);
-    if (due) recovery_.save_pass(segment, merged, before);
+    if (is_due) recovery_.save_pass(segment, merged, before);
   }
 
   void run_final_pass(GlobalFileWriter& out, PassProgress progress) {
@@ -110,7 +110,7 @@ class Merger {
       context_.progress.set_total(context_.report.input_nodes +
                                   rows_above(*progress.level, artifacts.readers()));
     const auto after_level = [&](const PassProgress& done) {
-      if (recovery_.due()) recovery_.save_level(done, artifacts.readers(), out);
+      if (recovery_.is_due()) recovery_.save_level(done, artifacts.readers(), out);
     };
     const PassTask task{inputs_.shape, true, artifacts.readers()};
     for (const ArtifactRoot& root :

@@ -32,7 +32,7 @@ class MergeRecovery {
   PassProgress restore(GlobalFileWriter& out);
 
   // True if it is time to save a state. Rethrows the last save's error.
-  bool due() { return saver_.due(); }
+  bool is_due() { return saver_.is_due(); }
   // Call it within a pass: `merged`, in `segment`, replace the pending artifacts before `next`.
   void save_in_pass(PassSegment& segment, std::vector<ArtifactRef> merged, size_t next);
   // Call it after a pass: `merged`, in `segment`, have replaced all artifacts of `before`.

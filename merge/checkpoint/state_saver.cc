@@ -24,7 +24,7 @@ void StateSaver::forget() {
   named_.clear();
 }
 
-bool StateSaver::due() {
+bool StateSaver::is_due() {
   if (!checkpoint_ || process_cpu_seconds() - saved_s_ < interval_s_) return false;
   if (save_.valid() && save_.wait_for(std::chrono::seconds(0)) == std::future_status::timeout)
     return false;

@@ -20,7 +20,7 @@ namespace voxdag {
 
 class StateSaver {
  public:
-  // Without a checkpoint, load() returns nothing, due() returns false and save() does nothing.
+  // Without a checkpoint, load() returns nothing, is_due() returns false and save() does nothing.
   StateSaver(Checkpoint* checkpoint, double interval_s)
       : checkpoint_(checkpoint), interval_s_(interval_s) {}
   // Does not remove the files that the durable state names: they outlive the merge.
@@ -38,7 +38,7 @@ class StateSaver {
 
   // True if the last save has finished and enough CPU time has passed since it began. Throws what
   // that save threw.
-  bool due();
+  bool is_due();
   // Saves a state in the background. `named` are the scratch files that the state names; `sync`
   // makes them durable. Then removes the files of the previous state and releases `merged`.
   void save(uint32_t level, MergeState state, std::vector<std::shared_ptr<ScratchPath>> named,

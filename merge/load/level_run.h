@@ -26,7 +26,7 @@ class LevelRun {
  public:
   virtual ~LevelRun() = default;
   // Decodes a frame. Several threads may call it concurrently, each with a separate `out`. Children
-  // are indices, or words of positions if they are rewired().
+  // are indices, or words of positions if they are is_rewired().
   virtual void read_frame(size_t index, Frame& out) const = 0;
 
   std::span<const FrameInfo> frames() const { return frames_; }
@@ -34,7 +34,7 @@ class LevelRun {
   const RowFormat& format() const { return format_; }
   bool bricks() const { return format_.bricks; }
   // True if children are positions, not indices into the run's level below.
-  bool rewired() const { return rewired_; }
+  bool is_rewired() const { return rewired_; }
 
   // Returns the number of rows before frame `index`, which may be one past the last frame.
   uint64_t rows_before(size_t index) const {

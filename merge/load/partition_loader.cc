@@ -33,7 +33,7 @@ class HashPartition::Loader {
          MemoryBudget& budget)
       : partition_(partition),
         maps_(maps),
-        spilled_(maps && !maps->resident()),
+        spilled_(maps && !maps->is_resident()),
         workers_(workers.count) {
     if (spilled_) {
       const uint64_t window_bytes =
@@ -70,7 +70,7 @@ class HashPartition::Loader {
     Worker& worker = workers_[worker_index];
     const RunSlice& slice = partition_.slices_[slice_index];
     const LevelRun& run = *partition_.runs_[slice.run];
-    const bool rewire = !run.bricks() && !run.rewired();
+    const bool rewire = !run.bricks() && !run.is_rewired();
     const bool by_windows = rewire && spilled_ && maps_->rows(slice.run) > window_rows_;
     const uint32_t* map = nullptr;
     if (rewire && !spilled_) map = maps_->words(slice.run);
@@ -112,7 +112,7 @@ class HashPartition::Loader {
     std::copy(frame.masks.begin(), frame.masks.end(), partition_.memory_.masks_.data() + row);
     if (map)
       replace_all(frame.children, map, maps_->wide(), run.format().wide, out);
-    else if (run.rewired() || !run.format().wide)
+    else if (run.is_rewired() || !run.format().wide)
       std::copy(frame.children.begin(), frame.children.end(), out);
     else
       for (const uint32_t child : frame.children) out = put_position(out, child, true);

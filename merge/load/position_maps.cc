@@ -54,14 +54,14 @@ uint64_t PositionMaps::max_rows() const {
 }
 
 void PositionMaps::store(size_t run, uint64_t first, std::span<const uint32_t> words) {
-  if (resident())
+  if (is_resident())
     std::ranges::copy(words, this->words(run) + (first << wide_));
   else
     file_->write(first_word(run) + (first << wide_), words);
 }
 
 void PositionMaps::load(size_t run, uint64_t first, std::span<uint32_t> words) const {
-  if (resident())
+  if (is_resident())
     std::copy_n(this->words(run) + (first << wide_), words.size(), words.begin());
   else
     file_->read(first_word(run) + (first << wide_), words);

@@ -30,7 +30,7 @@ class PositionMaps {
                uint64_t resident_bytes, MemoryBudget& budget);
 
   // True if the maps are in memory.
-  bool resident() const { return file_ == nullptr; }
+  bool is_resident() const { return file_ == nullptr; }
   bool wide() const { return wide_; }
   // Number of words per position.
   uint32_t position_words() const { return wide_ ? 2 : 1; }
@@ -38,7 +38,7 @@ class PositionMaps {
   std::vector<uint64_t> rows() const;
   // Number of rows of the longest map.
   uint64_t max_rows() const;
-  // Returns the words of a complete map. Requires resident().
+  // Returns the words of a complete map. Requires is_resident().
   uint32_t* words(size_t run) { return words_.data() + first_word(run); }
   const uint32_t* words(size_t run) const { return words_.data() + first_word(run); }
 

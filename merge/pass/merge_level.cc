@@ -63,7 +63,7 @@ class PartitionMerge {
       }
     };
     parallel_for(context_.plan.workers, partition_.bucket_count(), merge_bucket);
-    if (!task_.maps.resident()) store_positions();
+    if (!task_.maps.is_resident()) store_positions();
     return extent_;
   }
 
@@ -146,8 +146,8 @@ class PartitionMerge {
     const RunSlice& slice = partition_.slices()[s];
     const uint64_t row = partition_.bucket_begin(bucket, s).row;
     const uint32_t words = task_.maps.position_words();
-    return task_.maps.resident() ? task_.maps.words(slice.run) + words * (slice.first_row + row)
-                                 : partition_.positions() + words * (slice.row_base + row);
+    return task_.maps.is_resident() ? task_.maps.words(slice.run) + words * (slice.first_row + row)
+                                    : partition_.positions() + words * (slice.row_base + row);
   }
 
   void store_positions() {
@@ -178,7 +178,7 @@ uint64_t bucket_rows(const MergeContext& context, const LevelTask& task) {
 
 // Returns the words of each row's position that a partition keeps until it is merged.
 uint32_t held_position_words(const LevelTask& task) {
-  return task.maps.resident() ? 0 : task.maps.position_words();
+  return task.maps.is_resident() ? 0 : task.maps.position_words();
 }
 
 LevelExtent merge_partition(const MergeContext& context, const LevelTask& task,

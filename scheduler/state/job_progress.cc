@@ -14,11 +14,11 @@ constexpr double kWriteIntervalS = 1;
 }  // namespace
 
 template <class Change>
-void JobProgress::update(bool at_once, const Change& change) {
+void JobProgress::update(bool writes_now, const Change& change) {
   std::unique_lock lock(mutex_);
   change(snapshot_);
   const double now = wall_seconds();
-  if (!at_once && now - last_written_s_ < kWriteIntervalS) return;
+  if (!writes_now && now - last_written_s_ < kWriteIntervalS) return;
   last_written_s_ = now;
   lock.unlock();
   write();

@@ -42,9 +42,9 @@ class JobProgress : public Progress {
   void detach();
 
  private:
-  // Changes the snapshot. Writes it if a write is due or `at_once` is set.
+  // Changes the snapshot. Writes it if a write is due or `writes_now` is set.
   template <class Change>
-  void update(bool at_once, const Change& change);
+  void update(bool writes_now, const Change& change);
   void write();
 
   Progress& shown_;

@@ -20,8 +20,8 @@ constexpr int kPreviewNice = 5;  // in addition to the builds' nice value
 constexpr double kMaxSleepS = 1;
 constexpr double kNoTimeLimitS = 1e9;
 constexpr double kRetireIntervalS = 300;
-constexpr double kDeletionIntervalS = 30;  // between attempts of a failed deletion
-constexpr size_t kMaxRetiredAtOnce = 100;  // limited, so that jobs can start in between
+constexpr double kDeletionIntervalS = 30;   // between attempts of a failed deletion
+constexpr size_t kMaxRetiredPerPass = 100;  // limited, so that jobs can start in between
 
 void sleep_s(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
@@ -76,7 +76,7 @@ bool Dispatcher::stopping() {
 void Dispatcher::recover() {
   std::set<std::string> running;
   for (const auto& [key, worker] : workers_)
-    if (worker.runs()) running.insert(key);
+    if (worker.is_running()) running.insert(key);
   const auto pause = [this](unsigned attempt) { return pause_s(config_.jobs, attempt); };
   for (const Job& job : queue_.recover(running, pause))
     log_("job " + job.id + " " + state_name(job.state));
@@ -324,7 +324,7 @@ void Dispatcher::retire_old_jobs() {
   next_retirement_s_ = now_s + kRetireIntervalS;
   size_t removed = 0;
   for (const std::string& id : queue_.expired(oldest_s, config_.retention.finished_jobs)) {
-    if (removed == kMaxRetiredAtOnce) {
+    if (removed == kMaxRetiredPerPass) {
       next_retirement_s_ = now_s;
       break;
     }
@@ -344,22 +344,22 @@ Job Dispatcher::cancel(const std::string& id) {
   {
     std::lock_guard lock(mutex_);
     const auto worker = workers_.find(id);
-    const bool runs = worker != workers_.end() && worker->second.runs();
+    const bool is_running = worker != workers_.end() && worker->second.is_running();
     job = queue_.change(id, [&](Job& j) {
       if (j.state == JobState::kFailed || j.state == JobState::kSucceeded)
         throw state_conflict(j, "the job has ended");
       if (j.state == JobState::kCanceling || j.state == JobState::kCanceled) return;
-      j.state = runs ? JobState::kCanceling : JobState::kCanceled;
-      if (!runs) j.finished_s = unix_seconds();
+      j.state = is_running ? JobState::kCanceling : JobState::kCanceled;
+      if (!is_running) j.finished_s = unix_seconds();
     });
-    if (runs && job.state == JobState::kCanceling) worker->second.live->stop();
+    if (is_running && job.state == JobState::kCanceling) worker->second.live->stop();
   }
   if (job.state == JobState::kCanceled) remove_work(id);
   return job;
 }
 
 Job Dispatcher::suspend(const std::string& id) {
-  bool runs = false;
+  bool is_running = false;
   Job job;
   {
     std::lock_guard lock(mutex_);
@@ -369,11 +369,11 @@ Job Dispatcher::suspend(const std::string& id) {
       j.state = JobState::kSuspended;
     });
     const auto worker = workers_.find(id);
-    runs = worker != workers_.end() && worker->second.runs();
-    if (runs) worker->second.live->stop();
+    is_running = worker != workers_.end() && worker->second.is_running();
+    if (is_running) worker->second.live->stop();
   }
   // The job may have been queued again since a killed service left its tasks running.
-  if (!runs) stop_tasks(id);
+  if (!is_running) stop_tasks(id);
   return job;
 }
 

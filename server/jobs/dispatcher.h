@@ -70,7 +70,7 @@ class Dispatcher {
     bool recorded = false;  // the job's outcome is in the queue
     bool done = false;
     // True if the worker will still record the job's outcome.
-    bool runs() const { return !recorded && !done; }
+    bool is_running() const { return !recorded && !done; }
   };
   // Reserves the files of an ended job for the thread that removes them. Other removals wait, and a
   // retried job does not start.

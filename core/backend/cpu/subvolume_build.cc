@@ -83,7 +83,7 @@ NodeRef SubvolumeBuild::build(int size_log2, const LatticeCube& cube, size_t fir
   if (NodeRef node; count == 1 && entries_[first].inside() &&
                     planes_.build(triangles_, entries_[first], cube, size_log2, node))
     return node;
-  if (size_log2 <= kTileLog2 && !worth_splitting(size_log2, first, count))
+  if (size_log2 <= kTileLog2 && !is_worth_splitting(size_log2, first, count))
     return build_tile(size_log2, cube, first, count);
   if (count > octants_.size()) octants_.grow(memory_, count);
   size_t counts[8] = {};
@@ -113,7 +113,7 @@ NodeRef SubvolumeBuild::build(int size_log2, const LatticeCube& cube, size_t fir
   return tables_.add_node(size_log2, children);
 }
 
-bool SubvolumeBuild::worth_splitting(int size_log2, size_t first, size_t count) {
+bool SubvolumeBuild::is_worth_splitting(int size_log2, size_t first, size_t count) {
   if (size_log2 <= PlaneMemo::kSmallestLog2 || count > kFewTriangles) return false;
   for (size_t i = 0; i < count; ++i)
     if (!planes_.has_plane(triangles_, entries_[first + i])) return false;

@@ -32,7 +32,7 @@ class SubvolumeBuild {
   NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   // True if it is better to split a cube of at most tile size, because its parts may be in the
   // plane memo.
-  bool worth_splitting(int size_log2, size_t first, size_t count);
+  bool is_worth_splitting(int size_log2, size_t first, size_t count);
   NodeRef build_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   Octants test_octants(Entry entry, const LatticeCube& cube) const;
   void draw(const WideTriangle& triangle, const LatticeCube& tile);

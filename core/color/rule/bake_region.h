@@ -88,14 +88,14 @@ class RegionBaker {
   // stops.
   template <class Charge>
   bool add(std::span<const FixedSurface> triangles, const Charge& charge) {
-    constexpr size_t kAtOnce = 16;
+    constexpr size_t kTrianglesPerCharge = 16;
     if (!cells_.attributes().is_needed()) return add(triangles);
-    bool are_all = true;
-    for (size_t at = 0; are_all && at < triangles.size(); at += kAtOnce) {
-      are_all = add(triangles.subspan(at, std::min(kAtOnce, triangles.size() - at))) &&
+    bool has_all = true;
+    for (size_t at = 0; has_all && at < triangles.size(); at += kTrianglesPerCharge) {
+      has_all = add(triangles.subspan(at, std::min(kTrianglesPerCharge, triangles.size() - at))) &&
                 charge(cells_.attributes().bytes());
     }
-    return are_all;
+    return has_all;
   }
   void finish(std::vector<ColoredCell>& cells) { finish(cells, values_); }
   // `values` gets an element for each cell if normals or materials are wanted.

@@ -107,7 +107,7 @@ bool is_too_much(const CommandResult& result) {
 }
 
 // Slurm's commands print the reason with blanks or with underscores.
-bool is_held_for_ever(const std::string& state, std::string reason) {
+bool is_held_forever(const std::string& state, std::string reason) {
   std::ranges::replace(reason, ' ', '_');
   return state == "PENDING" &&
          (reason == "launch_failed_requeued_held" || reason == "JobHoldMaxRequeue");
@@ -115,9 +115,9 @@ bool is_held_for_ever(const std::string& state, std::string reason) {
 
 }  // namespace
 
-bool SlurmTask::is_held() const { return is_held_for_ever(state, reason); }
+bool SlurmTask::is_held() const { return is_held_forever(state, reason); }
 
-bool SlurmJob::is_held() const { return is_held_for_ever(state, reason); }
+bool SlurmJob::is_held() const { return is_held_forever(state, reason); }
 
 std::string SlurmEnd::text() const {
   if (state.empty()) return "ended, and Slurm has forgotten how";

@@ -128,7 +128,7 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
   std::string estimate;
   std::optional<Failure> failure;
   const double deadline = wall_seconds() + context.config.jobs.plan_timeout_s;
-  const auto is_in_vain = [&] {
+  const auto must_stop = [&] {
     return context.draining || wall_seconds() > deadline || call.request.client_has_left();
   };
   bool killed = false;
@@ -139,7 +139,7 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
         if (const auto* result = std::get_if<Result>(&*message)) estimate = result->json;
         if (const auto* reported = std::get_if<Failure>(&*message)) failure = *reported;
       },
-      [&] { return killed = killed || is_in_vain(); });
+      [&] { return killed = killed || must_stop(); });
   child.wait();
   if (killed && context.draining) throw busy("the service is stopping");
   if (killed && wall_seconds() <= deadline)

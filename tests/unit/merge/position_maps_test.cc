@@ -37,7 +37,7 @@ TEST(Positions, OfWideMapsKeepTheirHighHalf) {
   for (size_t i = 0; i < kPositions.size(); ++i) put_position(&words[2 * i], kPositions[i], true);
   for (const uint64_t resident_bytes : {0, 1 << 20}) {
     PositionMaps maps(rows, true, resident_bytes, scratch, budget);
-    EXPECT_EQ(maps.resident(), resident_bytes > 0);
+    EXPECT_EQ(maps.is_resident(), resident_bytes > 0);
     maps.store(0, 0, std::span(words).first(4));
     maps.store(1, 0, words);
     for (size_t i = 0; i < kPositions.size(); ++i) EXPECT_EQ(maps.at(1, i), kPositions[i]);
