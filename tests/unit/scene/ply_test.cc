@@ -364,7 +364,7 @@ TEST(Ply, HostileHeadersAreRefused) {
        "vertex_indices"},
       {begin + "element vertex 0\n" + xyz +
            "element face 0\nproperty list uchar float vertex_indices\nend_header\n",
-       "no list of integers"},
+       "is not a list of integers"},
       {begin + "element vertex 0\nproperty list float int x\nend_header\n",
        "float type for the count of a list"},
       {begin + "element vertex 0\nproperty list uchar int x\nend_header\n", "as a property"},
