@@ -323,7 +323,7 @@ void stop_earlier_merge_job(const BuildSpec& spec, const BuildContext& context) 
   try {
     stop_merge_job(context.files, work_folder_of(spec.run), commands_of(spec));
   } catch (const Error& error) {
-    context.progress.warn(error.message() + "; tasks of it may still run");
+    context.progress.warn(error.message() + "; its tasks may still run");
   }
 }
 

@@ -8,7 +8,8 @@ import numpy as np
 from . import _native
 from ._error import Error, Path, path_text, thread_count
 
-# By name: the components of a value, and their type. The int64 ones are indexes; -1 means none.
+# For each name: the number of components of a value, and their type. int64 values are indexes; -1
+# means none.
 _ATTRIBUTE_TYPES = {
     name: (components, np.dtype(dtype)) for name, components, dtype in _native.attribute_types()
 }
@@ -18,11 +19,11 @@ Region = Union[Sequence[Any], np.ndarray]
 
 
 class Hits(NamedTuple):
-    """What rays hit, one row per ray; a ray that hits nothing has an infinite distance."""
+    """The hits of rays, one row per ray. A ray without a hit has an infinite distance."""
 
     distance: np.ndarray  # (N,) float64, in voxels, or in units of the scene if the rays were
-    voxel: np.ndarray  # (N, 3) int64, the low corner of the cell that was hit; -1 for nothing
-    normal: np.ndarray  # (N, 3) int8, of the face; 0 if the ray began inside, or hit nothing
+    voxel: np.ndarray  # (N, 3) int64, the low corner of the hit cell; -1 without a hit
+    normal: np.ndarray  # (N, 3) int8, of the face; 0 if the ray began inside, and without a hit
 
     @property
     def hit(self) -> np.ndarray:
@@ -31,17 +32,17 @@ class Hits(NamedTuple):
 
 
 def open(path: Path) -> "Dag":
-    """Opens a .vdag file. It is mapped, not read: opening takes no time at any size."""
+    """Opens a .vdag file. The file is mapped, not read, so opening takes no time at any size."""
     return Dag(path)
 
 
 class Dag:
-    """A finished file. Immutable; any number of threads may ask at the same time.
+    """A finished file. Immutable; any number of threads may query it concurrently.
 
-    Positions are voxels of the finest grid, (N, 3) integers, unless a `level` l says that they are
-    cells of the grid of 2^l per edge, a cell being set where any voxel in it is. A region is
-    half-open, in cells of that grid, and may reach beyond it. With world=True positions, regions
-    and distances are in the units of the scene. `threads` is 0 for all.
+    Positions are voxels of the finest grid, (N, 3) integers. With a `level` l they are cells of the
+    grid of 2^l per edge; a cell is set if any voxel in it is set. A region is half-open, in cells
+    of the same grid, and may extend beyond it. With world=True, positions, regions and distances
+    are in the units of the scene. `threads` is 0 for all.
     """
 
     def __init__(self, path: Path) -> None:
@@ -49,7 +50,7 @@ class Dag:
         self._file: Optional[_native.Dag] = _native.Dag(self.path)
 
     def close(self) -> None:
-        """Lets go of the file. Asking after that is an Error."""
+        """Closes the file. Later queries raise Error."""
         self._file = None
 
     def __enter__(self) -> "Dag":
@@ -76,7 +77,7 @@ class Dag:
 
     @property
     def voxels(self) -> int:
-        """Set voxels in all."""
+        """Total number of set voxels."""
         return self._dag.voxels
 
     @property
@@ -139,8 +140,8 @@ class Dag:
         world: bool = False,
         threads: int = 1,
     ) -> Hits:
-        """The first set voxel on each ray, (N, 3) origins and directions of any length; one of
-        them may be a single row for all.
+        """Returns the first set voxel on each ray. Origins and directions are (N, 3); one of them
+        may be a single row for all rays. Directions may have any length.
 
         Rays stop at cells with an edge of `stop_size` voxels; 1 stops at voxels.
         """
@@ -202,10 +203,11 @@ class Dag:
         world: bool = False,
         attributes: Optional[Sequence[str]] = None,
     ) -> Any:
-        """The set cells of a region in Morton order, (N, 3) int64.
+        """Returns the set cells of a region in Morton order, (N, 3) int64.
 
-        With world=True their centers in the units of the scene, float64. With `attributes`, such
-        as ["color", "normal"], a tuple of the cells and of a dict that has an array for each."""
+        With world=True, returns their centers in the units of the scene, float64. With
+        `attributes`, such as ["color", "normal"], returns a tuple: the cells, and a dict with an
+        array for each attribute."""
         low, high = self._region(region, level, world)
         rows = self._dag.point_count(low, high, self._levels(level))
         found = np.empty((rows, 3), np.int64)
@@ -265,10 +267,11 @@ class Dag:
     def nearest(
         self, points: Any, max_distance: float = np.inf, *, threads: int = 1
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The set voxel nearest to each voxel, (N, 3) int64, and the distances between the centers.
+        """Returns the set voxel nearest to each voxel, (N, 3) int64, and the distances between the
+        centers.
 
-        At equal distances it is the first in Morton order. If none is found, the voxel is -1 and
-        the distance infinite."""
+        Among equally near voxels it is the first in Morton order. If none is found, the voxel is -1
+        and the distance is infinite."""
         positions = self._positions(points, None, False)
         voxels = np.empty_like(positions)
         distances = np.empty(len(positions))

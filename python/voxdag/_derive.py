@@ -1,4 +1,4 @@
-"""What is made of finished files: parts of them, and the formats of other programs."""
+"""Derives files from finished files: extracts, and the formats of other programs."""
 
 import json
 import os
@@ -28,7 +28,7 @@ def extract(
 
     region, level, world  as in Dag
     crop                  make the smallest octree cube around the region the new grid
-    force                 replace an output that exists
+    force                 replace an existing output
 
     Returns counts, bounds and the SHA-256 of the new file. Raises Error.
     """
@@ -69,8 +69,8 @@ def export(
     """Writes a .vdag file, or a part of it, in the format of another program (docs/export.md).
 
     Includes colors if the file and the format have them, unless `gray` is True.
-    `to` is one of export_formats(). Returns the files that were written, their bytes, the voxels,
-    and notes on how to open them. Raises Error.
+    `to` is one of export_formats(). Returns the written files, their bytes, the voxels, and
+    notes on how to open them. Raises Error.
     """
     path, output = path_text(path), path_text(output)
     files = _native.export_paths(to, output)

@@ -365,7 +365,7 @@ ExportReport write_vox(const ExportJob& job) {
                          count_text(writer.instance_count()) + " instances");
   if (job.has_colors)
     report.notes.push_back("a palette of " + count_text(colors.count()) +
-                           " colors; each place has its own model (--gray shares equal ones)");
+                           " colors; each place has a separate model (--gray shares equal models)");
   if (dag.grid_levels() > std::bit_width(kMagicaVoxelEdge) - 1)
     report.notes.push_back(
         "MagicaVoxel shows at most 2048 voxels per edge; other readers take all");

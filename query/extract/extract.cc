@@ -97,7 +97,7 @@ class Extraction {
     report_.merge_passes = merged.passes;
     report_.work_bytes += merged.scratch_bytes;
     if (merged.voxels == 0)
-      progress_.warn("nothing is set there: the file will have no nodes");
+      progress_.warn("the selection has no voxels: the file will have no nodes");
     else
       with_reader_errors([&] {
         for (const Attribute attribute : attributes_of(file_).list())

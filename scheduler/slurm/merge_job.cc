@@ -174,16 +174,16 @@ void MergeJob::cancel_held(const SlurmJob& job) {
   }
   if (!given_up.empty() && slurm_.cancel_tasks(given_up))
     context_.progress.warn("Slurm could not start and holds " + std::to_string(given_up.size()) +
-                           " tasks, " + given_up[0] + " for one: canceled");
+                           " tasks, such as " + given_up[0] + ": canceled");
 }
 
 // Reports once that the job runs, or why it does not.
 void MergeJob::report_state(const SlurmJob& job) {
   if (job.state == "PENDING" && !waits_for_its_turn(job.reason) &&
       warned_reasons_.insert(job.reason).second)
-    context_.progress.warn("job " + job.id + ", which merges, waits: " + job.reason);
+    context_.progress.warn("merge job " + job.id + " waits: " + job.reason);
   if (job.state == "RUNNING" && !is_running_)
-    context_.progress.warn("job " + job.id + " merges: see its log in " + folder_.path());
+    context_.progress.warn("merge job " + job.id + " is running: see its log in " + folder_.path());
   is_running_ = job.state == "RUNNING";
 }
 

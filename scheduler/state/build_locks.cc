@@ -26,7 +26,7 @@ std::unique_ptr<FileLock> wait_for_lock(const std::function<std::unique_ptr<File
     if (waited_s >= max_s) return nullptr;
     if (quiet && waited_s >= kQuietS) {
       context.progress.warn(what + " is in use by another build: waiting up to " +
-                            std::to_string(std::lround(max_s)) + " s in case that one is ending");
+                            std::to_string(std::lround(max_s)) + " s, because it may be ending");
       quiet = false;
     }
     context.cancel.check();

@@ -65,7 +65,7 @@ void JobFolders::clean_up() {
         remove_work(entry.name);
     });
   }
-  if (!foreign.empty()) log_("left alone, since it belongs to no job of the queue:" + foreign);
+  if (!foreign.empty()) log_("kept, because no job of the queue has this folder:" + foreign);
 }
 
 void JobFolders::remove_work(const std::string& id) {

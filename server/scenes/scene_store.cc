@@ -223,7 +223,7 @@ void SceneStore::remove_stale_uploads(double before_s) {
       check_file();
       drop_upload(name);
       log_("scene " + name +
-           ": removed its unfinished upload, to which nothing was added for long");
+           ": removed its unfinished upload, which has received nothing for too long");
     } catch (const RequestError&) {
       // The scene is being uploaded.
     }

@@ -152,7 +152,7 @@ Transform read_transform(const JsonElement& node, const std::string& where, Docu
   }
   if (!is_finite(local)) throw Violation{where + ": its transform is not finite"};
   if (rotation.size() == 4 && !is_unit(rotation))
-    document.warn(where + ": its rotation is no unit quaternion, taken as given");
+    document.warn(where + ": its rotation is not a unit quaternion, and is used unchanged");
   return local;
 }
 

@@ -75,7 +75,7 @@ class MaterialResolver {
     } else {
       if (primitive.material >= 0)
         warn(where_ + ": material " + std::to_string(primitive.material) +
-             " does not exist, it is white");
+             " does not exist; the primitive is white");
       surface.material = plain_material();
     }
     place_draco_surface(document_, primitive, set);

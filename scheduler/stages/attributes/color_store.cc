@@ -88,8 +88,8 @@ void ColorStore::find_artifacts(Progress& progress, const CancelToken& cancel) {
   }
   std::erase_if(damaged, [&](const Key& key) { return found_.contains(key); });
   if (!damaged.empty())
-    progress.warn(path_ +
-                  ": damaged colors are baked again, cubes: " + std::to_string(damaged.size()));
+    progress.warn(path_ + ": damaged colors are baked again; number of cubes: " +
+                  std::to_string(damaged.size()));
 }
 
 ColorStore::~ColorStore() {

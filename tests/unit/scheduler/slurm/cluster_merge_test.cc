@@ -73,7 +73,7 @@ TEST_F(ClusterMergeJob, ATaskThatSlurmHoldsForEverDoesNotHoldItUp) {
   };
   slurm_.merge_state = "PENDING|Dependency";
   EXPECT_EQ(build(merging_spec()).cluster->attempts, 1u);
-  EXPECT_NE(warnings_.text.find("could not start and holds 1 tasks, 1_1 for one: canceled"),
+  EXPECT_NE(warnings_.text.find("could not start and holds 1 tasks, such as 1_1: canceled"),
             std::string::npos)
       << warnings_.text;
 }
@@ -89,7 +89,7 @@ TEST_F(ClusterMergeJob, WhatAPersonHasToDoIsSaid) {
       merge();
   };
   build(merging_spec());
-  const std::string said = "job 2, which merges, waits: JobHeldUser\n";
+  const std::string said = "merge job 2 waits: JobHeldUser\n";
   EXPECT_EQ(warnings_.text.find(said), warnings_.text.rfind(said));
   EXPECT_NE(warnings_.text.find(said), std::string::npos) << warnings_.text;
 }
