@@ -36,7 +36,9 @@ double largest_extent(const WorldBounds& bounds) {
   if (!bounds.empty)
     for (int a = 0; a < 3; ++a) extent = std::max(extent, bounds.high[a] - bounds.low[a]);
   if (!std::isfinite(extent))
-    throw Error(ErrorCode::kLimit, "the scene's extent does not fit a double");
+    throw Error(ErrorCode::kLimit,
+                "the extent of the scene is out of the range of doubles: expected coordinates "
+                "below 1e307");
   return extent;
 }
 

@@ -272,7 +272,7 @@ voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_levels,
                                                {reinterpret_cast<Position*>(cells), capacity});
     if (count > capacity)
       refuse("the region has " + std::to_string(count) +
-             " set cells: expected an array of so many, "
+             " set cells: expected an array of at least this length, "
              "not of " +
              std::to_string(capacity));
   });

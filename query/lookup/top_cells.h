@@ -14,7 +14,7 @@ class TopCells {
  public:
   static constexpr uint32_t kLevels = 5;
 
-  // True if these cells are nodes that have children in the grid of `grid_levels`.
+  // True if the 32^3 cells are nodes of the DAG that have children in the grid of `grid_levels`.
   static bool serve(const DagView& dag, uint32_t grid_levels) {
     return !dag.empty() && dag.grid_levels() > kLevels + kBrickLevels && grid_levels > kLevels;
   }

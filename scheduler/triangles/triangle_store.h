@@ -39,7 +39,7 @@ class TriangleStore {
   virtual ~TriangleStore() = default;
 
   virtual size_t record_bytes() const = 0;
-  // Maximum number of records per chunk that callers should pass.
+  // Maximum number of records that a caller should pass to add_chunk().
   virtual size_t max_chunk_records() const = 0;
 
   // Creates the bins of the plan's cubes, once per store. A resumed store may already have them.

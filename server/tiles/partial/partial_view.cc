@@ -144,7 +144,8 @@ void PartialView::refresh(const std::string& work_folder) {
   ++version_;
 }
 
-// When its folder exists again, the job may build another scene with another grid.
+// The job's folder was removed. If it is created again, the job may build a scene with another
+// grid.
 void PartialView::restart() {
   cubes_ = {};
   frame_ = nullptr;
