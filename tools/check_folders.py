@@ -12,7 +12,8 @@ import re
 import subprocess
 import sys
 
-# Which folders a folder may include, itself aside. Nothing comes along: each edge is named.
+# The folders that a folder may include, besides itself. The relation is not transitive: every edge
+# is listed.
 CORE_INCLUDES = {
     "core/base": [],
     "core/fields": ["core/base"],
@@ -55,7 +56,8 @@ PUBLIC_HEADERS = {"merge": ["merge/merge.h"]}
 # Tests and benchmarks may include more than the public header.
 BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 
-# Folders whose inner folders are in layers: each includes only itself and folders further down.
+# Folders whose inner folders are in layers: an inner folder includes only itself and folders further
+# down its list.
 LAYERS = {
     "merge": [
         "merge",
@@ -149,20 +151,20 @@ THIRD_PARTY = {
     "openvdb/openvdb.h": ["query", "bench", "tests"],
     "nanovdb/util/OpenToNanoVDB.h": ["query"],
 }
-# Folders that build with a C++20 compiler (and CUDA) alone.
+# Folders that need nothing but a C++20 compiler (and CUDA).
 BARE = ["core/base", "core/geometry", "core/dag", "core/color", "core/backend"]
 LIBRARY = re.compile(
     r"(zstd|tiny_gltf|sqlite3|httplib|png|zlib|xxhash)\.h$|^(nlohmann|openssl|CLI|gtest|gmock|benchmark)/"
 )
-# The reader that users copy into their engine, in two headers: the standard library is all that
-# they may need, and each other.
+# The reader that users copy into their engine. Its two headers include only the standard library and
+# each other.
 STANDALONE_HEADERS = {
     "core/format/global/voxdag_reader.h": ["voxdag_reader_colors.h"],
     "core/format/global/voxdag_reader_colors.h": [],
 }
-# Where headers with a folder in their name are found.
+# The folders in which headers with a folder in their name are found.
 INCLUDE_ROOTS = ("", "include/")
-# Where code may ask which compiler is at work.
+# The files that may test which compiler compiles them.
 CUDA_PLACES = ("core/base/host_device.h", "core/backend/")
 MAX_FILE_LINES = 500
 MAX_FOLDER_FILES = 20

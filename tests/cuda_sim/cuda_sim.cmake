@@ -1,6 +1,6 @@
-# The CUDA backend's sources as C++, against the simulated device's headers. Every access to memory
-# in them calls a function of the simulation (-fsanitize=thread, whose own library is not linked),
-# so there is no simulation in builds with a sanitizer.
+# Compiles the CUDA backend's sources as C++ with the headers of the simulated device. Every memory
+# access in them calls a function of the simulation. -fsanitize=thread inserts these calls; its own
+# library is not linked. So there is no simulation in builds with a sanitizer.
 if(VOXDAG_SANITIZE)
   return()
 endif()
@@ -16,8 +16,8 @@ add_library(voxdag_cuda_sim STATIC ${cuda_sources} ${program_sources} ${simulati
 target_include_directories(voxdag_cuda_sim BEFORE PUBLIC cuda_sim/include)
 target_link_libraries(voxdag_cuda_sim PUBLIC voxdag_base voxdag_geometry voxdag_dag)
 
-# Not voxdag_backend_parallel: the linker might choose its copies of the same inline functions, which
-# call nothing.
+# Do not link voxdag_backend_parallel: the linker might choose its copies of the same inline functions,
+# which do not call the simulation.
 file(GLOB conformance_sources CONFIGURE_DEPENDS conformance/*.cc)
 list(FILTER conformance_sources EXCLUDE REGEX "/(backends|cuda_test|large_grid_test)\\.cc$")
 file(GLOB cuda_sim_tests CONFIGURE_DEPENDS cuda_sim/*.cc)
@@ -28,7 +28,7 @@ voxdag_compile_quickly(test_cuda_sim)
 target_compile_definitions(test_cuda_sim PRIVATE
   VOXDAG_SHARED_SCENES="${PROJECT_SOURCE_DIR}/../shared/scenes"
   VOXDAG_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-# What takes minutes on the simulated device runs in tools/test-long.
+# The tests that take minutes on the simulated device run in tools/test-long.
 set(long_tests "*AnyTriangles*:*ASplit*:*Reuse.*:*CountsAddUp*:*RegionsOfLargeCubes*")
 foreach(method fast hashes pointers)
   gtest_discover_tests(test_cuda_sim DISCOVERY_TIMEOUT 60
@@ -38,7 +38,7 @@ endforeach()
 gtest_discover_tests(test_cuda_sim DISCOVERY_TIMEOUT 60 TEST_FILTER "SimulatedDevice.*"
   PROPERTIES LABELS cuda_sim_fast TIMEOUT 900)
 
-# What each kernel takes of a device, and the toolkit's oldest and newest architecture.
+# The resources that each kernel needs, for the oldest and the newest architecture of the toolkit.
 if(VOXDAG_HAS_CUDA AND Python3_FOUND)
   add_test(NAME cuda_kernels COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/tools/check-kernels
                                      --nvcc ${CMAKE_CUDA_COMPILER})
