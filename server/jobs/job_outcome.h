@@ -13,10 +13,11 @@ namespace voxdag::server {
 double pause_s(const JobLimits& limits, unsigned attempts);
 
 // Changes the job, which may have been suspended, resumed or canceled since it started:
-//   a result                      succeeded (canceled if requested)
-//   stopped on request            as requested: canceled, suspended; queued again if the service
-//   stops no_space, io                  queued again after a pause, while attempts remain anything
-//   else                 failed
+//   outcome of the process   new state
+//   a result                 succeeded (canceled if requested)
+//   stopped on request       canceled or suspended, as requested; queued if the service stops
+//   no_space, io             queued again after a pause, while attempts remain; then failed
+//   anything else            failed
 void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
                    const JobLimits& limits, double now_s);
 

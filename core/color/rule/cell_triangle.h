@@ -1,26 +1,27 @@
 // A triangle prepared for the cells of the color grid: exact integer tests of touching
 // (core/geometry/overlap.h) and of covering columns (docs/color.md).
 //
-// Axes 0, 1, 2 are here a cyclic permutation of x, y, z such that axis 2 is the dominant one: that
-// of the largest component of the normal, which is made positive (n_2 > 0, and |n_0|, |n_1| <=
-// n_2).
+// Here, axes 0, 1, 2 are a cyclic permutation of x, y, z. Axis 2 is the dominant axis: the normal's
+// component along it is the largest, and is made positive (n_2 > 0, and |n_0|, |n_1| <= n_2).
 //
-//        axis 1                A cell's 16 columns run along axis 2, at 1/8, 3/8, 5/8 and 7/8 of
-//        its | . . . .             edge E. Column (P, Q) of the grid is at ((2 P + 1) E/8, (2 Q +
-//        1) E/8), | . . . .             so cell (p, q) has the columns 4p..4p+3 x 4q..4q+3.
-//        "Quarters" are | . . . .             units of E/4. | . . . .
-//        +--------- axis 0
+//     axis 1
+//     | . . . .      A cell has 16 columns along axis 2, at 1/8, 3/8, 5/8 and 7/8 of its edge E.
+//     | . . . .      Column (P, Q) of the grid is at ((2 P + 1) E/8, (2 Q + 1) E/8), so cell (p, q)
+//     | . . . .      has the columns 4p..4p+3 x 4q..4q+3. "Quarters" are units of E/4.
+//     | . . . .
+//     +--------- axis 0
 //
-// All tests are signs of linear functions with integer coefficients at cells or columns. Divided by
-// E (by E/4) they are A p + B q + C with C a quotient, rounded down or up without changing any
-// sign.
+// Every test is the sign of a linear function with integer coefficients at a cell or column.
+// Divided by E (for cells) or E/4 (for columns), the function is A p + B q + C. C is a quotient,
+// rounded down or up, which changes no sign.
 //
-// Bounds. Int = int64_t for triangles in the narrow box: coordinates v with 0 <= v + 2^27 < 2^29
-// (the grid's are at most 2^28). Edges are below 2^29, normals at most 2^58, edge functions
-// anywhere in the box below 2^59 and, added over 16 columns inside the triangle, at most 2^62.
-// Values of the plane at columns of cells that it touches are below 10 n_2 < 2^62 in quarters;
-// other intermediate values wrap. Int = int128 for the rest: coordinates at most 2^40, normals at
-// most 2^82, n.v below 2^124.
+// Bounds. Int is int64_t for triangles in the narrow box: coordinates v with 0 <= v + 2^27 < 2^29
+// (coordinates in the grid are at most 2^28). There, edges are below 2^29 and normals at most 2^58.
+// Edge functions are below 2^59 anywhere in the box, and at most 2^62 when added over 16 columns
+// inside the triangle. Values of the plane at columns of cells that it touches are below
+// 10 n_2 < 2^62 in quarters; other intermediate values wrap.
+// Int is int128 for all other triangles: coordinates are at most 2^40, normals at most 2^82, and
+// n.v is below 2^124.
 #pragma once
 
 #include <cmath>

@@ -5,9 +5,8 @@
 //      region has exactly the counts and prefixes of the DAG's cells.
 //   3. Each block of colors has the canonical form of its mode: the larger end first, 0 for missing
 //      cells.
-//   4. Values of other attributes are within their bounds. Values of coarser cells follow from
-//   their
-//      children's by the rule, and the bytes of missing cells are 0.
+//   4. Values of other attributes are within their bounds. Values of coarser cells follow by the
+//      rule from the values of their children. The bytes of missing cells are 0.
 #pragma once
 
 #include "core/base/progress.h"

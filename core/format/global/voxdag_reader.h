@@ -1,5 +1,5 @@
-// Reads voxdag's global file (.vdag): no dependencies but the C++17 standard library, POSIX and
-// voxdag_reader_colors.h; copy both into your engine. docs/format.md describes the file.
+// Reads voxdag's global file (.vdag). Depends only on the C++17 standard library, POSIX and
+// voxdag_reader_colors.h. Copy both headers into your engine. docs/format.md describes the file.
 //
 //     voxdag_reader::File dag("scene.vdag");               // throws voxdag_reader::Error
 //     bool set = dag.voxel(x, y, z);                       // 0 <= x, y, z < dag.resolution()
@@ -13,8 +13,8 @@
 // brick_level() = log2(R) - 2. Within a level everything is addressed by word offsets:
 //     brick:  [mask, low 32 bits] [mask, high 32 bits]     bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0
 //     node:   [child mask, 8 bits] [offset of each child in the next level, in child order]
-// An offset is one word, or two, low half first, where the next level's pointer_bits are 64. Child
-// index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
+// An offset is one word. If the next level's pointer_bits are 64, it is two words, low half first.
+// Child index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
 //
 // Opening checks the header, and that the levels and the checksum table are within the file. Nodes
 // and bricks are checked when they are read: a bad offset in a damaged file is an Error, and no
@@ -171,8 +171,8 @@ class File {
   // damaged header.
   explicit File(const std::string& path, Access access = Access::kMap)
       : File(path, std::make_shared<const Bytes>(path, access)) {}
-  // The same for already loaded bytes, for programs that prepare the mapping before it is
-  // read. `path` is for messages.
+  // The same for already loaded bytes, for programs that prepare the mapping before they read it.
+  // `path` is for messages.
   File(const std::string& path, std::shared_ptr<const Bytes> bytes)
       : path_(path), bytes_(std::move(bytes)) {
     read_header();
@@ -194,7 +194,7 @@ class File {
   uint32_t brick_level() const { return grid_levels_ - 2; }
   // Version of the format: 1, or 2 if the file has wide levels or attributes.
   uint32_t version() const { return version_; }
-  // The bits of the node hash by which the nodes of a level are ordered, 4 to 64.
+  // The number of bits of the node hash by which the nodes of a level are ordered, 4 to 64.
   uint32_t hash_bits() const { return hash_bits_; }
   // Set voxels, nodes of the octree that the DAG represents, and nodes of the DAG; bricks count as
   // nodes.
@@ -256,19 +256,20 @@ class File {
   // True if the cells of the levels 0 to color_levels() have colors. An empty scene has no colors.
   bool has_colors() const { return colors().tier_count() > 0; }
   uint32_t color_levels() const { return colors().color_levels(); }
-  // The section of an attribute. It has no tiers if the file has none of that kind.
+  // The section of an attribute. It has no tiers if the file does not have this attribute.
   const ColorSection& section(uint32_t kind) const { return sections_[kind - 1]; }
   const ColorSection& colors() const { return section(kColors); }
   const ColorSection& alphas() const { return section(kAlphas); }
   const ColorSection& normals() const { return section(kNormals); }
   const ColorSection& materials() const { return section(kMaterials); }
   // The color of a cell of level `level`, 0 to grid_levels(), which has 2^level cells along each
-  // axis; of its ancestor of level color_levels() if it is finer. None where the cell is not set or
-  // the file has no colors. A ColorCursor is faster where many cells are near each other.
+  // axis. If the level is finer than color_levels(), it is the color of the cell's ancestor of that
+  // level. None if the cell is not set or the file has no colors. A ColorCursor is faster if many
+  // cells are near each other.
   std::optional<Rgb> color(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     return BasicColorCursor<File>(*this).color(x, y, z, level);
   }
-  // The other attributes, by the same cells. Alpha is 0 to 255, linear.
+  // The other attributes, for the same cells. Alpha is 0 to 255, linear.
   std::optional<unsigned char> alpha(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     const auto value = BasicColorCursor<File>(*this, alphas()).value(x, y, z, level);
     return value ? std::optional(static_cast<unsigned char>(*value)) : std::nullopt;
@@ -399,7 +400,7 @@ class File {
     read_table(page);
   }
 
-  // Levels follow each other, the bricks first, each at the start of a page.
+  // Levels follow one another, the bricks first. Each begins at the start of a page.
   void read_levels(const unsigned char* page) {
     uint64_t end = kPageBytes, nodes = 0;
     for (uint32_t l = brick_level() + 1; l-- > 0;) {
@@ -436,7 +437,7 @@ class File {
     table_offset_ = end;
   }
 
-  // Sections are behind the levels in the order of their kinds. Unknown kinds are skipped.
+  // Sections follow the levels in the order of their kinds. Unknown kinds are skipped.
   void read_attributes(const unsigned char* page) {
     const uint64_t count = get<uint64_t>(page + 120);
     expect(count >= 1 && count <= 16 && dag_nodes_ > 0, "expected 1 to 16 attribute sections");

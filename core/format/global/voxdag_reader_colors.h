@@ -2,11 +2,11 @@
 // materials); copy both into your engine, and include that one. docs/format.md, "The color
 // section" and "The sections of alpha, normals and materials", describes the bytes.
 //
-// The set cells of all levels from 0 to a section's finest one have a color, or another value. They
-// are stored by regions of up to 64^3 cells of a tier's finest level: first the region's cells
-// of that level in Morton order, then the next coarser level, and so on. So the color of a cell is
-// found by its rank: the number of set cells of its level before it in the region, which follows
-// from the DAG.
+// All set cells of the levels from 0 to the finest level of a section have a color, or another
+// value. The values are stored by regions of up to 64^3 cells of a tier's finest level: first for
+// the region's cells of that level in Morton order, then for the next coarser level, and so on. The
+// position of a cell's value follows from the cell's rank: the number of set cells of its level
+// before it in the region. The DAG determines this rank.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace voxdag_reader {
 // What kind of error an Error is.
 enum class Problem { kNotFound, kIo, kCorrupt, kUnsupportedVersion };
 
-// The only exception that the reader throws, std::bad_alloc aside. Its message names the file.
+// The only exception that the reader throws, besides std::bad_alloc. Its message names the file.
 class Error : public std::runtime_error {
  public:
   Error(Problem problem, const std::string& message)
@@ -49,7 +49,7 @@ struct Normal {
   float x = 0, y = 0, z = 0;
 };
 
-// The normal in two bytes, the octahedral projection; any bytes are normals.
+// A normal as two bytes, its octahedral projection. Any bytes are a valid normal.
 inline Normal octahedral_normal(const unsigned char* bytes) {
   const double across = bytes[0] - 127.0, along = bytes[1] - 127.0;
   const double width = across < 0 ? -across : across, height = along < 0 ? -along : along;
@@ -64,7 +64,7 @@ inline Normal octahedral_normal(const unsigned char* bytes) {
           static_cast<float>(z * scale)};
 }
 
-// The color of cell `i`, 0 to 31, in a block of 16 bytes; any bytes are colors.
+// The color of cell `i`, 0 to 31, in a block of 16 bytes. Any bytes are valid colors.
 inline Rgb block_color(const unsigned char* block, unsigned i) {
   const auto u16 = [&](unsigned at) {
     return static_cast<unsigned>(block[at] | block[at + 1] << 8);
@@ -107,8 +107,8 @@ inline uint64_t morton_code(int64_t x, int64_t y, int64_t z) {
   return spread(x) << 2 | spread(y) << 1 | spread(z);
 }
 
-// The levels finest_level, finest_level - 1, ... region_level, by regions: cubes of the last one.
-// What they point to belongs to the File.
+// The levels finest_level, finest_level - 1, ... region_level. Its regions are cells of
+// region_level. The pointers point into memory of the File.
 struct ColorTier {
   const unsigned char* data = nullptr;  // of its regions
   uint64_t units = 0;                   // of 16 bytes
@@ -139,8 +139,9 @@ struct ColorRegion {
   Normal normal(uint64_t i) const { return octahedral_normal(blocks + 2 * i); }
   // The color of the `i`-th of all cells; below `cells`.
   Rgb color(uint64_t i) const { return block_color(blocks + i / 32 * 16, unsigned(i % 32)); }
-  // Table 0 is for the cells of the finest level, 1 for the next one. Its entries are for their
-  // ancestors four levels above, in order: how many of the cells come before those below it.
+  // Table 0 is for the cells of the finest level, table 1 for the cells of the next coarser level.
+  // An entry is for an ancestor four levels above these cells, in order: the number of cells that
+  // come before the cells below this ancestor.
   uint64_t prefix_count(uint32_t table) const {
     return table + 5 < level_count ? counts[table + 4] : 0;
   }
@@ -156,8 +157,8 @@ struct ColorRegion {
   }
 };
 
-// The kinds of attribute sections, and the bytes that 32 values take in each; 0 where the values
-// are indexes of a list of names, whose length decides their width.
+// The kinds of attribute sections, and the bytes that 32 values take in each. 0 means that the
+// values are indexes in a list of names, whose length determines their width.
 enum Kind : uint32_t { kColors = 1, kAlphas, kNormals, kMaterials, kEndOfKinds };
 constexpr uint32_t kKindBlockBytes[kEndOfKinds] = {0, 16, 32, 64, 0};
 
@@ -197,7 +198,7 @@ class ColorSection {
     if (has_names) return read_names(section + end, tables - end, block_bytes / 32);
     return end == tables ? nullptr : "the color section is longer than its tiers";
   }
-  // The list that a material is an index of. The last name, "", is for triangles without a
+  // A material is an index in this list. The last name, "", is for triangles without a
   // material.
   const std::vector<std::string>& names() const { return names_; }
 
@@ -275,13 +276,13 @@ class ColorSection {
   std::vector<std::string> names_;
 };
 
-// Looks up colors, or another attribute, fast where a cell is near the one before. Refers to the
-// File, which must outlive it; each thread needs its own.
+// Looks up colors, or another attribute. Fast if each cell is near the previous one. Refers to the
+// File, which must outlive it. Each thread needs its own cursor.
 template <class Dag>
 class BasicColorCursor {
  public:
   explicit BasicColorCursor(const Dag& dag) : BasicColorCursor(dag, dag.colors()) {}
-  // For find() in another section, such as dag.normals().
+  // For a lookup with find() in another section, such as dag.normals().
   BasicColorCursor(const Dag& dag, const ColorSection& section) : dag_(&dag), section_(&section) {
     path_[0] = 0;
   }
@@ -303,8 +304,8 @@ class BasicColorCursor {
     const ColorRegion* const region = find(x, y, z, level, i);
     return region ? std::optional(region->normal(i)) : std::nullopt;
   }
-  // The place of a value: cell `i` of a region, which is valid until the next call. Null where the
-  // cell is not set or has none.
+  // The place of a value: cell `i` of a region. The region is valid until the next call, and null
+  // if the cell is not set or has no value.
   const ColorRegion* find(int64_t x, int64_t y, int64_t z, uint32_t level, uint64_t& i) {
     if (section_->tier_count() == 0 || level > dag_->grid_levels()) return nullptr;
     const int64_t edge = int64_t{1} << level;
@@ -317,7 +318,7 @@ class BasicColorCursor {
   }
 
  private:
-  // A place in the DAG is a word offset, below the bricks the mask of the cell's children.
+  // A place in the DAG is a word offset or, below the bricks, the mask of the cell's children.
   uint32_t brick_level() const { return dag_->brick_level(); }
   uint32_t mask(uint32_t level, uint64_t place) const {
     if (level < brick_level()) return dag_->node(level, place).child_mask;
@@ -328,7 +329,7 @@ class BasicColorCursor {
     any |= any >> 1;
     return static_cast<uint32_t>((any & 0x0101010101010101u) * 0x0102040810204080u >> 56);
   }
-  // The child must be there.
+  // The child must exist.
   uint64_t child(uint32_t level, uint64_t place, unsigned index) const {
     if (level < brick_level()) return Dag::child(dag_->node(level, place), static_cast<int>(index));
     return level == brick_level() ? dag_->brick(place) >> 8 * index & 255 : 0;

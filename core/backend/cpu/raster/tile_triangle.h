@@ -1,8 +1,9 @@
 // A triangle prepared for the rasterizers: the overlap test of core/geometry/overlap.h (Schwarz and
 // Seidel 2010, section 4.1) as exact integer tests on the voxels of one tile.
 //
-// With vertices v relative to the tile's low corner, n the quarter normal (vertices are odd, so
-// edges are even, and half-edges cross to a quarter of the normal) and k a voxel of the tile:
+// Let v be the vertices relative to the tile's low corner, k a voxel of the tile, and n the quarter
+// normal: vertices are odd, so edges are even, and the cross product of half-edges is a quarter of
+// the normal. The two tests are:
 //
 //   plane   n.(256 k - v0) changes sign over the voxel's box   <=>   0 <= n.k + lowest <= width
 //   edge    the edge function's largest value over the box, in one of the three projections, is
@@ -11,11 +12,14 @@
 // since for an integer i and any c: 256 i + c >= 0 <=> i + floor(c / 256) >= 0. So the tests do not
 // need the eight bits within a voxel.
 //
-// Bounds. Narrow triangles: half-edges <= 2^27, |n_a| <= 2^54 (the triangle's projection is in its
-// box), sum of |n_a| <= 3 * 2^54. If the plane misses the tile there is nothing to draw; if not,
-// |n.k + lowest| <= 64 * 3 * 2^54 < 2^62 at every corner of a voxel. Edges: |a|, |b| <= 2^27,
-// |c| < 2^50. Wide triangles: half-edges < 2^40, so |n_a| < 2^81, n.v < 2^124 in 128 bits; edge
-// constants below 2^82 are clamped to +-2^60, which changes no sign since |a k_p + b k_q| < 2^47.
+// Bounds for narrow triangles: half-edges are <= 2^27, so |n_a| <= 2^54 (the triangle's projection
+// is in its box), and the sum of |n_a| is <= 3 * 2^54. If the plane misses the tile, there is
+// nothing to draw. Otherwise |n.k + lowest| <= 64 * 3 * 2^54 < 2^62 at every corner of a voxel. For
+// edges, |a|, |b| <= 2^27 and |c| < 2^50.
+//
+// Bounds for wide triangles: half-edges are < 2^40, so |n_a| < 2^81, and n.v < 2^124 in 128 bits.
+// Edge constants are below 2^82. They are clamped to +-2^60, which changes no sign since
+// |a k_p + b k_q| < 2^47.
 #pragma once
 
 #include <cstdint>

@@ -1,16 +1,16 @@
-// The rasterizer for AVX2 and AVX-512. Bricks are visited in columns along the axis of the normal's
-// largest component ("height"), where the plane passes a voxel column within a few voxels.
+// The rasterizer for AVX2 and AVX-512. It visits the bricks in columns along the axis of the
+// normal's largest component ("height"): along this axis the plane passes a voxel column within a
+// few voxels.
 //
-//   1. For each row of voxels of the tile, the edges bound its coordinates in the three
-//   projections:
-//      the projection along the columns gives the voxel columns inside (footprint.h), the two
-//      others bound the heights (sides.h).
-//   2. All 16 voxel columns of a column of bricks in one step: the heights between which the plane
-//      passes them (heights.h), and the bounds above.
-//   3. These become one bit per voxel of each brick, which is where the two rasterizers differ.
+//   1. For each row of voxels of the tile, the edges give bounds in the three projections. The
+//      projection along the columns gives the voxel columns inside (footprint.h), and the two
+//      other projections give bounds of the heights (sides.h).
+//   2. For all 16 voxel columns of a column of bricks in one step, the plane gives the heights
+//      between which it passes them (heights.h). The bounds of step 1 limit these heights.
+//   3. The heights become one bit per voxel of each brick. Only here the two rasterizers differ.
 //
-// Nothing branches on which edges cross a column of bricks: it would be mispredicted. A triangle
-// perpendicular to an axis is one layer of voxels: its columns are its voxels.
+// No branch depends on which edges cross a column of bricks, because it would be mispredicted. A
+// triangle perpendicular to an axis is one layer of voxels: its columns are its voxels.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once

@@ -1,16 +1,20 @@
 // The edge tests in one projection, as bounds of one coordinate in each row of voxels: edges are
 // tested once per row of the tile, not once per column of bricks.
 //
-// An edge leaves the voxels x of row k with across k + up x + c >= 0 (tile_triangle.h). All of
-// these are integers, so with y = (t - 1/2) / |up| and t = -(across k + c):
+// In row k, the inner side of an edge has the voxels x with across k + up x + c >= 0
+// (tile_triangle.h). All of these are integers. So with t = -(across k + c) and
+// y = (t - 1/2) / |up|, these voxels x are:
 //     up > 0:  x > floor(y)
 //     up < 0:  -x > floor(y)
-//     up = 0:  all, no voxel if t > 0; divided by 2^-60 instead, y is far below or above all
-// y = slope k + start in doubles, where only the division, products and sums are rounded. It is at
-// least 1 / (2 |up|) >= 2^-28 away from a whole number, and its floor is exact where it matters:
-//     |c| <= 2^36   its error is below 2^-12 / |up| + 2^-45, including the error of adding small
-//     numbers |c| > 2^36    |y| > 2^8 is beyond the tile, where only the side matters; its error is
-//     below 1 up = 0        |y| >= 2^59, and its error is below 2^58
+//     up = 0:  no voxel if t > 0, otherwise all. Divided by 2^-60 instead of 0, y is far above or
+//              far below all voxels.
+// The code computes y = slope k + start in doubles; only the division, products and sums are
+// rounded. y is at least 1 / (2 |up|) >= 2^-28 away from a whole number. Its floor is exact where
+// that matters:
+//     |c| <= 2^36:  The error of y is below 2^-12 / |up| + 2^-45, including the error of adding
+//                   small numbers.
+//     |c| > 2^36:   |y| > 2^8 is outside the tile, so only the side matters. The error is below 1.
+//     up = 0:       |y| >= 2^59, and its error is below 2^58.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -60,9 +64,10 @@ struct EdgeLanes {
   }
 };
 
-// [set of edges with up < 0]: the lanes, in halves of 32 bits, of two edges that bound x from below
-// and of two that bound it from above; lane 3 is unused. Edges sum to 0, so one or two of them have
-// up < 0, unless up = 0 for all three: these may bound it from either side.
+// Index: the set of edges with up < 0. Value: the lanes, in halves of 32 bits, of two edges that
+// bound x from below, and then of two edges that bound it from above. Lane 3 is unused. The three
+// edges sum to 0, so one or two of them have up < 0, unless up = 0 for all three. An edge with
+// up = 0 may be a bound on either side.
 struct BoundOrder {
   alignas(32) int32_t lane[8][8] = {};
   constexpr BoundOrder() {
@@ -80,8 +85,9 @@ constexpr BoundOrder kBoundOrder;
 
 class EdgeBounds {
  public:
-  // `bound_first`: the bounded coordinate belongs to the edges' a, the rows' coordinate to b. Adds
-  // `below_more` to all bounds from below, `over_more` to those from above.
+  // If `bound_first`, a is the edges' factor of the bounded coordinate and b their factor of the
+  // row; otherwise the reverse. Adds `below_more` to all bounds from below and `over_more` to all
+  // bounds from above.
   VOXDAG_INLINE EdgeBounds(const Edge (&edges)[3], bool bound_first, double below_more,
                            double over_more) {
     const EdgeLanes lanes(edges);

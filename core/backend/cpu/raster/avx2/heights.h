@@ -1,14 +1,17 @@
 // The plane test: the heights between which the plane passes each of the 16 voxel columns of a
 // column of bricks.
 //
-// Along the axis D of the normal's largest component a column is touched at the heights z with
+// Let D be the axis of the normal's largest component. The plane touches a column at the heights z
 //     0 <= n_D z + n.(p, q) + lowest <= width       (tile_triangle.h), that is
 //     y <= z <= y + width / n_D                     with y = -(n.(p, q) + lowest) / n_D
-// at most four voxels, since width <= 3 n_D. Lanes hold y in 16 bits, 12 of them below the voxel,
-// relative to the brick where the column begins: y spans 0..4 for the lowest of the 16, up to 6
-// more for the others, up to 3 more above. It is rounded downwards, the upper bound upwards, by
-// little more than 2 units. A lane so near to a whole number that the true height may be on the
-// other side of it is computed exactly by division (2 columns of bricks in 100 have one).
+// These are at most four voxels, since width <= 3 n_D.
+//
+// A lane holds y in 16 bits, 12 of them for the fraction of a voxel, relative to the brick where
+// the column of bricks begins. For the lowest of the 16 voxel columns y is in 0..4; for the others
+// it is up to 6 more, and the upper bound is up to 3 above y. y is rounded down and the upper bound
+// up, by little more than 2 units of a lane. If a lane is so close to a whole number that the exact
+// height may be on the other side of it, the code computes the height exactly by division. Of 100
+// columns of bricks, 2 have such a lane.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -94,7 +97,7 @@ class Heights {
     if (!_mm256_testz_si256(differ, whole)) [[unlikely]]
       divide_exactly(c.p, c.q, c.brick, _mm256_and_si256(differ, whole), below, top);
     below = _mm256_or_si256(below, outer);
-    // For the top, the distance from the highest voxel: all four bits inverted.
+    // The result for the top is the distance from the highest voxel: all four bits inverted.
     return _mm256_packus_epi16(_mm256_srli_epi16(below, kHeightBits),
                                _mm256_srli_epi16(_mm256_andnot_si256(top, whole), kHeightBits));
   }
@@ -104,8 +107,9 @@ class Heights {
 
   // Offsets in units of 16-bit lanes, including 0.02 for rounding in floats. The base of a column
   // is truncated to a whole unit, below_lanes_ are rounded, top_lanes_ truncated:
-  //   below   in (y - 2.02, y - 0.02]             so a whole number in doubt is 1 or 2 above it
-  //   top     in (y + width / n_D + 0.02, ... + 2.02]                 and 0, 1 or 2 below it
+  //   below is in (y - 2.02, y - 0.02]: a whole number in doubt is 1 or 2 units above it
+  //   top is in (y + width / n_D + 0.02, y + width / n_D + 2.02]: a whole number in doubt is
+  //       0, 1 or 2 units below it
   static constexpr double kLowered = 0.52;
   static constexpr float kTopRaised = 2.54f;
   static constexpr int16_t kBelowDoubt = 2, kTopDoubt = 3;

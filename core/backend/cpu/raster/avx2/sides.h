@@ -1,6 +1,6 @@
-// The edge tests in the two projections that show the height, and the triangle's box, as bounds of
-// the heights in each voxel column: one by its q, computed for each row of the tile, and one by its
-// p likewise.
+// Bounds of the heights in each voxel column (p, q), from the triangle's box and from the edge
+// tests in the two projections that show the height. One projection bounds the heights for every p,
+// the other for every q. Both are computed once per row of the tile.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -14,15 +14,16 @@
 namespace voxdag::cpu {
 namespace {
 
-// Bounds of the heights in the 16 columns of a column of bricks, one byte each, counted from the
-// floor of the brick where it begins: touched are below < z <= 15 - over. Each half has eight
-// columns, first `below`, then `over`. Both are 0 where there is no bound, so bounds are combined
-// by their maximum; 15 and more in `below`, 16 and more in `over` exclude everything.
+// Bounds of the heights in the 16 voxel columns of a column of bricks, one byte each, counted from
+// the floor of the brick where the column of bricks begins. The touched voxels are those with
+// below < z <= 15 - over. Each half has eight columns, first their `below`, then their `over`. A
+// bound of 0 excludes nothing, so bounds are combined by their maximum. `below` of 15 or more, or
+// `over` of 16 or more, excludes everything.
 using HeightBounds = __m256i;
 constexpr int kMaxHeight = 15;
 
-// From the four bounds from below and the four from above in a row of bricks, to the bounds of
-// columns: [of p].
+// Byte indexes that spread the four bounds from below and the four from above of a row of bricks to
+// the 16 columns. [1] spreads bounds that depend on p, [0] bounds that depend on q.
 struct SideOrder {
   alignas(32) uint8_t byte[2][32] = {};
   constexpr SideOrder() {
@@ -36,9 +37,9 @@ struct SideOrder {
 };
 constexpr SideOrder kSideOrder;
 
-// Bounds of heights in the tile, `below` larger by kBelowFloor and `over` by kOverFloor, so that
-// none is negative; [brick + kLowestBrick]: what to subtract from them in a column of bricks that
-// begins in `brick`. It begins at most ten voxels below the tile (heights.h).
+// Bounds of heights in the tile are stored with kBelowFloor added to `below` and kOverFloor added
+// to `over`, so that none is negative. Element [brick + kLowestBrick] is subtracted from them for a
+// column of bricks that begins in `brick`, at most ten voxels below the tile (heights.h).
 constexpr int kBelowFloor = 16, kOverFloor = 64, kLowestBrick = 4;
 struct BrickFloors {
   alignas(16) uint8_t byte[16 + kLowestBrick][16] = {};
