@@ -1,8 +1,9 @@
-// The contract of all backends: triangles of one subvolume in, its sub-DAG out.
+// The contract of all backends. A backend makes the sub-DAG of one subvolume from its triangles.
 //
 //   1. A voxel is set iff triangle_touches_cube() (core/geometry/overlap.h) holds for one of the
-//      triangles and the voxel's closed cube. Triangles that miss the cube are harmless.
-//   2. The sub-DAG is unique: no two equal nodes, level arrays in the total order. It does not
+//      triangles and the voxel's closed cube. Triangles that miss the subvolume's cube have no
+//      effect.
+//   2. The sub-DAG is unique: no nodes are equal, and level arrays are in total order. It does not
 //      depend on the order of the triangles, the memory, the method or the backend's caches.
 //   3. All large buffers are charged to the given budget. If the budget cannot hold the subvolume,
 //      build() returns kNeedsSplit without calling the sink, and the caller splits the cube and

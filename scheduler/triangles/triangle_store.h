@@ -6,9 +6,10 @@
 //   1. It is created with one reference, and filled by one BinWriter.
 //   2. Any number of streams read it.
 //   3. drop(): this run does not read it again. A store that no other run can read frees it.
-//   4. release(): its artifact is durable. The last release() frees the bin. Thread-safe, except
-//      that add_cube_bins() needs exclusive access and that a bin must not be filled and read
-//      concurrently.
+//   4. release(): its artifact is durable. The last release() frees the bin.
+//
+// Thread-safe, except that add_cube_bins() needs exclusive access and that a bin must not be filled
+// and read concurrently.
 #pragma once
 
 #include <cstddef>

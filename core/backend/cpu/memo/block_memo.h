@@ -1,13 +1,15 @@
 // A cache from voxel blocks (8^3 voxels, eight bricks in 64 bytes) to their nodes. Most blocks of a
-// scene occur more than once; one comparison then replaces a lookup of each brick and of the node.
+// scene occur more than once. For a repeated block, one comparison replaces a lookup of each brick
+// and of the node.
 //
-//   blocks    64 bytes each; all 0: free
+//   blocks    64 bytes each; all 0 if the slot is free
 //   nodes     the node of the block in the same slot
 //
-// It is direct-mapped: a block replaces the one in its slot. All bytes of blocks are compared, so a
-// hit is right for any keys. It is bypassed for a while when most lookups miss: in scans hardly two
-// blocks are equal. It is charged to the budget; beyond its minimum size it is at most a sixteenth
-// of it. Not thread-safe. Throws OutOfBudget if not even the minimum size fits.
+// It is direct-mapped: a new block replaces the block in its slot. All bytes of a block are
+// compared, so a hit is right for any keys. When most lookups miss, the cache is not used for a
+// while: in scans almost no blocks are equal. It is charged to the budget. If it is larger than its
+// minimum size, it is at most a sixteenth of the budget. Not thread-safe. Throws OutOfBudget if not
+// even the minimum size fits.
 #pragma once
 
 #include <cstdint>

@@ -1,13 +1,13 @@
-// The memo of planes, so that large flat surfaces cost a lookup per cube instead of rasterization.
+// The memo of planes. With it, large flat surfaces cost a lookup per cube instead of rasterization.
 // It is used for cubes that a single triangle covers.
 //
-//   small normals    (walls, floors, 45 degrees) the node of every offset and size of cube, in a
-//                    hash table whose keys contain all inputs, so a hit is exact
-//   other planes     the nodes of 8^3 voxels by direction (plane_direction.h), once a triangle has
-//                    covered enough tiles
+//   small normals    (walls, floors, 45 degrees) The nodes for every offset and size of cube, in a
+//                    hash table. Its keys contain all inputs, so a hit is exact.
+//   other planes     The nodes of 8^3 voxels by direction (plane_direction.h), for triangles that
+//                    have covered enough tiles.
 //
-// Everything is charged to the budget, at most an eighth of it, and lives as long as the build. Not
-// thread-safe.
+// All memory is charged to the budget, is at most an eighth of it, and is kept until the build
+// ends. Not thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -1,9 +1,10 @@
 // Reduces the bricks of a tile to one node, level by level. Voxel blocks that occurred before are
-// found in the block memo. All other nodes of a level are hashed, then their slots and
-// records prefetched, then looked up, so that memory latencies overlap.
+// found in the block memo. For the other nodes of a level, first all are hashed, then their slots
+// and records are prefetched, and then all are looked up, so that memory latencies overlap.
 //
-// The non-empty cubes of a level are a bit set in Morton order: its bytes are the child masks of
-// the nodes above, and the bytes that are not 0 are the bit set of the next level. Not thread-safe.
+// The non-empty cubes of a level are a bit set in Morton order. Each byte of this set is the child
+// mask of a node of the next coarser level, and the positions of the nonzero bytes are the bit set
+// of that level. Not thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -1,17 +1,17 @@
-// Finds the children of a cube that a triangle may touch: the overlap test for all eight in one
-// step, in doubles. The four numbers of a quad are the three edges of the triangle (the fourth is
-// ignored) or four children.
+// Finds the children of a cube that a triangle may touch: the overlap test for all eight children
+// in one step, in doubles. The four elements of a quad belong to the three edges of the triangle
+// (the fourth is ignored) or to four children.
 //
-// Culling need not be exact, since the rasterizers are. A touched child must never be omitted; an
-// untouched child may remain. "Inside" must never be wrong. Both hold because every sum is
-// widened, or narrowed, by more than its rounding error: vertices and edges are exact in doubles
-// (below 2^42), normals are made in integers and rounded once, and the rest are sums of at most
-// eight products, each off by at most 3 * 2^-53 of |coefficient| * |distance|.
+// This culling need not be exact, because the rasterizers are. It may keep an untouched child, but
+// must never omit a touched child, and "inside" must never be wrong. Both hold because every sum is
+// widened, or narrowed, by more than its rounding error. Vertices and edges are exact in doubles
+// (below 2^42). Normals are computed in integers and rounded once. All other values are sums of at
+// most eight products, each with an error of at most 3 * 2^-53 of |coefficient| * |distance|.
 //
 // Quad is a vector of four doubles with load(coordinates, origin), arithmetic and
-//   rotated()        elements 1, 2, 0, 3
-//   clamp_to_zero()     max(x, 0)
-//   negative()       the sign bits, one per element
+//   rotated()          elements 1, 2, 0, 3
+//   clamp_to_zero()    max(x, 0)
+//   negative()         the sign bits, one per element
 #pragma once
 
 #include <cstdint>

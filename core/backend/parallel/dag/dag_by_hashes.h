@@ -1,14 +1,15 @@
-// The second DAG construction of Sintorn, "DAG Construction" (2018): every octree node is hashed
-// from the leaves up; then, from the top down, each level's nodes that still have a parent are
-// sorted by hash, duplicates are removed and parents rewired. Children of removed nodes are never
-// visited, so that the cost of sorting follows the largest level of the DAG, not of the octree.
+// The second DAG construction of Sintorn, "DAG Construction" (2018). First, every octree node is
+// hashed, from the leaves up. Then, from the top down, the nodes of each level that still have a
+// parent are sorted by hash, duplicates are removed and the parents are rewired. Children of
+// removed nodes are never visited, so the cost of sorting is proportional to the largest level of
+// the DAG, not of the octree.
 //
-// A verification sweep makes it exact: on every level every octree node, removed or not, is
-// compared with the survivor of its hash (brick masks; above, mask and list of child hashes). If
-// all agree on all levels, equal hash implies equal subtree, by induction from the bricks: the
-// children of two equal nodes have equal hashes, so are equal. Then a level's hashes are all
-// different, and their order is the total order. After any mismatch the DAG is made by pointers
-// instead.
+// A verification pass makes the result exact. On every level it compares every octree node, removed
+// or not, with the remaining node of the same hash: for bricks their masks, above the bricks the
+// child masks and the lists of child hashes. If all agree on all levels, nodes with equal hashes
+// have equal subtrees. This follows by induction from the bricks: the children of the two nodes
+// have equal hashes, so the children are equal. Then all hashes of a level are different, and their
+// order is the total order. After any mismatch, the DAG is made by pointers instead.
 #pragma once
 
 #include <cstdint>

@@ -1,12 +1,12 @@
 // The first DAG construction of Sintorn, "DAG Construction" (2018), after Kämpe, Sintorn and
-// Assarsson, "High Resolution Sparse Voxel DAGs" (2013): bottom-up, the nodes of a level are sorted
-// by their (up to eight) child pointers, equal neighbors become one node, and parents are rewired
-// through
+// Assarsson, "High Resolution Sparse Voxel DAGs" (2013). From the bottom up, the nodes of a level
+// are sorted by their (up to eight) child pointers, equal neighbors become one node, and the
+// pointers of their parents are replaced by the mapping
 //
 //     original index -> sorted index -> compact index
 //
-// It is exact without hashes. Child pointers here are positions in the total order of the level
-// below, so nodes sorted by child pointers and then stably by hash are in their own total order.
+// This is exact without hashes. A child pointer here is a position in the total order of the level
+// below. So nodes that are sorted by child pointers, and then stably by hash, are in total order.
 #pragma once
 
 #include <algorithm>

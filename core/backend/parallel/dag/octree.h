@@ -1,9 +1,9 @@
-// The octree of a subvolume from its sorted brick codes, bottom-up, as in Sintorn, "DAG
-// Construction" (2018): mark the first child of each parent, prefix sum, child masks and pointers,
-// level by level.
+// Builds the octree of a subvolume from its sorted brick codes, from the bottom up, as in Sintorn,
+// "DAG Construction" (2018). For each level it marks the first child of each parent, computes a
+// prefix sum of the marks, and then the child masks and pointers.
 //
-// Codes are sorted, so the children of a node are consecutive in the level below: a node is its
-// child mask and the position of its first child.
+// Because codes are sorted, the children of a node are consecutive in the level below. So a node is
+// stored as its child mask and the position of its first child.
 #pragma once
 
 #include <cstdint>

@@ -1,31 +1,35 @@
-// A space is memory and the loops over it: HostSpace (threads) or CudaSpace (one stream of a GPU).
-// The pipeline of Sintorn, "DAG Construction" (Eurographics 2018 tutorial), is written once, as
-// templates over a space; the work on one element is a functor with a host+device operator().
+// A space is a memory with loops that work on it: HostSpace (threads) or CudaSpace (one stream of a
+// GPU). The pipeline of Sintorn, "DAG Construction" (Eurographics 2018 tutorial), is written once,
+// as templates over a space. The work on one element is a functor with a host+device operator().
 //
-// Both spaces have these members; pointers are into the space's own memory:
+// Both spaces have these members. Pointers point into the space's own memory.
 //
-//   for_each(n, f)                      f(i) for i < n, in no order; f is copied
-//   for_each_thread_block(n, k)         thread block kernels, see thread_block.h
+//   for_each(n, f)                      calls f(i) for every i < n, in any order; f is copied
+//   for_each_thread_block(n, k)         runs thread block kernels, see thread_block.h
 //   expand(offsets, first, last, n, f)  segmented work expansion: source s owns the outputs from
-//                                       offsets[s] to offsets[s + 1]; f(s, rank, output) for the n
-//                                       outputs of sources [first, last), the first counted as 0
-//   scan(counts, n)                     counts[0, n) to exclusive prefix sums, the sum in counts[n]
-//   select(flags, n, out)               the positions whose flag is not 0, ascending; their number
-//   merge_runs(keys, masks, n, ...)     reduce by key: each run of equal keys to one key and the OR
-//                                       of its masks; the number of runs
-//   count_bits(masks, n)                set bits in all
+//                                       offsets[s] to offsets[s + 1]. Calls f(s, rank, output) for
+//                                       the n outputs of the sources [first, last); the first of
+//                                       these outputs is number 0
+//   scan(counts, n)                     replaces counts[0, n) by exclusive prefix sums, and writes
+//                                       the total to counts[n]
+//   select(flags, n, out)               writes the positions of nonzero flags, ascending; returns
+//                                       their number
+//   merge_runs(keys, masks, n, ...)     reduces each run of equal keys to one key and the OR of its
+//                                       masks; returns the number of runs
+//   count_bits(masks, n)                returns the number of set bits in all masks
 //   sort_keys, sort_pairs               stable radix sorts by a range of the keys' bits; the
 //                                       second buffers are scratch of the same size
-//   copy, upload, download              n elements within the space, from and to host memory
-//   value(pointer)                      one element, on the host
-//   staging(to, max_count)              host memory for triangles whose destination is `to`
-//   upload_staged(area, to)             copies them to their destination
-//   available()                         estimate of the bytes that can be allocated now
-//   allocate, release, budget           memory; use SpaceArray
+//   copy, upload, download              copy n elements: within the space, from host memory, to
+//                                       host memory
+//   value(pointer)                      returns one element to the host
+//   staging(to, max_count)              returns host memory for triangles whose destination is `to`
+//   upload_staged(area, to)             copies these triangles to their destination
+//   available()                         estimates the bytes that can be allocated now
+//   allocate, release, budget           memory; use SpaceArray instead
 //
 // Calls take effect in their order. kWindow items, or kMaxTiles tiles, are enough to occupy a
-// space; kOnHost is true if its memory is the host's. A space belongs to one build and one thread.
-// Canceled builds throw from any call.
+// space. kOnHost is true if the space uses host memory. A space belongs to one build and one
+// thread. Any call throws when the build is canceled.
 #pragma once
 
 #include <cstddef>

@@ -1,10 +1,12 @@
 // Thread block kernels: a group of threads that work in phases on memory they share.
 //
 // A kernel K has
-//   K::kThreads, K::kPhases      threads of a block, phases between which they wait for each other
+//   K::kThreads                  number of threads of a block
+//   K::kPhases                   number of phases; between phases the threads wait for each other
 //   K::kMinResidentBlocks        thread blocks that a multiprocessor should have registers for
 //   K::Shared                    the thread block's memory: plain data, uninitialized
 //   operator()(phase, block, thread, Shared&)
+//
 // On a GPU the threads of a thread block run concurrently; on the host one thread runs them in
 // turn, phase by phase, so that the tests execute the same index computations as the device.
 #pragma once

@@ -1,9 +1,9 @@
-// Voxelization by work expansion (Sintorn, "DAG Construction", 2018): (triangle, cube) pairs
-// descend from a cube to the children that the triangle touches, level by level, by count -> scan
-// -> emit.
+// Voxelization by work expansion (Sintorn, "DAG Construction", 2018). Level by level, every
+// (triangle, cube) pair is replaced by pairs of the triangle and each child of the cube that it
+// touches: count the children, scan the counts, emit the pairs.
 //
-// Each level has a frame of fixed size. A full frame is expanded in slices that fit the next one,
-// depth first, so that memory is bounded for any triangles.
+// Each level has a frame of fixed size. A full frame is expanded depth first, in slices whose pairs
+// fit the next frame, so that memory is bounded for any triangles.
 #pragma once
 
 #include <algorithm>

@@ -1,10 +1,10 @@
-// The bricks of one tile of 64^3 voxels, drawn by one thread block: its shared memory holds
-// 4096 brick masks while all triangles of the tile are drawn into them. Then the bricks that are
-// not empty are written in Morton order.
+// Draws the bricks of one tile of 64^3 voxels with one thread block. Its shared memory holds 4096
+// brick masks, and all triangles of the tile are drawn into them. Then the bricks that are not
+// empty are written in Morton order.
 //
-// Drawn are (triangle, cell) pairs, a cell being a cube of 16^3 voxels that the triangle touches:
-// one thread finds the bricks of its cell, then the voxels of each. Masks are combined by OR, so
-// the result does not depend on the order.
+// The unit of work is a (triangle, cell) pair; the cell is a cube of 16^3 voxels that the triangle
+// touches. One thread finds the touched bricks of its cell, and then the voxels of each brick.
+// Masks are combined by OR, so the result does not depend on the order.
 #pragma once
 
 #include <cstdint>

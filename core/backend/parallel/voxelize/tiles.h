@@ -1,10 +1,10 @@
-// The fast voxelization: pairs descend to (triangle, 16^3 cell) only and are grouped by tile; each
-// tile's bricks are drawn by one thread block in shared memory (tile_kernel.h). There is no list of
-// voxels, nothing smaller than a cell is sorted, and bricks are made in Morton order.
+// The fast voxelization. Pairs are expanded only down to (triangle, 16^3 cell), and grouped by
+// tile. One thread block draws the bricks of a tile in shared memory (tile_kernel.h). There is no
+// list of voxels, nothing smaller than a cell is sorted, and bricks are made in Morton order.
 //
-// All triangles of the subvolume and their pairs are in memory together; a subvolume where they do
-// not fit is split. The smallest subvolume cannot be: it is voxelized by voxel_list.h instead,
-// which reads its triangles in batches.
+// All triangles of the subvolume and their pairs are in memory at the same time. If they do not
+// fit, the subvolume is split. The smallest subvolume cannot be split. voxel_list.h voxelizes it
+// instead, and reads its triangles in batches.
 #pragma once
 
 #include <algorithm>

@@ -2,22 +2,21 @@
 // test of core/geometry/overlap.h (Schwarz and Seidel 2010, section 4.1). Terms shared by the cells
 // are computed once.
 //
-// Let `low` be a corner of the lattice of cells, 2^shift units per edge, and k a cell's position on
-// it. Every test asks for the sign of
+// Let `low` be a corner of the lattice of cells, which are 2^shift units wide, and k the position
+// of a cell in this lattice. For an integer vector g and a constant c, every test is the sign of
 //
-//     g . k * 2^shift + c     for an integer vector g;   2^shift i + c >= 0  <=>  i + floor(c /
-//                                                        2^shift) >= 0  for an integer i
+//     g . k * 2^shift + c
 //
-// so that only the floored constants ever see the units within a cell. Vertices are odd: their
-// differences are even, so half edges and quarter normals are integers; and no vertex is on the
-// boundary of a cell.
+// For an integer i, 2^shift i + c >= 0 <=> i + floor(c / 2^shift) >= 0. So the tests of cells use
+// only the rounded constants and no units within a cell. Vertices are odd. Their differences are
+// even, so half edges and quarter normals are integers, and no vertex is on the boundary of a cell.
 //
-// Bounds, for triangles of less than 2^28 units in each axis ("narrow") and lattices of at most
-// 2^28 units (the largest grid): half edges < 2^27, quarter normals n_a < 2^55. Where triangle and
-// lattice are not apart in an axis, |low - v| < 2^29 there, so edge constants are below 2^58. The
-// plane's need 128 bits. Clamping a constant changes no sign as long as the added terms are
-// smaller: less than 2^30 for edges (8 half edges), 12 max |n_a| for the plane, with N = 4. Larger
-// triangles are tested cell by cell.
+// The bounds are for triangles of less than 2^28 units in each axis ("narrow") and lattices of at
+// most 2^28 units (the largest grid). Half edges are < 2^27, quarter normals n_a < 2^55. If the
+// triangle and the lattice overlap in an axis, |low - v| < 2^29 in this axis, so edge constants are
+// below 2^58. The constants of the plane need 128 bits. Clamping a constant changes no sign as long
+// as the added terms are smaller: with N = 4, these are below 2^30 for edges (8 half edges) and
+// 12 max |n_a| for the plane. Larger triangles are tested cell by cell.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,9 @@
-// Voxelization as in Sintorn, "DAG Construction" (2018): triangles to a list of voxels, as Morton
-// codes within the subvolume, sorted and packed into bricks. tiles.h makes the same bricks faster.
+// Voxelization as in Sintorn, "DAG Construction" (2018). It makes a list of the voxels of all
+// triangles, as Morton codes within the subvolume, which is sorted and packed into bricks. tiles.h
+// makes the same bricks faster.
 //
 // The list has a fixed capacity and is packed whenever it is full, so that the memory needed
-// follows the bricks, not the triangles.
+// depends on the bricks, not on the triangles.
 #pragma once
 
 #include <algorithm>
