@@ -11,9 +11,9 @@
 //   output   buckets are written in the order of their hashes, and the position of every row is
 //            stored for the level above
 //
-// The order within the runs is used to find the frames of a partition and the rows of a bucket, and
-// by the k-way heap merge for rows that a sort cannot hold (truncated hashes). Memory use is
-// bounded by the budget, never by the scene: if not all runs fit in one pass, neighboring artifacts
+// The order within the runs serves to find the frames of a partition and the rows of a bucket. The
+// k-way heap merge also needs it, for rows that a sort cannot hold (truncated hashes). The budget
+// bounds the memory for any scene: if not all runs fit in one pass, neighboring artifacts
 // are first merged with each other, in one or more passes. docs/architecture.md, "Why the merge is
 // right", has the proof; merge/load/row.h defines the terms.
 #pragma once

@@ -1,9 +1,11 @@
-// Accounts for large buffers, so that a build never exceeds --memory: each is charged here before
-// it is allocated. If the charge fails, its owner spills, splits or refuses the work.
+// Accounts for large buffers, so that a build never exceeds --memory. Each buffer is charged here
+// before it is allocated. If the charge fails, the buffer's owner spills, splits or refuses the
+// work.
 //
 // Invariants:
 //   1. used() <= limit() at any time.
 //   2. A budget may be a share of a parent: every charge is charged to the parent too.
+//
 // Thread-safe.
 #pragma once
 

@@ -1,10 +1,11 @@
-// Normals in two bytes: the octahedral projection, by integers and IEEE doubles of fixed order
-// (docs/color.md, "Normals"), so that the same sums are the same bytes on every machine.
+// Normals in two bytes, by the octahedral projection. It is computed with integers and with IEEE
+// doubles in a fixed order (docs/color.md, "Normals"), so that the same sums produce the same bytes
+// on every machine.
 //
 //     byte 0: 127 + 127 px, byte 1: 127 + 127 py, each 0 to 254
 //
-// where (px, py) = (x, y) / (|x| + |y| + |z|), and for z < 0 its mirror image at the diagonals:
-// ((1 - |py|) sign x, (1 - |px|) sign y), the sign of 0 being positive.
+// For z >= 0, (px, py) = (x, y) / (|x| + |y| + |z|). For z < 0, this point is mirrored at the
+// diagonals: ((1 - |py|) sign x, (1 - |px|) sign y). The sign of 0 is positive.
 #pragma once
 
 #include <array>

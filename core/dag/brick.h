@@ -2,8 +2,7 @@
 //
 //   bit = 32 x1 + 16 y1 + 8 z1 + 4 x0 + 2 y0 + z0      (x1, x0: high and low bit of x, and so on)
 //
-// which is the voxel's Morton code within the brick: byte k of the mask is child k of a 2x2x2
-// split.
+// This is the voxel's Morton code within the brick: byte k of the mask is child k of a 2x2x2 split.
 #pragma once
 
 #include <cstdint>

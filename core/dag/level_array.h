@@ -1,6 +1,7 @@
-// Level arrays: the nodes of one level of a sub-DAG, or of several merged, in the total order
+// Level arrays: the nodes of one level of a sub-DAG, or of several merged sub-DAGs. They are in the
+// total order, by
 //
-//     (hash, mask, child indices lexicographically)         bricks: (hash, mask)
+//     (hash, mask, child indices lexicographically)         or, for bricks, (hash, mask)
 //
 // Child indices are positions in the next level's array (bricks follow the last node level). Within
 // a level no two nodes are equal in mask and children. Not thread-safe.

@@ -1,5 +1,6 @@
-// Rows of a table, from the description of a record (core/fields/field.h), whose members are
-// integers, enums, double, text, bytes or optional integers:
+// Writes and reads rows of a table. A row is made from the description of a record
+// (core/fields/field.h), whose members are integers, enums, double, text, bytes or optional
+// integers:
 //
 //   template <class Row>
 //   void fields(Row& row, Record& record) {
@@ -7,7 +8,8 @@
 //     row("name", record.name);
 //   }
 //
-// From it put_row() and select_rows() make their SQL, so that no column is known by its number.
+// put_row() and select_rows() make their SQL from this description, so that no code needs the
+// number of a column.
 #pragma once
 
 #include <optional>

@@ -9,8 +9,9 @@
 //     visit.derived("daily_cost", trip.total / trip.days);
 //   }
 //
-// JSON, JSON schemas, command-line options, Python keywords and checks are visitors. A member's
-// type decides its form: an enumeration has enum_names(E), a set of names has NameSetTraits.
+// There are visitors for JSON, JSON schemas, command-line options, Python keywords and checks. A
+// member's type determines its form: an enumeration has enum_names(E), a set of names has
+// NameSetTraits.
 // Visitors that write are given a copy of the struct, so `fields` takes it by reference in both
 // directions.
 #pragma once

@@ -1,7 +1,7 @@
 // The voxel grid in world space and how world positions are snapped to its fixed-point lattice.
 //
-// Computed in IEEE doubles with + - * / only, compiled without fused multiply-add, so that every
-// machine snaps to the same positions:
+// All values are computed in IEEE doubles with only + - * /, and compiled without fused
+// multiply-add, so that every machine snaps to the same positions:
 //     edge   = max(hi - lo) * (1 + 2^-15)        origin = 0.5 * (lo + hi) - 0.5 * edge
 //     x      = ((w - origin) / edge) * R         u      = 2 * floor(128 * x) + 1
 // The default cube does not depend on R.

@@ -2,7 +2,7 @@
 // gamma and orientation, as glTF requires.
 //
 // Decoders: libpng, and libjpeg-turbo with its accurate integer transform and smooth upsampling.
-// All invalid bytes end in BrokenImage, including bytes that declare any size. Not thread-safe.
+// All invalid bytes cause BrokenImage, whatever image size they declare. Not thread-safe.
 #pragma once
 
 #include <cstddef>

@@ -2,10 +2,10 @@
 // that is full, loses unsynced data, or flips bits. Paths are plain byte strings.
 //
 // Errors: kNotFound, kNoSpace (ENOSPC, EDQUOT, EFBIG), kIo; the message names the call, the path,
-// the offset if there is one, and the system's reason. Short reads and writes and EINTR are handled
-// inside. A FileSystem is thread-safe. A file is not, except that several threads may call
-// ReadableFile::read_at and WritableFile::write_at, and WritableFile::sync and release concurrently
-// with them.
+// the offset if there is one, and the system's reason. Implementations handle short reads and
+// writes, and EINTR. A FileSystem is thread-safe. A file is not, except that several threads may
+// call ReadableFile::read_at and WritableFile::write_at, and WritableFile::sync and release
+// concurrently with them.
 #pragma once
 
 #include <cstddef>

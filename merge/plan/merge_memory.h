@@ -1,12 +1,13 @@
-// How a merge divides the memory that it is given; scheduler/spec/memory_plan.h has the other
+// How a merge divides the memory that it may use. scheduler/spec/memory_plan.h describes the other
 // stages.
 //
-//   position maps    of the level below and of this one, up to resident_bytes each; else spilled
+//   position maps    of the level below and of this level, up to resident_bytes each; larger maps
+//                    are spilled
 //   workers          frames, windows of spilled maps, memory for sorting a bucket
 //   hash partition   all the rest, at least partition_bytes
 //
-// The fan-in is bounded by the hash partition: it must hold two frames of every run, so that,
-// whatever the hashes, the rows of any one hash fit unless they are many.
+// The hash partition limits the fan-in: it must hold two frames of every run. Then the rows of any
+// single hash fit, unless there are very many of them.
 #pragma once
 
 #include <algorithm>

@@ -1,10 +1,10 @@
 // Encodes colors in blocks of 128 bits: up to 32 cells, 4 bits each. docs/format.md, "Color
-// blocks", is the layout; voxdag_reader_colors.h decodes it.
+// blocks", documents the layout. voxdag_reader_colors.h decodes the blocks.
 //
-// A block has two ends and, for each cell, a weight between them. The ends come from the colors'
-// principal axis and one step of least squares, once for each of the two modes, of which the one
-// with the smaller squared error is taken. All of it is exact, so that the same colors are the same
-// bytes on every machine. Blocks of one or two colors are exact.
+// A block has two ends and, for each cell, a weight between them. The ends follow from the colors'
+// principal axis and one step of least squares. They are computed for both modes, and the mode with
+// the smaller squared error is used. All arithmetic is exact, so that the same colors produce the
+// same bytes on every machine. Blocks of one or two colors are lossless.
 #pragma once
 
 #include <array>

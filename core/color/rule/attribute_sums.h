@@ -1,5 +1,5 @@
-// The sums of a region's cells for attributes that do not follow from the ColorSum, one class each
-// in a list. The cells are numbered by RegionCells.
+// The sums of a region's cells for the attributes that do not follow from the ColorSum: a list with
+// one class for each such attribute. RegionCells numbers the cells.
 //
 // A class of the list has
 //     static constexpr Attribute kAttribute;

@@ -1,12 +1,13 @@
-// What the surfaces in a region of the color grid look like: the rule of docs/color.md. The sum of
-// a cell is a function of the triangles that touch it, of their materials and of the images,
-// whatever the order of the triangles, and whichever region that contains the cell is baked.
+// Computes how the surfaces in a region of the color grid look, by the rule of docs/color.md. The
+// sum of a cell is a function of the triangles that touch the cell, of their materials and of the
+// images. It does not depend on the order of the triangles, or on the region in which the cell is
+// baked.
 //
-// `Textures` is a reader of images, linear and with 16 bits per channel, as pyramids of
-// box-filtered levels, the first one being the image:
+// `Textures` is a reader of images. An image is a pyramid of box-filtered levels, linear and with
+// 16 bits per channel. The first level is the image itself. The members of `Textures` are
 //     uint32_t levels(uint32_t image), width(uint32_t image, uint32_t level), height(...);
 //     View view(uint32_t image, uint32_t level);
-// with the members of View, which refers to a level,
+// A View refers to a level. Its members are
 //     uint32_t width(), height();
 //     uint64_t texel(uint32_t x, uint32_t y);  // r lowest, then g, b, a
 //     void prefetch(uint32_t x, uint32_t y);

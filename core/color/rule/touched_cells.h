@@ -1,11 +1,12 @@
-// The cells of a range that a triangle touches, each with the columns in which it covers the cell:
-// exact, and a function of triangle and cell alone.
+// Finds the cells of a range that a triangle touches, and the columns in which it covers each of
+// these cells. The result is exact, and depends only on the triangle and the cell.
 //
-// By columns of cells along the triangle's dominant axis. Where its shadow contains a column's
-// whole closed square, the cells of that column that the triangle touches are those that its plane
-// touches; where the shadow only touches the square, the edges in the other two projections decide
-// too. From one column to the next the plane climbs by at most a cell, and so is followed by
-// additions, from an estimate in doubles that exact values correct.
+// The search visits columns of cells along the triangle's dominant axis. The triangle's shadow is
+// its projection along this axis. If the shadow contains a column's whole closed square, the
+// triangle touches exactly the cells of the column that its plane touches. If the shadow only
+// touches the square, the edges in the other two projections decide too. From one column to the
+// next the plane climbs by at most one cell. So its height is updated by additions, and starts from
+// an estimate in doubles that exact values correct.
 #pragma once
 
 #include <cstdint>

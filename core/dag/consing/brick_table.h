@@ -1,8 +1,8 @@
 // The unique bricks of one subvolume: an open-addressing table from masks to ids 0, 1, 2, ...
 //
-// Slots are indexed by the top bits of the brick's hash and probed linearly. So growing is one
-// streaming pass, and the slots from first to last are almost in the order of the hash: the level
-// array is made by sorting a nearly sorted array (sort_slots()). Not thread-safe. Throws
+// Slots are indexed by the top bits of the brick's hash and probed linearly. So the table grows in
+// one sequential pass, and its slots are almost in the order of the hash. To make the level array,
+// only a nearly sorted array must be sorted (sort_slots()). Not thread-safe. Throws
 // OutOfBudget when the budget cannot hold more.
 #pragma once
 

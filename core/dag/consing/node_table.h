@@ -3,9 +3,9 @@
 //   slots     [tag | id]  [tag | id] ...           8 bytes each; tag: upper half of the node's hash
 //   records   hash (2 words), child mask, children        words of 32 bits; id = word of its start
 //
-// Slots are indexed by the top bits of the hash and probed linearly. So growing is one streaming
-// pass over the tags, and the slots from first to last are almost in the order of the hash: the
-// level array is made by sorting a nearly sorted array (sort_slots()). Records never move, and
+// Slots are indexed by the top bits of the hash and probed linearly. So the table grows in one
+// sequential pass over the tags, and its slots are almost in the order of the hash. To make the
+// level array, only a nearly sorted array must be sorted (sort_slots()). Records never move, and
 // neighbors in space are neighbors in memory. Not thread-safe. Throws OutOfBudget when the budget,
 // or 2^32 words, cannot hold more.
 #pragma once

@@ -1,5 +1,5 @@
 // The parts of an artifact: a sub-DAG on disk between the build and the merge, many of them in one
-// segment file. docs/format.md, "Segments and artifacts", is the byte layout.
+// segment file. docs/format.md, "Segments and artifacts", documents the byte layout.
 //
 //   segment:   [header] [artifact] [artifact] ...
 //   artifact:  [frames of the bricks] [frames of level L-3] ... [frames of its top level] [index]

@@ -1,6 +1,7 @@
 // Copies artifacts between builds. A cache entry is a file of one artifact. An artifact of one
 // subvolume can be copied into a segment for another cube of the same size, since hashes and
-// indices depend neither on place nor on level. docs/format.md, "Cache entry", is the byte layout.
+// indices depend neither on place nor on level. docs/format.md, "Cache entry", documents the byte
+// layout.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
 // The index at an artifact's end: its roots, its levels and their frames. docs/format.md, "Artifact
-// index", is the byte layout.
+// index", documents the byte layout.
 #pragma once
 
 #include <cstddef>

@@ -1,15 +1,15 @@
 // Encodes and decodes one frame: up to kFrameRows rows of one level as columns. docs/format.md,
-// "Frame", is the byte layout.
+// "Frame", documents the byte layout.
 //
 //   bricks:   column(mask byte planes)
 //   nodes:    plane count, hashes, column(masks), column(children, byte plane 0), ...
 //   column:   [stored size, high bit: zstd] [bytes]
 //
-// Hashes and the low byte plane of the children are random and are stored as they are. The other
-// columns are compressed where that pays: measured on real sub-DAGs, zstd level 1 reduces brick
-// masks to 50-60 %, child masks to 55-80 %, high child planes to nothing, middle ones to 60-90 %,
-// for 10-25 ns per row in both directions together. A column that shrinks by less than a quarter is
-// not compressed in the next frames.
+// Hashes and the low byte plane of the children are random and are stored uncompressed. The other
+// columns are compressed if that saves enough. On real sub-DAGs, zstd level 1 reduces brick masks
+// to 50-60 %, child masks to 55-80 %, high child planes to almost nothing, and middle planes to
+// 60-90 %. Compression and decompression together take 10-25 ns per row. A column that shrinks by
+// less than a quarter is not compressed in the next frames.
 #pragma once
 
 #include <array>

@@ -3,7 +3,7 @@
 //
 //   [tier 0] [tier 1] ... [tier table]            tier: [regions' data] [directory]
 //
-// voxdag_reader_colors.h, which stands alone, repeats the numbers it needs.
+// voxdag_reader_colors.h includes no other headers of voxdag, so it repeats the numbers it needs.
 #pragma once
 
 #include <cstddef>

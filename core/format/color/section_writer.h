@@ -1,8 +1,10 @@
-// Writes an attribute section behind the levels of a global file, whatever the attribute: tiers of
-// regions with their directories. docs/format.md, "The color section", is the byte layout.
+// Writes an attribute section after the levels of a global file: tiers of regions with their
+// directories. It is the same for all attributes. docs/format.md, "The color section", documents
+// the byte layout.
 //
-// The regions of tier 0 go to the file as they come; the regions of the coarser tiers and the
-// directories are in memory until finish(), charged to the budget. One thread uses a writer.
+// The regions of tier 0 are written to the file when they are added. The regions of the coarser
+// tiers and the directories are in memory until finish(), charged to the budget. One thread uses a
+// writer.
 #pragma once
 
 #include <cstdint>

@@ -1,14 +1,14 @@
 // Writes the global file: one SVDAG, levels contiguous, variable-size nodes, canonical bytes.
-// docs/format.md, "The global file", is the byte layout; voxdag_reader.h reads it.
+// docs/format.md, "The global file", documents the byte layout. voxdag_reader.h reads the file.
 //
 // Levels are stored in the order in which the merge finishes them, from the bricks up to the root.
-// Within a level everything is addressed in 32-bit words from the level's start: a brick is two
-// words (low half of the mask first), a node is its child mask followed by the word offsets of its
-// children in the next level, one word each, or two (low half first) if that level is wide. Nothing
-// in the file varies with time, place or machine.
+// Within a level everything is addressed in 32-bit words from the level's start. A brick is two
+// words, the low half of the mask first. A node is its child mask, then the word offsets of its
+// children in the next level: one word each, or two (low half first) if that level is wide. Nothing
+// in the file depends on the time, the place or the machine.
 //
-// Checksums are computed from the words that the merge passes in, never from a file, and the sealed
-// file is read and compared: bytes that a disk returns wrong are Error{kCorrupt}.
+// Checksums are computed from the words that the merge passes in, never from a file. The sealed
+// file is read and compared with them: wrong bytes from a disk are Error{kCorrupt}.
 //
 // One thread uses a writer, except for write_words() and sync().
 #pragma once
