@@ -1,4 +1,4 @@
-// Builds: a scene in, one .vdag file out.
+// Builds one .vdag file from a scene.
 //
 //     voxdag::BuildOptions options;
 //     options.scenes = {"scene.glb"};
@@ -6,13 +6,13 @@
 //     options.output = "scene.vdag";
 //     const voxdag::BuildResult result = voxdag::build(options);
 //
-// A build may be interrupted at any time, also by SIGKILL: the same call resumes it from its work
-// folder and produces the same bytes. The scene and the options of geometry decide every byte of
-// the file; memory, threads and folders never do.
+// A build may be interrupted at any time, even by SIGKILL: the same call resumes it from its work
+// folder and produces the same bytes. Every byte of the file depends only on the scene and the
+// options of geometry, never on memory, threads or folders.
 //
 // Errors are voxdag::Error with one of the codes of voxdag/error.h and a message that names the
-// problem, the place and the expectation. Both functions are thread-safe; two builds with one
-// output or one work folder exclude each other. docs/library.md has more.
+// problem, the place and the expectation. Both functions are thread-safe; two builds with the
+// same output or work folder exclude each other. docs/library.md has the details.
 #pragma once
 
 #include <array>

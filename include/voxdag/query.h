@@ -6,13 +6,13 @@
 //     dag.lookup(points, dag.grid_levels(), set);
 //
 // The file is mapped, not read. A batch function takes any number of items in one call, works on up
-// to `threads` threads, the caller's among them, and allocates nothing per item. The results do not
+// to `threads` threads including the caller's, and allocates nothing per item. The results do not
 // depend on the threads. All spans of one call have the same length.
 //
 // All functions are const and thread-safe. They throw Error{kInvalidInput} for arguments that break
 // their rules, and Error{kCorrupt} that names the file if the bytes they read are damaged. They
-// check offsets on the way, and no checksums (`voxdag verify` does). docs/library.md describes
-// conventions and units.
+// check the offsets that they follow, but not the checksums (`voxdag verify` does). docs/library.md
+// describes conventions and units.
 #pragma once
 
 #include <array>

@@ -4,7 +4,7 @@
 //     a brick       its 64-bit mask                  (edge 4)
 //     half a brick  the 8 bits of its 2x2x2 voxels   (edge 2)
 //     a voxel       1                                (edge 1)
-// Offsets come from a file that may be damaged: each is checked, a bad one is Error{kCorrupt}.
+// The file may be damaged, so every offset is checked. A bad offset is Error{kCorrupt}.
 // Immutable; any number of threads may read.
 #pragma once
 

@@ -22,11 +22,11 @@ class LevelCells {
              const CancelToken& cancel)
       : file_(file), dag_(dag), budget_(budget), cancel_(cancel) {}
 
-  // Returns the number of set cells in the grid of 2^grid_levels cells per edge, or any number over
-  // `limit` if there are more. The grid must be a brick or larger, coarser than the file's, and not
-  // coarser than in the previous call. Takes 8 bytes for each node two and three levels above the
-  // cells, and 2 bits for each word of these nodes. Throws Error{kOutOfMemory} if the budget has
-  // less, Error{kCorrupt}.
+  // Returns the number of set cells in the grid of 2^grid_levels cells per edge. If it is over
+  // `limit`, the returned number is any number over `limit`. The grid must be a brick or larger,
+  // coarser than the file's, and not coarser than in the previous call. Takes 8 bytes for each node
+  // two and three levels above the cells, and 2 bits for each word of these nodes. Throws
+  // Error{kOutOfMemory} if the budget is smaller, and Error{kCorrupt}.
   uint64_t count(uint32_t grid_levels, uint64_t limit);
 
  private:

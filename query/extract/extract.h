@@ -2,10 +2,10 @@
 // both. Its levels are canonical: they depend only on the voxels.
 //
 // The grid is divided into octree-aligned cubes. For each cube the necessary part of the DAG is
-// read and reduced in memory (part_builder.h), by several threads, and written as an artifact; a
+// read and reduced in memory (part_builder.h), by several threads, and written as an artifact. A
 // cube that does not fit its share of the budget is divided into its children. The merge then makes
-// the file, as for a build. So memory is bounded by the budget, not by the file. Colors and
-// other attributes follow (part_colors.h), if the file has some.
+// the file, as for a build. So memory is bounded by the budget, not by the size of the file. If the
+// file has colors or other attributes, they are written last (part_colors.h).
 #pragma once
 
 #include <cstdint>

@@ -1,11 +1,11 @@
 // The walk of a packet of rays, for any implementation of vectors of four doubles. Each source that
 // includes this is compiled for different instructions, so everything here has internal linkage.
 //
-// Large cells are visited depth first, once for all rays that may cross them: bounds of all rays
-// together skip most children, and each ray is tested with the remaining ones if there are
-// several. If few rays remain, each descends separately through its cells in order, so
-// that it loads nothing behind its hit. Rays take turns, one step each. Memory loads the next cell
-// of a ray while the other rays step.
+// Large cells are visited depth first, once for all rays that may cross them. Common bounds of all
+// rays exclude most children. If several children remain, each ray is tested with each of them. If
+// few rays remain, each ray descends separately through its cells in order, so that it loads no
+// cells behind its hit. These rays take turns, one step each: while the others step, the memory
+// loads the next cell of a ray.
 //
 // A ray crosses a cell if its interval in the cell is not empty. In two cases the result depends on
 // the path from the root: an interval of length 0 in an occupied cell, and two planes passed at the

@@ -45,9 +45,11 @@ const std::vector<std::string>& view_names();
 // walls around and a floor below. "auto" is "inside" if most of the scene cannot be seen from
 // outside, otherwise "iso". `aspect` is the picture's width divided by its height. Without
 // `fov_degrees`, the view chooses the field of view.
+//
 // "inside" and "auto" cast rays for up to half a second, or one to two seconds if the scene is
 // dust. Their number of steps is limited. At the limit, the result is the best view so far, or
 // "iso".
+//
 // Throws Error{kInvalidInput} for another name, and as `cancel` does.
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
                      std::optional<double> fov_degrees, const CancelToken& cancel = {});

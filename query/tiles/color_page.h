@@ -2,7 +2,8 @@
 // (docs/format.md, "Color pages"). Unlike tiles they are addressed by their position, because equal
 // subtrees have different colors.
 //
-// Addresses may come from anyone, and colors from damaged files; the work for a page is bounded.
+// Addresses may come from unknown clients, and colors from damaged files. So the work for a page is
+// bounded.
 #pragma once
 
 #include <array>

@@ -1,10 +1,10 @@
 // Tiles: a node of a finished DAG with a few levels below it, for viewers that fetch visible data
 // (docs/format.md, "Tiles"). A tile is addressed by its root, so that equal subtrees are one tile,
-// wherever they occur. Where it ends in the middle of the DAG, it has for each cut-off child the
-// address of that child's tile and a coarse brick to draw until the tile arrives.
+// wherever they occur. If a tile ends above the bricks, it has for each child of its last level the
+// address of this child's tile and a coarse brick to draw until the tile arrives.
 //
-// Stateless; thread-safe. Offsets may come from anyone and from damaged files: each is checked, and
-// the work for a tile is bounded by its levels.
+// Stateless; thread-safe. Offsets may come from unknown clients and damaged files. So each offset
+// is checked, and the work for a tile is bounded by its number of levels.
 #pragma once
 
 #include <cstdint>

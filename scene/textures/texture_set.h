@@ -1,14 +1,14 @@
 // The materials of a scene with their images, decoded once into pyramids (docs/color.md): linear
-// light, 16 bits, RGBA, and an integer box filter that drops no column, for any image size. Their
-// contents depend on the scene alone, never on memory or threads.
+// light, 16 bits, RGBA, and an integer box filter that omits no column, for any image size. Their
+// contents depend only on the scene, never on memory or threads.
 //
 // The pyramids are kept in memory if they take at most half of the free budget. Otherwise they are
 // in a scratch file. Images are decoded row by row.
 //
 // An image can be missing, broken, too large (over kMaxTexels), or neither PNG nor JPEG (WebP,
-// KTX2). It costs one warning that names the image and a material; its materials keep their factors
-// alone. A valid image whose decoder exceeds the budget (progressive JPEG, interlaced PNG) is an
-// error, because memory must not decide the colors.
+// KTX2). Then one warning names the image and a material, and the materials of this image have only
+// their factors. A valid image whose decoder exceeds the budget (progressive JPEG, interlaced PNG)
+// is an error, because memory must not decide the colors.
 #pragma once
 
 #include <cstdint>

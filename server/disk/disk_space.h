@@ -1,6 +1,6 @@
-// The free space on the data folder's disk. A part is always kept free. Uploads reserve a few
-// megabytes ahead of their writes. So two uploads never count on the same bytes, and a slow upload
-// does not exclude others. Thread-safe.
+// Manages the free space on the data folder's disk. A part of it is always kept free. Uploads
+// reserve a few megabytes ahead of their writes. So two uploads never count on the same bytes, and
+// a slow upload does not exclude others. Thread-safe.
 //
 // A ballast file protects against other programs that fill the disk completely: without it, the
 // databases could not even record a deletion.

@@ -7,6 +7,7 @@
 //   3. Only one request writes to an upload.
 //   4. A deletion removes the marked files, not a newer upload of the same name.
 //   5. Nothing is recorded in a deleted database.
+//
 // Thread-safe. Callers check names with is_scene_name().
 #pragma once
 

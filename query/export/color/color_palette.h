@@ -1,14 +1,15 @@
-// Few colors in place of many, for formats of indexed colors: first all colors are added, then the
-// palette is made, then each color gets an index.
+// Replaces many colors by few, for formats with indexed colors. First all colors are added, then
+// the palette is made, and then each color gets an index.
 //
 // Up to 255 distinct colors are kept unchanged. Otherwise colors with the same six high bits per
-// channel become one, and boxes of them in Oklab (Ottosson 2020) are cut in two,
-// the one with the largest sum of squared distances along an axis first. The cut is at the mean: at
-// the median, as in Heckbert's method, the picture is 0.3 to 0.6 dB worse. A color of the palette
-// is the mean of a box. All of it is in integers, or in IEEE operations of fixed order: the palette
-// depends on how often each color comes, and on nothing else.
+// channel are treated as one color, and these colors are divided into boxes in Oklab (Ottosson
+// 2020). The box with the largest sum of squared distances along an axis is cut in two first. The
+// cut is at the mean: at the median, as in Heckbert's method, the picture is 0.3 to 0.6 dB worse. A
+// color of the palette is the mean of a box. All arithmetic is in integers, or in IEEE operations
+// in a fixed order. So the palette depends only on how often each color occurs.
 //
-// Memory does not grow with the colors, and is charged to the budget. One thread uses a palette.
+// Memory does not grow with the number of colors, and is charged to the budget. One thread uses a
+// palette.
 #pragma once
 
 #include <array>

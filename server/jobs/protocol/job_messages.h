@@ -1,10 +1,11 @@
-// What a job's process reports to the service: one JSON object per line of its standard output,
-// with the name of the message as "message" and the members of its struct under their own names.
+// The messages from a job's process to the service. A message is one JSON object per line of the
+// standard output. It has the name of the message as "message" and the members of its struct under
+// their own names.
 //
 //   {"message":"stage_advanced","done":12,"total":64}
 //
-// The service trusts a job's process no more than a file: a line that is broken, incomplete or
-// unknown has no value.
+// The service does not trust a job's process: a line that is broken, incomplete or unknown is no
+// message.
 #pragma once
 
 #include <cstdint>

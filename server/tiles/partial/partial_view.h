@@ -1,7 +1,7 @@
 // The subvolumes that one job has built so far, coarsely, as a list and as a DAG.
 //
-// 1. The job's folder is read at most once per second, by one of the requests; the others get the
-//    last answer. Reading and converting take at most a twentieth of one core.
+// 1. The job's folder is read at most once per second, by one of the requests; the other requests
+//    get the last answer. Reading and converting take at most a twentieth of one core.
 // 2. One reading handles a limited number of subvolumes, so a large job appears step by step.
 // 3. Nodes never move while a digest is in use: a new digest replaces all nodes in one step.
 //
