@@ -12,7 +12,8 @@ namespace {
 using voxdag::query::Coordinates;
 using voxdag::query::DagFile;
 
-// Looks along the z axis: near voxels are dark, far ones light, nothing is a blank.
+// Looks along the z axis. Near voxels are dark, far voxels are light, and a pixel without a voxel
+// is blank.
 void draw(const DagFile& dag) {
   constexpr int kColumns = 64, kRows = 32;
   const double edge = static_cast<double>(dag.resolution());
@@ -33,13 +34,13 @@ void draw(const DagFile& dag) {
   }
 }
 
-// True if a box of voxels contains a set one: the collision test of a game or a planner.
+// True if a box of voxels contains a set voxel: the collision test of a game or a planner.
 bool collides(const DagFile& dag, const voxdag::query::Region& box) {
   return dag.count({dag.grid_levels(), box}) > 0;
 }
 
-// Moves a box down the y axis until it would touch the scene, and returns its height, -1 if it
-// never does.
+// Moves a box down the y axis until it would touch the scene. Returns its height, or -1 if it never
+// touches.
 int64_t drop_box(const DagFile& dag, int64_t x, int64_t z, int64_t size) {
   for (int64_t y = dag.resolution(); y >= 0; --y)
     if (collides(dag, {{x, y - 1, z}, {x + size, y - 1 + size, z + size}})) return y;

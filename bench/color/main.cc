@@ -1,10 +1,10 @@
-// What a color costs: the rule and the encoding, on one core, for a generated scene.
+// Measures what a color costs: the rule and the encoding, on one core, for a generated scene.
 //
 //     bench_color [K]
 //
 // A wavy, tilted sphere in a color grid of K^3 cells (default 1024), with an image of 1024^2
-// texels, is baked region by region as a build does it. Printed are the nanoseconds of CPU time per
-// colored cell, the least of three runs.
+// texels, is baked region by region as in a build. Prints the nanoseconds of CPU time per colored
+// cell, the least of three runs.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -24,7 +24,7 @@ namespace {
 
 constexpr int kRuns = 3;
 constexpr uint32_t kImageEdge = 1024;
-// The sphere's triangles, of some 16 x 16 cells.
+// The triangles of the sphere are about 16 x 16 cells large.
 constexpr double kTriangleCells = 16;
 
 double cpu_seconds() {
@@ -62,7 +62,7 @@ struct Image {
   }
 };
 
-// The sphere's point at these shares of its circles.
+// Returns the point of the sphere at these fractions of its two circles.
 std::array<int64_t, 3> point_at(const ColorGrid& grid, double along, double up) {
   const double edge = static_cast<double>(uint64_t{kUnitsPerVoxel} << grid.levels);
   const double angle = 2 * M_PI * along, height = M_PI * up;
@@ -96,7 +96,7 @@ std::vector<FixedSurface> sphere(const ColorGrid& grid) {
   return surfaces;
 }
 
-// The surfaces by the regions that their boxes reach.
+// Returns the surfaces of each region that their boxes reach.
 std::vector<std::vector<FixedSurface>> by_region(const ColorGrid& grid) {
   const uint32_t level = grid.region_level();
   std::vector<std::vector<FixedSurface>> regions(size_t{1} << 3 * level);

@@ -1,11 +1,11 @@
-// How near the colors of a file are to the scene's: peak signal-to-noise ratios, over a sample of
-// its cells, of the colors by the rule and of those in the file against the oracle
-// (tests/oracle/surface_color.h).
+// Measures how close the colors of a file are to the scene's colors. Over a sample of the file's
+// cells, it compares the colors by the rule, and the colors in the file, with the oracle
+// (tests/oracle/surface_color.h), and prints peak signal-to-noise ratios.
 //
 //     bench_color_quality [--cells N] [--points N] SCENE FILE.vdag
 //
-// --cells: about how many cells are compared (default: 200000).
-// --points: how many points of a cell the oracle looks at (default: 128).
+// --cells: the approximate number of cells that are compared (default: 200000).
+// --points: the number of points of a cell that the oracle samples (default: 128).
 #include <cinttypes>
 #include <cstdio>
 #include <cstdlib>

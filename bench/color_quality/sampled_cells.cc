@@ -26,7 +26,7 @@ uint64_t count_colored(const voxdag_reader::File& file) {
   return cells;
 }
 
-// Passes the cells of a level on: cubes of bricks, bricks or nodes.
+// Calls the visitor for the cells of a level: cubes of bricks, bricks or nodes.
 template <class Visit>
 struct CellVisitor {
   uint32_t level;  // of the cells
@@ -84,7 +84,7 @@ struct SampledCells::Plane {
       length += std::abs(normal[a]);
     }
   }
-  // True if it misses a cube for sure.
+  // True if the plane certainly misses a cube.
   bool misses(const double (&center)[3], double half) const {
     double distance = -offset, scale = std::abs(offset);
     for (int a = 0; a < 3; ++a) {

@@ -1,4 +1,4 @@
-// Some of the colored cells of a file, and the triangles near each of them.
+// A sample of the colored cells of a file, and the triangles near each cell.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@ using CellPosition = std::array<uint32_t, 3>;
 
 class SampledCells {
  public:
-  // About `wanted` of the file's colored cells, chosen by a hash of their positions: the same ones
-  // for each file with these cells. The file must have colors.
+  // Selects about `wanted` of the file's colored cells by a hash of their positions, so every file
+  // with these cells has the same sample. The file must have colors.
   SampledCells(const voxdag_reader::File& file, uint64_t wanted);
 
   // In Morton order.
@@ -25,7 +25,7 @@ class SampledCells {
   uint64_t file_cells() const { return file_cells_; }
   // log2 of a cell's edge in lattice units.
   int cell_bits() const { return cell_bits_; }
-  // Appends the indices of all cells that the closed triangle touches, and of some that are near.
+  // Appends the indices of all cells that the closed triangle touches, and of some cells near it.
   void find_near(const FixedTriangle& triangle, std::vector<uint32_t>& cells) const;
 
  private:

@@ -1,5 +1,5 @@
-// The scene's appearance for the oracle: decoded images, materials and surfaces. Only the scene
-// readers and the image decoders are shared with the product.
+// The scene's appearance for the oracle: decoded images, materials and surfaces. It shares only the
+// scene readers and the image decoders with the product.
 #pragma once
 
 #include <memory>
@@ -13,9 +13,9 @@ namespace voxdag {
 
 class SceneLooks {
  public:
-  // Decodes all images, 16 bytes a texel. An image that is broken is not used.
+  // Decodes all images, with 16 bytes per texel. Ignores broken images.
   SceneLooks(const SceneMaterials& materials, MemoryBudget& budget);
-  // Refers to the materials here.
+  // The result refers to the materials in this object.
   oracle::Surface surface(const FixedSurface& surface) const;
   size_t texels() const;
 

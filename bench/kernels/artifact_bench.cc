@@ -15,7 +15,7 @@ namespace {
 
 constexpr uint32_t kLevels = 11;
 
-// A sub-DAG of random triangles of about 30 voxels, as in a scan; built once.
+// A sub-DAG of random triangles of about 30 voxels, as in a scan. It is built once.
 struct Sample {
   MemoryBudget budget{uint64_t{4} << 30};
   SubDag dag;

@@ -1,5 +1,5 @@
-// Synthetic artifacts for the benchmarks of the merge: runs of random bricks and nodes in the
-// total order, part of them common to many runs, as neighboring subvolumes share theirs.
+// Synthetic artifacts for the benchmarks of the merge: runs of random bricks and nodes in the total
+// order. Many runs have some of them in common, as neighboring subvolumes have.
 #pragma once
 
 #include <algorithm>
@@ -12,15 +12,16 @@
 
 namespace voxdag {
 
-// A block is a small DAG; a run consists of blocks, and two runs that contain the same block
-// have its nodes in common. Children are random within the block, as they are in hash order.
+// A block is a small DAG, and a run consists of blocks. Two runs that contain the same block have
+// its nodes in common. Children are random within the block, because real nodes are in the order of
+// their hashes.
 class SyntheticRuns {
  public:
   static constexpr uint32_t kLevels = 5;  // of nodes, above the bricks
   static constexpr uint32_t kGridLevels = 14;
 
   // Writes `runs` artifacts of about `rows` rows in total to one segment. Half of each run's blocks
-  // come from a pool that holds each about twice as often as a pool block is drawn.
+  // come from a common pool, and each block of the pool is drawn about four times.
   SyntheticRuns(const std::string& folder, size_t runs, uint64_t rows) {
     segment_path_ = segment_path(folder, 0);
     SegmentWriter segment(system_files(), folder, 0, budget_);

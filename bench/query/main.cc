@@ -1,10 +1,10 @@
-// Speed of queries on one core, warm: this library's, a plain loop over the reader, and OpenVDB and
-// OctoMap on the same cells where they are installed.
+// Measures the speed of queries on one core, with the file in memory: of this library, of a plain
+// loop over the reader, and, if they are installed, of OpenVDB and OctoMap on the same cells.
 //
 //     bench_query [--levels N] [--picture EDGE] FILE.vdag...
 //
-// --levels: on the grid of 2^N cells per edge (default: the file's); rays stop at its cells.
-// --picture: rays through the pixels of a square picture of that edge (default: 1024).
+// --levels: queries the grid of 2^N cells per edge (default: the file's); rays stop at its cells.
+// --picture: casts rays through the pixels of a square picture of that edge (default: 1024).
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -25,7 +25,7 @@ constexpr size_t kReaderBoxes = 20;
 // OctoMap takes some 5 GB for Sponza on a grid of 2048^3.
 constexpr uint32_t kMaxOtherLevels = 11;
 
-// `expected` is the first library's result, if both should find the same.
+// `expected` is the first library's result, if both libraries should have the same result.
 void print(const char* who, const char* what, const Timing& timing,
            const Timing* expected = nullptr) {
   std::printf("  %-22s %-22s %10.4f M/s   found %llu%s\n", who, what, timing.per_second / 1e6,
@@ -40,7 +40,7 @@ uint64_t sum(const std::vector<uint8_t>& set) {
   return found;
 }
 
-// A cell of a coarser grid is set where the reader has a node, or a voxel.
+// A cell of a coarser grid is set if the reader has a node there, or a voxel.
 bool reader_has(const voxdag_reader::File& file, uint32_t grid_levels, const Position& p) {
   if (grid_levels == file.grid_levels()) return file.voxel(p[0], p[1], p[2]);
   uint64_t offset = 0;
@@ -110,7 +110,7 @@ Timing rays(const DagFile& dag, uint32_t grid_levels, const QuerySet& queries) {
   return packets;
 }
 
-// The cells of a few boxes one by one.
+// Reads the cells of a few boxes one by one.
 void reader_boxes(const DagFile& dag, uint32_t grid_levels, const QuerySet& queries) {
   const int64_t edge = int64_t{1} << grid_levels;
   std::vector<uint8_t> cells(kBoxEdge * kBoxEdge * kBoxEdge);

@@ -13,7 +13,8 @@ std::optional<Timings> measure_octomap(const DagFile& dag, uint32_t grid_levels,
                                        const QuerySet& queries) {
   octomap::OcTree tree(1.0);
   const auto half = static_cast<double>(int64_t{1} << (grid_levels - 1));
-  // The grid around the origin, so that grids of up to 2^16 cells fit in the tree's keys.
+  // Keys are relative to the middle of the grid, so that grids of up to 2^16 cells fit in the
+  // tree's keys.
   const auto key_of = [&](const Position& p) {
     const int64_t zero = 32768 - (int64_t{1} << (grid_levels - 1));
     return octomap::OcTreeKey(static_cast<octomap::key_type>(p[0] + zero),
@@ -36,7 +37,8 @@ std::optional<Timings> measure_octomap(const DagFile& dag, uint32_t grid_levels,
   };
   timings.uniform = look_up(queries.uniform);
   timings.set_cells = look_up(queries.set_cells);
-  // castRay() begins within the tree and steps from cell to cell, so rays are a sample.
+  // castRay() begins within the tree and steps from cell to cell, which is slow, so only a sample
+  // of the rays is cast.
   const size_t step = std::max<size_t>(1, queries.origins.size() / 20000);
   timings.rays = best_of_three(queries.origins.size() / step, [&] {
     uint64_t found = 0;

@@ -8,12 +8,13 @@
 
 namespace voxdag::query {
 
-// A BoolGrid of the set cells; lookups by an accessor, rays by the volume ray intersector, which
-// finds the leaf of the tree (8x8x8 cells) that a ray hits first, not the cell; boxes by
-// copyToDense() on one thread, counts by the masks of the leaves. Nothing if it is not installed.
+// Measures a BoolGrid of the set cells. Lookups use an accessor. Rays use the volume ray
+// intersector, which finds the first leaf of the tree (8x8x8 cells) that a ray hits, not the cell.
+// Boxes use copyToDense() on one thread, and counts use the masks of the leaves. Returns nothing if
+// OpenVDB is not installed.
 std::optional<Timings> measure_openvdb(const DagFile& dag, uint32_t grid_levels,
                                        const QuerySet& queries);
-// An OcTree of the set cells; lookups by search(), rays by castRay(), boxes and counts by the
+// Measures an OcTree of the set cells. Lookups use search(), rays castRay(), boxes and counts the
 // iterator over the leaves of a box.
 std::optional<Timings> measure_octomap(const DagFile& dag, uint32_t grid_levels,
                                        const QuerySet& queries);

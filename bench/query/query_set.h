@@ -15,23 +15,24 @@ struct QuerySet {
   std::vector<Coordinates> origins, directions;  // of a picture's pixels, in tiles of 8 x 8
 };
 
-// Boxes of 64^3 cells around the first set cells; those at the edge of the grid reach out of it.
+// Boxes of 64^3 cells around the first set cells. Boxes at the edge of the grid extend beyond it.
 inline constexpr size_t kBoxes = 2000;
 inline constexpr int64_t kBoxEdge = 64;
 Region box_around(const QuerySet& queries, size_t i);
 
-// `points` of each kind in the grid of 2^grid_levels, and the rays through the pixels of a square
-// picture, in cells of that grid, for the placement that `voxdag render` would choose.
+// Returns `points` points of each kind in the grid of 2^grid_levels, and the rays through the
+// pixels of a square picture, in cells of this grid. The camera is at the placement that `voxdag
+// render` would choose.
 QuerySet make_queries(const DagFile& dag, uint32_t grid_levels, size_t points, int picture_edge);
 
-// What a benchmark found, so that libraries can be compared, and its speed.
+// The result of a benchmark, so that libraries can be compared, and its speed.
 struct Timing {
   double per_second = 0;
   uint64_t found = 0;
 };
 
-// What one library was measured to do. What `found` says: of lookups and rays those with a set
-// cell, of dense boxes and of counts all set cells.
+// The measurements of one library. `found` is, for lookups and rays, the number of them with a set
+// cell, and for dense boxes and counts, the number of all set cells.
 struct Timings {
   Timing uniform, set_cells, rays, boxes, counts;
 };
@@ -39,7 +40,7 @@ struct Timings {
 // CPU time of this thread.
 double thread_seconds();
 
-// The best of three runs by CPU time of this thread; run() returns its result.
+// Returns the best of three runs by CPU time of this thread, with the result of run().
 template <class Run>
 Timing best_of_three(size_t items, const Run& run) {
   Timing best;
@@ -52,7 +53,7 @@ Timing best_of_three(size_t items, const Run& run) {
   return best;
 }
 
-// For kBoxes: make_box(i) fills `cells` with box i, z fastest.
+// Runs over kBoxes boxes: make_box(i) fills `cells` with box i, z fastest.
 template <class MakeBox>
 Timing measure_boxes(const std::vector<uint8_t>& cells, const MakeBox& make_box) {
   Timing timing = best_of_three(kBoxes, [&] {

@@ -11,7 +11,7 @@
 namespace voxdag::selftest {
 namespace {
 
-// Does nothing: the cost of a sink is not measured.
+// Ignores its data, so that the cost of a sink is not measured.
 class NullSink : public SubDagSink {
  public:
   void bricks(const BrickLevelView&) override {}

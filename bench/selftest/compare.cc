@@ -28,7 +28,7 @@ Built build(Backend& backend, const SubvolumeTask& task, const Scene& scene) {
   return built;
 }
 
-// The first difference, or "" if there is none.
+// Returns the first difference, or "" if there is no difference.
 std::string difference(const Built& a, const Built& b) {
   if (a.outcome != b.outcome) return "outcome";
   if (a.summary.voxels != b.summary.voxels) return "voxel count";

@@ -18,7 +18,8 @@ struct Subject {
 };
 
 // Builds scenes of every kind with each subject and with the CPU backend, compares every level
-// array and count, and prints a table. `quick`: small cubes only. Returns whether all are equal.
+// array and count, and prints a table. `quick` limits the test to small cubes. Returns true if all
+// results are equal.
 bool compare_with_cpu(const std::vector<Subject>& subjects, bool quick);
 
 struct BenchOptions {

@@ -1,4 +1,4 @@
-// Scenes for the self-test, made from a seed with the standard library alone: triangles on the
+// Scenes for the self-test, made from a seed with only the standard library: triangles on the
 // lattice of a grid of 2^grid_levels voxels.
 #pragma once
 
@@ -16,16 +16,17 @@ struct Scene {
   std::vector<FixedTriangle> triangles;
 };
 
-// Small scenes of every kind that is difficult to voxelize exactly, in and around `cube`: mixed,
-// degenerate, slivers, smaller than a voxel, walls, 45 degrees through voxel corners, spanning the
-// cube, vertices at the limit of the coordinates.
+// Small scenes of every kind that is difficult to voxelize exactly, in and around `cube`: mixed and
+// degenerate triangles, slivers, triangles smaller than a voxel, walls, planes of 45 degrees
+// through voxel corners, triangles that span the cube, and vertices at the limit of the
+// coordinates.
 std::vector<Scene> tricky_scenes(uint64_t seed, const Cube& cube, uint32_t grid_levels, int count);
 
-// A surface like a scanner's: about `triangles` small triangles on a bumpy ball that fills the
+// A surface like a scanned one: about `triangles` small triangles on a bumpy ball that fills the
 // grid.
 Scene scan(uint64_t triangles, uint32_t grid_levels);
 
-// A building: floors, walls, round columns and folded curtains; large and small triangles.
+// A building of large and small triangles: floors, walls, round columns and folded curtains.
 Scene building(uint64_t triangles, uint32_t grid_levels);
 
 }  // namespace voxdag::selftest

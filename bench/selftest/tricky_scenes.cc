@@ -45,8 +45,8 @@ class Maker {
     for (auto& v : t.v) v[axis] = t.v[0][axis];
     return t;
   }
-  // Corners of voxels, all moved by the same unit: planes and edges of 45 degrees meet voxels in
-  // corners.
+  // The vertices are corners of voxels, all moved by the same unit, so planes and edges of 45
+  // degrees meet voxels in their corners.
   FixedTriangle diagonal() {
     FixedTriangle t;
     for (int a = 0; a < 3; ++a) {

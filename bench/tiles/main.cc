@@ -1,15 +1,19 @@
-// Tiles of different depths: how many and how many bytes five pictures need, and how fast one core
-// encodes them.
+// Compares tiles of different depths: the number of tiles and bytes that five pictures need, and
+// how fast one core encodes the tiles.
 //
 //     bench_tiles [--size WxH] [--pixels P --views VIEWS] FILE.vdag
 //
-// For each depth: the tiles and bytes (as they are, and with gzip, tile by tile) until no cell of
-// view `auto` is wider than 16 pixels; until none of each of five views is wider than one pixel;
-// and of all five together. Then the sizes and the speed over those tiles in random order, the
-// first time after the file was dropped from memory (if nothing else holds it there), then from
-// memory; then with checksum blocks compared at their first use, and when all of them are. With
-// VIEWS, a file with lines of a name and the camera options of `voxdag render`: only what those
-// need until no cell is wider than P pixels; the viewer's P is 0.75.
+// For each depth, it prints the number of tiles and their bytes (uncompressed, and with gzip, tile
+// by tile) that are needed
+//   - until no cell of the view `auto` is wider than 16 pixels,
+//   - until no cell is wider than one pixel, for each of five views and for all five together.
+// Then it encodes the last of these sets of tiles in random order, and prints sizes and speed:
+// first after the file was dropped from memory (if no other process keeps it there), then from
+// memory, then with checksum blocks that are compared at their first use, and then with blocks that
+// are already compared.
+//
+// VIEWS is a file whose lines have a name and the camera options of `voxdag render`. With it, only
+// these views are measured, until no cell is wider than P pixels. The viewer's P is 0.75.
 #include <fcntl.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -65,8 +69,8 @@ struct View {
   std::string name;
   Placement placement;
 };
-// The named views, and one from where a voxel of what `auto` sees in its middle is four pixels
-// wide.
+// Returns the named views, and one more view from a point where a voxel in the middle of the `auto`
+// view is four pixels wide.
 std::vector<View> views_of(const DagView& dag, double aspect, int width, int height) {
   std::vector<View> views;
   for (const char* name : {"auto", "iso", "front", "left"})

@@ -1,6 +1,6 @@
-// The tiles needed for a picture. A tile is needed if without it some ray's first cell would be
-// coarser than requested. A tile has its cells; the tile above has the coarse brick, with the cells
-// down to two levels below the tile's root.
+// Finds the tiles needed for a picture. A tile is needed if, without it, the first cell of some ray
+// would be coarser than requested. A tile has its own cells. The tile above it has the coarse
+// brick, with the cells down to two levels below the tile's root.
 #pragma once
 
 #include <algorithm>
@@ -18,10 +18,11 @@ class NeededTiles {
  public:
   using Addresses = std::set<std::pair<uint32_t, uint64_t>>;
 
-  // Cells of up to `pixels` pixels are drawn as they are.
+  // Cells of up to `pixels` pixels are drawn without finer cells.
   NeededTiles(const DagView& dag, double pixels) : dag_(dag), pixels_(pixels) {}
 
-  // The tiles for a picture, by their levels of nodes, from 1; kMaxTileLevels + 1 sets.
+  // Returns the tiles for a picture, for each number of levels per tile, from 1: kMaxTileLevels + 1
+  // sets.
   std::vector<Addresses> find(const Placement& placement, int width, int height) {
     tiles_.assign(kMaxTileLevels + 1, {});
     for (Addresses& tiles : tiles_) tiles.insert({0, 0});
@@ -57,7 +58,7 @@ class NeededTiles {
     return span;
   }
 
-  // Notes the tiles by which the children of the cell at `level` on the present path are known.
+  // Records the tiles that contain the children of the cell at `level` on the current path.
   void mark(uint32_t level) {
     if (level < 2) return;  // known with the first tile
     const uint32_t bricks = dag_.grid_levels() - 2;

@@ -5,9 +5,10 @@
 
 namespace voxdag {
 
-// Checks every invariant of a sub-DAG: levels complete, masks not 0, indices in range, total order
-// without duplicates, hashes right for shape.hash_bits, every node but the root used by a parent.
-// Throws Error{kCorrupt} naming the first level and node that break one.
+// Checks every invariant of a sub-DAG: levels are complete, masks are not 0, indices are in range,
+// nodes are in the total order without duplicates, hashes are right for shape.hash_bits, and every
+// node but the root has a parent. Throws Error{kCorrupt} with the first level and node that break
+// an invariant.
 void check_sub_dag(const SubDag& dag, const SubDagShape& shape);
 
 }  // namespace voxdag

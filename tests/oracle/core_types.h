@@ -1,5 +1,5 @@
-// The oracle's plain types as voxdag's own and back: for tests that compare the two. The oracle
-// itself never includes this.
+// Converts the oracle's plain types to voxdag's own types and back, for tests that compare the two.
+// The oracle itself never includes this.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-// The DAG of a cube of voxels, made from the definitions only: bricks of 4x4x4 voxels, above them
-// nodes of up to eight children, equal ones merged level by level with ordinary maps, every level
-// in the order (hash, mask, child indices).
+// The DAG of a cube of voxels, made only from the definitions: bricks of 4x4x4 voxels, and above
+// them nodes of up to eight children. Equal nodes are merged level by level with ordinary maps.
+// Every level is in the order (hash, mask, child indices).
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,10 @@
 
 namespace oracle {
 
-// The node hash as the format page has it, written a second time.
+// The node hash as defined in docs/format.md, implemented a second time.
 uint64_t brick_hash(uint64_t mask);
 uint64_t node_hash(uint32_t mask, const std::vector<uint64_t>& child_hashes);
-// The top `bits` of a hash, the others 0.
+// Returns the top `bits` of a hash; the other bits are 0.
 uint64_t truncated(uint64_t hash, int bits);
 
 struct Node {
@@ -33,7 +33,7 @@ struct Dag {
   bool operator==(const Dag&) const = default;
 };
 
-// `voxels` has an edge of 4 or more, a power of two. No voxels: a DAG without levels.
+// `voxels` has an edge of 4 or more, a power of two. Without voxels, the DAG has no levels.
 Dag build_dag(const Voxels& voxels, int hash_bits);
 
 }  // namespace oracle

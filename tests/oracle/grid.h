@@ -1,4 +1,4 @@
-// World space to the lattice, as the design page has it, written a second time.
+// Maps world space to the lattice as the documentation defines it, implemented a second time.
 #pragma once
 
 #include <array>
@@ -17,13 +17,13 @@ struct WorldCube {
   double edge = 1;
 };
 
-// The default cube: around all vertices, a little larger than the longest side.
+// The default cube: it contains all vertices, and is slightly larger than their longest extent.
 WorldCube default_cube(const std::vector<WorldTriangle>& triangles);
-// Voxels of one size, centered on the scene.
+// The cube for voxels of a given size, centered on the scene.
 WorldCube cube_of_voxel_size(const std::vector<WorldTriangle>& triangles, double voxel_size,
                              int64_t resolution);
 
-// Snaps all triangles; those whose boxes miss the grid are left out.
+// Snaps all triangles. Omits triangles whose boxes miss the grid.
 Triangles snap(const std::vector<WorldTriangle>& triangles, const WorldCube& cube,
                int64_t resolution);
 

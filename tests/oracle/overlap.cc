@@ -5,7 +5,8 @@
 namespace oracle {
 namespace {
 
-// No overflow: a normal's components are below 2^83, a dot product with a point below 2^125.
+// Nothing overflows: components of a normal are below 2^83, a dot product with a point is below
+// 2^125.
 __extension__ typedef __int128 Wide;
 using Axis = std::array<Wide, 3>;
 
@@ -35,8 +36,9 @@ bool touches(const Triangle& triangle, const Point& low, int64_t edge) {
     corners[i] = {low[0] + (i & 1 ? edge : 0), low[1] + (i & 2 ? edge : 0),
                   low[2] + (i & 4 ? edge : 0)};
 
-  // The faces' normals of the cube, the triangle's, and all products of an edge of one with an edge
-  // of the other: the normals of the faces that the two bodies' difference can have.
+  // The axes are the normals of the cube's faces, the normal of the triangle, and all cross
+  // products of an edge of the cube with an edge of the triangle. These are the normals of all
+  // faces that the Minkowski difference of the two bodies can have.
   const Axis unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   const Axis edges[3] = {minus(triangle[1], triangle[0]), minus(triangle[2], triangle[1]),
                          minus(triangle[0], triangle[2])};

@@ -1,12 +1,12 @@
-// Does a closed triangle touch a closed cube? By the plain separating-axis theorem: two convex
-// bodies are apart iff their projections onto one of a few axes are apart.
+// Decides whether a closed triangle touches a closed cube, by the plain separating-axis theorem:
+// two convex bodies are apart iff their projections onto one of a few axes are apart.
 #pragma once
 
 #include "tests/oracle/triangle.h"
 
 namespace oracle {
 
-// `low` and `edge` in lattice units; coordinates up to kWidest + 1.
+// `low` and `edge` are in lattice units. Coordinates are at most kWidest + 1.
 bool touches(const Triangle& triangle, const Point& low, int64_t edge);
 
 }  // namespace oracle

@@ -41,13 +41,13 @@ class Maker {
   }
 
  private:
-  // Inside the region.
+  // Returns a point inside the region.
   Point point() {
     Point p;
     for (int a = 0; a < 3; ++a) p[a] = low_[a] + random_.odd(0, size_);
     return p;
   }
-  // Within `reach` of p, on every axis.
+  // Returns a point within `reach` of p on every axis.
   Point around(const Point& p, int64_t reach) {
     Point q;
     for (int a = 0; a < 3; ++a) q[a] = random_.odd(p[a] - reach, p[a] + reach);
@@ -56,7 +56,8 @@ class Maker {
   Triangle near(const Point& p, int64_t reach) {
     return {around(p, reach), around(p, reach), around(p, reach)};
   }
-  // A size from a fraction of a voxel to the whole region, small ones as likely as large ones.
+  // Returns a size from a fraction of a voxel to the whole region. Small sizes are as likely as
+  // large ones.
   int64_t some_size() {
     int64_t size = size_;
     while (size > 128 && random_.between(0, 2) != 0) size /= 2;
@@ -103,8 +104,8 @@ class Maker {
     out.push_back({r, s, p});
   }
 
-  // In a plane a + b = 256 k or a - b = 256 k for two axes a and b: it holds edges of voxels, and
-  // touches the voxels next to it without entering them.
+  // A triangle in a plane a + b = 256 k or a - b = 256 k for two axes a and b. The plane contains
+  // edges of voxels, and touches the voxels next to it without entering them.
   Triangle diagonal() {
     const int64_t a = random_.between(0, 2), b = (a + random_.between(1, 2)) % 3;
     const int64_t sign = random_.coin() ? 1 : -1;
@@ -117,7 +118,7 @@ class Maker {
     return t;
   }
 
-  // On the hull of the region.
+  // Returns a point on the hull of the region.
   Point side() {
     Point p = point();
     const int64_t axis = random_.between(0, 2);
@@ -132,7 +133,7 @@ class Maker {
     out.push_back({t[2], t[1], t[0]});
   }
 
-  // The middle of its first edge is a voxel's corner.
+  // A triangle whose first edge has a voxel's corner as its middle.
   Triangle through_corner() {
     const Point corner = near_corner(point());
     const int64_t reach = std::max<int64_t>(some_size() / 2, 3);
@@ -156,7 +157,8 @@ class Maker {
     return t;
   }
 
-  // Two opposite far vertices with a point of the region between them; the third one anywhere.
+  // A triangle with two far vertices on opposite sides of a point of the region. The third vertex
+  // is anywhere.
   Triangle wide() {
     const Point middle = point();
     Point p, q, r;

@@ -1,5 +1,5 @@
-// Seeded triangle scenes of every kind that has ever gone wrong somewhere, placed in and around a
-// region of the grid. The same seed gives the same triangles on every machine.
+// Seeded triangle scenes of every kind that ever revealed a defect, placed in and around a region
+// of the grid. The same seed gives the same triangles on every machine.
 #pragma once
 
 #include <random>
@@ -31,16 +31,16 @@ constexpr SceneKind kAllKinds[] = {
 // "soup", "degenerate", ...
 std::string kind_name(SceneKind kind);
 
-// Random numbers that are alike everywhere, unlike the standard distributions.
+// Random numbers that are the same on every machine, unlike those of the standard distributions.
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}
-  // From [least, most].
+  // Returns a number from [least, most].
   int64_t between(int64_t least, int64_t most) {
     return least + static_cast<int64_t>(engine_() % static_cast<uint64_t>(most - least + 1));
   }
   bool coin() { return between(0, 1) == 1; }
-  // An odd number from [least, most].
+  // Returns an odd number from [least, most].
   int64_t odd(int64_t least, int64_t most) { return between(least, most - 1) | 1; }
 
  private:

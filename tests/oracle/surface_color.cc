@@ -6,8 +6,8 @@
 namespace oracle {
 namespace {
 
-// A point of a triangle: where it is, seen from the cube's low corner, and how much of each corner
-// it has.
+// A point of a triangle: its position relative to the cube's low corner, and its barycentric
+// coordinates.
 struct SurfacePoint {
   std::array<double, 3> at{}, shares{};
 };
@@ -22,7 +22,7 @@ SurfacePoint between(const SurfacePoint& a, const SurfacePoint& b, double part) 
   return out;
 }
 
-// What is on the side of the plane at `bound` where sign * coordinate is less.
+// Returns the part of the polygon where sign * coordinate is less than at the plane `bound`.
 Polygon clipped(const Polygon& polygon, size_t axis, double bound, double sign) {
   Polygon out;
   for (size_t i = 0; i < polygon.size(); ++i) {
@@ -66,7 +66,7 @@ int bordered(int texel, int size, Border border) {
 
 Rgba texture_at(const SurfaceMaterial& material, double u, double v) {
   const ColorImage& image = *material.image;
-  // Whole periods only lose precision.
+  // Removes whole periods, which would only lose precision.
   const double x = std::remainder(u, 2.0) * image.width - 0.5;
   const double y = std::remainder(v, 2.0) * image.height - 0.5;
   const bool far_x = material.borders[0] == Border::kClamp,
@@ -106,8 +106,8 @@ Rgba look_at(const Surface& surface, const std::array<double, 3>& shares) {
   return out;
 }
 
-// The k-th of a sequence of points that are spread evenly over a triangle, as shares of its
-// corners: a lattice with the steps of the plastic number, folded.
+// Returns the k-th of a sequence of points that are spread evenly over a triangle, in barycentric
+// coordinates: a lattice with the steps of the plastic number, folded.
 std::array<double, 3> spread_point(int k) {
   const double steps[] = {0.7548776662466927, 0.5698402909980532};
   double s = std::fmod(0.5 + k * steps[0], 1.0), t = std::fmod(0.5 + k * steps[1], 1.0);
@@ -151,7 +151,7 @@ double linear_to_srgb(double linear) {
 std::optional<std::array<uint8_t, 3>> mean_color(std::span<const Surface* const> surfaces,
                                                  const Point& low, int64_t edge, int points) {
   const std::vector<Piece> pieces = pieces_in(surfaces, low, edge);
-  // Less is what rounding leaves of surfaces that touch the cube from outside.
+  // Smaller areas are rounding errors of surfaces that touch the cube from outside.
   const double least = 1e-9 * static_cast<double>(edge) * static_cast<double>(edge);
   if (pieces.empty() || pieces.back().area_up_to <= least) return std::nullopt;
   std::array<double, 3> seen{}, plain{};

@@ -1,6 +1,6 @@
 // The reference color of a cube of the grid: the mean color of the surfaces in the closed cube, in
-// linear light, over many points spread evenly over their area. Triangles are clipped to the cube;
-// images are sampled bilinearly in their finest texels. All computations are in doubles.
+// linear light, over many points spread evenly over their area. Triangles are clipped to the cube.
+// Images are sampled bilinearly in their finest texels. All computations are in doubles.
 #pragma once
 
 #include <array>
@@ -42,13 +42,13 @@ struct Surface {
   const SurfaceMaterial* material = nullptr;
 };
 
-// sRGB of IEC 61966-2-1, from 0 to 1 both.
+// The transfer function of sRGB (IEC 61966-2-1). Argument and result are from 0 to 1.
 double srgb_to_linear(double encoded);
 double linear_to_srgb(double linear);
 
-// In 8 bits; nothing where the surfaces have no area in the cube: they touch it in points or lines.
-// Surfaces count by area and by alpha, or by area alone where all points are transparent.
-// `points`: number of samples.
+// Returns the mean color in 8 bits, or nothing if the surfaces touch the cube only in points or
+// lines and so have no area in it. Surfaces count by area and by alpha, or only by area if all
+// points are transparent. `points` is the number of samples.
 std::optional<std::array<uint8_t, 3>> mean_color(std::span<const Surface* const> surfaces,
                                                  const Point& low, int64_t edge, int points = 128);
 
@@ -57,9 +57,9 @@ class ColorError {
  public:
   void add(const std::array<uint8_t, 3>& a, const std::array<uint8_t, 3>& b);
   uint64_t colors() const { return colors_; }
-  // Peak signal-to-noise ratio in dB; infinite if all were equal.
+  // Returns the peak signal-to-noise ratio in dB; infinite if all colors were equal.
   double psnr() const;
-  // Which part of the colors differ by more than this in any channel.
+  // Returns the fraction of the colors that differ by more than `difference` in any channel.
   double part_above(int difference) const;
 
  private:

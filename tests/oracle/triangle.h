@@ -1,7 +1,8 @@
 // The plain types of the oracle: independent code, as simple as possible, that computes voxdag's
 // correct answers. It shares nothing with the checked code, not even constants.
 //
-// Lengths are in lattice units, 256 to a voxel; vertices are odd, so never on a voxel's boundary.
+// Lengths are in lattice units, 256 to a voxel. Vertices are odd, so they are never on a voxel's
+// boundary.
 #pragma once
 
 #include <array>

@@ -7,7 +7,7 @@
 namespace oracle {
 namespace {
 
-// Voxels that `triangle` sets in the part of the region that starts at (x, y, z).
+// Marks the voxels that `triangle` sets in the part of the region that starts at (x, y, z).
 void mark(const Triangle& triangle, const Region& region, int x, int y, int z, int edge,
           Voxels& out) {
   const Point low = {(region.low[0] + x) * kUnits, (region.low[1] + y) * kUnits,

@@ -26,9 +26,9 @@ class Voxels {
 };
 
 // A voxel is set iff one of the triangles touches its closed cube. The region's edge is a power of
-// two; parts that a triangle does not touch are skipped.
+// two. Parts of the region that a triangle does not touch are skipped.
 Voxels voxelize(const Triangles& triangles, const Region& region);
-// The same, testing every voxel against every triangle. Slow.
+// Does the same, but tests every voxel against every triangle. Slow.
 Voxels voxelize_one_by_one(const Triangles& triangles, const Region& region);
 
 }  // namespace oracle

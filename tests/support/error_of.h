@@ -6,7 +6,8 @@
 
 namespace voxdag {
 
-// The Error that `run` throws; a test failure, and an empty message, if it throws none.
+// Returns the Error that `run` throws. If it throws none, the test fails and the returned message
+// is empty.
 template <class Run>
 Error error_of(Run run) {
   try {

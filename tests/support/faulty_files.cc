@@ -35,7 +35,7 @@ class FaultyWriter : public voxdag::ForwardingWriter {
   }
   void sync() override {
     files_.operate([&] {
-      // What is written during the sync may or may not be on the disk afterwards.
+      // Data written during the sync may or may not be on the disk afterwards.
       std::string before = contents(path());
       ForwardingWriter::sync();
       std::lock_guard lock(files_.mutex_);
@@ -113,7 +113,7 @@ std::unique_ptr<voxdag::WritableFile> FaultyFiles::open_write(const std::string&
   std::unique_ptr<voxdag::WritableFile> file;
   operate([&] {
     std::lock_guard lock(mutex_);
-    // What an earlier process left of it is on the disk.
+    // The contents that an earlier process left are on the disk.
     if (!synced_.contains(path)) synced_[path] = exists(path) ? contents(path) : "";
     file = ForwardingFiles::open_write(path);
   });
@@ -154,7 +154,8 @@ void FaultyFiles::sync_directory(const std::string& path) {
 }
 
 void FaultyFiles::cut_power() {
-  // Held until the end: no other thread may treat bytes as durable that are dropped here.
+  // The lock is held until the end: no other thread may treat bytes as durable that are dropped
+  // here.
   std::lock_guard lock(mutex_);
   for (const auto& [path, bytes] : synced_)
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;

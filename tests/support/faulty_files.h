@@ -1,8 +1,8 @@
-// A file system that fails on request: after leveldb's fault_injection_test, a disk that drops
-// unsynced data, is full, or kills the process.
+// A file system that fails on request, modeled on leveldb's fault_injection_test: a disk that drops
+// unsynced data or is full, or a process that is killed.
 //
-// Every call that changes the disk is an operation, numbered from 1 in the order in which they
-// begin (they differ a little from run to run where there are several threads). Thread-safe.
+// Every call that changes the disk is an operation. Operations are numbered from 1 in the order in
+// which they begin. With several threads, this order differs slightly from run to run. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -50,19 +50,20 @@ class FaultyFiles : public voxdag::ForwardingFiles {
  private:
   friend class FaultyWriter;
   friend class FaultyReader;
-  // Runs one operation, which gets its number, or the planned fault instead; `half` is the partial
-  // operation of a failing disk.
+  // Runs one operation, which gets its number, or the planned fault instead. `half` does the part
+  // of the operation that a failing disk completes.
   template <class Operation, class Half>
   void operate(const Operation& operation, const Half& half);
   template <class Operation>
   void operate(const Operation& operation) {
     operate([&](uint64_t) { operation(); }, [] {});
   }
-  // Runs a write: `half` is one that the disk gives up on, `flipped` one that it gets wrong.
+  // Runs a write. `half` is a write that the disk does not complete, `flipped` a write with a wrong
+  // bit.
   template <class Operation, class Half, class Flipped>
   void write(const Operation& operation, const Half& half, const Flipped& flipped);
   void read();
-  // Reverts files and names to their synced state; SIGKILL.
+  // Reverts files and names to their synced state, then sends SIGKILL.
   void cut_power();
 
   const FaultPlan plan_;

@@ -7,7 +7,7 @@
 
 namespace voxdag {
 
-// Flips these bits of one byte of the file; done once more, the file is as it was.
+// Flips these bits of one byte of the file. A second call restores the file.
 inline void flip_bits(const std::string& path, uint64_t at, int bits) {
   std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
   file.seekg(static_cast<std::streamoff>(at));

@@ -1,4 +1,5 @@
-// PNG and JPEG files made by tests: PNG from its bytes, JPEG by the library.
+// PNG and JPEG files made by tests. PNG files are written byte by byte, JPEG files with the
+// library.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +17,13 @@ struct PngFormat {
 // Length, type, data and checksum.
 std::string png_chunk(const std::string& type, const std::string& data);
 std::string big_endian(uint32_t value);
-// `pixels` without filter bytes: whole bytes per row. Interlaced ones have whole bytes per pixel.
+// `pixels` has no filter bytes. A row has whole bytes; in interlaced files, every pixel has.
 std::string png_file(const PngFormat& format, const std::string& pixels);
 
-// `pixels` has 1 (gray), 3 (RGB) or 4 (CMYK) bytes each.
+// `pixels` has 1 (gray), 3 (RGB) or 4 (CMYK) bytes per pixel.
 std::string jpeg_file(uint32_t width, uint32_t height, int components, const std::string& pixels,
                       bool is_progressive = false);
-// RGB, with a separate scan for each channel; the last scan is repeated `repeats` times.
+// `pixels` is RGB. Each channel has a separate scan, and the last scan is repeated `repeats` times.
 std::string jpeg_of_scans(uint32_t width, uint32_t height, const std::string& pixels, int repeats);
 
 }  // namespace voxdag::test

@@ -8,8 +8,8 @@
 
 namespace voxdag {
 
-// True if work(), run in a child process, was ended by SIGKILL. It must not need threads that run
-// already.
+// Runs work() in a child process. Returns true if SIGKILL ended the process. work() must not need
+// threads that already run.
 template <class Work>
 bool is_killed(const Work& work) {
   const pid_t child = fork();

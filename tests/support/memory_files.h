@@ -1,4 +1,4 @@
-// Files in memory, for tests of what only reads.
+// Files in memory, for tests of code that only reads.
 #pragma once
 
 #include <cstring>
