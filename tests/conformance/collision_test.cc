@@ -1,4 +1,4 @@
-// Different nodes with equal upper 32 bits of their hashes, which is all that a table may store,
+// Tables may store only the upper 32 bits of a hash. Different nodes with equal upper 32 bits must
 // remain different nodes.
 #include <unordered_map>
 
@@ -16,7 +16,8 @@ struct SmallNode {
   uint64_t brick;
 };
 
-// Nodes found by trying: one after the other, each two share half a hash.
+// Returns pairs of nodes, one pair after the other. The hashes of a pair have equal upper halves.
+// The pairs are found by trial.
 std::vector<SmallNode> colliding_nodes() {
   std::unordered_map<uint32_t, SmallNode> by_half_hash;
   std::vector<SmallNode> found;
@@ -34,7 +35,7 @@ std::vector<SmallNode> colliding_nodes() {
   return found;
 }
 
-// A triangle in every voxel of the node's brick, the node being number `index` of the grid.
+// Adds a triangle in every voxel of the node's brick. The node has number `index` in the grid.
 void place(const SmallNode& node, int index, oracle::Triangles& scene) {
   for (int bit = 0; bit < 64; ++bit) {
     if (!(node.brick >> bit & 1)) continue;

@@ -15,7 +15,7 @@ Cube random_cube(oracle::Random& random, uint32_t level) {
   return {level, {position(), position(), position()}};
 }
 
-// The region of `edge` voxels that holds the cube, moved inside the grid.
+// Returns the region of `edge` voxels that contains the cube, moved inside the grid.
 oracle::Region region_around(const Cube& cube, uint32_t grid_levels, int edge) {
   oracle::Region region = oracle::region_of(cube, grid_levels);
   for (int64_t& low : region.low)
@@ -24,8 +24,8 @@ oracle::Region region_around(const Cube& cube, uint32_t grid_levels, int edge) {
   return region;
 }
 
-// All cubes of all levels of one grid, down to single bricks, each with all of the scene's
-// triangles: those that miss the cube are harmless.
+// Builds all cubes of all levels of one grid, down to single bricks. Each gets all of the scene's
+// triangles, because triangles that miss the cube have no effect.
 TEST_P(Cubes, EveryCubeOfASmallGrid) {
   constexpr uint32_t kLevels = 5;
   const auto backend = open();
@@ -67,8 +67,8 @@ TEST_P(Cubes, SmallCubesOfLargeGrids) {
     }
 }
 
-// Large cubes of large grids, too large for the oracle: regions of them are compared
-// voxel by voxel, near triangles and anywhere.
+// Large cubes of large grids are too large for the oracle. So some of their regions, near triangles
+// and elsewhere, are compared voxel by voxel.
 TEST_P(Cubes, RegionsOfLargeCubes) {
   const auto backend = open();
   oracle::Random random(22);
@@ -97,8 +97,8 @@ TEST_P(Cubes, RegionsOfLargeCubes) {
   }
 }
 
-// One large cube equals its eight children built on their own: same voxels, and the octree has one
-// node more than theirs together.
+// One large cube equals its eight children built separately: it has the same voxels, and one octree
+// node more than they have together.
 TEST_P(Cubes, CountsAddUp) {
   const auto backend = open();
   for (const oracle::SceneKind kind : oracle::kAllKinds) {
@@ -118,7 +118,7 @@ TEST_P(Cubes, CountsAddUp) {
   }
 }
 
-// Triangles that miss the cube by however little leave it empty, whatever they do around it.
+// Triangles that miss the cube, even by very little, leave it empty.
 TEST_P(Cubes, MissedCubesAreEmpty) {
   const auto backend = open();
   const Cube cube{4, {5, 6, 7}};  // of 64 voxels at R 1024

@@ -1,5 +1,5 @@
-// The CUDA backend is under test where there is a device; elsewhere its error says why it cannot be
-// opened.
+// The CUDA backend is tested if there is a device. Without a device, the error must state why it
+// cannot be opened.
 #include "core/base/error.h"
 #include "tests/conformance/harness.h"
 

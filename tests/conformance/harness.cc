@@ -29,7 +29,7 @@ class OrderedSink : public SubDagSink {
   uint32_t next_level_;
 };
 
-// Where node `index` of a level array has its children.
+// Returns the position of the first child of node `index` of a level array.
 size_t first_child(const SubDag::Nodes& nodes, size_t index) {
   size_t at = 0;
   for (size_t i = 0; i < index; ++i) at += static_cast<size_t>(std::popcount(nodes.masks[i]));

@@ -55,12 +55,12 @@ Built build(Backend& backend, const SubvolumeTask& task, TriangleStream& stream,
 Built build(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles,
             uint64_t budget_bytes = kAmpleBudget);
 
-// Checks sub-DAG and summary against the oracle's, array for array.
+// Checks that sub-DAG and summary equal those of the oracle, array for array.
 void expect_equals(const Built& built, const oracle::Dag& truth, const SubvolumeTask& task);
-// Builds by the backend and by the oracle, and compares.
+// Builds with the backend and with the oracle, and compares the results.
 void expect_right(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles);
 
-// The voxels that a sub-DAG of `cube` sets in a region within it.
+// Returns the voxels that a sub-DAG of `cube` sets in a region of the cube.
 oracle::Voxels voxels_of(const SubDag& dag, const Cube& cube, uint32_t grid_levels,
                          const oracle::Region& region);
 

@@ -1,6 +1,6 @@
-// A grid too large for the oracle, where all memos of a build are used (planes and
-// their directions, grown tables, subvolumes of many tiles): implementations that share no inner
-// loop agree.
+// A grid that is too large for the oracle and in which a build uses all its memos (planes and their
+// directions, grown tables, subvolumes of many tiles). Implementations that share no inner loop
+// must agree.
 #include "tests/conformance/harness.h"
 
 namespace voxdag {

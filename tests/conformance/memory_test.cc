@@ -1,5 +1,5 @@
-// The memory guarantee of a backend: a cube that does not fit needs a split, the smallest always
-// fits.
+// The memory guarantee of a backend: a cube that does not fit needs a split, and the smallest cube
+// always fits.
 #include <malloc.h>
 
 #include <atomic>
@@ -49,7 +49,7 @@ VOXDAG_FOR_ALL_BACKENDS(Memory);
 
 constexpr int64_t kUncharged = int64_t{1} << 20;  // for small things that nobody counts
 
-// Makes triangles as they are read: `count` of them, `unique` different ones over and over.
+// Makes triangles when they are read: `count` triangles, of which `unique` are different.
 class EndlessStream : public TriangleStream {
  public:
   EndlessStream(const oracle::Triangles& unique, uint64_t count)
@@ -59,7 +59,7 @@ class EndlessStream : public TriangleStream {
   size_t read(std::span<FixedTriangle> out) override {
     size_t n = 0;
     for (; n < out.size() && next_ < count_; ++n, ++next_) {
-      // Another vertex first in every turn, so that they are not the same bytes.
+      // Every repetition begins with another vertex, so that equal triangles have different bytes.
       const FixedTriangle& t = unique_[next_ * 7919 % unique_.size()];
       for (size_t i = 0; i < 3; ++i)
         std::copy_n(t.v[(i + next_ / unique_.size()) % 3], 3, out[n].v[i]);
@@ -127,7 +127,7 @@ class Splitter {
   const oracle::Triangles& scene_;
 };
 
-// The parts of a cube that had to be split have the voxels of the whole.
+// If a cube had to be split, its parts together have the same voxels as the cube.
 TEST_P(Memory, CubesThatNeedASplitCanBeSplit) {
   const auto backend = open();
   const Cube cube{1, {1, 1, 0}};  // 512 voxels

@@ -39,8 +39,8 @@ std::vector<Work> make_work() {
   return all;
 }
 
-// One instance builds many tasks in random order, with some in between that do not fit the budget:
-// every result equals a new instance's, and the oracle's.
+// One backend builds many tasks in random order, some of which do not fit the budget. Every result
+// equals the result of a new backend, and of the oracle.
 TEST_P(Reuse, ResultsDoNotDependOnWhatWasBuiltBefore) {
   const auto all = make_work();
   const auto reused = open();

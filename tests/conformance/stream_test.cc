@@ -29,7 +29,8 @@ void expect_same(const Built& a, const Built& b) {
   EXPECT_EQ(a.summary.root_hash, b.summary.root_hash);
 }
 
-// Triangles shuffled, duplicated, with rotated vertices, read one by one or in one batch.
+// The triangles are shuffled and duplicated, their vertices are rotated, and they are read one by
+// one or in one batch.
 TEST_P(Streams, OrderAndRepetitionDoNotShow) {
   const auto backend = open();
   oracle::Triangles scene = mixed_scene(1);
@@ -49,8 +50,7 @@ TEST_P(Streams, OrderAndRepetitionDoNotShow) {
   }
 }
 
-// A stream that starts in the middle is rewound first; one that promised more than it gives is
-// believed at its end.
+// A stream that starts in the middle is rewound first.
 TEST_P(Streams, StartsAtTheFirstTriangle) {
   const auto backend = open();
   const oracle::Triangles scene = mixed_scene(2);
@@ -159,7 +159,8 @@ class CancelingStream : public TriangleStream {
   uint64_t done_ = 0;
 };
 
-// Canceled before or while streaming: kCanceled soon, nothing sent, the backend usable.
+// A build that is canceled before or while it reads the stream soon throws kCanceled and sends
+// nothing, and the backend remains usable.
 TEST_P(Streams, CanBeCanceled) {
   const auto backend = open();
   const SubvolumeTask smallest{12, {6, {9, 8, 7}}, 64};

@@ -9,7 +9,7 @@ VOXDAG_FOR_ALL_BACKENDS(WholeGrid);
 
 constexpr uint32_t kHashBits[] = {4, 16, 64};
 
-// Every kind of scene, R from 4 to 64, few and many triangles, hashes truncated and full.
+// Scenes of every kind, with R from 4 to 64, few and many triangles, and truncated and full hashes.
 TEST_P(WholeGrid, EqualsTheOracle) {
   const auto backend = open();
   for (const oracle::SceneKind kind : oracle::kAllKinds)
@@ -41,7 +41,7 @@ TEST_P(WholeGrid, EqualsTheOracleOnMixedScenes) {
   }
 }
 
-// All 2^18 voxels set: one node a level, however many times it occurs.
+// All 2^18 voxels are set: there is one node per level, which occurs many times.
 TEST_P(WholeGrid, FullGridIsOneNodeALevel) {
   oracle::Triangles scene;
   for (int64_t x = 128 + 1; x < 64 * 256; x += 256) {
@@ -57,7 +57,7 @@ TEST_P(WholeGrid, FullGridIsOneNodeALevel) {
   expect_right(*open(), task, scene);
 }
 
-// Nothing in, nothing out: the sink is not called.
+// Without triangles, the sink is not called.
 TEST_P(WholeGrid, EmptyScene) {
   const Built built = build(*open(), {10, Cube{}, 64}, oracle::Triangles{});
   EXPECT_EQ(built.outcome, BuildOutcome::kBuilt);

@@ -1,5 +1,5 @@
-// A build with colors and all other attributes that is killed, cut off from power, or has its disk
-// fill up or fail, at any operation on the disk, ends with the same bytes when it is run again.
+// A build with colors and all other attributes is killed, loses power, or its disk becomes full or
+// fails, at any operation on the disk. Run again, it ends with the same bytes.
 #include <array>
 #include <set>
 
@@ -33,7 +33,7 @@ TEST_P(ColorCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
 TEST_P(ColorCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
-// Unwanted artifacts are dropped, all of them or none.
+// Either all unwanted artifacts are removed, or none.
 TEST(ColorStoreCrash, KeepsWhatIsWanted) {
   const voxdag::TemporaryFolder folder;
   const std::string path = folder.file("colors.vddurable");

@@ -1,4 +1,4 @@
-// Builds of a small scene that meet every fault of disks and processes, and how they must end.
+// Builds a small scene with every fault of disks and processes, and checks the results.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ class Warnings : public voxdag::NoProgress {
   std::string last;
 };
 
-// Moments tried for each fault; VOXDAG_CRASH_ROUNDS sets it.
+// The number of moments that are tested for each fault. VOXDAG_CRASH_ROUNDS sets it.
 inline uint64_t rounds() {
   const char* text = std::getenv("VOXDAG_CRASH_ROUNDS");
   return text ? std::strtoull(text, nullptr, 10) : 6;
@@ -49,7 +49,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
   void SetUp() override {
     voxdag::GenerateOptions options;
     options.kind = voxdag::SceneKind::kCity;
-    // Ingest with checkpoints needs a few batches.
+    // Ingest with checkpoints needs several batches of triangles.
     options.triangles = is_durable() ? 20000 : 3000;
     voxdag::NoProgress progress;
     voxdag::CancelToken cancel;
@@ -111,10 +111,11 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     return WIFSIGNALED(status);
   }
 
-  // Whatever happened before: run again, it ends as it should and leaves nothing behind.
+  // Whatever happened before, the build that is run again ends with the expected file and leaves no
+  // other files.
   void expect_to_resume() {
     if (std::filesystem::exists(output())) {
-      // Only a whole file may ever have that name.
+      // A file of this name must always be complete.
       const voxdag_reader::File file(output());
       voxdag::MemoryBudget budget(uint64_t{1} << 30);
       voxdag::NoProgress progress;
@@ -125,7 +126,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     std::filesystem::remove(output());
   }
 
-  // Numbers from 1 to `count`: all of them, or a random choice of rounds().
+  // Returns numbers from 1 to `count`: all of them, or a random choice of rounds() numbers.
   static std::vector<uint64_t> moments(uint64_t count) {
     std::vector<uint64_t> all(count);
     for (uint64_t i = 0; i < count; ++i) all[i] = i + 1;
@@ -159,8 +160,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     }
   }
 
-  // A disk that is full, or fails, from any operation on is reported, and nothing is lost when it
-  // has recovered.
+  // The disk becomes full, or fails, at any operation. The build reports this, and nothing is lost
+  // when the disk has recovered.
   void break_disk_at_any_operation() {
     const uint64_t operations = operations_of_a_build();
     struct Case {

@@ -11,7 +11,8 @@ namespace {
 
 TEST_P(CrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
-// The same scene finer, in larger subvolumes: about as long a build, most of it computing.
+// The same scene at a higher resolution, in larger subvolumes. The build takes about as long, and
+// computes most of the time.
 class FineCrashTest : public CrashTest {
  protected:
   BuildSpec spec() const override {
@@ -24,8 +25,7 @@ class FineCrashTest : public CrashTest {
   }
 };
 
-// SIGKILL at moments that have nothing to do with our own calls: inside SQLite, or while it
-// computes.
+// SIGKILL at random moments, for example inside SQLite or during computations.
 TEST_P(FineCrashTest, KilledAtRandomMoments) {
   const double start = voxdag::wall_seconds();
   run(voxdag::system_files());
@@ -36,7 +36,7 @@ TEST_P(FineCrashTest, KilledAtRandomMoments) {
     const auto after = std::chrono::microseconds(1000 + random() % whole_us);
     SCOPED_TRACE(testing::Message() << "after " << after.count() << " us of " << whole_us);
     killed({}, after);
-    // Killed again after it resumed.
+    // The build is killed again after it has resumed.
     killed({}, after / 2);
     expect_to_resume();
   }
@@ -69,7 +69,8 @@ TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   EXPECT_EQ(report.sha256, whole.sha256);
 }
 
-// Reads that fail are errors that name no artifact as damaged: nothing is thrown away for them.
+// A read that fails is an error that does not call any artifact damaged, so no artifact is
+// discarded.
 TEST_P(CrashTest, ReadsThatFail) {
   FaultyFiles counting({});
   run(counting);
@@ -79,7 +80,7 @@ TEST_P(CrashTest, ReadsThatFail) {
     FaultyFiles files({Fault::kReadError, at});
     try {
       run(files);
-      // Threads share blocks that are read, so that a run may have a few reads less.
+      // Threads share the blocks that they read, so a run may have slightly fewer reads.
       EXPECT_LT(files.reads(), at) << "the build went through";
     } catch (const voxdag::Error& error) {
       EXPECT_EQ(error.code(), voxdag::ErrorCode::kIo) << error.what();

@@ -1,4 +1,5 @@
-// Bytes that a disk returns changed are noticed, and repaired or refused: never a wrong DAG.
+// If a disk returns wrong bytes, the build notices it, and repairs or refuses them. It never makes
+// a wrong DAG.
 #include <fstream>
 
 #include "core/base/error.h"
@@ -14,7 +15,8 @@ using voxdag::ErrorCode;
 
 class DamageTest : public CrashTest {
  protected:
-  // Builds until the process is killed at that operation of the disk; false if it was not.
+  // Builds until the process is killed at this operation on the disk. Returns false if it was not
+  // killed.
   bool killed_at(uint64_t operation) const { return killed({Fault::kKillBefore, operation}); }
 
   // Flips one bit of the file, which must not be empty.
@@ -24,8 +26,8 @@ class DamageTest : public CrashTest {
     voxdag::flip_bits(path, bit / 8, 1 << bit % 8);
   }
 
-  // Whatever the disk holds: the build ends with the right bytes, or is refused and starts over
-  // with them. True if it ended by itself.
+  // Whatever is on the disk, the build ends with the right bytes, or is refused and makes them from
+  // the beginning. Returns true if it was not refused.
   bool expect_healed_or_refused(voxdag::FileSystem& files = voxdag::system_files()) {
     bool healed = true;
     try {
@@ -45,7 +47,7 @@ class DamageTest : public CrashTest {
   }
 };
 
-// A bit that flips on its way to the disk, in any write of any file.
+// A bit flips when any file is written.
 TEST_P(DamageTest, BitsFlippedInAnyWrite) {
   const uint64_t operations = operations_of_a_build();
   for (const uint64_t at : moments(operations)) {
@@ -55,8 +57,8 @@ TEST_P(DamageTest, BitsFlippedInAnyWrite) {
   }
 }
 
-// A bit that flips while the build is stopped, in any file that it left: segments, the job store
-// and its log, maps, rounds' artifacts, the global file so far.
+// A bit flips while the build is stopped, in any file that it left: segments, the job store and its
+// log, maps, artifacts of merge passes, or the partial global file.
 TEST_P(DamageTest, BitsFlippedBetweenTwoRuns) {
   const uint64_t operations = operations_of_a_build();
   std::mt19937_64 random(2);

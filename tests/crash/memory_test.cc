@@ -1,5 +1,5 @@
-// Short of memory: a build under a small budget, in a process that gets only a little more address
-// space than that, ends with the bytes of a build that has plenty.
+// A build with a small budget, in a process that has only slightly more address space, ends with
+// the same bytes as a build with enough memory.
 #include <sys/resource.h>
 
 #include <fstream>
@@ -9,10 +9,11 @@
 namespace crash {
 namespace {
 
-// Memory of a process in addition to its budget: code, stacks, the allocator's reserves, SQLite.
+// The memory that a process needs in addition to its budget: code, stacks, the allocator's reserves
+// and SQLite.
 constexpr uint64_t kBesides = uint64_t{1} << 30;
 
-// A sanitizer's shadow alone takes more than any limit worth testing.
+// The shadow memory of a sanitizer is larger than any useful limit.
 bool under_a_sanitizer() {
   uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
@@ -21,7 +22,7 @@ bool under_a_sanitizer() {
 
 class MemoryTest : public CrashTest {};
 
-// Slivers that cross the whole grid: the crowded case, in which subvolumes outgrow their share.
+// Slivers cross the whole grid, so that many subvolumes exceed their share of the memory.
 TEST_P(MemoryTest, EndsUnderALimitOfAddressSpace) {
   if (under_a_sanitizer()) GTEST_SKIP() << "a sanitizer needs the address space for itself";
   voxdag::GenerateOptions options;

@@ -1,5 +1,5 @@
-// The triangles of a glTF scene in another format give the same bytes, also by a build that is
-// killed while it ingests them and run again.
+// The triangles of a glTF scene in another format give the same bytes, even if the build is killed
+// while it ingests them and then run again.
 #include <cstring>
 
 #include "scene/formats/formats.h"

@@ -76,7 +76,7 @@ TEST_F(Hostile, TooLargeBodiesAreRejected) {
             "");
 }
 
-// The type of a scene's bytes is not looked at.
+// The content type of a scene is ignored.
 TEST_F(Hostile, MultipartBodiesAreNotParsed) {
   start();
   const client::HeaderMap form = {{"Content-Type", "multipart/form-data; boundary=x"}};
@@ -137,7 +137,7 @@ TEST_F(Hostile, TokensAreRequired) {
   HttpClient client({url(), reader.token, "", 60});
   EXPECT_EQ(client.get("/api/v1/jobs").status, 200);
   EXPECT_EQ(client.send("DELETE", "/api/v1/scenes/a.glb\x9b", "").status, 403);
-  // The log names who was refused, and holds no byte that controls a terminal.
+  // The log names the client that was refused, and contains no byte that controls a terminal.
   EXPECT_NE(log().find("audit DELETE /api/v1/scenes/a.glb%9b status=403 who=r"), std::string::npos)
       << log();
 }

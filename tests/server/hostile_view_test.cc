@@ -71,7 +71,7 @@ class HostileView : public testing::Test {
   std::string log_;
 };
 
-// Only data in the damaged block is refused, and its file is logged once.
+// Only requests for data in the damaged block are refused. The damaged file is logged once.
 TEST_F(HostileView, SeesThatAFileIsDamaged) {
   const auto file = open_global_file(path_);
   const uint32_t bricks = file->brick_level();
@@ -137,7 +137,7 @@ TEST_F(HostileView, RefusesRequestsOfOtherSites) {
     EXPECT_EQ(http_->get(path).header("Cross-Origin-Resource-Policy"), "same-origin") << path;
 }
 
-// Nobody works for a client that has left; others are answered, and the service stops.
+// The service stops work for clients that have left, answers other clients, and can be stopped.
 TEST_F(HostileView, SurvivesClientsThatLeave) {
   start();
   std::string batch = "GET /api/v1/view/tiles/batch?v=" + digest_ + "&nodes=0.0";
@@ -152,7 +152,7 @@ TEST_F(HostileView, SurvivesClientsThatLeave) {
   EXPECT_EQ(get("0/0").status, 200);
 }
 
-// Sequential requests for tiles of a job.
+// Sends one request after the other for tiles of a job.
 class TilePermits : public RunningService {
  protected:
   void SetUp() override {
@@ -168,7 +168,7 @@ class TilePermits : public RunningService {
   std::string base_, version_;
 };
 
-// However a request ends, the next one gets the permit, also while the answer is not read.
+// However a request ends, the next request gets its permit, even while an answer is not read.
 TEST_F(TilePermits, AreFreeWhenTheWorkIsDone) {
   const std::string tile = base_ + "/0/0" + version_;
   const std::string tag = http_->get(tile).header("ETag");

@@ -1,4 +1,4 @@
-// Uploads that a disk, another client or the end of the service gets in the way of.
+// Uploads that are interrupted by a disk, by another client or by the end of the service.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -76,7 +76,7 @@ class InterruptedUpload : public RunningService {
     }
     return socket;
   }
-  // What is answered before any byte of it is sent.
+  // Returns the answer to an upload whose body is not sent.
   std::string answer_to_upload(const std::string& name, uint64_t size) {
     const int socket = begin_upload(name, size, "");
     char answer[13] = {};
@@ -117,7 +117,8 @@ TEST_F(InterruptedUpload, SurvivesADeletionThatFailed) {
   EXPECT_TRUE(std::filesystem::exists(data("scenes/files/m.glb")));
 }
 
-// Clients that announce all of the disk, and send little, keep out neither uploads nor jobs.
+// Clients that announce uploads as large as the disk, and send few bytes, block neither other
+// uploads nor jobs.
 TEST_F(InterruptedUpload, IsNotBlockedBySlowOnes) {
   disk_.bytes = 200 * kMiB;
   config_.jobs.min_free_disk_bytes = 100 * kMiB;
@@ -147,8 +148,8 @@ TEST_F(InterruptedUpload, StartsOverInItsOwnSpace) {
   EXPECT_EQ(http_->get("/api/v1/scenes/n.glb").status, 404);
 }
 
-// The end of the service does not wait until a large scene is read; it is finished afterwards,
-// without its bytes.
+// The service stops without waiting until a large scene is read. The next service finishes the
+// upload, and the client does not send the bytes again.
 TEST_F(InterruptedUpload, IsFinishedByTheNextService) {
   const std::string bytes = scene_bytes();
   ASSERT_GT(bytes.size(), 512u << 10) << "the digest reads it in several pieces";
@@ -235,7 +236,7 @@ TEST_F(InterruptedUpload, IsNotAcknowledgedWithoutTheDatabase) {
   EXPECT_EQ(put_scene("m.glb", "x").status, 201);
 }
 
-// Clocks that are ahead for a while must not make all uploads old.
+// A clock that was ahead for a while must not make all uploads old.
 TEST_F(InterruptedUpload, OutlivesAClockThatJumped) {
   const auto age = [&](const std::string& seconds) {
     SqlDatabase(data("scenes/scenes.db"), SqlDatabase::Mode::kReadWrite)
@@ -249,7 +250,7 @@ TEST_F(InterruptedUpload, OutlivesAClockThatJumped) {
   start();
   EXPECT_TRUE(until([&] { return log().find("no upload is deleted") != std::string::npos; }));
   EXPECT_EQ(offset("m.glb"), "5");
-  // A service that was used lately: the upload is old indeed.
+  // The service was used recently, so the upload is really old.
   EXPECT_EQ(put_scene("n.glb", "x").status, 201);
   stop();
   start();

@@ -1,4 +1,5 @@
-// What once lost the results of jobs, or left jobs in a state that nothing ended.
+// Regression tests for defects that lost the results of jobs, or left jobs in a state that did not
+// end.
 #include <condition_variable>
 #include <csignal>
 #include <filesystem>
@@ -20,7 +21,7 @@ class JobRecovery : public RunningService {
   void edit_queue(const std::string& sql) {
     SqlDatabase(data("queue.db"), SqlDatabase::Mode::kReadWrite).execute(sql);
   }
-  // In place of the program that runs jobs and plans.
+  // Replaces the program that runs jobs and plans.
   void use_program(const std::string& script) {
     write_file_atomically(system_files(), folder_.file("program"), "#!/bin/sh\n" + script + "\n");
     std::filesystem::permissions(folder_.file("program"), std::filesystem::perms::owner_all);
@@ -68,8 +69,8 @@ class JobRecovery : public RunningService {
   bool armed_ = true, held_ = false, free_ = false;
 };
 
-// What a failed deletion left is finished later: until then the job is not run again, or its new
-// results would be deleted too.
+// The rest of a failed deletion is removed later. Until then the job does not run again, because
+// its new results would be deleted too.
 TEST_F(JobRecovery, AJobWhoseDeletionFailedIsNotTriedAgain) {
   start();
   const std::string id = posted_job();
@@ -87,7 +88,7 @@ TEST_F(JobRecovery, AJobWhoseDeletionFailedIsNotTriedAgain) {
   EXPECT_FALSE(std::filesystem::exists(data("jobs/" + id + ".deleted")));
 }
 
-// Only marked files are deleted: not the job's new folder, nor its record.
+// Only marked files are deleted. The job's new folder and its record are kept.
 TEST_F(JobRecovery, AMarkedFolderTakesNoOtherAlong) {
   start();
   const std::string id = posted_job(), waiting = posted_job();

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kMaxWaitS = 600;
 
-// How often to kill the service.
+// Returns how often the service is killed.
 int rounds() {
   const char* text = std::getenv("VOXDAG_CRASH_ROUNDS");
   return text ? std::atoi(text) : 4;
@@ -61,7 +61,7 @@ class KilledService : public testing::Test {
       usleep(2000);
     }
   }
-  // The exit status, or minus the signal.
+  // Stops the service with this signal. Returns the exit status, or minus the number of the signal.
   int end(int signal) {
     if (pid_ <= 0) return 0;
     kill(pid_, signal);
@@ -193,7 +193,7 @@ TEST_F(KilledService, FewOpenFilesLeaveConnections) {
   for (const int socket : slow) close(socket);
 }
 
-// Nothing of the data folder can be read by other users of the machine, whatever their umask is.
+// Other users of the machine cannot read the data folder, whatever the umask is.
 TEST_F(KilledService, DataIsForTheServiceAlone) {
   prepare();
   const ClientResponse posted =

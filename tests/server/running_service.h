@@ -24,12 +24,12 @@ using client::HttpClient;
 class RunningService : public testing::Test {
  protected:
   RunningService();
-  // Expects that the service has answered with documented statuses only.
+  // Expects that the service has answered only with documented statuses.
   ~RunningService() override;
 
   void start();
   void stop();
-  // As SIGTERM does it, from any thread.
+  // Stops the service as SIGTERM does. Any thread may call it.
   void begin_stop() { service_->stop(); }
   std::string url() const { return service_->url(); }
 
@@ -45,7 +45,7 @@ class RunningService : public testing::Test {
   // Polls the condition for up to ten minutes; returns whether it became true.
   bool until(const std::function<bool()>& condition);
   bool until_state(const std::string& id, const std::string& state);
-  // Describes an answer that is not this problem; "" if it is.
+  // Returns "" if the answer is this problem; otherwise a description of the answer.
   static std::string not_problem(const ClientResponse& response, int status,
                                  const std::string& code);
   std::string log();

@@ -1,4 +1,5 @@
-// What once ended the service, lost files, or let one client keep out all others.
+// Regression tests for defects that ended the service, lost files, or let one client block all
+// other clients.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -26,7 +27,7 @@ class ServiceFailures : public RunningService {
   void edit_queue(const std::string& sql) {
     SqlDatabase(data("queue.db"), SqlDatabase::Mode::kReadWrite).execute(sql);
   }
-  // A small job that has succeeded.
+  // Returns a small job that has succeeded.
   std::string finished_job() {
     put_scene("m.glb", scene_bytes());
     const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 64}});
@@ -35,7 +36,8 @@ class ServiceFailures : public RunningService {
   }
 };
 
-// Every step of the service and every handler fails the first time, each in another way.
+// Every step of the service and every handler fails when it is first called, with different
+// exceptions.
 TEST_F(ServiceFailures, NoFailureEndsTheService) {
   std::mutex mutex;
   std::set<std::string> failed;
@@ -103,7 +105,7 @@ TEST_F(ServiceFailures, StepsMayFailForEver) {
   EXPECT_NE(log().find("failed to dispatch jobs: injected"), std::string::npos) << log();
 }
 
-// A client that deletes jobs while the retention rule does.
+// A client deletes jobs at the same time as the retention rule.
 TEST_F(ServiceFailures, RetentionMeetsADeletion) {
   config_.retention.finished_jobs = 0;
   std::atomic<bool> deleted = false;
@@ -350,12 +352,12 @@ TEST_F(ServiceFailures, ReadyzNoticesThatTheQueueIsGone) {
   }
 }
 
-// Clocks that are ahead for a while must not make all results old.
+// A clock that was ahead for a while must not make all results old.
 TEST_F(ServiceFailures, AClockThatJumpedDeletesNothing) {
   start();
   const std::string id = finished_job();
   stop();
-  // As if the clock was two years ahead now.
+  // Moves the queue's times as if the clock were two years ahead now.
   edit_queue(
       "UPDATE job SET finished_s = finished_s - 63072000; "
       "UPDATE job_event SET at_s = at_s - 63072000");
@@ -364,7 +366,7 @@ TEST_F(ServiceFailures, AClockThatJumpedDeletesNothing) {
   usleep(200'000);
   EXPECT_EQ(job(id)["state"], "succeeded");
   stop();
-  // The service was used yesterday: the job is old indeed.
+  // The service was used yesterday, so the job is really old.
   edit_queue("UPDATE job_event SET at_s = at_s + 63072000");
   start();
   EXPECT_TRUE(until([&] { return http_->get("/api/v1/jobs/" + id).status == 404; }));

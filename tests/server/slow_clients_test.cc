@@ -1,4 +1,4 @@
-// Clients that want the service's memory or its connections for themselves.
+// Clients that try to use up the service's memory or its connections.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -24,13 +24,13 @@ class SlowClients : public RunningService {
   }
 
   int port() const { return std::stoi(url().substr(url().rfind(':') + 1)); }
-  // A connection on which these bytes were sent, as far as the service takes them.
+  // Opens a connection and sends these bytes, as far as the service accepts them.
   int open_with(const std::string& bytes) {
     sockets_.push_back(raw_connect(port()));
     send(sockets_.back(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     return sockets_.back();
   }
-  // How many of twenty requests, each on its own connection, are answered 200.
+  // Returns how many of twenty requests, each on a separate connection, are answered with 200.
   int answered() {
     int count = 0;
     for (int i = 0; i < 20; ++i)
@@ -38,7 +38,8 @@ class SlowClients : public RunningService {
                    .starts_with("HTTP/1.1 200");
     return count;
   }
-  // How much of `bytes`, sent again and again, the service takes before it closes the connection.
+  // Sends `bytes` repeatedly. Returns the number of bytes that the service accepts before it closes
+  // the connection.
   size_t bytes_taken(int socket, const std::string& bytes, size_t max_bytes) {
     size_t total = 0;
     while (total < max_bytes) {
@@ -82,7 +83,7 @@ TEST_F(SlowClients, LinesOfChunksAreBounded) {
   EXPECT_EQ(answered(), 20);
 }
 
-// Bodies that hardly arrive are given up when others want to connect.
+// Connections whose bodies arrive very slowly are closed when other clients want to connect.
 TEST_F(SlowClients, SlowBodiesDoNotBlockOthers) {
   start();
   for (size_t i = 0; i < kAttackers; ++i)
@@ -93,7 +94,8 @@ TEST_F(SlowClients, SlowBodiesDoNotBlockOthers) {
   EXPECT_EQ(answered(), 20);
 }
 
-// So are answers that nobody reads, and the kernel holds little of each.
+// Connections whose answers are not read are closed in the same way, and the kernel buffers little
+// of each answer.
 TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   start();
   std::string requests;
@@ -125,7 +127,7 @@ TEST_F(SlowClients, TwoHostsAreRejected) {
           .starts_with("HTTP/1.1 400 "));
 }
 
-// Several clients request readiness concurrently, with and without tokens.
+// Several clients request /readyz concurrently, with and without tokens.
 TEST_F(SlowClients, ReadinessDoesNotDependOnWhoElseAsks) {
   config_.transfers.max_requests_per_s = 0;
   start();

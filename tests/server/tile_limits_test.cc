@@ -1,4 +1,5 @@
-// What bounds requests for tiles: permits, the size of a tile, and a file that changes during one.
+// The limits of requests for tiles: permits, the size of a tile, and a file that changes during a
+// request.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -17,7 +18,8 @@
 namespace voxdag::server {
 namespace {
 
-// Bytes of a tile of so many levels that has all that a tile can have (docs/format.md).
+// Returns the bytes of a tile of this number of levels that has everything a tile can have
+// (docs/format.md).
 uint64_t bytes_of_fullest_tile(uint32_t levels) {
   uint64_t nodes = 0, of_level = 1;
   for (uint32_t l = 0; l < levels; ++l, of_level *= 8) nodes += of_level;
@@ -31,8 +33,8 @@ std::string largest_batch(const std::string& version) {
   return path;
 }
 
-// A scene in which no cube of level 3 is empty, and no two are equal: the tile of the root is the
-// largest that there can be.
+// Makes a scene in which all cubes of level 3 have voxels and no two are equal: the tile of its
+// root is as large as possible.
 void make_soup(const std::string& path) {
   const std::string command = std::string(VOXDAG_BINARY) + " generate soup " + path +
                               " --triangles 200000 --force >/dev/null 2>&1";
@@ -66,13 +68,13 @@ class TileLimits : public RunningService {
     HttpClient client(ClientOptions{url(), tokens_[name], "", 300});
     return client.get(base_ + path);
   }
-  // Asks for the largest answer and reads no more of it than that it has begun: from then on it
-  // holds a permit.
+  // Requests the largest answer and reads only its beginning. After that the request holds a
+  // permit.
   int ask_and_read_nothing(const std::string& name) {
     const std::string text = "GET " + base_ + largest_batch(version_) +
                              " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" +
                              "Authorization: Bearer " + tokens_[name] + "\r\n\r\n";
-    // The permit of the last answer may be there for a moment after it.
+    // The permit of the last answer may be held for a moment after the answer.
     for (;;) {
       const int socket = raw_connect(std::stoi(url().substr(url().rfind(':') + 1)));
       EXPECT_EQ(send(socket, text.data(), text.size(), MSG_NOSIGNAL),
@@ -85,7 +87,7 @@ class TileLimits : public RunningService {
       if (HasFailure()) return -1;
     }
   }
-  // How a request that gets no permit differs from the answer that is expected; "" if it does not.
+  // Returns "" if the answer says that no permit was free; otherwise the difference.
   static std::string not_busy(const ClientResponse& answer) {
     if (answer.status == 503 && answer.header("Retry-After") != "1") return "no Retry-After";
     if (answer.status == 503 && answer.header("Cache-Control") != "no-store") return "it is cached";
@@ -96,8 +98,8 @@ class TileLimits : public RunningService {
   std::string base_, version_;
 };
 
-// A client that does not read a large answer uses up its own permit, for tiles only, until it goes;
-// others are answered while there are permits left.
+// A client that does not read a large answer blocks only its own permit, and only for tiles, until
+// it disconnects. Other clients are answered while permits are left.
 TEST_F(TileLimits, ASlowReaderBlocksItselfAlone) {
   const std::string tile = "/0/0" + version_;
   const int anna = ask_and_read_nothing("anna");
@@ -147,7 +149,7 @@ TEST_F(TileLimits, TilesAreNoLargerThanDocumented) {
     EXPECT_LE(query::encode_tile(dag, depth, {0, 0}).size() * 4, bytes_of_fullest_tile(depth));
 }
 
-// The file of `voxdag view`, which changes after each look at which file it is.
+// The file of `voxdag view` changes every time the service has checked its identity.
 class ChangingFiles : public ForwardingFiles {
  public:
   using ForwardingFiles::ForwardingFiles;

@@ -1,5 +1,5 @@
-// The frames of an artifact. The first byte chooses bricks or nodes and the hash bits, the next
-// four the counts of rows and children that the index would have.
+// The frames of an artifact. The first byte selects bricks or nodes and the hash bits. The next
+// four bytes are the numbers of rows and children, which are normally in the index.
 #include "core/dag/sub_dag.h"
 #include "core/format/artifact/artifact.h"
 #include "core/format/artifact/frame_codec.h"

@@ -1,5 +1,5 @@
-// The index of an artifact, whose checksum and place are made to fit: a decoded index obeys the
-// format, so that encoding it gives the same bytes.
+// The index of an artifact, with corrected checksum and position. A decoded index obeys the format,
+// so that encoding it gives the same bytes.
 #include "core/format/artifact/artifact_index.h"
 
 #include <algorithm>

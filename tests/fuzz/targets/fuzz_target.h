@@ -1,6 +1,6 @@
-// What the fuzz targets share. A target is one function: it passes the bytes to a decoder and
-// aborts where a property does not hold. Errors that the decoder documents are outcomes like any
-// other; every other exception ends the process, which is a finding.
+// The common part of the fuzz targets. A target is one function: it passes the bytes to a decoder,
+// and aborts if a property does not hold. Errors that the decoder documents are valid results.
+// Every other exception ends the process, which is a finding.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ inline std::span<const std::byte> bytes_of(const uint8_t* data, size_t size) {
   return std::as_bytes(std::span(data, size));
 }
 
-// The bytes followed by the checksum that the decoders of records expect.
+// Returns the bytes followed by the checksum that the decoders of records expect.
 inline std::vector<std::byte> with_checksum(std::span<const std::byte> bytes) {
   std::vector<std::byte> record(bytes.begin(), bytes.end());
   ByteSink(record).put(checksum64(bytes));

@@ -49,8 +49,8 @@ class EchoServer {
   std::thread thread_;
 };
 
-// An address of the loopback, another one each time: one has not enough ports for the connections
-// that were closed in the last minute.
+// Returns a different loopback address in each call: one address does not have enough ports for the
+// connections that were closed in the last minute.
 sockaddr_in next_loopback_address() {
   static uint32_t count = 0;
   sockaddr_in address{};
@@ -59,7 +59,7 @@ sockaddr_in next_loopback_address() {
   return address;
 }
 
-// Waits by the second: a machine that pauses for longer is no finding.
+// Waits in steps of a second, so that it is not a finding if the machine pauses for longer.
 bool has_something_to_read(int fd) {
   for (int i = 0; i < kMaxWaits; ++i) {
     pollfd waiting{fd, POLLIN, 0};

@@ -1,5 +1,5 @@
-// Images: PNG and JPEG, as they are, and PNG also with corrected checksums of its chunks, so
-// that a mutation reaches the code behind them. Whatever the bytes, they are pixels, the same ones
+// Images: PNG and JPEG without changes, and PNG also with corrected checksums of its chunks, so
+// that a mutation reaches the code that follows. Any bytes give either pixels, which are the same
 // each time, or a problem.
 #include <zlib.h>
 

@@ -1,5 +1,5 @@
-// The durable state of a merge, whose checksum is made to fit: a decoded state is encoded to the
-// same bytes.
+// The durable state of a merge, with a corrected checksum. A decoded state is encoded to the same
+// bytes.
 #include "merge/checkpoint/merge_state.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What the targets of scene formats check of a file.
+// The checks of a file that the targets of scene formats share.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace voxdag::fuzz {
 
-// A few bytes can declare any number of instances; drawing them tests nothing more.
+// A few bytes can declare any number of instances. Reading all of them would not test more.
 constexpr uint64_t kMaxTriangles = 2000;
 constexpr uint64_t kSceneBudgetBytes = uint64_t{16} << 20;
 

@@ -4,12 +4,12 @@
 // removed nodes are never visited, so the cost of sorting is proportional to the largest level of
 // the DAG, not of the octree.
 //
-// A verification pass makes the result exact. On every level it compares every octree node, removed
-// or not, with the remaining node of the same hash: for bricks their masks, above the bricks the
-// child masks and the lists of child hashes. If all agree on all levels, nodes with equal hashes
-// have equal subtrees. This follows by induction from the bricks: the children of the two nodes
-// have equal hashes, so the children are equal. Then all hashes of a level are different, and their
-// order is the total order. After any mismatch, the DAG is made by pointers instead.
+// A verification sweep makes the result exact. On every level it compares every octree node,
+// removed or not, with the remaining node of the same hash: for bricks their masks, above the
+// bricks the child masks and the lists of child hashes. If all agree on all levels, nodes with
+// equal hashes have equal subtrees. This follows by induction from the bricks: the children of the
+// two nodes have equal hashes, so the children are equal. Then all hashes of a level are different,
+// and their order is the total order. After any mismatch, the DAG is made by pointers instead.
 #pragma once
 
 #include <cstdint>

@@ -7,7 +7,7 @@
 namespace voxdag {
 namespace {
 
-// A token says nothing until it is set, and then keeps saying kCanceled.
+// A token has no effect until it is set. Then every check throws kCanceled.
 TEST(CancelToken, ThrowsOnceSet) {
   CancelToken token;
   EXPECT_FALSE(token.canceled());

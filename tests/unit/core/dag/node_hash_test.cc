@@ -11,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-// Vectors computed apart from any code here, with Python's integers. A changed constant is a new
+// The vectors were computed independently, with Python's integers. A changed constant needs a new
 // format version.
 TEST(NodeHash, VectorsOfVersionOne) {
   EXPECT_EQ(hash_brick(1), 0xda4ddbf519386855u);
@@ -27,8 +27,8 @@ TEST(NodeHash, VectorsOfVersionOne) {
   EXPECT_EQ(hash_node(0xff, aaaaaaaa), 0x02995b2011a1e04au);
 }
 
-// The oracle's own writing of the same definition agrees on random input, and so does the running
-// form with the one-call form.
+// The oracle's own implementation of the definition agrees on random input. So do the incremental
+// hash and the hash in one call.
 TEST(NodeHash, EqualsTheOracle) {
   std::mt19937_64 random(4);
   for (int i = 0; i < 20000; ++i) {
@@ -45,7 +45,7 @@ TEST(NodeHash, EqualsTheOracle) {
   }
 }
 
-// The same children under another mask are another node: the hash must see the mask.
+// The same children with another mask are another node, so the hash must depend on the mask.
 TEST(NodeHash, SeesTheMask) {
   const uint64_t children[8] = {1, 2, 3, 4, 5, 6, 7, 8};
   std::set<uint64_t> seen;
