@@ -1,13 +1,10 @@
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
 
+#include "cli/cluster.h"
 #include "cli/option_fields.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "scheduler/run_build.h"
-#include "scheduler/slurm/commands/slurm.h"
-#include "scheduler/slurm/run_batch.h"
 #include "scheduler/spec/build_fields.h"
 
 namespace voxdag::cli {
@@ -15,9 +12,7 @@ namespace {
 
 struct BuildCommand {
   BuildSpec spec;
-  ClusterOptions cluster;
-  bool cluster_merge = false;
-  std::string merge_options;
+  BuildClusterOptions cluster;
   bool json = false;
 };
 
@@ -50,60 +45,9 @@ void print(const BuildReport& r) {
       size_text(r.peak_rss_bytes).c_str(), size_text(r.memory_bytes).c_str());
 }
 
-constexpr const char* kMergeJobFlag = "--cluster-merge-job";
-
-// Returns this process's command line without the program name.
-std::vector<std::string> own_arguments() {
-  std::ifstream line("/proc/self/cmdline");
-  std::vector<std::string> words;
-  for (std::string word; std::getline(line, word, '\0');) words.push_back(word);
-  if (words.size() < 2)
-    throw Error(ErrorCode::kIo,
-                "/proc/self/cmdline cannot be read: expected this command, for the "
-                "job that merges (--cluster-merge)");
-  words.erase(words.begin());
-  return words;
-}
-
-// The merge job gets the user's --memory and --threads. Without these options it gets the resources
-// of a task.
-ClusterOptions::MergeJobOptions merge_job(const BuildCommand& command, const BuildSpec& spec) {
-  ClusterOptions::MergeJobOptions job;
-  job.arguments = own_arguments();
-  // The first word is the command. Words after "--" are scenes, so the flag cannot be appended.
-  job.arguments.insert(job.arguments.begin() + 1, kMergeJobFlag);
-  job.folder = std::filesystem::current_path().string();
-  if (spec.run.memory_bytes > 0)
-    job.submit_options.push_back(
-        "--mem=" + std::to_string(allocation_for(spec.run.memory_bytes) >> 20) + "M");
-  if (spec.run.threads > 0)
-    job.submit_options.push_back("--cpus-per-task=" + std::to_string(spec.run.threads));
-  for (std::string& word : split_words(command.merge_options))
-    job.submit_options.push_back(std::move(word));
-  return job;
-}
-
-// Applies this job's Slurm allocation to the options that the user left out.
-void take_allocation(RunOptions& run) {
-  const Allocation given = slurm_allocation();
-  if (run.memory_bytes == 0 && given.memory_bytes > 0)
-    run.memory_bytes = batch_budget(given.memory_bytes);
-  if (run.threads == 0) run.threads = given.cpus;
-  // An earlier attempt at this job may still be ending on another node.
-  run.lock_wait_s = 300;
-  run.restart = false;
-}
-
 void run(const BuildCommand& command, CommandContext& context) {
   BuildSpec spec = command.spec;
-  if (command.cluster.engine != ClusterEngine::kNone) {
-    spec.run.cluster = command.cluster;
-    spec.run.cluster->program_version = VOXDAG_VERSION;
-    if (command.cluster.is_merge_job)
-      take_allocation(spec.run);
-    else if (command.cluster_merge)
-      spec.run.cluster->merge_job = merge_job(command, spec);
-  }
+  apply_cluster(command.cluster, spec.run);
   const auto progress = make_progress_bar();
   const BuildReport report = [&] {
     try {
@@ -122,20 +66,7 @@ void declare(Command& command, BuildCommand& state) {
   OptionDeclarer options(command, Scope::kBuild);
   fields(options, state.spec);
   command.config_option();
-  fields(options, state.cluster);
-  const char* const heading = kClusterHeading;
-  const Option merge =
-      command.flag("--cluster-merge", state.cluster_merge, "merge in a job of the cluster as well")
-          .needs(options.at("cluster"))
-          .group(heading);
-  command
-      .option("--cluster-merge-options", state.merge_options,
-              "options of sbatch for the merge job, added to --cluster-options")
-      .needs(merge)
-      .group(heading);
-  command.flag(kMergeJobFlag, state.cluster.is_merge_job, "this process is that job")
-      .needs(merge)
-      .group("");
+  declare_cluster(command, state.cluster);
   command.json_flag(state.json);
 }
 

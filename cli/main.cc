@@ -55,18 +55,23 @@ int run(int argc, char** argv) {
   CommandLine line(context);
   // Help lists the commands in this order.
   for (const auto add_command : {
-           add_build_command,    add_build_batch_command, add_stop_tasks_command, add_plan_command,
-           add_status_command,   add_info_command,        add_verify_command,     add_diff_command,
+           add_build_command,
+#ifdef VOXDAG_HAS_CLUSTER
+           add_build_batch_command, add_stop_tasks_command,
+#endif
+           add_plan_command,        add_status_command,     add_info_command,
+           add_verify_command,      add_diff_command,
 #ifdef VOXDAG_HAS_GENERATORS
            add_generate_command,
 #endif
-           add_render_command,   add_extract_command,     add_export_command,
+           add_render_command,      add_extract_command,    add_export_command,
 #ifdef VOXDAG_HAS_VIEWER
            add_view_command,
 #endif
 #ifdef VOXDAG_HAS_SERVER
-           add_serve_commands,   add_health_command,      add_submit_command,     add_jobs_command,
-           add_watch_command,    add_job_action_commands, add_download_command,
+           add_serve_commands,      add_health_command,     add_submit_command,
+           add_jobs_command,        add_watch_command,      add_job_action_commands,
+           add_download_command,
 #endif
        })
     add_command(line);

@@ -1,11 +1,12 @@
 #include <cstdio>
 
+#include "cli/cluster.h"
 #include "cli/option_fields.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "scheduler/plan_build.h"
-#include "scheduler/slurm/cluster_plan.h"
 #include "scheduler/spec/build_fields.h"
+#include "scheduler/stages/plan/cluster_plan.h"
 
 namespace voxdag::cli {
 namespace {
@@ -75,7 +76,7 @@ void declare(Command& command, PlanCommand& state) {
   OptionDeclarer options(command, Scope::kPlan);
   fields(options, state.spec);
   command.config_option();
-  fields(options, state.cluster);
+  declare_cluster(command, state.cluster);
   command.json_flag(state.json);
 }
 

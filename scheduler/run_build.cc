@@ -9,9 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "scheduler/check_spec.h"
-#include "scheduler/slurm/cluster_builder.h"
-#include "scheduler/slurm/merge_job.h"
-#include "scheduler/slurm/stop_tasks.h"
+#include "scheduler/cluster/cluster.h"
 #include "scheduler/stages/attributes/attribute_sections.h"
 #include "scheduler/stages/build/thread_builder.h"
 #include "scheduler/stages/ingest/ingest_stage.h"
@@ -277,25 +275,20 @@ void resumable(BuildJob& job, const std::function<void()>& stages) {
 // Runs the build as the cluster's merge job. A job that was submitted twice, or restarted by Slurm,
 // may find the build already finished.
 void run_as_merge_job(BuildJob& job, double start_s) {
-  const MergeJob merge_job(job.spec, job.scene.open(), job.work.path(), job.context,
-                           commands_of(job.spec));
-  if (const auto report = merge_job.finished()) {
+  const auto merge_job = make_merge_job(job.spec, job.scene.open(), job.context);
+  if (const auto report = merge_job->finished()) {
     job.report = *report;
     return remove_finished_work(job);
   }
-  job.report.merge_request = merge_job.request();
-  ClusterBuilder builder(job);
-  run_stages(job, builder, start_s);
+  job.report.merge_request = merge_job->request();
+  run_stages(job, *make_cluster_builder(job), start_s);
 }
 
 BuildReport run_here(BuildJob& job) {
   const double start_s = wall_seconds();
   resumable(job, [&] {
     if (is_merge_job(job.spec)) return run_as_merge_job(job, start_s);
-    if (job.spec.run.cluster) {
-      ClusterBuilder builder(job);
-      return run_stages(job, builder, start_s);
-    }
+    if (job.spec.run.cluster) return run_stages(job, *make_cluster_builder(job), start_s);
     ThreadBuilder builder(job);
     run_stages(job, builder, start_s);
   });
@@ -311,29 +304,19 @@ std::string submit_merge_job(BuildJob& job, MergeJob& merge_job) {
     if (!job.start_over && merge_job.is_alive()) return;
     merge_job.forget_finished();
     prepare_work_folder(job);
-    ClusterBuilder builder(job);
-    build_artifacts(job, builder);
-    id = builder.submit_merge_job();
+    const auto builder = make_cluster_builder(job);
+    build_artifacts(job, *builder);
+    id = builder->submit_merge_job();
   });
   return id;
-}
-
-// Stops the merge job of an earlier build, which may hold the locks.
-void stop_earlier_merge_job(const BuildSpec& spec, const BuildContext& context) {
-  try {
-    stop_merge_job(context.files, work_folder_of(spec.run), commands_of(spec));
-  } catch (const Error& error) {
-    context.progress.warn(error.message() + "; its tasks may still run");
-  }
 }
 
 }  // namespace
 
 BuildReport run_build(const BuildSpec& requested, const BuildContext& context) {
   const BuildSpec spec = checked(requested);
-  const std::string work = work_folder_of(spec.run);
   MemoryBudget budget(spec.run.memory_bytes);
-  BuildScene scene(spec.geometry, work, budget, context);
+  BuildScene scene(spec.geometry, work_folder_of(spec.run), budget, context);
   check_places(spec, scene, context);
   if (spec.run.cluster) check_cluster(spec, context);
   if (spec.run.restart) stop_earlier_merge_job(spec, context);
@@ -341,15 +324,15 @@ BuildReport run_build(const BuildSpec& requested, const BuildContext& context) {
     BuildJob job(spec, scene, budget, context);
     return run_here(job);
   }
-  MergeJob merge_job(spec, scene.open(), work, context, commands_of(spec));
+  const auto merge_job = make_merge_job(spec, scene.open(), context);
   std::string id;
-  const bool is_over = merge_job.finished() && !merge_job.has_remaining_work();
-  if (spec.run.restart || !(is_over || merge_job.is_alive())) {
+  const bool is_over = merge_job->finished() && !merge_job->has_remaining_work();
+  if (spec.run.restart || !(is_over || merge_job->is_alive())) {
     BuildJob job(spec, scene, budget, context);
-    id = submit_merge_job(job, merge_job);
+    id = submit_merge_job(job, *merge_job);
   }
   scene.close();
-  return merge_job.follow(id);
+  return merge_job->follow(id);
 }
 
 }  // namespace voxdag

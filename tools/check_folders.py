@@ -75,6 +75,7 @@ LAYERS = {
         "scheduler/slurm",
         "scheduler/slurm/files",
         "scheduler/slurm/commands",
+        "scheduler/cluster",
         "scheduler/stages/publish",
         "scheduler/stages/attributes",
         "scheduler/stages/merge",

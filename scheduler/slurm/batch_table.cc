@@ -10,6 +10,7 @@
 #include "core/io/random_id.h"
 #include "scheduler/slurm/files/batch_file.h"
 #include "scheduler/stages/build/split_subvolume.h"
+#include "scheduler/stages/plan/cluster_plan.h"
 #include "scheduler/state/job_progress.h"
 #include "scheduler/triangles/chunk.h"
 #include "scheduler/triangles/memory_store.h"

@@ -1,7 +1,5 @@
 #include "scheduler/slurm/batches.h"
 
-#include <algorithm>
-#include <cmath>
 #include <numeric>
 
 #include "core/geometry/morton.h"
@@ -49,12 +47,6 @@ CutBatches make_batches(const Batch& like, std::span<const BatchSubvolume> subvo
     cut.open.push_back(std::move(open));
   }
   return cut;
-}
-
-uint64_t default_tasks(double expected_bricks, uint64_t subvolumes) {
-  const uint64_t most = std::clamp<uint64_t>(subvolumes, 1, kMaxDefaultTasks);
-  const double wanted = std::ceil(expected_bricks * kSecondsPerBrick / kTaskSeconds);
-  return static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(most)));
 }
 
 }  // namespace voxdag

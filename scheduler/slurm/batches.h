@@ -31,13 +31,4 @@ struct CutBatches {
 CutBatches make_batches(const Batch& like, std::span<const BatchSubvolume> subvolumes,
                         uint64_t most, uint32_t first_number);
 
-// Returns the default number of tasks: about kTaskSeconds of one CPU each.
-uint64_t default_tasks(double expected_bricks, uint64_t subvolumes);
-
-// CPU time per expected brick: measured from 3 ns (the scene repeats itself) to 150 ns (no
-// repetition).
-inline constexpr double kSecondsPerBrick = 30e-9;
-inline constexpr double kTaskSeconds = 120;
-inline constexpr uint64_t kMaxDefaultTasks = 1000;
-
 }  // namespace voxdag

@@ -1,4 +1,4 @@
-// State shared by the parts of a cluster build (cluster_builder.h): the build, its cluster options,
+// State shared by the parts of a cluster build (slurm_builder.cc): the build, its cluster options,
 // its folder and its connection to Slurm.
 #pragma once
 

@@ -62,7 +62,7 @@ struct ClusterOptions {
   double slurm_interval_s = 5;  // between two queries to Slurm
   // Time after Slurm's start in which it may not know the requested nodes yet.
   double slurm_start_s = 15;
-  // Options of the merge job (slurm/merge_job.h). Without them this process merges.
+  // Options of the merge job (MergeJob). Without them this process merges.
   struct MergeJobOptions {
     // This program's arguments. The merge job runs the same build with them.
     std::vector<std::string> arguments;

@@ -3,6 +3,7 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/fields/json_fields.h"
+#include "scheduler/cluster/cluster.h"
 #include "server/http/connection/listener.h"
 
 namespace voxdag::server {
@@ -96,6 +97,7 @@ void read_config(FileSystem& files, const std::string& path, ServerConfig& confi
 }
 
 void check_config(const ServerConfig& config) {
+  if (config.cluster.engine != ClusterEngine::kNone) check_cluster_support();
   const auto expect = [](bool holds, const std::string& what) {
     if (!holds) throw Error(ErrorCode::kInvalidInput, what);
   };

@@ -7,7 +7,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
-#include "scheduler/slurm/stop_tasks.h"
+#include "scheduler/cluster/cluster.h"
 #include "server/jobs/job_outcome.h"
 #include "server/jobs/protocol/job_task.h"
 
@@ -304,7 +304,7 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
 void Dispatcher::stop_tasks(const std::string& id) {
   steps_.run("stop the cluster's tasks of job " + id, [&] {
     const FilesLock lock(*this, id);
-    stop_cluster_tasks(files_, folder(id).work(), system_commands());
+    stop_cluster_tasks(files_, folder(id).work());
   });
 }
 

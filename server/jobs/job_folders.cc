@@ -1,7 +1,7 @@
 #include "server/jobs/job_folders.h"
 
 #include "core/base/clock.h"
-#include "scheduler/slurm/stop_tasks.h"
+#include "scheduler/cluster/cluster.h"
 #include "server/jobs/process/job_process.h"
 #include "server/jobs/protocol/job_task.h"
 #include "server/jobs/task_resolver.h"
@@ -60,7 +60,7 @@ void JobFolders::clean_up() {
       // The service may have been killed before it stopped the tasks.
       else if (job->state == JobState::kSuspended || job->state == JobState::kFailed)
         // No job of the service uses a merge job.
-        stop_cluster_tasks(files_, of(entry.name).work(), system_commands(), true);
+        stop_cluster_tasks(files_, of(entry.name).work(), true);
       else if (has_ended(job->state) && job->state != JobState::kFailed)
         remove_work(entry.name);
     });
@@ -70,8 +70,7 @@ void JobFolders::clean_up() {
 
 void JobFolders::remove_work(const std::string& id) {
   const std::string work = of(id).work();
-  steps_.run("stop the cluster's tasks of job " + id,
-             [&] { stop_cluster_tasks(files_, work, system_commands()); });
+  steps_.run("stop the cluster's tasks of job " + id, [&] { stop_cluster_tasks(files_, work); });
   remove_tree(files_, work);
 }
 

@@ -56,7 +56,7 @@ struct ClusterState {
   ClusterTotals totals;
 
   std::string task_name() const { return "voxdag-" + build; }
-  // Name of the merge job (merge_job.h).
+  // Name of the merge job (MergeJob).
   std::string merge_job_name() const { return task_name() + "-merge"; }
   OpenBatch* find(uint32_t batch);
 };

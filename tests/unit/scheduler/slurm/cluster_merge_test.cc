@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "scheduler/slurm/cluster_builder.h"
+#include "scheduler/run_build.h"
 #include "tests/support/error_of.h"
 #include "tests/unit/scheduler/slurm/played_slurm.h"
 

@@ -7,9 +7,10 @@
 #include "core/base/error.h"
 #include "scheduler/run_build.h"
 #include "scheduler/slurm/batches.h"
-#include "scheduler/slurm/cluster_builder.h"
 #include "scheduler/slurm/files/batch_file.h"
+#include "scheduler/slurm/files/cluster_folder.h"
 #include "scheduler/slurm/run_batch.h"
+#include "scheduler/stages/plan/cluster_plan.h"
 #include "tests/support/error_of.h"
 #include "tests/unit/scheduler/slurm/played_slurm.h"
 

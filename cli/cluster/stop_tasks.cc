@@ -1,9 +1,8 @@
-#include "scheduler/slurm/stop_tasks.h"
-
 #include <cstdio>
 
 #include "cli/command.h"
 #include "core/base/error.h"
+#include "scheduler/cluster/cluster.h"
 #include "scheduler/slurm/files/cluster_state.h"
 
 namespace voxdag::cli {
@@ -18,7 +17,7 @@ void run(const StopTasksCommand& command, CommandContext& context) {
   if (!state)
     throw Error(ErrorCode::kNotFound,
                 command.work_folder + ": expected the work folder of a build on a cluster");
-  stop_cluster_tasks(context.files, command.work_folder, system_commands());
+  stop_cluster_tasks(context.files, command.work_folder);
   std::printf("stopped the tasks %s; finished subvolumes are kept\n", state->task_name().c_str());
 }
 

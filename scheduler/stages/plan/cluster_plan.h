@@ -17,6 +17,9 @@ struct ClusterPlan {
   EstimateRange merge_s;       // CPU time of the merge, on the machine that submits
 };
 
+// Returns the default number of tasks: about two minutes of one CPU each.
+uint64_t default_tasks(double expected_bricks, uint64_t subvolumes);
+
 // `tasks` is the number of tasks; 0 lets the build choose.
 ClusterPlan plan_cluster(const Estimate& estimate, uint64_t tasks);
 

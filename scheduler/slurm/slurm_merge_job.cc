@@ -1,5 +1,3 @@
-#include "scheduler/slurm/merge_job.h"
-
 #include <algorithm>
 #include <set>
 #include <thread>
@@ -9,8 +7,10 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "scene/formats/formats.h"
+#include "scheduler/cluster/cluster.h"
+#include "scheduler/slurm/cluster_context.h"
+#include "scheduler/slurm/files/cluster_folder.h"
 #include "scheduler/slurm/files/cluster_state.h"
-#include "scheduler/state/work_folder.h"
 
 namespace voxdag {
 namespace {
@@ -59,19 +59,46 @@ std::string request_digest(const BuildSpec& spec, const TriangleSource& scene) {
   return sha256_hex(text);
 }
 
-}  // namespace
+class SlurmMergeJob : public MergeJob {
+ public:
+  SlurmMergeJob(const BuildSpec& spec, const TriangleSource& scene, const BuildContext& context)
+      : spec_(spec),
+        options_(*spec.run.cluster),
+        context_(context),
+        folder_(work_folder_of(spec.run)),
+        slurm_(commands_of(spec), context.cancel),
+        request_(request_digest(spec, scene)) {}
 
-MergeJob::MergeJob(const BuildSpec& spec, const TriangleSource& scene,
-                   const std::string& work_folder, const BuildContext& context,
-                   CommandRunner& commands)
-    : spec_(spec),
-      options_(*spec.run.cluster),
-      context_(context),
-      folder_(work_folder),
-      slurm_(commands, context.cancel),
-      request_(request_digest(spec, scene)) {}
+  const std::string& request() const override { return request_; }
+  std::optional<BuildReport> finished() const override;
+  bool has_remaining_work() const override;
+  void forget_finished() override;
+  bool is_alive() override;
+  BuildReport follow(const std::string& id) override;
 
-std::optional<BuildReport> MergeJob::finished() const {
+ private:
+  std::optional<std::vector<SlurmJob>> query_jobs();
+  void set_names(const ClusterState& state);
+  void report_state(const SlurmJob& job);
+  void cancel_held(const SlurmJob& job);
+  void show_progress();
+  [[noreturn]] void fail(const std::string& id, const std::optional<SlurmEnd>& end) const;
+
+  const BuildSpec& spec_;
+  const ClusterOptions& options_;
+  const BuildContext& context_;
+  const ClusterFolder folder_;
+  Slurm slurm_;
+  const std::string request_;
+  bool is_answering_ = true;
+  bool is_running_ = false;
+  uint64_t shown_built_ = 0;
+  std::set<std::string> warned_reasons_;  // why the job waits
+  // Names from the last state that was read, because a finished job removes the state.
+  std::string name_, task_name_;
+};
+
+std::optional<BuildReport> SlurmMergeJob::finished() const {
   const std::string path = report_path(spec_.run.output);
   try {
     if (!context_.files.exists(path)) return std::nullopt;
@@ -86,11 +113,11 @@ std::optional<BuildReport> MergeJob::finished() const {
   return std::nullopt;
 }
 
-void MergeJob::forget_finished() {
+void SlurmMergeJob::forget_finished() {
   if (finished()) context_.files.remove(report_path(spec_.run.output));
 }
 
-std::optional<std::vector<SlurmJob>> MergeJob::query_jobs() {
+std::optional<std::vector<SlurmJob>> SlurmMergeJob::query_jobs() {
   const auto jobs = slurm_.jobs(name_);
   if (!jobs && is_answering_)
     context_.progress.warn("Slurm does not answer (squeue): waiting for it");
@@ -98,7 +125,7 @@ std::optional<std::vector<SlurmJob>> MergeJob::query_jobs() {
   return jobs;
 }
 
-bool MergeJob::is_alive() {
+bool SlurmMergeJob::is_alive() {
   const auto state = read_cluster_state(context_.files, folder_.work_folder());
   if (!state) return false;
   set_names(*state);
@@ -109,17 +136,17 @@ bool MergeJob::is_alive() {
   }
 }
 
-bool MergeJob::has_remaining_work() const {
+bool SlurmMergeJob::has_remaining_work() const {
   return !spec_.run.keep_work &&
          context_.files.exists(WorkFolder::store_path(folder_.work_folder()));
 }
 
-void MergeJob::set_names(const ClusterState& state) {
+void SlurmMergeJob::set_names(const ClusterState& state) {
   name_ = state.merge_job_name();
   task_name_ = state.task_name();
 }
 
-BuildReport MergeJob::follow(const std::string& submitted) {
+BuildReport SlurmMergeJob::follow(const std::string& submitted) {
   std::string id = submitted;
   double queried_s = -options_.slurm_interval_s, gone_since_s = 0;
   context_.progress.begin_stage("build", 0, "batches");
@@ -164,7 +191,7 @@ BuildReport MergeJob::follow(const std::string& submitted) {
 
 // Cancels tasks that Slurm could not start and holds. The merge job starts when these tasks have
 // ended and resubmits their batches. A canceled merge job is resubmitted by the next command.
-void MergeJob::cancel_held(const SlurmJob& job) {
+void SlurmMergeJob::cancel_held(const SlurmJob& job) {
   std::vector<std::string> given_up;
   if (job.is_held()) given_up.push_back(job.id);
   if (job.state == "PENDING") {
@@ -178,7 +205,7 @@ void MergeJob::cancel_held(const SlurmJob& job) {
 }
 
 // Reports once that the job runs, or why it does not.
-void MergeJob::report_state(const SlurmJob& job) {
+void SlurmMergeJob::report_state(const SlurmJob& job) {
   if (job.state == "PENDING" && !waits_for_its_turn(job.reason) &&
       warned_reasons_.insert(job.reason).second)
     context_.progress.warn("merge job " + job.id + " waits: " + job.reason);
@@ -188,7 +215,7 @@ void MergeJob::report_state(const SlurmJob& job) {
 }
 
 // Shows the number of built batches: completion records, plus batches the merge job has accepted.
-void MergeJob::show_progress() {
+void SlurmMergeJob::show_progress() {
   std::optional<ClusterState> state;
   try {
     state = read_cluster_state(context_.files, folder_.work_folder());
@@ -208,7 +235,7 @@ void MergeJob::show_progress() {
   shown_built_ = built;
 }
 
-void MergeJob::fail(const std::string& id, const std::optional<SlurmEnd>& end) const {
+void SlurmMergeJob::fail(const std::string& id, const std::optional<SlurmEnd>& end) const {
   const std::string log = folder_.path() + "/log-" + id + ".txt";
   const std::string log_end = last_lines(context_.files, log);
   throw Error(end ? code_of(*end) : ErrorCode::kIo,
@@ -216,6 +243,13 @@ void MergeJob::fail(const std::string& id, const std::optional<SlurmEnd>& end) c
                   (end ? end->text() : "Slurm does not say how") +
                   (log_end.empty() ? "" : "; its log " + log + " ends with:\n" + log_end) +
                   "\nthe same command submits it again");
+}
+
+}  // namespace
+
+std::unique_ptr<MergeJob> make_merge_job(const BuildSpec& spec, const TriangleSource& scene,
+                                         const BuildContext& context) {
+  return std::make_unique<SlurmMergeJob>(spec, scene, context);
 }
 
 }  // namespace voxdag

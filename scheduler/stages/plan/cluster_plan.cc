@@ -1,13 +1,19 @@
-#include "scheduler/slurm/cluster_plan.h"
+#include "scheduler/stages/plan/cluster_plan.h"
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "scheduler/slurm/batches.h"
 #include "scheduler/triangles/chunk.h"
 
 namespace voxdag {
 namespace {
 
+// CPU time per expected brick: measured from 3 ns (the scene repeats itself) to 150 ns (no
+// repetition).
+constexpr double kSecondsPerBrick = 30e-9;
+constexpr double kTaskSeconds = 120;
+constexpr uint64_t kMaxDefaultTasks = 1000;
 // The merge's share of a build's CPU time, as measured (docs/performance.md).
 constexpr double kMergeShare = 0.2;
 // A task also reads its batch and merges its artifacts. The final merge repeats both.
@@ -26,6 +32,12 @@ nlohmann::ordered_json to_json(const EstimateRange& r) {
 }
 
 }  // namespace
+
+uint64_t default_tasks(double expected_bricks, uint64_t subvolumes) {
+  const uint64_t most = std::clamp<uint64_t>(subvolumes, 1, kMaxDefaultTasks);
+  const double wanted = std::ceil(expected_bricks * kSecondsPerBrick / kTaskSeconds);
+  return static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(most)));
+}
 
 ClusterPlan plan_cluster(const Estimate& estimate, uint64_t tasks) {
   ClusterPlan plan;

@@ -1,0 +1,90 @@
+// Builds on a cluster, as other folders use them. scheduler/slurm/ implements these functions. With
+// VOXDAG_CLUSTER=OFF, without_cluster.cc replaces it: the program refuses cluster options and
+// leaves the tasks of earlier builds alone.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/io/file_system.h"
+#include "scene/triangle_source.h"
+#include "scheduler/spec/build_report.h"
+#include "scheduler/spec/build_spec.h"
+#include "scheduler/stages/build/subvolume_builder.h"
+#include "scheduler/state/job/build_job.h"
+
+namespace voxdag {
+
+// Throws Error{kInvalidInput} if this program has no cluster support.
+void check_cluster_support();
+// Throws Error{kInvalidInput} if Slurm is not installed, or if it would refuse the tasks of a build
+// with cluster options.
+void check_cluster(const BuildSpec& spec, const BuildContext& context);
+
+// True if this process is the merge job.
+inline bool is_merge_job(const BuildSpec& spec) {
+  return spec.run.cluster && spec.run.cluster->is_merge_job;
+}
+
+// Builds subvolumes in tasks of a cluster.
+class ClusterBuilder : public SubvolumeBuilder {
+ public:
+  // Submits all batches that Slurm accepts now, and a merge job that starts when their tasks have
+  // ended. Returns the merge job's id. The merge job resubmits failed batches.
+  virtual std::string submit_merge_job() = 0;
+};
+// `job` must outlive the result.
+std::unique_ptr<ClusterBuilder> make_cluster_builder(BuildJob& job);
+
+// A cluster build whose merge is also a job of the cluster (`--cluster-merge`). The submitting
+// process submits the tasks and a job that depends on them, unlocks the work folder and follows the
+// job. The job is the same command: it resumes the work folder as any later run does, resubmits
+// failed batches, waits for them and merges. The following process may be stopped and started
+// again. If the job is lost, the same command submits it again. While the job exists, it is found
+// by its name, which depends only on the state of the build. When it has ended, it is found by the
+// report next to the output, which contains the job's request.
+class MergeJob {
+ public:
+  virtual ~MergeJob() = default;
+
+  // Digest of the geometry options and of the scene's files with their sizes and times, taken when
+  // this object is made. Image files are included if the build has attributes.
+  virtual const std::string& request() const = 0;
+  // Returns the report of a finished merge job with the same request whose output exists.
+  virtual std::optional<BuildReport> finished() const = 0;
+  // True if the work folder still exists: the job is still removing it, or was stopped earlier.
+  virtual bool has_remaining_work() const = 0;
+  // Removes the report of an earlier merge job.
+  virtual void forget_finished() = 0;
+  // True if the work folder's merge job is waiting or running. Repeats the query until Slurm
+  // answers.
+  virtual bool is_alive() = 0;
+  // Shows the progress of job `id` ("" if unknown) until it has ended, and returns its report.
+  // Throws Error with the job's error code if it fails. Throws Error{kCanceled} if the context is
+  // canceled; the job continues to run.
+  virtual BuildReport follow(const std::string& id) = 0;
+};
+// `spec` and `context` must outlive the result.
+std::unique_ptr<MergeJob> make_merge_job(const BuildSpec& spec, const TriangleSource& scene,
+                                         const BuildContext& context);
+
+// Every build calls the following functions, because an earlier run in the same work folder may
+// have started tasks.
+
+// Records the results of tasks that an earlier run started for the scene with this digest. Throws
+// Error{kInvalidInput} if there are such tasks and this program has no cluster support.
+void accept_earlier_tasks(BuildJob& job, const std::string& scene_digest);
+// Stops running tasks of the work folder and removes their files. If a task cannot be stopped, this
+// is only a warning: the task will fail because its batch file is missing.
+void remove_tasks(BuildJob& job);
+// Stops the merge job of an earlier build, which may hold the locks. A failure is only a warning.
+void stop_earlier_merge_job(const BuildSpec& spec, const BuildContext& context);
+// Stops the merge job (unless this process is the merge job), then all tasks of the cluster build
+// in a work folder. Does nothing without a cluster build. If Slurm does not accept the request,
+// throws Error{kIo} with a command that the user can run to stop the tasks. Throws
+// Error{kInvalidInput} if this program has no cluster support.
+void stop_cluster_tasks(FileSystem& files, const std::string& work_folder,
+                        bool is_merge_job = false);
+
+}  // namespace voxdag
