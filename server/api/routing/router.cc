@@ -23,11 +23,19 @@ bool matches(const std::vector<std::string>& pattern, const std::vector<std::str
   return true;
 }
 
+Problem unknown_parameter(const Route& route, const std::string& name) {
+  std::string expected;
+  for (const Parameter& parameter : route.query)
+    expected += (expected.empty() ? "" : ", ") + parameter.name;
+  return bad_request("unknown query parameter '" + name.substr(0, 64) + "': expected " +
+                     (expected.empty() ? "none" : expected));
+}
+
 void check_query(const Request& request, const Route& route) {
   if (route.accepts_any_query) return;
   for (const auto& [name, value] : request.target.query)
     if (std::ranges::find(route.query, name, &Parameter::name) == route.query.end())
-      throw bad_request("unknown query parameter '" + name.substr(0, 64) + "'");
+      throw unknown_parameter(route, name);
 }
 
 // Returns the method whose routes answer the request: GET for HEAD.
