@@ -35,6 +35,7 @@ namespace {
 constexpr uint64_t kBytesPerFace = 128;
 constexpr uint64_t kBytesPerFaceOfTable = 64;
 constexpr uint64_t kMapBytesPerValue = 16;
+constexpr uint64_t kBytesPerAttribute = 1024;  // objects of an attribute and its decoder
 
 // Triangles of a strip per Draco face. Degenerate triangles join the pieces of a strip.
 constexpr uint64_t kMaxStripTrianglesPerFace = 8;
@@ -64,7 +65,7 @@ class BoundedDecoder : public Decoder {
   }
   bool DecodePointAttributes() override {
     attributes_ = *this->buffer();
-    return Decoder::DecodePointAttributes();
+    return admit([&] { charge_attributes(); }) && Decoder::DecodePointAttributes();
   }
   bool DecodeAllAttributes() override {
     return admit([&] { check_attributes(); }) && Decoder::DecodeAllAttributes();
@@ -89,12 +90,17 @@ class BoundedDecoder : public Decoder {
       check_valence_tables(*this->buffer(), admit_table_);
   }
 
+  // Draco makes the objects of all attributes before it calls DecodeAllAttributes().
+  void charge_attributes() {
+    const uint64_t attributes = count_attributes(attributes_, *this);
+    charge_up_to(charge_, charge_.bytes() + attributes * kBytesPerAttribute);
+  }
+
   void check_attributes() {
     const draco::PointCloud& mesh = *this->point_cloud();
     if (mesh.num_points() != vertices_)
       throw BrokenData{"its Draco data have " + std::to_string(mesh.num_points()) +
                        " vertices, its accessors " + std::to_string(vertices_)};
-    check_attribute_tables(attributes_, *this, admit_table_);
     uint64_t bytes_per_vertex = 0;
     for (int i = 0; i < mesh.num_attributes(); ++i) {
       const draco::PointAttribute& a = *mesh.attribute(i);
@@ -102,6 +108,8 @@ class BoundedDecoder : public Decoder {
                           sizeof(int32_t) * static_cast<uint64_t>(a.num_components());
     }
     charge_up_to(charge_, charge_.bytes() + vertices_ * bytes_per_vertex);
+    // After the charge, which limits the number of values to walk over.
+    check_attribute_tables(attributes_, *this, admit_table_);
   }
 
   const DracoHeader& header_;

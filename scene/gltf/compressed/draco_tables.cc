@@ -266,6 +266,14 @@ void check_valence_tables(const draco::DecoderBuffer& at, const AdmitTable& admi
   }
 }
 
+uint64_t count_attributes(const draco::DecoderBuffer& at, draco::MeshDecoder& decoder) {
+  const AdmitTable no_tables;
+  Walker walker(at, no_tables);
+  uint64_t attributes = 0;
+  for (const Group& group : read_groups(walker, decoder)) attributes += group.coders.size();
+  return attributes;
+}
+
 void check_attribute_tables(const draco::DecoderBuffer& at, draco::MeshDecoder& decoder,
                             const AdmitTable& admit) {
   Walker walker(at, admit);

@@ -28,6 +28,10 @@ void check_index_tables(const draco::DecoderBuffer& at, const AdmitTable& admit)
 // connectivity.
 void check_valence_tables(const draco::DecoderBuffer& at, const AdmitTable& admit);
 
+// Returns the number of attributes. `at` is the start of the attribute section; `decoder` has
+// decoded the connectivity.
+uint64_t count_attributes(const draco::DecoderBuffer& at, draco::MeshDecoder& decoder);
+
 // Checks the tables of all attributes. `at` is the start of the attribute section; `decoder` has
 // decoded the connectivity and the attributes' headers.
 void check_attribute_tables(const draco::DecoderBuffer& at, draco::MeshDecoder& decoder,

@@ -318,6 +318,15 @@ TEST(GltfDraco, DamagedDataAreErrors) {
   }
 }
 
+Error error_within(const std::string& file, uint64_t budget_bytes) {
+  try {
+    OpenScene(file, {}, budget_bytes).triangles();
+  } catch (const Error& error) {
+    return error;
+  }
+  return Error(ErrorCode::kInvalidInput, "");
+}
+
 // One byte can declare 64 symbols of the entropy coder, and each takes 12 bytes of tables: a file
 // of 400 KB would take 293 MiB.
 void expect_tables_in_the_budget(const std::vector<char>& data_before_the_table) {
@@ -328,18 +337,10 @@ void expect_tables_in_the_budget(const std::vector<char>& data_before_the_table)
     data.push_back(static_cast<char>((symbols & 127) | (symbols > 127 ? 128 : 0)));
   data.insert(data.end(), table_bytes, '\xff');  // 64 of them have probability 0
   const std::string file = compressed_scene(data, 3, 3).glb();
-  const auto error_within = [&](uint64_t budget_bytes) {
-    try {
-      OpenScene(file, {}, budget_bytes).triangles();
-    } catch (const Error& error) {
-      return error;
-    }
-    return Error(ErrorCode::kInvalidInput, "");
-  };
-  const Error refused = error_within(uint64_t{256} << 20);
+  const Error refused = error_within(file, uint64_t{256} << 20);
   EXPECT_EQ(refused.code(), ErrorCode::kOutOfMemory);
   EXPECT_THAT(refused.message(), testing::HasSubstr("decoding its Draco data takes 296 MiB"));
-  const Error damaged = error_within(uint64_t{512} << 20);
+  const Error damaged = error_within(file, uint64_t{512} << 20);
   EXPECT_EQ(damaged.code(), ErrorCode::kInvalidInput);
   EXPECT_THAT(damaged.message(), testing::HasSubstr("its Draco data are damaged"));
 }
@@ -347,6 +348,17 @@ void expect_tables_in_the_budget(const std::vector<char>& data_before_the_table)
 TEST(GltfDraco, TablesOfIndicesArePartOfTheBudget) {
   expect_tables_in_the_budget({'D', 'R', 'A', 'C', 'O', 2, 2, 1, 0, 0, 0,  // sequential
                                1, 3, 0});  // faces, vertices, compressed indices
+}
+
+// Draco makes the objects of each attribute before it decodes any.
+TEST(GltfDraco, AttributesArePartOfTheBudget) {
+  std::vector<char> data = {'D', 'R',    'A',    'C', 'O', 2, 2, 1, 0, 0, 0,  // sequential
+                            1,   3,      1,      0,   1,   2,  // face, vertices, plain indices
+                            1,   '\xa0', '\x8d', 6};           // one group of 100000 attributes
+  for (int i = 0; i < 100000; ++i) data.insert(data.end(), {4, 9, 1, 0, 0});  // generic floats
+  data.insert(data.end(), 100000, 0);                                         // their coders
+  const std::string file = compressed_scene(data, 3, 3).glb();
+  EXPECT_EQ(error_within(file, uint64_t{32} << 20).code(), ErrorCode::kOutOfMemory);
 }
 
 TEST(GltfDraco, TablesOfValencesArePartOfTheBudget) {
