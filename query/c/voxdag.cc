@@ -89,13 +89,23 @@ voxdag::query::Selection selection_of(uint32_t grid_levels, const voxdag_region*
   return selection;
 }
 
+// Larger sizes than later headers can have are uninitialized memory.
+constexpr size_t kMaxStructBytes = 4096;
+
+// `first_bytes` is the size of the struct in the first header that had it.
+void check_struct_size(const char* name, size_t struct_size, size_t first_bytes) {
+  if (struct_size < first_bytes || struct_size > kMaxStructBytes)
+    refuse(std::string(name) + " has the struct_size " + std::to_string(struct_size) +
+           ": expected sizeof(" + name + ")");
+}
+
 voxdag::query::RayLimits ray_limits_of(const voxdag_ray_limits* limits) {
   if (!limits) return {};
+  check_struct_size("voxdag_ray_limits", limits->struct_size,
+                    offsetof(voxdag_ray_limits, stop_size) + sizeof limits->stop_size);
   const char* const bytes = reinterpret_cast<const char*>(limits);
-  if (limits->struct_size < sizeof *limits)
-    refuse("voxdag_ray_limits has the struct_size " + std::to_string(limits->struct_size) +
-           ": expected sizeof(voxdag_ray_limits)");
-  if (std::any_of(bytes + sizeof *limits, bytes + limits->struct_size, [](char c) { return c; }))
+  if (limits->struct_size > sizeof *limits &&
+      std::any_of(bytes + sizeof *limits, bytes + limits->struct_size, [](char c) { return c; }))
     refuse("voxdag_ray_limits has members that libvoxdag.so " VOXDAG_VERSION " does not know");
   return {limits->max_distance, limits->stop_size};
 }
@@ -139,9 +149,8 @@ voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts) {
   return answer([&] {
     expect_pointer(file, "the file");
     expect_pointer(facts, "the place of the facts");
-    if (facts->struct_size < offsetof(voxdag_facts, bytes) + sizeof facts->bytes)
-      refuse("voxdag_facts has the struct_size " + std::to_string(facts->struct_size) +
-             ": expected sizeof(voxdag_facts)");
+    check_struct_size("voxdag_facts", facts->struct_size,
+                      offsetof(voxdag_facts, bytes) + sizeof facts->bytes);
     const voxdag::query::DagFile& dag = file->dag;
     voxdag_facts known{};
     known.struct_size = facts->struct_size;

@@ -50,6 +50,8 @@ TEST_F(CApiTest, StructsOfOtherSizes) {
     voxdag_facts known{};
     uint64_t unknown = 7, behind = 7;
   } later;
+  facts.struct_size = SIZE_MAX;  // uninitialized memory
+  EXPECT_EQ(voxdag_get_facts(file_, &facts), VOXDAG_INVALID_INPUT);
   later.known.struct_size = sizeof(voxdag_facts) + 8;
   ASSERT_EQ(voxdag_get_facts(file_, &later.known), VOXDAG_OK);
   EXPECT_EQ(later.known.voxels, dag_.voxels());
