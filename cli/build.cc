@@ -48,6 +48,7 @@ void print(const BuildReport& r) {
 void run(const BuildCommand& command, CommandContext& context) {
   BuildSpec spec = command.spec;
   apply_cluster(command.cluster, spec.run);
+  with_option_names([&] { check_options(spec); });
   const auto progress = make_progress_bar();
   const BuildReport report = [&] {
     try {

@@ -74,4 +74,14 @@ class OptionDeclarer {
   std::map<std::string, Option> options_;
 };
 
+// Calls check(). Errors of fields have the names of options: "--color-resolution".
+void with_option_names(const auto& check) {
+  try {
+    check();
+  } catch (const FieldError& error) {
+    throw Error(ErrorCode::kInvalidInput,
+                option_name(error.field.c_str()) + ": expected " + error.expectation);
+  }
+}
+
 }  // namespace voxdag::cli

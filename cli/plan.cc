@@ -54,6 +54,7 @@ void print(const ClusterPlan& plan) {
 }
 
 void run(const PlanCommand& command, CommandContext& context) {
+  with_option_names([&] { check_options(command.spec); });
   const auto progress = make_progress_bar();
   const Estimate estimate = plan_build(command.spec, {context.files, *progress, context.cancel});
   if (command.cluster.engine == ClusterEngine::kNone) {

@@ -56,8 +56,8 @@ PUBLIC_HEADERS = {"merge": ["merge/merge.h"]}
 # Tests and benchmarks may include more than the public header.
 BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 
-# Folders whose inner folders are in layers: an inner folder includes only itself and folders further
-# down its list.
+# Folders whose inner folders are in layers: an inner folder includes only itself and folders that
+# are further down its list.
 LAYERS = {
     "merge": [
         "merge",
@@ -157,8 +157,8 @@ BARE = ["core/base", "core/geometry", "core/dag", "core/color", "core/backend"]
 LIBRARY = re.compile(
     r"(zstd|tiny_gltf|sqlite3|httplib|png|zlib|xxhash)\.h$|^(nlohmann|openssl|CLI|gtest|gmock|benchmark)/"
 )
-# The reader that users copy into their engine. Its two headers include only the standard library and
-# each other.
+# The reader that users copy into their engine. Its two headers include only the standard library
+# and each other.
 STANDALONE_HEADERS = {
     "core/format/global/voxdag_reader.h": ["voxdag_reader_colors.h"],
     "core/format/global/voxdag_reader_colors.h": [],

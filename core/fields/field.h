@@ -58,6 +58,7 @@ struct Field {
   bool is_bytes = false;       // an integer that users write as 8GiB
   bool is_line = false;        // a text without control characters (one line)
   bool is_path = false;
+  bool accepts_unset = false;  // 0 or an empty text on the command line means "not given"
   bool is_required = false;
   bool is_positional = false;     // positional on the command line
   bool is_left_if_empty = false;  // JSON leaves the member out if it is empty
@@ -93,13 +94,19 @@ struct Field {
   constexpr Field from(Scope first) const { return with(&Field::scope, first); }
   constexpr Field key(bool present) const { return with(&Field::in_key, std::optional(present)); }
   constexpr Field unset_means(const char* text) const { return with(&Field::default_text, text); }
+  constexpr Field or_unset() const { return with(&Field::accepts_unset, true); }
   constexpr Field excludes(const char* other) const { return with(&Field::excluded, other); }
   constexpr Field needs(const char* other) const { return with(&Field::needed, other); }
 };
 
 // A value that a decoder refuses. The message has the field, the value and the expectation.
 struct FieldError : Error {
-  explicit FieldError(std::string message) : Error(ErrorCode::kInvalidInput, std::move(message)) {}
+  FieldError(std::string its_field, std::string its_expectation)
+      : Error(ErrorCode::kInvalidInput, "'" + its_field + "': expected " + its_expectation),
+        field(std::move(its_field)),
+        expectation(std::move(its_expectation)) {}
+
+  std::string field, expectation;
 };
 
 template <class E>
@@ -162,7 +169,9 @@ std::vector<std::string> choices_of(E e = {}) {
 
 template <NamedEnum E>
 constexpr const char* name_of(E e) {
-  return enum_names(e)[static_cast<size_t>(e)];
+  const auto& names = enum_names(e);
+  const auto index = static_cast<size_t>(e);
+  return index < std::size(names) ? names[index] : "invalid";
 }
 
 template <NamedEnum E>
@@ -239,6 +248,8 @@ bool fits(const Field& field, const T& value) {
   } else if constexpr (std::is_floating_point_v<T>) {
     return std::isfinite(value) && (!field.is_above_zero || value > 0) &&
            (!field.min || value >= static_cast<double>(*field.min));
+  } else if constexpr (NamedEnum<T>) {
+    return static_cast<size_t>(value) < std::size(enum_names(value));
   } else if constexpr (IsNumbers<T>::value) {
     for (const double number : value)
       if (!std::isfinite(number)) return false;
@@ -282,6 +293,11 @@ std::string documentation(const Field& field, const T& value, bool has_limits) {
   return standard.empty() ? text : text + " (default: " + standard + ")";
 }
 
+template <class T>
+bool is_unset(const Field& field, const T& value) {
+  return field.accepts_unset && value == T{};
+}
+
 // Parses a value from the command line. Returns false if the text is not a valid value.
 template <class T>
 bool parse_text(const Field& field, const std::string& text, T& value) {
@@ -305,10 +321,10 @@ bool parse_text(const Field& field, const std::string& text, T& value) {
     value = *numbers;
   } else if constexpr (NamedEnum<T>) {
     const auto found = enum_of<T>(text);
-    if (!found || text.empty()) return false;
+    if (!found || (text.empty() && !is_unset(field, *found))) return false;
     value = *found;
   } else if constexpr (NameSet<T>) {
-    for (size_t at = 0; at <= text.size();) {
+    for (size_t at = 0; at <= text.size() && !is_unset(field, text);) {
       const size_t end = std::min(text.find(',', at), text.size());
       if (!NameSetTraits<T>::add(value, text.substr(at, end - at))) return false;
       at = end + 1;
@@ -316,7 +332,7 @@ bool parse_text(const Field& field, const std::string& text, T& value) {
   } else {
     value = text;
   }
-  return fits(field, value);
+  return is_unset(field, value) || fits(field, value);
 }
 
 }  // namespace voxdag

@@ -5,7 +5,7 @@
 namespace voxdag::json_fields {
 
 void refuse(const std::string& name, const std::string& expected) {
-  throw FieldError("'" + name + "': expected " + expected);
+  throw FieldError(name, expected);
 }
 
 bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,

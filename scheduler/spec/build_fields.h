@@ -62,9 +62,11 @@ void fields(Visitor& visit, GeometryOptions& g) {
   visit(option("color_resolution", "cells per edge of the color grid, at most the resolution")
             .power_of_two(4, kMaxOptionEdge)
             .unset_means("the resolution, 4096 at most")
+            .or_unset()
             .key(g.attributes.any()),
         g.color_resolution);
   visit(option("attributes", "attributes to store for the cells of the color grid")
+            .or_unset()
             .key(g.attributes.any() && g.attributes != AttributeSet{Attribute::kColor}),
         g.attributes);
 }
@@ -85,15 +87,20 @@ void fields(Visitor& visit, RunOptions& r) {
             .bytes()
             .unset_means("half the RAM"),
         r.memory_bytes);
-  visit(option("threads", "worker threads").range(1, kMaxOptionThreads).unset_means("all cores"),
+  visit(option("threads", "worker threads")
+            .range(1, kMaxOptionThreads)
+            .unset_means("all cores")
+            .or_unset(),
         r.threads);
   visit(option("subvolume", "edge of a subvolume in voxels")
             .power_of_two(64, kMaxOptionEdge)
-            .unset_means("chosen by the build"),
+            .unset_means("chosen by the build")
+            .or_unset(),
         r.subvolume_edge);
   visit(option("backend", "device and pipeline that build subvolumes"), r.backend);
   visit(option("method", "algorithm of the backend; consing is the CPU's")
-            .unset_means("the backend's fastest"),
+            .unset_means("the backend's fastest")
+            .or_unset(),
         r.method);
   visit(option("work", "folder for temporary files")
             .path()

@@ -67,7 +67,7 @@ void check_options(const BuildSpec& spec) {
   if (g.resolution == 0)
     json_fields::refuse(kResolutionField.name, expectation<uint64_t>(kResolutionField));
   if (g.color_resolution && !g.attributes.any())
-    json_fields::refuse("color_resolution", "color or attributes at the same time");
+    json_fields::refuse("color_resolution", "color or attributes as well");
   if (g.color_resolution > g.resolution)
     json_fields::refuse("color_resolution",
                         "at most the resolution, " + std::to_string(g.resolution));

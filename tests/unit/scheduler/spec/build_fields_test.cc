@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <string_view>
 
 #include "scene/formats/formats.h"
 
@@ -14,6 +15,49 @@ namespace {
 TEST(BuildFields, SceneHelpListsAllEndings) {
   EXPECT_THAT(std::string(kSceneField.help),
               testing::HasSubstr("(" + list_scene_endings(", ", ", ") + ")"));
+}
+
+// Parses a text into the field of this name.
+struct OneOption {
+  std::string_view name;
+  std::string text;
+  bool is_valid = false;
+
+  template <class T>
+  void operator()(const Field& field, T& value) {
+    if (name == field.name) is_valid = parse_text(field, text, value);
+  }
+  void object(const char*, const auto&) {}
+};
+
+TEST(BuildFields, ZeroAndEmptyMeanTheDefault) {
+  BuildSpec spec;
+  spec.geometry.resolution = 64;
+  const auto accepts = [&](const char* name, const char* text) {
+    OneOption option{name, text};
+    fields(option, spec);
+    return option.is_valid;
+  };
+  for (const char* name : {"threads", "subvolume", "color_resolution"})
+    EXPECT_TRUE(accepts(name, "0")) << name;
+  for (const char* name : {"method", "attributes"}) EXPECT_TRUE(accepts(name, "")) << name;
+  check_options(spec);
+  for (const char* name : {"memory", "hash_bits", "voxel_size"})
+    EXPECT_FALSE(accepts(name, "0")) << name;
+  EXPECT_FALSE(accepts("backend", ""));
+}
+
+TEST(BuildFields, UnknownEnumerationsAreRefused) {
+  BuildSpec spec;
+  spec.geometry.resolution = 64;
+  spec.run.backend = static_cast<BackendName>(99);
+  try {
+    check_options(spec);
+    ADD_FAILURE() << "was accepted";
+  } catch (const FieldError& error) {
+    EXPECT_EQ(error.field, "backend");
+    EXPECT_THAT(error.message(), testing::HasSubstr("expected one of auto, "));
+  }
 }
 
 }  // namespace

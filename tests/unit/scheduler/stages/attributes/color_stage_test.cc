@@ -198,7 +198,7 @@ TEST_F(ColorStage, RefusesOptionsThatDoNotFit) {
             std::string::npos);
   BuildSpec s = spec(64, 32);
   s.geometry.attributes = {};
-  EXPECT_EQ(refusal(s), "'color_resolution': expected color or attributes at the same time");
+  EXPECT_EQ(refusal(s), "'color_resolution': expected color or attributes as well");
 }
 
 // A plan includes colors: their size in the file, and additional disk space.
