@@ -126,7 +126,7 @@ TEST(GltfNodes, RotationsThatAreNone) {
   EXPECT_EQ(open.triangles()[0][0], (Point{1, 2, 3}));
   const auto warnings = open.source->warnings();
   ASSERT_EQ(warnings.size(), 21u);
-  EXPECT_NE(warnings[0].find("node 0: its rotation is no unit quaternion"), std::string::npos);
+  EXPECT_NE(warnings[0].find("node 0: its rotation is not a unit quaternion"), std::string::npos);
   EXPECT_NE(warnings[20].find("980 further warnings"), std::string::npos);
 }
 

@@ -117,7 +117,8 @@ TEST_F(ColorArtifacts, WhatIsDamagedIsBakedAgain) {
   damage(100);
   ColorReport colors = *resume().colors;
   EXPECT_EQ(colors.cubes_reused + 1, colors.cubes);
-  EXPECT_NE(warnings_.text.find("damaged colors are baked again, cubes: 1"), std::string::npos);
+  EXPECT_NE(warnings_.text.find("damaged colors are baked again; number of cubes: 1"),
+            std::string::npos);
   // Cut off, as by a stop: silent.
   warnings_.text.clear();
   bake();

@@ -113,7 +113,7 @@ TEST_F(ColorStoreTest, HasArtifactsInParts) {
   damage(56 + 7 + 56);
   const ColorStore damaged = open();
   EXPECT_TRUE(damaged.has(a_) && !damaged.has(b_));
-  EXPECT_NE(warnings_.text.find("baked again, cubes: 1"), std::string::npos);
+  EXPECT_NE(warnings_.text.find("baked again; number of cubes: 1"), std::string::npos);
 }
 
 TEST_F(ColorStoreTest, DropsWhatIsMostOfItAndNotWanted) {
