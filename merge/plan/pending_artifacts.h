@@ -1,5 +1,6 @@
-// The artifacts that the next merge pass reads: first the inputs, later artifacts of earlier passes
-// (intermediates). Also the segment files of the intermediates.
+// The artifacts that the next merge pass reads. At first these are the inputs. A pass replaces the
+// artifacts that it merged by its output (intermediates). Also holds the intermediates' segment
+// files.
 #pragma once
 
 #include <cstdint>

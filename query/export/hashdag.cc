@@ -30,8 +30,8 @@ uint32_t top_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels > 7 ? grid_levels - 7 : 1, 1, 10);
 }
 
-// Returns an upper bound of the nodes in the top levels, of a coarser grid or of the DAG's own
-// grid.
+// Returns an upper bound on the number of nodes in the top levels of a grid with `grid_levels`
+// levels: the DAG's own grid or a coarser one.
 uint64_t top_nodes(const SelectedDag& dag, uint32_t grid_levels) {
   uint64_t nodes = 0;
   for (uint32_t level = 0; level < std::min(top_levels(grid_levels), grid_levels - kBrickLevels);

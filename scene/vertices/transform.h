@@ -58,7 +58,8 @@ inline Transform from_trs(const std::array<double, 3>& t, const std::array<doubl
 }
 
 // Converts a column-major 4x4 matrix, as stored in glTF. Returns false if a number is not finite or
-// the last row is not 0 0 0 1 (within 2^-10, for inverses in single precision).
+// the last row differs from 0 0 0 1 by more than 2^-10. The tolerance admits inverse bind matrices
+// that were computed in single precision.
 inline bool from_columns(const double* columns, Transform& out) {
   const auto near = [](double value, double wanted) {
     return value - wanted <= 1.0 / 1024 && wanted - value <= 1.0 / 1024;

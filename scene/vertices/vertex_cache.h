@@ -30,8 +30,8 @@ class VertexCache {
   // Clears the cache and changes to `source`, which must outlive its use. place() must be called
   // next.
   void bind(PositionSource& source);
-  // From this call on, returns the source's vertices transformed by `world` and, if `grid` is not
-  // null, snapped to it. All coordinates of a vertex that is not finite after the transform become
+  // From this call on, at() returns the source's vertices transformed by `world` and, if `grid` is
+  // not null, snapped to it. If a vertex is not finite after the transform, all its coordinates are
   // NaN.
   void place(const Transform& world, const Grid* grid);
 

@@ -1,4 +1,5 @@
-// Converts a request to the task of a process: finds its scenes and applies limits. Thread-safe.
+// Converts a job request to the task that a job process runs: finds the request's scenes and
+// applies the configured limits. Thread-safe.
 #pragma once
 
 #include <string>

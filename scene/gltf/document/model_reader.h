@@ -16,9 +16,9 @@ class ModelReader {
  public:
   ModelReader(const std::string& scene_path, MemoryBudget& budget);
 
-  // Adds an element of a section to the text. Throws Violation unless the asset's members and the
-  // names of extensions that voxdag uses are strings. Throws Error{kOutOfMemory} if the model would
-  // not fit the budget.
+  // Adds an element of a top-level section (asset, materials, ...) to the JSON text that parse()
+  // passes to tinygltf. Throws Violation if the asset's version or minVersion, or the name of an
+  // extension, is not a string. Throws Error{kOutOfMemory} if the model would not fit the budget.
   void add(const JsonElement& element);
   void add_image(const JsonElement& element);
 

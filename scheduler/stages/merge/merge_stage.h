@@ -1,7 +1,8 @@
-// The merge stage: from the artifacts of all subvolumes to the levels of the global file.
+// The merge stage: turns the artifacts of all subvolumes into the levels of the global file.
 //
-// Resume rule: the merge continues at its checkpoint in the job store. The last groups of artifacts
-// become durable before a checkpoint refers to them.
+// Resume rule: the merge continues at its checkpoint in the job store. When the merge starts, the
+// artifacts that CommitQueue received last may not be durable yet. They become durable before a
+// checkpoint refers to them.
 #pragma once
 
 #include <span>

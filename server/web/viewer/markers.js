@@ -15,7 +15,8 @@ export class Markers {
     for (const mark of this.marks) mark.remove();
   }
 
-  // `positions`: the pick and the start of a measurement in voxels, or null.
+  // `positions`: the picked point and the start of the measurement, both in voxels. An entry that
+  // does not exist is null or undefined.
   show(positions, camera, width, height) {
     const {forward, right, up} = camera.axes();
     const pixel = camera.pixelSpread(height);
