@@ -217,9 +217,11 @@ void GlobalFileWriter::end_level(const GlobalLevel& level) {
                                        " words, the format's limit is 2^40 a level");
   if (!s.level_open || nodes == 0 || words < 2 * nodes || words != s.checksummed_words)
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(s.current_level()) +
-                                         " has " + std::to_string(nodes) + " nodes in " +
-                                         std::to_string(words) + " words, of which " +
-                                         std::to_string(s.checksummed_words) + " were checksummed");
+                                         " cannot end with " + std::to_string(nodes) +
+                                         " nodes in " + std::to_string(words) + " words, " +
+                                         std::to_string(s.checksummed_words) +
+                                         " of them checksummed: expected an open level with nodes "
+                                         "of two words or more, all checksummed");
   s.levels.push_back(level);
   s.pad(s.end + bytes_of(level));
   s.level_open = false;

@@ -121,15 +121,16 @@ CompressedBytes bytes_of_view(const Document& d, int view, const std::string& wh
 
 // Checks that the view describes the decoded bytes.
 void check_parent(const Document& d, const BufferView& view, size_t index) {
-  const std::string where =
-      "bufferView " + std::to_string(index) + ": its EXT_meshopt_compression makes ";
+  const std::string where = "bufferView " + std::to_string(index);
   const MeshoptView& meshopt = *view.meshopt;
   if (view.byte_length > meshopt.decoded_bytes())
-    refuse(d.path, where + std::to_string(meshopt.decoded_bytes()) + " bytes, its byteLength is " +
-                       std::to_string(view.byte_length));
+    refuse(d.path, where + " has byteLength " + std::to_string(view.byte_length) +
+                       ": expected at most " + std::to_string(meshopt.decoded_bytes()) +
+                       ", the bytes that its EXT_meshopt_compression decodes to");
   if (view.byte_stride != 0 && view.byte_stride != meshopt.stride)
-    refuse(d.path, where + "elements of " + std::to_string(meshopt.stride) +
-                       " bytes, its byteStride is " + std::to_string(view.byte_stride));
+    refuse(d.path, where + " has byteStride " + std::to_string(view.byte_stride) + ": expected " +
+                       std::to_string(meshopt.stride) +
+                       ", the stride of its EXT_meshopt_compression");
 }
 
 }  // namespace

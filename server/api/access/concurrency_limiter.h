@@ -27,6 +27,11 @@ class ConcurrencyLimiter {
     return std::shared_ptr<void>(state_.get(),
                                  [state = state_, client](void*) { state->release(client); });
   }
+  // Returns the limits, for messages.
+  std::string limits() const {
+    return "expected at most " + std::to_string(max_per_client_) + " per client and " +
+           std::to_string(max_) + " in total";
+  }
   size_t in_use() const {
     std::lock_guard lock(state_->mutex);
     return state_->in_use;

@@ -123,7 +123,7 @@ Response follow(Context& context, Call& call) {
   response.headers.emplace("X-Accel-Buffering", "no");  // a proxy must not buffer events
   if (call.request.method == "HEAD") return response;
   auto permit = context.event_streams.acquire(call.caller.client);
-  if (!permit) throw busy("too many event streams, from this client or in total", 10);
+  if (!permit) throw busy("too many event streams: " + context.event_streams.limits(), 10);
   const auto feed =
       std::make_shared<EventFeed>(context, call.names[0], last_event_id(call.request));
   response.next_event = [feed] { return feed->next(); };

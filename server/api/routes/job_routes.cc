@@ -117,7 +117,7 @@ Problem problem_of(const Failure& failure) {
 // stopping, or the plan takes too long.
 Response dry_run(Context& context, Call& call, const JobRequest& request) {
   const auto permit = context.plans.acquire(call.caller.client);
-  if (!permit) throw busy("too many concurrent plans", 5);
+  if (!permit) throw busy("too many concurrent plans: " + context.plans.limits(), 5);
   const Plan plan(context, request);
   const TemporaryTask temporary(context.files,
                                 context.config.data_folder + "/plans/" + random_id());

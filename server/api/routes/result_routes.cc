@@ -109,7 +109,7 @@ Response answer_with_file(const Request& request, std::shared_ptr<ReadableFile> 
 Response get_dag(Context& context, Call& call) {
   const Job job = finished_job(context, call);
   auto permit = context.downloads.acquire(call.caller.client);
-  if (!permit) throw busy("too many downloads, from this client or in total", 5);
+  if (!permit) throw busy("too many concurrent downloads: " + context.downloads.limits(), 5);
   Response response = answer_with_file(
       call.request, context.files.open_read(context.dispatcher.folder(job.id).result()),
       nlohmann::json::parse(job.result).at("sha256"), file_name(job));

@@ -49,7 +49,7 @@ std::string checked_name(const Call& call) {
 // Returns SCENE, with the headers that a client needs to resume an upload.
 Response scene_response(Context& context, int status, const std::string& name) {
   const auto scene = context.scenes.find(name);
-  if (!scene) throw not_found("no such scene");
+  if (!scene) throw not_found("no such scene: expected the name of an uploaded scene");
   Response response = json_response(status, scene_json(*scene).dump());
   const auto upload = context.scenes.upload(name);
   const uint64_t offset = upload ? upload->offset : scene->offset;
@@ -150,7 +150,7 @@ Response put_scene(Context& context, Call& call) {
   check_running(context);
   const std::string name = checked_name(call);
   const auto permit = context.uploads.acquire(call.caller.client);
-  if (!permit) throw busy("too many uploads, from this client or in total", 5);
+  if (!permit) throw busy("too many concurrent uploads: " + context.uploads.limits(), 5);
   const Part part = part_of(call.request);
   const uint64_t announced = announced_bytes(context, part);
   check_unused(context, name);
@@ -207,7 +207,7 @@ Response delete_scene(Context& context, Call& call) {
   check_unused(context, name);
   if (context.planned_scenes.contains(name)) throw conflict("the scene is in use by a dry run");
   const bool found = context.disk.with_ballast([&] { return context.scenes.remove(name); });
-  if (!found) throw not_found("no such scene");
+  if (!found) throw not_found("no such scene: expected the name of an uploaded scene");
   return no_content();
 }
 

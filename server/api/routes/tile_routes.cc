@@ -94,7 +94,8 @@ auto parse_batch(const std::string& name, std::string_view list, size_t most, co
   std::vector<decltype(parse(std::string()))> addresses;
   for (size_t comma;; list.remove_prefix(comma + 1)) {
     if (addresses.size() == most)
-      throw bad_request("'" + name + "': expected at most " + std::to_string(most));
+      throw bad_request("'" + name + "' has too many addresses: expected at most " +
+                        std::to_string(most));
     comma = list.find(',');
     addresses.push_back(parse(std::string(list.substr(0, comma))));
     if (comma == std::string_view::npos) return addresses;
@@ -223,8 +224,7 @@ Response get_colors(const Call& call, const TileSource& dag) {
 
 std::shared_ptr<void> tile_permit(Context& context, const Call& call) {
   auto permit = context.tiles.acquire(call.caller.client);
-  if (!permit)
-    throw busy("too many concurrent requests for tiles, from this client or in total", 1);
+  if (!permit) throw busy("too many concurrent requests for tiles: " + context.tiles.limits(), 1);
   return permit;
 }
 

@@ -173,7 +173,7 @@ TEST(GltfMeshopt, WhatDoesNotFitIsRefusedByName) {
   EXPECT_THAT(with({{"byteStride", 10}}, same), HasSubstr("not a multiple of 4 up to 256"));
   EXPECT_THAT(with({{"byteStride", 16}}, same), HasSubstr("bufferView 1: its EXT_meshopt_compr"));
   EXPECT_THAT(with({{"count", 3599}}, same),
-              HasSubstr("makes 43188 bytes, its byteLength is 43200"));
+              HasSubstr("has byteLength 43200: expected at most 43188"));
   EXPECT_THAT(with({{"buffer", 7}}, same), HasSubstr("EXT_meshopt_compression: buffer 7"));
   EXPECT_THAT(with({{"byteLength", 1 << 20}}, same), HasSubstr("ends past the"));
   EXPECT_THAT(with({{"buffer", 1}}, same), HasSubstr("buffer 1 has no uri"));
