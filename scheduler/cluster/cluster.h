@@ -1,6 +1,6 @@
-// Builds on a cluster, as other folders use them. scheduler/slurm/ implements these functions. With
-// VOXDAG_CLUSTER=OFF, without_cluster.cc replaces it: the program refuses cluster options and
-// leaves the tasks of earlier builds alone.
+// The interface through which other folders run cluster builds. scheduler/slurm/ implements these
+// functions. With VOXDAG_CLUSTER=OFF, without_cluster.cc implements them instead: the program
+// refuses cluster options and leaves the tasks of earlier builds alone.
 #pragma once
 
 #include <memory>
@@ -38,12 +38,13 @@ class ClusterBuilder : public SubvolumeBuilder {
 std::unique_ptr<ClusterBuilder> make_cluster_builder(BuildJob& job);
 
 // A cluster build whose merge is also a job of the cluster (`--cluster-merge`). The submitting
-// process submits the tasks and a job that depends on them, unlocks the work folder and follows the
-// job. The job is the same command: it resumes the work folder as any later run does, resubmits
-// failed batches, waits for them and merges. The following process may be stopped and started
-// again. If the job is lost, the same command submits it again. While the job exists, it is found
-// by its name, which depends only on the state of the build. When it has ended, it is found by the
-// report next to the output, which contains the job's request.
+// process submits the tasks and a merge job that depends on them, and unlocks the work folder. Then
+// it follows the merge job. The merge job runs the same voxdag command: it resumes the work folder
+// as any later run does, resubmits failed batches, waits for their tasks and merges. The following
+// process may be stopped and started again with the same command. This also submits the merge job
+// again if Slurm has lost it. A process finds a running merge job by the job's name, which depends
+// only on the state of the build. It finds an ended merge job by the report next to the output,
+// which contains the job's request.
 class MergeJob {
  public:
   virtual ~MergeJob() = default;
@@ -53,7 +54,8 @@ class MergeJob {
   virtual const std::string& request() const = 0;
   // Returns the report of a finished merge job with the same request whose output exists.
   virtual std::optional<BuildReport> finished() const = 0;
-  // True if the work folder still exists: the job is still removing it, or was stopped earlier.
+  // True if the work folder still exists and the build does not keep it: the merge job is still
+  // removing it, or was stopped before it removed it.
   virtual bool has_remaining_work() const = 0;
   // Removes the report of an earlier merge job.
   virtual void forget_finished() = 0;
@@ -75,10 +77,11 @@ std::unique_ptr<MergeJob> make_merge_job(const BuildSpec& spec, const TriangleSo
 // Records the results of tasks that an earlier run started for the scene with this digest. Throws
 // Error{kInvalidInput} if there are such tasks and this program has no cluster support.
 void accept_earlier_tasks(BuildJob& job, const std::string& scene_digest);
-// Stops running tasks of the work folder and removes their files. If a task cannot be stopped, this
-// is only a warning: the task will fail because its batch file is missing.
+// Stops running tasks of the work folder and removes their files. Only warns if a task cannot be
+// stopped: the task will fail because its batch file is missing.
 void remove_tasks(BuildJob& job);
-// Stops the merge job of an earlier build, which may hold the locks. A failure is only a warning.
+// Stops the merge job of an earlier build, because that job may hold the locks. Only warns if this
+// fails.
 void stop_earlier_merge_job(const BuildSpec& spec, const BuildContext& context);
 // Stops the merge job (unless this process is the merge job), then all tasks of the cluster build
 // in a work folder. Does nothing without a cluster build. If Slurm does not accept the request,

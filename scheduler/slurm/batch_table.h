@@ -2,9 +2,9 @@
 // attempts failed, and the totals of built batches. The table is stored in cluster.json
 // (cluster_state.h), which is written by one process only. Used by one thread.
 //
-// A lost table is harmless: its subvolumes are still planned in the job store, so the next run
-// makes new batches of them. Building a batch twice is harmless too, because bytes are canonical
-// and only the first valid record is accepted.
+// Losing cluster.json is harmless: its subvolumes are still planned in the job store, so the next
+// run makes new batches of them. Building a batch twice is harmless too: both results have the same
+// bytes, and only the first valid record is accepted.
 #pragma once
 
 #include <cstdint>
@@ -77,7 +77,7 @@ class BatchTable {
 
   ClusterContext& cluster_;
   ClusterState state_;
-  std::map<SubvolumeId, StoredSubvolume> rows_;  // of the subvolumes of open batches
+  std::map<SubvolumeId, StoredSubvolume> rows_;  // job store rows of the open batches' subvolumes
   uint64_t earlier_requests_ = 0;                // requests to Slurm by earlier runs
   bool is_saved_ = true;                         // the last try_save() succeeded
   bool is_changed_ = false;

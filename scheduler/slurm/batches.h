@@ -26,8 +26,8 @@ struct CutBatches {
   std::vector<OpenBatch> open;      // the state of the same batches
   std::vector<size_t> first_items;  // index of the first subvolume of each batch
 };
-// Makes at most `most` batches, numbered from `first_number`. All other fields are copied from
-// `like`.
+// Makes at most `most` batches, numbered from `first_number`. Each batch gets its other fields (all
+// except its number and subvolumes) from `like`.
 CutBatches make_batches(const Batch& like, std::span<const BatchSubvolume> subvolumes,
                         uint64_t most, uint32_t first_number);
 

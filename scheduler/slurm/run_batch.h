@@ -12,7 +12,7 @@
 namespace voxdag {
 
 struct BatchRun {
-  std::string work_folder;  // of the build, on the shared disk
+  std::string work_folder;  // the build's work folder, on the shared disk
   uint32_t batch = 0;
   std::string program;           // this program's version
   std::string temporary_folder;  // on this machine; "" for $TMPDIR or /tmp
@@ -34,8 +34,8 @@ struct Allocation {
 };
 Allocation slurm_allocation();
 
-// Memory budget for a batch within an allocation of `given_bytes`. The rest is for the program
-// itself, buffers and page tables.
+// Returns the memory budget for building a batch in an allocation of `given_bytes`. The
+// allocation's remaining memory is for the program itself, buffers and page tables.
 uint64_t batch_budget(uint64_t given_bytes);
 // Allocation that a task needs for this budget.
 uint64_t allocation_for(uint64_t budget_bytes);

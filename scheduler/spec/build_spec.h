@@ -71,7 +71,7 @@ struct ClusterOptions {
   };
   std::optional<MergeJobOptions> merge_job;
   bool is_merge_job = false;  // this process is the merge job
-  // Runs Slurm's commands. Tests pass their own; null means the system's.
+  // Runs Slurm's commands. Null: the build uses the system's commands. Tests set a fake runner.
   CommandRunner* commands = nullptr;
 };
 
@@ -86,12 +86,13 @@ struct RunOptions {
   MethodName method = MethodName::kDefault;
   std::string cache_folder;  // "": no cache
   uint64_t cache_bytes = uint64_t{16} << 30;
-  // Interval between checkpoints: CPU time in the merge, wall time before it.
+  // Seconds between checkpoints: CPU time during the merge, wall time in the stages before it.
   double checkpoint_interval_s = 2;
-  // Minimum triangles of a scene for checkpoints of its ingest, which then takes about two CPU
-  // seconds.
+  // Ingest makes checkpoints only for scenes with at least this many triangles. Reading such a
+  // scene takes about two CPU seconds.
   uint64_t durable_min_triangles = uint64_t{4} << 20;
-  // Maximum wait for locks held by another build, which may be about to end.
+  // Maximum seconds to wait for locks held by another build, because that build may be about to
+  // end.
   double lock_wait_s = 30;
   bool keep_work = false;
   bool restart = false;  // discard the job in the work folder and start over

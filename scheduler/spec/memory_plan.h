@@ -20,7 +20,7 @@
 //                     each table of the plane memo  1/16, 1/8 of free            BackendMemory
 //                     block memo                    1/16 of free                 BackendMemory
 //                     more retained pages           1/8, up to 128 MiB           nobody
-//                     before it: key for the cache  the share less those pages   ArtifactCache
+//                     cache key, before build()     7/8 of the share             ArtifactCache
 //   color         surfaces; the rest is spilled     up to 1/3 of free            RecordStore
 //                   incomplete chunks of surfaces   1/8                          nobody
 //                 textures, or else spilled         up to 1/2 of the rest        TextureSet
@@ -68,7 +68,8 @@ struct MemoryPlan {
   static constexpr uint64_t ingest_workers(uint64_t free_bytes) {
     return std::max<uint64_t>(free_bytes / 2 / kIngestWorkerBytes, 1);
   }
-  // Returns the number of `threads` that have one of `pieces` to read and the memory for it.
+  // Returns the number of reading threads: at most `threads`, at most one per piece, and at most
+  // ingest_workers(free_bytes).
   static constexpr unsigned ingest_threads(uint64_t pieces, uint64_t free_bytes, unsigned threads) {
     return static_cast<unsigned>(
         std::clamp<uint64_t>(std::min(pieces, ingest_workers(free_bytes)), 1, threads));
@@ -113,7 +114,7 @@ struct ColorMemory {
 
 // Memory of the workers of the build stage.
 struct WorkerMemory {
-  // The maximum is limited because every worker has a segment file open.
+  // Maximum number of workers. It is limited because every worker has a segment file open.
   static constexpr uint64_t kMaxWorkers = 256;
   // Memory one worker needs outside its share.
   static constexpr uint64_t kOutsideShareBytes = kSegmentWriterBytes + BackendMemory::kMinPageBytes;

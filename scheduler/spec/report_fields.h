@@ -29,7 +29,7 @@ void fields(Visitor& visit, ColorReport& colors) {
   });
 }
 
-// The number of split subvolumes is left out, because the report counts it itself.
+// Omits the number of split subvolumes, because the report has it under "subvolumes".
 template <class Visitor>
 void fields(Visitor& visit, ClusterTotals& totals) {
   visit("batches", totals.batches);

@@ -15,7 +15,7 @@ struct StageTime {
   std::string name;
   double wall_s = 0;
   double cpu_s = 0;  // of the whole process
-  // The largest part of cpu_s used by a single thread (ThreadTimes).
+  // CPU time of the busiest thread as a fraction of cpu_s, from 0 to 1 (ThreadTimes).
   double largest_thread_share = 0;
 };
 

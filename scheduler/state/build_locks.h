@@ -12,8 +12,9 @@
 
 namespace voxdag {
 
-// Calls `try_lock` until it returns a lock, for up to `max_s` seconds; then returns null. Reports a
-// warning that begins with `what` after waiting longer than `voxdag status` may hold a lock.
+// Calls `try_lock` until it returns a lock, and returns this lock; null after `max_s` seconds
+// without a lock. Warns, with a text that begins with `what`, if the wait is longer than `voxdag
+// status` may hold a lock.
 std::unique_ptr<FileLock> wait_for_lock(const std::function<std::unique_ptr<FileLock>()>& try_lock,
                                         const std::string& what, double max_s,
                                         const BuildContext& context);

@@ -41,9 +41,9 @@ class CommitQueue {
   // Makes all built artifacts durable. Throws each error once; the next call retries the remaining
   // artifacts.
   void commit();
-  // Called when the worker has no more subvolumes. Completes the segment and shows the last group
-  // in the job store; it becomes durable only by commit(). The triangle store is not used after
-  // this call.
+  // Called when the worker has no more subvolumes. Completes the segment and makes the job store
+  // return the last group as built. This group becomes durable only by commit(). The triangle store
+  // is not used after this call.
   void finish();
 
  private:

@@ -30,7 +30,7 @@ struct JobStatus {
 JobStatus read_job_status(FileSystem& files, const std::string& work_folder);
 
 // Returns one JSON object with the names in docs/cli.md. `cluster` is the JSON status of a cluster
-// build, else "".
+// build, or "" for any other build.
 std::string status_json(const JobStatus& status, const std::string& cluster = "");
 
 }  // namespace voxdag

@@ -81,7 +81,7 @@ class WorkFolder {
   const std::string path_;
   bool existed_before_ = false;
   std::unique_ptr<FileLock> lock_;
-  std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments that had a part freed
+  std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments with a freed part
 };
 
 }  // namespace voxdag

@@ -2,8 +2,8 @@
 // Both triangle stores use these chunks. Nothing here locks: one thread writes a list of chunks,
 // and any number of threads may read it when it is complete.
 //
-// A record has nine coordinates of 32 bits (36 bytes). If the grid is an option of the build,
-// triangles may extend far beyond it, so coordinates have 64 bits ("wide", 72 bytes).
+// A record has nine coordinates of 32 bits (36 bytes). If the build's options define the grid,
+// triangles may extend far beyond it. Their coordinates then have 64 bits ("wide", 72 bytes).
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ struct Chunk {
   std::vector<std::byte> memory = {};  // empty if the records are in a file
   Extent extent = {};                  // in that file
   uint32_t records = 0;
-  uint64_t first = 0;  // records of the list before this chunk, set by the list
+  uint64_t first = 0;  // number of records in the list before this chunk
 };
 
 // Bytes per chunk in a growing list of chunks.

@@ -32,13 +32,13 @@ struct DurableStoreState {
 
 class DurableStore : public TriangleStore {
  public:
-  // Opens the store at `path` with its contents at a checkpoint; throws DamagedTriangles. Parts go
-  // to memory and `spill_path` as in a MemoryStore with this share.
+  // Opens the store at `path` with its contents at a checkpoint. Throws DamagedTriangles if they
+  // are damaged. Parts go to memory and `spill_path`, as in a MemoryStore that charges to `share`.
   DurableStore(FileSystem& files, std::string path, const DurableStoreState& state,
                std::string spill_path, bool wide, MemoryBudget& share);
 
   size_t record_bytes() const override { return parts_.record_bytes(); }
-  // More than in memory, so that there are fewer chunks to list, read and release.
+  // More records than in a MemoryStore, so that there are fewer chunks to list, read and release.
   size_t max_chunk_records() const override { return 16384; }
   void add_cube_bins(std::span<const Cube> cubes) override;
   const std::vector<CubeBin>& cube_bins() const override { return cube_bins_; }
@@ -72,7 +72,7 @@ class DurableStore : public TriangleStore {
 
   static bool is_part(BinId bin) { return bin >= kFirstPart; }
   void add_bin() { bins_.push_back(std::make_unique<Bin>()); }
-  // The bin itself, or the durable bin that a part was copied from.
+  // Returns the bin itself, or, for a part, the durable bin that it was copied from.
   BinId source_of(BinId bin) const;
   void set_cubes(std::span<const Cube> cubes, const Extent& extent);
   void read_chain();

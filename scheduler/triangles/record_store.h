@@ -53,7 +53,7 @@ class RecordStore {
   const std::string spill_path_;
   mutable std::mutex mutex_;  // guards all members below
   MemoryCharge charge_;
-  uint64_t memory_bytes_ = 0;  // of records in memory and their chunks
+  uint64_t memory_bytes_ = 0;  // bytes of records in memory and of their chunks
   std::unique_ptr<TriangleFile> spill_;
 };
 

@@ -26,8 +26,8 @@ inline constexpr size_t kMaxSurfaceRecordBytes = 1 + 4 + 9 * 8 + 6 * 8 + 12 * 2;
 // Appends the record of a surface. `has_image` is true if its material has a readable image.
 void append_surface(const FixedSurface& surface, bool has_image, std::vector<std::byte>& out);
 
-// Reads records that append_surface() wrote from the front of `bytes`. The bytes must have passed
-// their checksum; remaining defects are reported as damage of the file.
+// Reads records from the front of `bytes`, in the form that append_surface() writes. The bytes must
+// have passed their checksum; remaining defects are reported as damage of the file.
 class SurfaceRecords {
  public:
   explicit SurfaceRecords(std::span<const std::byte> bytes) : in_(bytes) {}

@@ -13,9 +13,9 @@
 
 namespace voxdag {
 
-// A task or job is_held() if Slurm could not start it and holds it until an operator releases it.
-// One cause: after a crash slurmctld may reuse the ids of tasks that nodes still know, and these
-// nodes refuse the new tasks.
+// is_held() of a task or job is true if Slurm could not start it and holds it until an operator
+// releases it. One cause: after a crash slurmctld may reuse the ids of tasks that nodes still know,
+// and these nodes refuse the new tasks.
 
 // A task of an array. Its name is JOB_INDEX, for the user and for Slurm.
 struct SlurmTask {
@@ -73,8 +73,8 @@ struct SlurmJob {
 
 class Slurm {
  public:
-  // Canceling `cancel` ends a running command. For some seconds after its start Slurm knows no
-  // nodes and refuses all requests, so such refusals are retried for `start_s`.
+  // Canceling `cancel` ends a running command. For some seconds after Slurm has started, it knows
+  // no nodes and refuses all requests. Such refusals are retried for `start_s`.
   Slurm(CommandRunner& commands, const CancelToken& cancel, double start_s = 0)
       : commands_(commands), cancel_(cancel), start_s_(start_s) {}
 

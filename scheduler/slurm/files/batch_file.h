@@ -48,8 +48,8 @@ struct Batch {
   double weight() const;
 };
 
-// Writes the file, durable under its name on return. `open` returns the triangles of the subvolume
-// with the given index.
+// Writes the file. When this returns, the file is durable under its name. `open` returns the
+// triangles of the subvolume with the given index.
 void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
                  const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,
                  const CancelToken& cancel);

@@ -3,12 +3,13 @@
 //
 //   cluster.json                       state of the submitting process (cluster_state.h)
 //   batch-7.vdbatch                    input of batch 7 (batch_file.h)
-//   batch-7.record-ATTEMPT.json        a batch that is built (completion_record.h)
-//   batch-7.failure-ATTEMPT.json       why an attempt ended
+//   batch-7.record-ATTEMPT.json        record of the built batch (completion_record.h)
+//   batch-7.failure-ATTEMPT.json       the reason why the attempt failed
 //   attempt-7-ATTEMPT/segment-N.vdseg  output of the attempt
 //   log-JOB_INDEX.txt                  standard error of a task
 //
-// The segment of the first valid record is moved to the work folder, where the merge reads it.
+// The segment of a batch's first valid record is moved to the work folder, where the merge reads
+// it.
 #pragma once
 
 #include <cstdint>

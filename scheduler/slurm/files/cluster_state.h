@@ -1,7 +1,7 @@
 // The state of the submitting process of a cluster build, in cluster.json: open batches with their
 // tasks and failures, and totals. Only the submitting process writes the file, by an atomic rename;
-// `voxdag status` reads it. No other file maps records to batches. Without it, batches are built
-// again unless a run has already accepted their records.
+// `voxdag status` reads it. No other file maps records to batches. If cluster.json is lost, batches
+// are built again unless a run has already accepted their records.
 #pragma once
 
 #include <cstdint>

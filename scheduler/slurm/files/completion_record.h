@@ -19,7 +19,7 @@ inline constexpr uint64_t kMaxRecordBytes = uint64_t{1} << 30;
 
 struct BuiltSubvolume {
   SubvolumeId id = 0;
-  SubDagSummary summary;  // of all its parts if it was split
+  SubDagSummary summary;  // if the subvolume was split: the summary of all its parts
 };
 
 struct CompletionRecord {
@@ -32,9 +32,10 @@ struct CompletionRecord {
   ArtifactRef artifact;  // one artifact for all subvolumes; 0 bytes if none has a voxel
   uint64_t segment_bytes = 0;
   std::vector<BuiltSubvolume> subvolumes;
-  uint64_t rows_before = 0, rows_after = 0;  // before and after merging the subvolumes' artifacts
-  uint64_t split = 0;                        // subvolumes that were split
-  double started_s = 0;                      // Unix time
+  uint64_t rows_before = 0,
+           rows_after = 0;  // DAG nodes before and after the merge of the artifacts
+  uint64_t split = 0;       // subvolumes that were split
+  double started_s = 0;     // Unix time
   double wall_s = 0, cpu_s = 0;
   uint64_t peak_rss_bytes = 0;
 };

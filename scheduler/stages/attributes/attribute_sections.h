@@ -16,8 +16,9 @@ class AttributeSections {
   // Adds the sections to a file that already has all its levels. Does nothing for a build without
   // attributes.
   void add_to(GlobalFileWriter& out);
-  // Returns a digest of all inputs of the sections: as add_to() used them, or else as the output of
-  // an earlier run has them. "" for a build without attributes.
+  // Returns a digest of all inputs of the sections; "" for a build without attributes. After
+  // add_to() it returns the digest of the inputs that add_to() used. Otherwise it reads the inputs,
+  // and fills in the color report from the output file of an earlier run.
   std::string digest();
 
  private:

@@ -22,7 +22,7 @@ struct SurfaceBinning {
   std::span<const Material> materials;
   std::span<const Checksum128> looks;  // look_digests() of the materials
   std::span<const Cube> cubes;         // these cubes cover the grid
-  size_t record_bytes;                 // per triangle, as digested by ingest (triangles/chunk.h)
+  size_t record_bytes;                 // bytes per triangle in ingest's digest (triangles/chunk.h)
   std::string digest;                  // digest of the triangles that ingest read
   size_t buffer_bytes;                 // for records not yet in the bins; uncharged
 };
@@ -32,8 +32,8 @@ struct BinnedSurfaces {
   std::vector<BinContent> contents;  // contents of each bin
 };
 
-// Throws Error{kInvalidInput} if the triangles differ from the ones that ingest read, because the
-// scene was changed during the build.
+// Throws Error{kInvalidInput} if the triangles differ from the triangles that ingest read. This
+// happens if the scene was changed during the build.
 BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
                             RecordStore& store, const StageContext& context);
 

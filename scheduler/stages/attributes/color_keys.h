@@ -1,5 +1,6 @@
-// Keys for the colors, or another attribute, of a cube: digests of all inputs. Equal keys mean
-// equal colors, independent of the order of the scene's triangles and of the rest of the scene.
+// A key for the colors, or for another attribute, of a cube: a digest of all inputs from which they
+// are computed. Equal keys mean equal colors. A key does not depend on the order of the scene's
+// triangles or on parts of the scene outside the cube.
 #pragma once
 
 #include <bitset>
@@ -16,14 +17,14 @@
 
 namespace voxdag {
 
-// Set of images, by image number modulo the set's size. With more images than that, a set can
-// contain more images than were added.
+// Set of images. Image i is bit i modulo the set's size (256), so in a scene with more images,
+// adding one image also adds all images with the same bit.
 using ImageClasses = std::bitset<256>;
 
 // Summary of the surfaces in a bin.
 struct BinContent {
   uint64_t surfaces = 0;
-  Checksum128 sum;  // sum over the surfaces of surface_digest()
+  Checksum128 sum;  // sum of the surfaces' surface_digest()
   ImageClasses images;
 };
 
@@ -33,8 +34,8 @@ struct StoredAttribute {
   uint32_t value_bytes = 0;  // per cell; 0 for colors
 };
 
-// Returns a digest of each material's contribution to the attributes, without its name. `images`
-// are digests of the image contents.
+// Returns for each material a digest of everything that it contributes to the attributes. The
+// material's name is not included. `images` are digests of the image contents.
 std::vector<Checksum128> look_digests(std::span<const Material> materials,
                                       std::span<const std::string> images,
                                       const AttributeSet& attributes);

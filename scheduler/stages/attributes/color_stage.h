@@ -28,7 +28,7 @@ struct ColorSource {
   std::string digest;            // digest of the triangles that ingest read
   std::string work_folder;       // for scratch files
   std::string artifact_path;     // file of the colors that outlive a run
-  double checkpoint_interval_s;  // between two syncs of that file
+  double checkpoint_interval_s;  // seconds between two syncs of that file
 };
 
 class ColorStage {
@@ -38,11 +38,11 @@ class ColorStage {
   ColorStage(const ColorSource& source, const StageContext& context);
   ~ColorStage();
 
-  // Returns the SHA-256 of the keys of all cubes. It is equal if the colors are equal. Reads the
-  // scene and its images.
+  // Returns the SHA-256 of the keys of all cubes, and of the materials' names if an attribute needs
+  // them. Equal digests mean equal sections. Reads the scene and its images.
   std::string digest();
-  // Returns digest(). If `output`, a valid file of an earlier run, has the colors of that digest,
-  // also fills in `report`.
+  // Returns digest(), and fills in `report` from `output`, a valid file of an earlier run. The
+  // report is correct only if that file has the sections of this digest.
   std::string digest_of(FileSystem& files, const std::string& output,
                         std::optional<ColorReport>& report);
   // Adds the sections to `out`, which has all its levels and is not sealed. Does nothing for a file

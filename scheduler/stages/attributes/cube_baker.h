@@ -22,9 +22,9 @@ class CubeBaker {
   // Records (region_record.h) of regions, for each attribute.
   using Records = std::vector<std::vector<std::byte>>;
 
-  // Charges `region_bytes`, at least ColorMemory::kRegionBytes, and ColorMemory::value_bytes().
-  // With more memory, regions are baked in fewer pieces. Surfaces in memory take up to
-  // `surface_bytes`. The references must outlive the baker.
+  // Charges `region_bytes`, which must be at least ColorMemory::kRegionBytes, plus
+  // ColorMemory::value_bytes(). With more memory, regions are baked in fewer pieces. In addition,
+  // surfaces in memory take up to `surface_bytes`. The references must outlive the baker.
   CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
             std::span<const Material> materials, TextureReader& textures, RecordStore& store,
             uint64_t region_bytes, uint64_t surface_bytes, MemoryBudget& budget,
@@ -32,9 +32,10 @@ class CubeBaker {
 
   // Receives and empties the complete records when they exceed the memory limit.
   using TakeRecords = std::function<void(Records& records)>;
-  // Appends the records of the regions with surfaces in Morton order, and clears the bin, which
-  // contains all surfaces that touch the cube. `records` has the order of the attributes. Calls
-  // take(records) whenever the records of one attribute have kManyRecordBytes.
+  // Bakes the regions of the cube that have surfaces, and appends their records in Morton order.
+  // `bin` must contain all surfaces that touch the cube, and is cleared. `records` has one element
+  // per attribute, in the order of the attributes. Calls take(records) whenever the records of one
+  // attribute have kManyRecordBytes.
   void bake(const Cube& cube, ChunkList& bin, Records& records, const TakeRecords& take);
 
   static constexpr size_t kManyRecordBytes = 256 << 10;

@@ -14,8 +14,8 @@ namespace voxdag {
 
 void append_region(const EncodedRegion& region, std::vector<std::byte>& out);
 
-// Reads records that append_region() wrote from the front of `bytes`. The bytes must have passed a
-// checksum; remaining defects throw.
+// Reads records from the front of `bytes`, in the form that append_region() writes. The bytes must
+// have passed a checksum; remaining defects throw.
 class RegionRecords {
  public:
   explicit RegionRecords(std::span<const std::byte> bytes) : in_(bytes) {}

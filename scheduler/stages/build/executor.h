@@ -43,9 +43,10 @@ struct ExecutorCounts {
   uint64_t cached = 0;  // subvolumes copied from the cache instead of built
 };
 
-// Builds `subvolumes` and releases their bins. Records the results in `jobs`; the last groups are
-// recorded when the caller commits `unfinished`, which receives the workers' queues. Throws the
-// first Error of any worker after all workers have stopped and finished subvolumes are recorded.
+// Builds `subvolumes` and releases their bins. Records the results in `jobs` in groups
+// (CommitQueue). Moves the workers' queues to `unfinished`; their last groups are recorded only
+// when the caller commits it. Throws the first Error of any worker after all workers have stopped
+// and finished subvolumes are recorded.
 ExecutorCounts build_subvolumes(const ExecutorOptions& options,
                                 std::vector<QueuedSubvolume> subvolumes, TriangleStore& triangles,
                                 JobStore& jobs, CommitQueues& unfinished, MemoryBudget& budget,

@@ -13,8 +13,8 @@
 
 namespace voxdag {
 
-// Records the octants of `whole` that have triangles in its place. Returns them with a bin for
-// each, and releases the bin of `whole`. The edge of `whole` must be longer than kSmallestEdge.
+// Records, in place of `whole`, its octants that have triangles. Returns these octants with a bin
+// for each, and releases the bin of `whole`. The edge of `whole` must be longer than kSmallestEdge.
 std::vector<QueuedSubvolume> split_subvolume(const QueuedSubvolume& whole, uint32_t grid_levels,
                                              TriangleStore& triangles, JobStore& jobs,
                                              Progress& progress, const CancelToken& cancel);

@@ -1,11 +1,10 @@
 // The two passes over a scene. The scan finds its bounds. Ingest snaps its triangles to the grid,
 // counts them in the top tree and stores them in the scene's bin.
 //
-// Resume rule: both continue from the given state, which an earlier run may have saved.
+// Resume rule: scan and ingest continue from the given state, which an earlier run may have saved.
 //
-// Several threads read pieces of the scene, of 16384 declared triangles each. Their results are
-// processed in the order of the pieces, so the state and the plan do not depend on the number of
-// threads.
+// Several threads read the scene in pieces of 16384 declared triangles. The results are processed
+// in the order of the pieces, so the state and the plan do not depend on the number of threads.
 #pragma once
 
 #include <functional>
@@ -17,7 +16,7 @@
 
 namespace voxdag {
 
-// Called after each piece. The state then covers all triangles up to its position.
+// Called after each piece. The IngestState then covers all triangles up to its `position`.
 using AfterPiece = std::function<void()>;
 
 // Adds the scene's triangles to the bounds of `state`.

@@ -71,9 +71,9 @@ class TopTree {
 
     const uint32_t grid_levels_;
     const uint32_t depth_;
-    std::vector<Entry> entries_;                 // several are possible for one cell
+    std::vector<Entry> entries_;                 // a cell can have several entries
     std::vector<LargeTriangle> large_;           // triangles that touch more than kMaxTouched cells
-    std::array<uint32_t, kSlots> last_entry_{};  // for the cells of a slot
+    std::array<uint32_t, kSlots> last_entry_{};  // index of the last entry for any cell of the slot
     std::vector<uint64_t> touched_;              // cells that the last triangle touches
     CubeInside last_cell_;                       // a cell that contains a complete triangle
     size_t entry_of_last_cell_ = 0;

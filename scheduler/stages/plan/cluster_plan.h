@@ -10,10 +10,10 @@ namespace voxdag {
 
 struct ClusterPlan {
   uint64_t tasks = 0;
-  uint64_t memory_bytes = 0;   // recommended per task; with less, a task needs more passes
+  uint64_t memory_bytes = 0;   // recommended per task; with less memory, a task needs more passes
   EstimateRange cpu_hours;     // of all tasks
-  EstimateRange task_s;        // of one task with one CPU, if all tasks were equal
-  EstimateRange shared_bytes;  // of the shared disk at its peak
+  EstimateRange task_s;        // CPU time per task, if all tasks were equal
+  EstimateRange shared_bytes;  // peak space on the shared disk
   EstimateRange merge_s;       // CPU time of the merge, on the machine that submits
 };
 

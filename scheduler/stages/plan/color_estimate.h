@@ -11,9 +11,9 @@ namespace voxdag {
 
 struct ColorEstimate {
   EstimateRange cells;           // cells of the color grid that have a color
-  EstimateRange file_bytes;      // of the sections in the global file
-  EstimateRange artifact_bytes;  // colors in the work folder until the file is complete
-  EstimateRange spill_bytes;     // surfaces and image pyramids that do not fit in memory
+  EstimateRange file_bytes;      // bytes of the sections in the global file
+  EstimateRange artifact_bytes;  // bytes of colors in the work folder until the file is complete
+  EstimateRange spill_bytes;     // bytes of surfaces and image pyramids that do not fit in memory
   EstimateRange memory_bytes;
   EstimateRange cpu_s;
 

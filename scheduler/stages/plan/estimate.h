@@ -2,9 +2,9 @@
 // extrapolated to the requested one.
 //
 // Voxels and octree nodes grow as a R^2 + b R (surfaces and their borders): two pilots give a and
-// b. DAG nodes grow by a factor per doubling of R. Two pilots give the first factor. Surfaces
-// flatten under the voxel, so the factor falls with each further doubling, at a rate measured on
-// real scenes. The spread widens with the distance from the pilots.
+// b. The number of DAG nodes grows by a factor whenever R doubles. Two pilots give the first
+// factor. A surface looks flatter within smaller voxels, so the factor falls with each further
+// doubling, at a rate measured on real scenes. The spread widens with the distance from the pilots.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,7 @@
-// The triangles of a scene on the coarser grid of a pilot. Of triangles that become equal and are
-// close in the scene's order, one is kept. If the scene's triangles are much smaller than the
-// pilot's voxels, few triangles remain, with the same voxels.
+// The triangles of a scene on the coarser grid of a pilot. Triangles that become equal on this grid
+// are kept only once if they are close together in the scene's order. If the scene's triangles are
+// much smaller than the pilot's voxels, few triangles remain. They touch the same voxels as all
+// triangles.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,8 @@ namespace voxdag {
 class PilotTriangles {
  public:
   // Copies the triangles of the store's scene bin, with coordinates divided by 2^shift. All threads
-  // read them, as the stage "estimate". If `budget` is too small for them, is_complete() is false.
+  // of the stage "estimate" read the bin. If `budget` is too small for the copy, is_complete() is
+  // false.
   PilotTriangles(const TriangleStore& scene, uint32_t shift, MemoryBudget& budget,
                  const StageContext& context);
 
