@@ -1,5 +1,5 @@
-// The public functions of the merge: many sub-DAGs and the top tree above them become one global
-// DAG, or one artifact.
+// The public functions of the merge. They merge many sub-DAGs, and the top tree above them, into
+// one global DAG or one artifact.
 //
 // Levels are merged from the bricks up. The nodes above the subvolumes (the top tree) are one more
 // run of their level. A level is merged hash partition by hash partition (usually one is enough):
@@ -11,11 +11,12 @@
 //   output   buckets are written in the order of their hashes, and the position of every row is
 //            stored for the level above
 //
-// The order within the runs serves to find the frames of a partition and the rows of a bucket. The
-// k-way heap merge also needs it, for rows that a sort cannot hold (truncated hashes). The budget
-// bounds the memory for any scene: if not all runs fit in one pass, neighboring artifacts
-// are first merged with each other, in one or more passes. docs/architecture.md, "Why the merge is
-// right", has the proof; merge/load/row.h defines the terms.
+// Because runs are sorted, the merge can find the frames of a partition and the rows of a bucket.
+// The k-way heap merge also needs sorted runs. It merges rows that a sort cannot hold, which occur
+// with truncated hashes. The budget bounds the memory for any scene: if not all runs fit in one
+// pass, neighboring artifacts are first merged with each other, in one or more passes.
+// docs/architecture.md, "Why the merge is right", has the proof; merge/load/row.h defines the
+// terms.
 #pragma once
 
 #include "core/base/memory_budget.h"

@@ -74,19 +74,21 @@ enum class Simd { kNone, kAvx2, kAvx512 };
 // True if this machine and this build can run the kernels for an instruction set.
 bool cpu_supports(Simd simd);
 
-// The CPU backend: bricks rasterized tile by tile, nodes hash-consed. Uses the largest instruction
-// set up to `max_simd` that the machine supports, chosen at run time; the result is the same.
+// Creates the CPU backend, which rasterizes bricks tile by tile and hash-conses nodes. It uses the
+// largest instruction set up to `max_simd` that the machine supports, chosen at run time. The
+// result is the same with every instruction set.
 std::unique_ptr<Backend> make_cpu_backend(Simd max_simd = Simd::kAvx512);
 
-// How the parallel backends work; the result is the same. kPointers and kHashes are the two
-// algorithms of Sintorn, "DAG Construction" (Eurographics 2018 tutorial).
+// The algorithms of the parallel backends. All methods produce the same result. kPointers and
+// kHashes are the two algorithms of Sintorn, "DAG Construction" (Eurographics 2018 tutorial).
 enum class Method {
   kFast,      // bricks drawn tile by tile, DAG by hashes: the fastest on a GPU
   kPointers,  // voxel list, DAG by pointers
   kHashes,    // voxel list, DAG by hashes
 };
 
-// The parallel pipeline on the host's threads (0: all of them), for tests and comparisons.
+// Creates a backend that runs the parallel pipeline on `threads` threads of the host (0: all of
+// them), for tests and comparisons.
 std::unique_ptr<Backend> make_parallel_host_backend(Method method, unsigned threads = 1);
 
 // Returns the number of GPUs that make_cuda_backend() can open. 0 if this build has no CUDA, or if
@@ -96,9 +98,10 @@ inline bool cuda_device_available() { return cuda_device_count() > 0; }
 // Returns why there is no usable device, as a sentence; "" if there is one.
 std::string cuda_device_problem();
 
-// Returns the parallel pipeline on a GPU. Device memory is charged to the build's budget like any
-// other. Each backend has its own stream, so if two share a device, transfers and host work of one
-// overlap with kernels of the other. Throws Error{kDevice} if there is no such device.
+// Creates a backend that runs the parallel pipeline on a GPU. Device memory is charged to the
+// build's budget like host memory. Each backend has its own stream. So if two backends share a
+// device, transfers and host work of one backend overlap with kernels of the other. Throws
+// Error{kDevice} if there is no such device.
 std::unique_ptr<Backend> make_cuda_backend(Method method = Method::kFast, int device = 0);
 
 }  // namespace voxdag

@@ -1,9 +1,9 @@
-// Divides the budget of one Backend::build() call among the structures that only make it faster.
-// A structure that exceeds its part is made smaller or omitted; the result is the same. All other
-// memory of a build (triangles, tile bricks, the tables as they grow) is allocated on demand, until
-// the budget refuses it and the subvolume is split.
+// Divides the budget of one Backend::build() call among the caches and tables that only make the
+// build faster. A structure that exceeds its part is made smaller or omitted; the result is the
+// same. All other memory of a build (triangles, tile bricks, the tables as they grow) is allocated
+// on demand, until the budget refuses it and the subvolume is split.
 //
-// Only the CPU backend has these parts. The guarantee for kSmallestBudget holds for them.
+// Only the CPU backend has these parts. kSmallestBudget (backend.h) suffices with these parts.
 #pragma once
 
 #include <algorithm>

@@ -12,8 +12,8 @@
 namespace voxdag {
 
 // Starts `work` on a new thread. If the system has no thread left, the first call of get() or
-// wait() runs it. get() rethrows the exception of `work`. The destructor of the future waits for
-// the thread.
+// wait() runs `work`. get() rethrows the exception of `work`. The destructor of the future waits
+// for the thread.
 template <class Work>
 [[nodiscard]] std::future<void> run_in_background(Work&& work) {
   const auto shared = std::make_shared<std::decay_t<Work>>(std::forward<Work>(work));

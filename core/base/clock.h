@@ -24,9 +24,9 @@ inline double unix_seconds() { return clock_seconds(CLOCK_REALTIME); }
 inline double process_cpu_seconds() { return clock_seconds(CLOCK_PROCESS_CPUTIME_ID); }
 inline double thread_cpu_seconds() { return clock_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
-// CPU time by threads, which shows if a stage keeps all of them busy. All threads that
-// parallel_for() has started for the same worker count as one, and so do all background threads. A
-// thread adds its time when it ends.
+// CPU time of each thread, which shows whether a stage keeps all threads busy. The times of all
+// threads that parallel_for() started with the same worker number are added together. So are the
+// times of all background threads. A thread adds its time when it ends.
 class ThreadTimes {
  public:
   static constexpr size_t kThreads = 257;

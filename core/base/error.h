@@ -1,6 +1,5 @@
-// Mappings of Error codes to the outside. One table in docs/errors.md maps a code to the exit
-// status of the command line and to the HTTP status of the service. The functions below are this
-// table in code.
+// Maps Error codes to the exit statuses of the command line and to the HTTP statuses of the
+// service. The functions below implement the table in docs/errors.md.
 #pragma once
 
 #include <optional>

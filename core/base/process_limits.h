@@ -1,6 +1,6 @@
-// Memory and CPUs that a build may use on this machine, and memory that this process uses. Also the
-// allocator settings without which the process would use more memory than it has charged.
-// Thread-safe.
+// Returns the memory and CPUs that a build may use on this machine, and the memory that this
+// process uses. Also changes allocator settings, because with the defaults the process would use
+// more memory than it has charged. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;
 
 // Returns half of the memory that RAM and cgroups allow, at least kMinMemory, in bytes.
 uint64_t default_memory();
-// Returns the lowest memory limit of some cgroups and of their ancestors, of version 2 or 1,
-// mounted under `mount`. `membership` lists the cgroups; it is the text of /proc/self/cgroup.
+// Returns the lowest memory limit of some cgroups (version 2 or 1), mounted under `mount`, and of
+// their ancestors. `membership` lists the cgroups; it is the text of /proc/self/cgroup. Returns
 // UINT64_MAX if there is no limit.
 uint64_t cgroup_memory(const std::string& membership, const std::string& mount);
 // Returns the number of CPUs that this process may use: the CPUs of its affinity mask, or fewer if
 // a cgroup has a quota.
 unsigned default_threads();
-// Returns the lowest CPU quota of the cgroups as above, in CPUs, rounded up. UINT64_MAX if there is
-// no quota.
+// Returns the lowest CPU quota of the same cgroups, in CPUs, rounded up. Returns UINT64_MAX if
+// there is no quota.
 uint64_t cgroup_cpus(const std::string& membership, const std::string& mount);
 // Largest resident set of this process so far (VmHWM), in bytes.
 uint64_t peak_resident_bytes();

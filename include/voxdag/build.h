@@ -8,11 +8,11 @@
 //
 // A build may be interrupted at any time, even by SIGKILL: the same call resumes it from its work
 // folder and produces the same bytes. Every byte of the file depends only on the scene and the
-// options of geometry, never on memory, threads or folders.
+// geometry options, never on memory, threads or folders.
 //
-// Errors are voxdag::Error with one of the codes of voxdag/error.h and a message that names the
-// problem, the place and the expectation. Both functions are thread-safe; two builds with the
-// same output or work folder exclude each other. docs/library.md has the details.
+// build() and plan() throw voxdag::Error with one of the codes in voxdag/error.h and a message that
+// names the problem, the place and the expectation. Both functions are thread-safe. Two builds with
+// the same output or work folder cannot run at the same time. docs/library.md has the details.
 #pragma once
 
 #include <array>
@@ -30,12 +30,14 @@
 namespace voxdag {
 
 // The device and the algorithm that voxelize a part of the scene. kAuto uses a GPU if one is
-// present; kDefault is the backend's fastest method. All of them produce the same bytes.
+// present; kDefault is the backend's fastest method. All backends and methods produce the same
+// bytes.
 enum class BackendName { kAuto, kCpu, kCuda, kParallelHost };
 enum class MethodName { kDefault, kConsing, kPointers, kHashes };
 
 struct BuildOptions {
-  // The scene: files (glTF 2.0, PLY), a mesh in memory, or both. Together they are one scene.
+  // The scene: files (glTF 2.0, PLY), a mesh in memory, or both. The files and the mesh form one
+  // scene.
   std::vector<std::string> scenes;
   std::optional<Mesh> mesh;
 
@@ -46,14 +48,15 @@ struct BuildOptions {
   std::optional<std::array<double, 4>> bounds;
   std::optional<double> voxel_size;
   bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
-  uint32_t hash_bits = 64;    // of the node hash, 4 to 64
-  // The attributes to store for the cells of a color grid, and its cells per edge, a power of two;
-  // 0 for the resolution, at most 4096.
+  uint32_t hash_bits = 64;    // bits of the node hash, 4 to 64
+  // The attributes to store for each cell of the color grid. `color_resolution` is the number of
+  // cells per edge of this grid, a power of two. 0 means the smaller of `resolution` and 4096.
   bool color = false, alpha = false, normal = false, material = false;
   uint64_t color_resolution = 0;
 
-  // The file to write, and the folder for the work in between; "" for output + ".work". The output
-  // path is created only by the final rename, so it never holds a partial file.
+  // `output` is the file to write. `work_folder` is the folder for intermediate files; an empty
+  // `work_folder` means output + ".work". The output path is created only by the final rename, so
+  // it never holds a partial file.
   std::string output;
   std::string work_folder;
   bool keep_work = false;    // keep the work folder after success
@@ -63,7 +66,7 @@ struct BuildOptions {
   uint64_t cache_bytes = uint64_t{16} << 30;
 
   // Resources. Resident memory, without `mesh`, exceeds memory_bytes by at most 64 MiB.
-  uint64_t memory_bytes = 0;    // from 64 MiB up; 0 for half of the machine's or the cgroup's
+  uint64_t memory_bytes = 0;    // at least 64 MiB; 0: half of the RAM or cgroup limit
   unsigned threads = 0;         // 0: all CPUs that the process may use
   uint64_t subvolume_edge = 0;  // in voxels, a power of two; 0: chosen by the plan
   BackendName backend = BackendName::kAuto;
@@ -78,8 +81,9 @@ struct BuildProgress {
   uint64_t total = 0;  // 0 while unknown
 };
 
-// All members may be empty. The build calls the functions from its threads; calls never overlap.
-// They must not throw. To end the build, a function calls cancel() of the token.
+// The functions may be empty, and `cancel` may be null. The build calls the functions from its
+// threads; calls never overlap. The functions must not throw. To end the build, a function calls
+// cancel->cancel().
 struct BuildHooks {
   std::function<void(const BuildProgress&)> on_progress;  // at most ten times a second
   std::function<void(std::string_view message)> on_warning;
@@ -94,8 +98,8 @@ struct BuildResult {
   std::array<double, 3> origin{};  // the low corner of the grid, in the units of the scene
   double edge = 0;                 // edge of the grid
   uint64_t triangles = 0;          // triangles that may touch the grid
-  uint64_t dropped_outside = 0;    // triangles
-  uint64_t dropped_invalid = 0;    // triangles
+  uint64_t dropped_outside = 0;    // triangles that miss the grid
+  uint64_t dropped_invalid = 0;    // invalid triangles (see skip_invalid)
   uint64_t voxels = 0;
   uint64_t dag_nodes = 0;
   uint64_t subvolumes = 0;

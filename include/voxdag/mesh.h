@@ -11,7 +11,8 @@ namespace voxdag {
 struct Mesh {
   // x, y and z of each vertex, in any units. A build with doubles does not round them to floats.
   std::variant<std::span<const float>, std::span<const double>> positions;
-  // Three vertex numbers for each triangle. Degenerate triangles are set like all others.
+  // Three vertex numbers for each triangle. Degenerate triangles set voxels like all other
+  // triangles.
   std::span<const uint32_t> indices;
   // Red, green, blue and alpha of each vertex, in sRGB; alpha is linear. Empty for white.
   std::span<const uint8_t> colors = {};

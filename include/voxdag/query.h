@@ -67,8 +67,8 @@ struct Nearest {
   bool found = false;
 };
 
-// Points for nearest() are within this distance of the grid's origin on every axis, so that squares
-// of distances fit in 64 bits.
+// Points for nearest() must be within this distance of the grid's origin on every axis, so that
+// squares of distances fit in 64 bits.
 inline constexpr int64_t kMaxCoordinate = int64_t{1} << 30;
 
 class DagFile {
@@ -100,9 +100,9 @@ class DagFile {
               unsigned threads = 1) const;
 
   // Attributes of cells. The grids of up to 2^color_levels() cells per edge have their own values;
-  // a finer cell has the value of the cell that contains it. A file of an empty scene has none.
-  // Positions near their predecessors are faster. Throws Error{kInvalidInput} for an attribute that
-  // the file does not have.
+  // a finer cell has the value of the cell that contains it. The file of an empty scene has no
+  // attributes. A lookup is faster if its position is near the previous position of the call.
+  // Throws Error{kInvalidInput} for an attribute that the file does not have.
   uint32_t color_levels() const;
   bool has_colors() const;
   bool has_alphas() const;
@@ -111,17 +111,18 @@ class DagFile {
   // Sets colors[i] to the color of cell points[i]; to zeros if the cell is not set.
   void colors(std::span<const Position> points, uint32_t grid_levels, std::span<Rgba> colors,
               unsigned threads = 1) const;
-  // Linear, 0 to 255; 0 for a cell that is not set.
+  // Sets alphas[i] to the alpha of cell points[i], linear, 0 to 255; to 0 if the cell is not set.
   void alphas(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> alphas,
               unsigned threads = 1) const;
-  // Zeros for a cell that is not set.
+  // Sets normals[i] to the normal of cell points[i]; to zeros if the cell is not set.
   void normals(std::span<const Position> points, uint32_t grid_levels, std::span<Normal> normals,
                unsigned threads = 1) const;
-  // Indices into material_names(); kNoMaterial for a cell that is not set.
+  // Sets materials[i] to an index into material_names(); to kNoMaterial if cell points[i] is not
+  // set.
   void materials(std::span<const Position> points, uint32_t grid_levels,
                  std::span<uint32_t> materials, unsigned threads = 1) const;
-  // The last name, "", is for triangles without a material. Empty if the file does not have the
-  // attribute.
+  // Returns the names of the materials. The last name is "", for triangles without a material. The
+  // list is empty if the file does not have the attribute.
   const std::vector<std::string>& material_names() const;
 
   // Finds the first set cell on each ray. Directions may have any length except 0. All numbers must
@@ -144,18 +145,19 @@ class DagFile {
   void bricks(const Selection& selection, const std::function<void(const Brick&)>& visit) const;
 
   // Returns the number of set cells in the region. The first count in a grid reads every node of
-  // its levels once, and stores a number for each.
+  // the grid's levels once, and stores a count for each node.
   uint64_t count(const Selection& selection) const;
 
-  // Finds the nearest set cell for each point, from center to center, at most `max_distance` cells
-  // away. Among equally near cells, it is the first in Morton order. Points may be outside the
-  // grid, with coordinates of at most kMaxCoordinate.
+  // Finds the nearest set cell for each point. Distances are measured between cell centers, and the
+  // cell is at most `max_distance` cells away. Of several equally near cells, the result is the
+  // first in Morton order. Points may be outside the grid, with coordinates of at most
+  // kMaxCoordinate.
   void nearest(std::span<const Position> points, uint32_t grid_levels, double max_distance,
                std::span<Nearest> cells, unsigned threads = 1) const;
 
   // Returns the cell that contains a point of the scene's space. The cell may be outside the grid,
-  // at most 2^62 cells away. A point counts as on a boundary between cells if it is within rounding
-  // error of it.
+  // at most 2^62 cells away. A point within rounding error of a boundary between cells counts as on
+  // the boundary.
   Position world_to_cell(const Coordinates& world, uint32_t grid_levels) const;
   // Returns the cells that the half-open box of the scene's space touches. An infinite side ends at
   // the border of the grid.

@@ -26,9 +26,9 @@ class MergeRecovery {
         pending_(pending),
         saver_(checkpoint, inputs.checkpoint_interval_s) {}
 
-  // Resumes the saved state if there is one and it fits: changes `pending`, the report and `out`,
-  // and returns the progress of the final pass. A state that does not fit is discarded with a
-  // warning.
+  // Resumes the saved state if there is one and it fits the inputs: changes `pending`, the report
+  // and `out`, and returns the progress of the final pass. A state that does not fit is discarded
+  // with a warning.
   PassProgress restore(GlobalFileWriter& out);
 
   // True if it is time to save a state. Rethrows the last save's error.
@@ -49,9 +49,11 @@ class MergeRecovery {
   PassProgress resume(const MergeState& state, GlobalFileWriter& out);
   PassProgress resume_final_pass(const FinalPassState& state, GlobalFileWriter& out);
   MergeState make_state(std::vector<ArtifactRef> intermediates) const;
-  // Returns the intermediates among the pending artifacts, starting at `begin`.
+  // Returns the intermediates (outputs of earlier passes) among the pending artifacts from number
+  // `begin` on.
   std::vector<ArtifactRef> intermediates_from(size_t begin) const;
-  // Returns the frames of the inputs from the bricks up to `level`, except frames returned earlier.
+  // Returns the inputs' frames of all levels from the bricks up to `level`, except frames returned
+  // earlier.
   std::vector<SegmentRange> newly_merged(std::span<const ArtifactReader> readers, uint32_t level);
 
   const MergeContext& context_;

@@ -1,6 +1,7 @@
-// Merges the rows of one hash if they do not fit in memory (hashes truncated to a few bits). They
-// cannot be divided by hash, so they are merged row by row: the rows of every run are rewired into
-// a scratch file, part by part, and read back through one small buffer per run.
+// Merges all rows with one hash if they do not fit in memory. This happens if hashes are truncated
+// to a few bits. Rows with equal hashes cannot be divided by hash, so they are merged row by row:
+// the rows of every run are rewired into a scratch file, part by part, and read back through one
+// small buffer per run.
 #pragma once
 
 #include <cstdint>

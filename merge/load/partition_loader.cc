@@ -125,8 +125,8 @@ class HashPartition::Loader {
     return worker.window.data();
   }
 
-  // Returns the number of buckets that begin at or before this hash, plus one if the hash is after
-  // the last bucket, for its end.
+  // Returns the number of buckets that begin at or before this hash. Adds one, for the end of the
+  // last bucket, if the hash is after that bucket.
   size_t begins_up_to(uint64_t hash) const {
     const HashInterval& interval = partition_.interval_;
     if (hash < interval.first) return 0;

@@ -1,4 +1,4 @@
-// The segment file that one merge pass writes and later ones read.
+// The segment file that one merge pass writes and later passes read.
 #pragma once
 
 #include <memory>

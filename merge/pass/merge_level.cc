@@ -171,12 +171,13 @@ class PartitionMerge {
 
 uint64_t bucket_rows(const MergeContext& context, const LevelTask& task) {
   const uint64_t rows = std::max<uint64_t>(kBucketRows, kMinBucketRowsPerRun * task.runs.size());
-  // Uses half of a worker's memory, because buckets differ in size.
+  // Plans buckets for half of a worker's memory, because buckets differ in size.
   const uint64_t row_bytes = BucketSorter::bytes_for({1, task.format.max_words()});
   return std::min(rows, context.plan.worker_bytes / (2 * row_bytes));
 }
 
-// Returns the words of each row's position that a partition keeps until it is merged.
+// Returns how many words a partition holds for the position of each row until the partition is
+// merged.
 uint32_t held_position_words(const LevelTask& task) {
   return task.maps.is_resident() ? 0 : task.maps.position_words();
 }
@@ -191,9 +192,9 @@ LevelExtent merge_partition(const MergeContext& context, const LevelTask& task,
   return PartitionMerge(context, task, partition, first_position).run();
 }
 
-// The plan has space for two frames of every run. So only a group of equal hashes that is longer
-// than two frames in some run may fail to fit. Throws Error{kOutOfMemory} if no run has such a
-// group.
+// The plan has space for two frames of every run. So a group of rows with equal hashes can fail to
+// fit only if it is longer than two frames in some run. Throws Error{kOutOfMemory} if no run has
+// such a group.
 void check_group_is_large(const LevelTask& task, uint64_t hash) {
   for (const LevelRun* run : task.runs) {
     const FrameSpan frames = run->frames_within({hash, hash});

@@ -79,7 +79,8 @@ class Pass {
       memory_.release();
   }
 
-  // Returns the maximum number of positions of rows, reached if no two are equal.
+  // Returns the maximum number of positions that the rows take in the output, reached if no two
+  // rows are equal.
   uint64_t max_positions(const RowCount& rows) const {
     return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }

@@ -31,8 +31,8 @@ struct PassProgress {
   std::vector<ArtifactRoot> roots;
 };
 
-// Continues from `progress`. Calls `after_level`, if set, after every level. Returns the roots of
-// the subvolumes; `index` is their position in `output`.
+// Runs the pass, continuing from `progress`. Calls `after_level`, if set, after every level.
+// Returns the roots of the subvolumes; `index` is their position in `output`.
 std::vector<ArtifactRoot> run_merge_pass(
     const MergeContext& context, const PassTask& task, LevelOutput& output, PassProgress progress,
     const std::function<void(const PassProgress&)>& after_level);

@@ -82,7 +82,8 @@ void PendingArtifacts::reset() {
 }
 
 void PendingArtifacts::survey(std::span<const ArtifactRef> refs) {
-  // A row has at most nine words, and the top tree adds a few rows.
+  // The division by 10 is safe: a row has at most nine words, and the top tree adds only a few
+  // rows.
   ArtifactSurvey found = survey_artifacts(refs, open_, inputs_.shape, false);
   if (found.rows > narrow_words_ / 10) found = survey_artifacts(refs, open_, inputs_.shape, true);
   artifacts_ = std::move(found.in_morton_order);

@@ -31,8 +31,9 @@ class PendingArtifacts {
   bool has_inputs() const;
   // Identifies the inputs by their content.
   uint64_t inputs_checksum() const { return inputs_checksum_; }
-  // Divides the artifacts into consecutive groups and returns the groups' ends. Each group can be
-  // merged within `partition_bytes` and has at most `max_rows`, but at least one artifact.
+  // Divides the artifacts into consecutive groups and returns the groups' ends. Each group has at
+  // least one artifact. A group of several artifacts can be merged within `partition_bytes` and has
+  // at most `max_rows` rows.
   std::vector<size_t> group_ends(uint64_t partition_bytes, uint64_t max_rows) const;
   bool fit_at_once(uint64_t partition_bytes) const {
     return size() < 2 || group_ends(partition_bytes, UINT64_MAX).size() == 1;

@@ -8,8 +8,8 @@ namespace {
 
 // A digit with more rows is sorted by comparison before the insertion sort runs over all rows.
 constexpr uint32_t kMaxInsertionRows = 32;
-// In a bucket every slice has a few rows at scattered addresses. They are prefetched this many
-// slices ahead.
+// In a bucket every slice has a few rows, and the slices are at scattered addresses. Rows are
+// prefetched this many slices ahead.
 constexpr size_t kSlicesAhead = 8;
 
 template <class T>
@@ -117,7 +117,7 @@ bool BucketSorter::same_row(const Entry& a, const Entry& b) const {
   return true;
 }
 
-// Rows with equal hashes are usually a single row, or the same row in several runs.
+// A hash usually occurs in a single row, or in equal rows of several runs.
 void BucketSorter::emit_unique(bool in_words) {
   unique_.clear();
   extent_ = 0;

@@ -38,7 +38,8 @@ class CudaDevice {
   // stream order.
   void send_staging(size_t count, FixedTriangle* to, const std::string& where);
 
-  // Free bytes of the device, including those that its memory pool retains.
+  // Returns the free bytes of the device, including the bytes that the device's memory pool
+  // retains.
   uint64_t available(const std::string& where) const;
   // Allocates device memory in stream order. Throws OutOfBudget if there is not enough.
   void* allocate(uint64_t bytes, const std::string& where);

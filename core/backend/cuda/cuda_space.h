@@ -1,5 +1,6 @@
-// The GPU's space: loops are kernels on one stream, memory is the device's.
-// core/backend/parallel/space/space.h specifies the calls. Only for CUDA sources.
+// The space of a GPU: its loops are kernels on one stream, and its memory is device memory.
+// core/backend/parallel/space/space.h defines spaces and specifies the calls. Only for CUDA
+// sources.
 #pragma once
 
 #include <algorithm>
@@ -70,7 +71,8 @@ class CudaSpace {
   template <class T>
   void upload(const T* from, T* to, uint64_t n) {
     transfer(from, to, n, cudaMemcpyHostToDevice);
-    // `from` may be freed soon, and it depends on the system whether the copy is still reading it.
+    // The caller may free `from` after this call. It depends on the system whether an asynchronous
+    // copy would still be reading `from` then.
     check(cudaStreamSynchronize(stream()), "cudaStreamSynchronize");
   }
   template <class T>

@@ -6,10 +6,10 @@
 //   nodes     the node of the block in the same slot
 //
 // It is direct-mapped: a new block replaces the block in its slot. All bytes of a block are
-// compared, so a hit is right for any keys. When most lookups miss, the cache is not used for a
-// while: in scans almost no blocks are equal. It is charged to the budget. If it is larger than its
-// minimum size, it is at most a sixteenth of the budget. Not thread-safe. Throws OutOfBudget if not
-// even the minimum size fits.
+// compared, so a hit is correct even if different blocks have the same key. When most lookups miss,
+// the cache is not used for a while: in scans almost no blocks are equal. It is charged to the
+// budget. If it is larger than its minimum size, it is at most a sixteenth of the budget. Not
+// thread-safe. Throws OutOfBudget if not even the minimum size fits.
 #pragma once
 
 #include <cstdint>
@@ -44,7 +44,8 @@ class BlockMemo {
     return true;
   }
   void prefetch(uint64_t key) const { __builtin_prefetch(&blocks_[slot_of(key)]); }
-  // Null if the block, which must not be empty, is not in the memo.
+  // Returns the node of a block, which must not be empty. Returns null if the block is not in the
+  // memo.
   const Node* find(uint64_t key, const VoxelBlock& block) const {
     const uint64_t slot = slot_of(key);
     uint64_t differ = 0;

@@ -1,7 +1,7 @@
-// All nodes of 8^3 voxels that the planes of one direction can have. Whether a plane passes above
-// or below a voxel corner k depends on whether f >= -n.k. A cube of 8^3 voxels has 729 corners, so
-// the sorted values -n.k divide all offsets f into at most 730 intervals; within an interval the
-// node is the same, so it is made once and then looked up.
+// All nodes of 8^3 voxels that planes of one direction can produce. Whether a plane passes above or
+// below a voxel corner k depends on whether f >= -n.k. A cube of 8^3 voxels has 729 corners, so the
+// sorted values -n.k divide all offsets f into at most 730 intervals; within an interval the node
+// is the same, so it is made once and then looked up.
 #pragma once
 
 #include <cstdint>

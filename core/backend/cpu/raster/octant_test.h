@@ -56,7 +56,7 @@ struct OctantTest {
     half = static_cast<double>(cube.edge / 2);
   }
 
-  // The children that the triangle's box touches, exactly; sets `reach` and `long_axes`.
+  // Returns exactly the children that the triangle's box touches. Sets `reach` and `long_axes`.
   uint32_t box_test() {
     uint32_t touched = 0xff;
     int64_t farthest = cube.edge;
@@ -105,8 +105,8 @@ struct OctantTest {
     return ~touched & 0xff;
   }
 
-  // The children on the inner side of the edges in projection `d`; `inside`, if not null, receives
-  // the children whose complete area is on that side.
+  // Returns the children on the inner side of the edges in projection `d`. `inside`, if not null,
+  // receives the children whose complete area is on that side.
   uint32_t edge_test(int d, uint32_t* inside) const {
     const int p = (d + 1) % 3, q = (d + 2) % 3;
     const Quad vp = Quad::load(t.v[p], cube.low[p]), vq = Quad::load(t.v[q], cube.low[q]);

@@ -98,7 +98,8 @@ class TriangleSet {
 
  private:
   PooledMemory& memory_;
-  // One more than used, so that a load of four elements is possible at the last three.
+  // narrow_ has one more element than is used, so that a load of four coordinates is possible at
+  // the last three coordinates.
   PooledArray<NarrowTriangle> narrow_;
   PooledArray<WideTriangle> wide_;
   uint32_t narrow_count_ = 0;

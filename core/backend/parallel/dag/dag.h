@@ -49,8 +49,8 @@ struct HashBrick {
 // Only bits [64 - hash_bits, 64) of a truncated hash can be set.
 inline int first_hash_bit(uint32_t hash_bits) { return 64 - static_cast<int>(hash_bits); }
 
-// Returns the number of children of each of some octree nodes. The prefix sums are the positions of
-// their first children.
+// Counts the children of each octree node in `items`. The prefix sums of these counts are the
+// positions of the nodes' first children.
 struct CountChildren {
   OctreeNodes nodes;
   const uint32_t* items;

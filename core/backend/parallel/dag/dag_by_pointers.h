@@ -29,7 +29,7 @@ struct Reduced {
   SpaceArray<Space, uint32_t> index_of;   // position of the survivor of each octree node
 };
 
-// A level's nodes as child lists of the level below, already reduced.
+// The nodes of a level, as lists of their children in the level below, which is already reduced.
 struct LinkedNodes {
   OctreeNodes nodes;
   const uint32_t* index_of;  // of the octree nodes below

@@ -1,4 +1,5 @@
-// The host's space: loops over threads, plain memory. space.h specifies the calls.
+// The space of the host: its loops run on threads, and its memory is ordinary memory. space.h
+// specifies the calls.
 #pragma once
 
 #include <algorithm>

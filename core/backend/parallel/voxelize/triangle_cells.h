@@ -90,7 +90,7 @@ struct TriangleOnLattice {
     }
   }
 
-  // The cells of the group at position `at` that the triangle touches.
+  // Returns the cells that the triangle touches, in the group at position `at`.
   template <int N>
   VOXDAG_HD uint64_t touched(const int (&at)[3]) const {
     uint64_t cells = ~uint64_t{0};
@@ -136,7 +136,7 @@ struct TriangleOnLattice {
     return cells;
   }
 
-  // Cells on the inner side of the three edges in the projection along axis c.
+  // Returns the cells on the inner side of the three edges in the projection along axis c.
   template <int N>
   VOXDAG_HD uint64_t inside_edges(int c, const int (&at)[3]) const {
     const int a = c == 2 ? 0 : c + 1, b = c == 0 ? 2 : c - 1;
@@ -187,7 +187,8 @@ VOXDAG_HD inline bool is_narrow(const FixedTriangle& t) {
   return true;
 }
 
-// Cells of 2^shift units, the first one's low corner at `low`.
+// Returns the cells that the triangle touches, in a group of cells with an edge of 2^shift units.
+// The low corner of the first cell is `low`.
 template <int N>
 VOXDAG_HD inline uint64_t touched_cells(const FixedTriangle& t, const int64_t (&low)[3],
                                         int shift) {

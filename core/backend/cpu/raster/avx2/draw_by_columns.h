@@ -82,7 +82,7 @@ class ColumnWalk {
   Sides<D> sides;
 };
 
-// Voxel columns p + 4 q as a layer of a brick in Morton order.
+// Returns voxel columns (bit p + 4 q for column (p, q)) as a layer of a brick, in Morton order.
 template <int D>
 VOXDAG_INLINE uint32_t in_layer(uint32_t columns) {
   const uint32_t middle = (columns >> 2 ^ columns) & 0x0c0c;

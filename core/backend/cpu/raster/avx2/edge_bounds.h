@@ -55,7 +55,8 @@ struct EdgeLanes {
   }
 
  private:
-  // Integers from -2^51 to 2^51, as the low bits of doubles from 2^52 to 2^53.
+  // Converts integers from -2^51 to 2^51 to doubles. The integers become the low bits of doubles
+  // from 2^52 to 2^53.
   static VOXDAG_INLINE __m256d convert(const int64_t* at) {
     const __m256d origin = _mm256_set1_pd(0x1.8p52);
     const __m256i four = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(at));
@@ -110,7 +111,8 @@ class EdgeBounds {
     spread(starts, start_);
   }
 
-  // For the rows k, one per lane: the largest y of the edges on this side, not rounded yet.
+  // Returns, for the rows k (one per lane), the largest y of the edges on this side, not rounded
+  // yet.
   VOXDAG_INLINE __m256d below(__m256d k) const {
     return _mm256_max_pd(_mm256_fmadd_pd(slope_[0], k, start_[0]),
                          _mm256_fmadd_pd(slope_[1], k, start_[1]));

@@ -1,5 +1,6 @@
-// The triangle's footprint: the voxel columns, and the columns of bricks, that its edges leave in
-// the projection along them, and its box. Exact: it is the overlap test of the projections.
+// The footprint of a triangle: the voxel columns, and the columns of bricks, inside the triangle's
+// edges in the projection along the columns. The footprint is also limited to the triangle's box.
+// Exact: these are the overlap test's edge and box tests in this projection.
 //
 // A row of bricks is four rows of 64 voxels, one bit each: the edges bound p in every row.
 //

@@ -165,7 +165,7 @@ class Heights {
   // The height of a column of bricks is the height of its lowest voxel column, kLowered units of
   // 16-bit lanes lower, kColumnBits below the voxel. Off by less than 2^-30 after 16 columns.
   int64_t origin_, step_p_, step_q_;
-  // An upper bound of the distance from there to the highest top of the column.
+  // An upper bound of the distance from the height of a column of bricks to its highest top.
   int64_t reach_;
   __m256i below_lanes_, top_lanes_;
 };

@@ -44,7 +44,7 @@ struct ColumnList {
   int count = 0;
   uint8_t numbers[256 + 16];  // add() writes 16
 
-  // Those of a row from first to last, 0 <= first <= last <= 15.
+  // Adds the columns of bricks `first` to `last` of row q, 0 <= first <= last <= 15.
   VOXDAG_INLINE void add(int q, int first, int last) {
     const __m128i steps = _mm_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     _mm_storeu_si128(reinterpret_cast<__m128i*>(numbers + count),
@@ -57,7 +57,8 @@ struct ColumnList {
   }
 };
 
-// Parts of a brick's Morton index in the tile: its column's, by number, and its height's.
+// The two parts of a brick's Morton index in the tile: one for the number of its column of bricks,
+// and one for its height in the column.
 template <int D>
 struct BrickIndex {
   uint16_t of_column[256] = {};
