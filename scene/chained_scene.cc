@@ -43,7 +43,8 @@ TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
   };
 }
 
-// Reads the parts one after another. Only one part's cursor is open, and it has the memory for all.
+// Reads the parts one after another. The cursor of only one part is open at a time, so each part's
+// cursor can use all memory of this cursor.
 class ChainedCursor : public TriangleCursor {
  public:
   ChainedCursor(const std::vector<Part>& parts, unsigned cursors)

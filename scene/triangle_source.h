@@ -39,7 +39,8 @@ class TriangleCursor {
   virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
   // Does the same with each vertex snapped to `grid`.
   virtual void read_snapped(uint64_t first, uint64_t count, const Grid& grid, const Visitor& visit);
-  // Visits the triangles with their surfaces. By default they are white and have material 0.
+  // Visits the triangles with their surfaces. The default implementation makes all triangles white,
+  // with material 0.
   virtual void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
   // Returns the bounds of the triangles that read() visits.
   virtual WorldBounds read_bounds(uint64_t first, uint64_t count);
@@ -57,7 +58,7 @@ struct ImageSource {
   bool is_data_uri = false;  // the base64 characters begin after the first comma
   uint64_t skip = 0;
   uint64_t bytes = UINT64_MAX;  // fewer if the source has fewer
-  std::string problem;          // why it cannot be read, if known; "" otherwise
+  std::string problem;          // why the image cannot be read, if known; otherwise ""
 };
 
 struct SceneMaterials {
@@ -71,7 +72,8 @@ struct SceneMaterials {
     for (Material& material : materials) material.image = Material::kNoImage;
     images.clear();
   }
-  // Appends the name "" for triangles without material, and gives them its number.
+  // Appends the name "" to `names`, and gives its number to the materials without a number, which
+  // are used by triangles without material.
   void name_unlisted() {
     for (Material& material : materials)
       if (material.number == Material::kNoNumber)

@@ -156,8 +156,8 @@ void build_artifacts(BuildJob& job, SubvolumeBuilder& builder) {
 }
 
 // Recovers from damage: plans subvolumes with damaged artifacts again. If no artifact is damaged, a
-// file of the merge must be, and the merge restarts, at most once. Returns false if it has
-// restarted before.
+// file of the merge must be damaged, so the merge restarts. This happens at most once: returns
+// false if the merge has restarted before.
 bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
   if (replan_damaged(job) > 0) return true;
   if (std::exchange(has_restarted, true)) return false;

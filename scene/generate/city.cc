@@ -53,7 +53,8 @@ class City {
     const Vec3 center{
         kPitch * (static_cast<double>(2 * column) - static_cast<double>(columns_ - 1)) / 2, 0,
         kPitch * (static_cast<double>(2 * row) - static_cast<double>(rows_ - 1)) / 2};
-    // A park is only known after its street. With colors, the ground is added then.
+    // Whether the block is a park is decided only after its street was made. With colors, the
+    // ground is added after this decision.
     if (!scene_.has_colors()) make_ground(center, false);
     make_street(center, random);
     const bool is_park = random.chance(10);

@@ -69,7 +69,7 @@ void add_ridge_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   for (const auto& f : kFaces) mesh.add_triangle(first + f[0], first + f[1], first + f[2]);
 }
 
-// Adds a box turned against the building, and a pyramid on it turned once more.
+// Adds a box that is rotated relative to the building, and on it a pyramid that is rotated further.
 void add_crown(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double half = std::min(tier.half_x(), tier.half_z());
   const double y = tier.top() + kSlabHeight;

@@ -8,8 +8,8 @@ namespace {
 
 constexpr Rgba8 kGlass{40, 62, 92, 255}, kTrunk{205, 51, 100, 255}, kLeaves{200, 225, 160, 255};
 
-// A unit of wall, its window's four corners set back behind the wall's plane: 12 corners in three
-// rings (the wall's edge, the window in the wall, the pane), 18 triangles.
+// A unit of wall with a window whose pane is set back behind the wall's plane. It has 12 corners in
+// three rings (the wall's edge, the window in the wall, the pane) and 18 triangles.
 //
 //     +-----------+        u to the right, v up, w out of the wall
 //     | \_______/ |

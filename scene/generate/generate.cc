@@ -29,7 +29,8 @@ constexpr uint32_t kMaxMengerLevel = 5;
 // Bytes per triangle of terrain, which is the most compact kind.
 constexpr uint64_t kMinBytesPerTriangle = 12;
 
-// Refuses sizes that are obviously too large without counting. GlbLayout refuses the others.
+// Refuses, without counting, sizes that are obviously too large. GlbLayout refuses all other sizes
+// that are too large.
 void check_size(const GenerateOptions& options) {
   const bool is_menger = options.kind == SceneKind::kMenger;
   const bool fits =

@@ -1,7 +1,8 @@
 // Scenes generated from a seed. They can have any size, are streamed to a .glb in a few MB of
-// memory, and have the same bytes on every machine. So the generators use only integers, + - * /
-// and sqrt of IEEE doubles (compiled without fused multiply-add) and their own random numbers,
-// never the math library. docs/generate.md describes the kinds; tests pin a digest of each.
+// memory, and have the same bytes on every machine. To get the same bytes, the generators use only
+// integers, + - * / and sqrt of IEEE doubles (compiled without fused multiply-add) and their own
+// random numbers, never the math library. docs/generate.md describes the kinds; tests pin a digest
+// of each.
 #pragma once
 
 #include <cstdint>
@@ -50,7 +51,8 @@ struct GenerateOptions {
   uint32_t level = 3;
   // city and spheres: repeated parts are stored once and placed by EXT_mesh_gpu_instancing.
   bool instances = false;
-  // city only, not with instances: materials and vertex colors. The triangles are the same.
+  // city only, without `instances`: adds materials and vertex colors. The triangles are the same as
+  // without colors.
   bool colors = false;
 };
 

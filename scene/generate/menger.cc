@@ -1,6 +1,7 @@
-// Menger's sponge of level n: the cells, of 3^n unit cells per axis, that at no scale are in the
-// middle of two or three axes. Every face between a cell of the sponge and one outside it is a unit
-// square with corners on the integer lattice: 2 * 20^n + 4 * 8^n squares.
+// Menger's sponge of level n: a grid of 3^n unit cells per axis, without the cells that at some
+// scale are in the middle of two or three axes. Every face between a remaining cell and a removed
+// cell or the outside is a unit square with corners on the integer lattice: 2 * 20^n + 4 * 8^n
+// squares.
 #include "scene/generate/scene_builder.h"
 
 namespace voxdag {

@@ -35,9 +35,10 @@ class SceneBuilder {
   // Material of the following additions. Has no effect without colors.
   void paint(uint32_t material, const Rgba8& color) { paint_ = {material, color}; }
 
-  // Returns a mesh of the current paint with space for `vertices` and `triangles` more: the current
-  // mesh, or an empty one after passing the current one to the sink. At most
-  // MeshBuilder::kMaxVertices and MeshBuilder::kMaxTriangles.
+  // Returns a mesh of the current paint with space for `vertices` and `triangles` more. This is the
+  // current mesh if it has the space. Otherwise the current mesh is passed to the sink, and an
+  // empty mesh is returned. The arguments are at most MeshBuilder::kMaxVertices and
+  // MeshBuilder::kMaxTriangles.
   MeshBuilder& mesh_for(uint32_t vertices, uint32_t triangles);
   uint32_t add_part(MeshBuilder mesh);
   // Places a part. Its colors are multiplied by the current paint's color.

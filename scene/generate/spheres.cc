@@ -9,7 +9,8 @@ namespace voxdag {
 namespace {
 
 constexpr double kBallRadius = 512;
-// Radii from 64 down to slightly over 1, edges in 64 down to 1 parts.
+// Radii from 64 down to slightly over 1. The octahedron's edges are divided into 64 down to 1
+// parts.
 constexpr uint32_t kSizes = 7;
 
 // Adds a face of the octahedron with its edges divided into n parts.

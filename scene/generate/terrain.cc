@@ -1,6 +1,7 @@
 // A fractal heightfield on a square of 1024 x 1024: octaves of gradient noise, ridged on high land
-// and smooth on low land. Its coordinates are bent by two more octaves, so that valleys wind. Each
-// octave has half the wavelength of the previous one, down to four cells of the field.
+// and smooth on low land. Two more octaves shift the coordinates at which the noise is evaluated,
+// so that valleys wind. Each octave has half the wavelength of the previous one, down to four cells
+// of the field.
 #include <cmath>
 
 #include "scene/generate/random.h"
@@ -63,7 +64,7 @@ class Heights {
     const double x = 8 + 2.5 * s + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 100);
     const double z = 8 + 2.5 * t + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 101);
     const double land = 0.5 + 0.6 * noise_.at(x * 0.7, z * 0.7, 0);
-    // High land is rough. Where one octave is smooth, the next ones are also smooth.
+    // High land is rough. Where one octave is smooth, the following octaves are also smooth.
     double weight = land < 0.15 ? 0.15 : land > 1 ? 1 : land;
     double sum = 0.55 * land, frequency = 1.5, amplitude = 0.42;
     for (uint64_t octave = 1; octave <= octaves_; ++octave) {

@@ -1,5 +1,5 @@
-// Returns the vertex indices of the triangles of a PLY file, three each, starting at any triangle.
-// Not thread-safe.
+// Reads the triangles of a PLY file as three vertex indices each, starting at any triangle. Not
+// thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -25,7 +25,7 @@ class Rows {
   // element and row if the row is invalid or ends past the file, Error{kLimit} for more than
   // kMaxEntries.
   virtual uint64_t read(uint64_t row, uint64_t offset) = 0;
-  // Returns the wanted list of the last row; kNoVertex for a negative index.
+  // Returns the entries of the wanted list in the last row. A negative index becomes kNoVertex.
   std::span<const uint32_t> entries() const { return {entries_.data(), entry_count_}; }
 
  protected:

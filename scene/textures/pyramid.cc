@@ -12,8 +12,8 @@ struct Taps {
   std::array<uint64_t, 3> weights;
 };
 
-// Returns the texels, and their weights, that form texel `i` of a level, along an edge of `fine`
-// texels in the level below.
+// Returns the texels from which texel `i` of a level is computed along one axis, and their weights.
+// They are in the next finer level, which has `fine` texels along this axis.
 Taps taps_of(uint32_t i, uint32_t fine) {
   if (fine == 1) return {0, 1, {1, 0, 0}};
   if (fine % 2 == 0) return {2 * i, 2, {1, 1, 0}};

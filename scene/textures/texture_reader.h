@@ -96,7 +96,7 @@ class TextureReader {
 
     TextureReader& reader_;
     uint64_t first_;          // first texel of the level in the file
-    const uint64_t* texels_;  // texels of the level; null: in the file
+    const uint64_t* texels_;  // texels of the level; null if they are in the file
     uint64_t row_of_tiles_;   // texels in a row of tiles
     uint32_t width_, height_;
   };
@@ -123,7 +123,7 @@ class TextureReader {
   void load(uint64_t page, size_t slot);
 
   const TextureLayout& layout_;
-  const uint64_t* const all_ = nullptr;  // all texels; null: in the file
+  const uint64_t* const all_ = nullptr;  // all texels; null if they are in the file
   const ReadableFile* file_ = nullptr;
   const uint32_t* checksums_ = nullptr;
   int slot_shift_ = 63;

@@ -62,7 +62,7 @@ std::string user_of(const SceneMaterials& materials, uint32_t image) {
   return ", the base color of material " + numbered(index, found->name) + ",";
 }
 
-// Runs `body` concurrently with others and, if memory is short, again alone.
+// Runs `body` concurrently with others. If memory is short, runs it again alone.
 template <class Body>
 void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const Body& body) {
   try {

@@ -1,8 +1,8 @@
 // Random access to the vertex positions of an instance of a primitive, in world space or snapped to
 // a grid, within a fixed amount of memory. Blocks of consecutive vertices are cached, each in the
-// slot given by its number. An instance that fits is read once. A larger instance is read about
-// once if its indices are close together. A primitive of up to 262144 vertices is decoded once for
-// all its instances.
+// slot given by its number. If all vertices of an instance fit in the cache, they are read once. If
+// they do not fit, they are read about once if the instance's indices are close together. A
+// primitive of up to 262144 vertices is decoded once for all its instances.
 #pragma once
 
 #include <bit>

@@ -32,14 +32,16 @@ void BatchTable::resume(const std::string& scene_digest, const DagShape& shape) 
     start_new(scene_digest, shape);
   }
   earlier_requests_ = state_.totals.requests;
-  // Batch numbers are in the names of segments, so they are unique even if the table was lost.
+  // Segment names contain batch numbers. New numbers start after all existing segments, so they are
+  // unique even if the table was lost.
   for (const StoredSubvolume& subvolume : cluster_.job.store->leaves()) {
     rows_[subvolume.id] = subvolume;
     if (const uint32_t segment = subvolume.artifact.segment; segment >= kFirstClusterSegment)
       state_.next_batch = std::max(state_.next_batch, segment - kFirstClusterSegment + 1);
   }
-  // If an open batch has built subvolumes, it was accepted just before the earlier process was
-  // killed. Batches with such subvolumes, with unknown subvolumes or without a file are dropped.
+  // If an open batch has built subvolumes, its record was accepted just before the earlier process
+  // was killed. Batches with such subvolumes, with unknown subvolumes or without a file are
+  // dropped.
   std::erase_if(state_.open, [&](const OpenBatch& batch) { return !is_valid(batch); });
   save();
 }

@@ -58,7 +58,7 @@ void RecordCollector::read_failure(const ClusterFolder::Entry& entry) {
 
 void RecordCollector::read_record(const ClusterFolder::Entry& entry) {
   OpenBatch* const batch = batches_.find(entry.batch);
-  // Without an open batch, another attempt's record was already accepted.
+  // If the batch is no longer open, another attempt's record was already accepted.
   if (!batch) return remove_attempt(entry);
   try {
     accept(read_valid_record(cluster_.files(), cluster_.folder, entry, batches_.state(),

@@ -242,7 +242,7 @@ class Task {
     };
     inputs.scratch_folder = temporary + "/merge";
     const std::string folder = folder_.attempt_folder(run_.batch, attempt_);
-    // A missing folder was removed with the build, which no longer needs this task.
+    // If the folder is missing, it was removed with the build, which no longer needs this task.
     if (!context_.files.exists(folder_.path()))
       throw Error(ErrorCode::kNotFound, folder_.path() + ": expected the folder of the build");
     context_.files.make_directories(folder);

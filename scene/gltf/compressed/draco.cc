@@ -108,7 +108,7 @@ class BoundedDecoder : public Decoder {
                           sizeof(int32_t) * static_cast<uint64_t>(a.num_components());
     }
     charge_up_to(charge_, charge_.bytes() + vertices_ * bytes_per_vertex);
-    // After the charge, which limits the number of values to walk over.
+    // Called after the charge, because the charge limits the number of values to walk over.
     check_attribute_tables(attributes_, *this, admit_table_);
   }
 
@@ -169,7 +169,8 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
                  const Writer<uint32_t>::Write& write) {
   Writer<uint32_t> out(write);
   const uint64_t faces = mesh.num_faces(), triangles = part.corners / 3;
-  // The last face pads the strip, because degenerate triangles also have a face.
+  // A strip can declare more triangles than Draco has faces, because it counts degenerate
+  // triangles. The last face is repeated for the missing triangles.
   for (uint64_t i = 0; i < triangles; ++i) {
     const draco::Mesh::Face& face =
         mesh.face(draco::FaceIndex(static_cast<uint32_t>(std::min(i, faces - 1))));

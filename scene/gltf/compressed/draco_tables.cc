@@ -163,7 +163,8 @@ uint64_t count_entries(const Group& group, int first_attribute, draco::MeshDecod
   return count_vertices(*own);
 }
 
-// Skips the numbers that undo a prediction, of wrapped differences or of points of an octahedron.
+// Skips the parameters of the transform that undoes a prediction. There are two kinds: for wrapped
+// differences, and for points of an octahedron.
 void skip_transform(Walker& walker, int transform) {
   walker.skip(transform == draco::PREDICTION_TRANSFORM_NORMAL_OCTAHEDRON ? 4 : 8);
 }

@@ -22,9 +22,9 @@ struct AccessorUse {
   std::vector<int> may_be_normalized = {};
 };
 
-// Checks that accessor `index`, unless it is -1, exists and has a type of the use. Checks that its
-// bytes are inside its view and inside the declared length of its buffer. Throws
-// Error{kInvalidInput}.
+// If `index` is not -1, checks that this accessor exists and has a type that the use allows. Checks
+// that the accessor's bytes are inside its view and inside the declared length of its buffer.
+// Throws Error{kInvalidInput}.
 void check_accessor(const Document& document, int index, const AccessorUse& use);
 // Checks that an accessor has `count` elements. `index` must be -1 or an existing accessor.
 void check_count(const Document& document, int index, uint64_t count, const std::string& where);

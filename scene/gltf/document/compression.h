@@ -85,10 +85,11 @@ uint64_t heap_bytes(const DracoExtension& draco);
 
 // Adds a buffer for every compressed view without uncompressed bytes, and points the view at it.
 void place_meshopt_views(Document& document);
-// Adds such buffers for a compressed primitive. Its accessors become copies that point at the
-// buffer. Call it before the primitive's accessors are checked. Throws Error{kInvalidInput}.
+// Adds buffers of decoded bytes for a compressed primitive. The primitive's accessors become copies
+// that point at these buffers. Call it before the accessors are checked. Throws
+// Error{kInvalidInput}.
 void place_draco_primitive(Document& document, Primitive& primitive, const std::string& where);
-// Adds a buffer for the accessors of the primitive's surface, if the function above placed its
+// Adds a buffer for the accessors of the primitive's surface, if place_draco_primitive() placed its
 // positions. `set` is the n of the surface's TEXCOORD_n, if it has one.
 void place_draco_surface(Document& document, Primitive& primitive, int set);
 // Checks a buffer made by one of these functions. Throws Error{kInvalidInput}, also if voxdag was

@@ -32,13 +32,14 @@ struct BufferSource {
     kBinChunk,  // the bytes `range` of the scene file
     kExternal,  // the file `uri`, percent-encoded and relative to the scene file
     kBase64,    // the base64 characters `range` of the scene file
-    kMemory,    // the base64 in `characters`, with JSON escapes in the file: the URI at `range`
+    kMemory,    // the base64 `characters`, from the URI at `range`, which has JSON escapes
     kDecoded,   // the decoded bytes of `meshopt` or `draco`; not a buffer of the file
   };
   Kind kind = Kind::kNone;
   uint64_t byte_length = 0;
   bool is_read = false;  // some triangles use it; set by check_document()
-  // A fallback for readers without EXT_meshopt_compression; never the BIN chunk.
+  // The buffer is a fallback for readers without EXT_meshopt_compression. It is never the BIN
+  // chunk.
   bool is_fallback = false;
   FileRange range;
   std::string uri;

@@ -39,7 +39,7 @@ uint64_t model_bytes(const Json& value, bool is_in_extensions, uint64_t& values)
   return bytes;
 }
 
-// Returns the memory of an element in the model's arrays. A growing vector needs it twice.
+// Returns the memory of an element in the model's arrays. A growing vector needs this memory twice.
 uint64_t element_bytes(std::string_view section) {
   if (section == "materials") return 2 * sizeof(tinygltf::Material);
   if (section == "textures") return 2 * sizeof(tinygltf::Texture);

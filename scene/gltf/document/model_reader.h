@@ -1,6 +1,6 @@
 // The part of a scene file that tinygltf reads: asset, extensions, materials, textures and
-// samplers. Their elements are collected as text, which tinygltf parses once. Images are put into
-// its model here, because tinygltf would load them.
+// samplers. The elements are collected as text, which tinygltf parses once. ModelReader itself puts
+// the images into tinygltf's model, because tinygltf would load them.
 #pragma once
 
 #include <memory>

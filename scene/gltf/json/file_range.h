@@ -15,7 +15,7 @@ struct FileRange {
 struct RawString {
   FileRange characters;     // between the quotes
   bool is_escaped = false;  // has JSON escapes
-  bool is_clipped = false;  // the parser saw only its beginning
+  bool is_clipped = false;  // the parser received only the first characters (JsonWindow)
 };
 
 }  // namespace voxdag::gltf

@@ -175,7 +175,8 @@ class SectionParser : public nlohmann::json_sax<Json> {
   const std::string& path_;
   const JsonWindow& window_;
   const std::vector<JsonSection>& sections_;
-  // For the largest element so far, because the allocator may retain its memory.
+  // Charge for the largest element so far. It never shrinks, because the allocator may retain the
+  // memory.
   GrowingCharge charge_;
   std::set<std::string> seen_;
   std::string violation_;

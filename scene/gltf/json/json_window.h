@@ -3,10 +3,10 @@
 //
 // Strings can be long: a data: URI of geometry or of an image may be most of the file. The parser
 // would collect them in memory. So the window withholds the plain characters of a string past the
-// first few thousand, and records the string's position in the file, from which a buffer is decoded
-// in windows. The parser receives one of several blanks between values. A number with more digits
-// than any value needs is refused. The parser's characters are charged to the budget. Not
-// thread-safe.
+// first few thousand, and records the string's position in the file. The readers of buffers and
+// images later decode the string from there, in windows. If there are several blanks between two
+// values, the parser receives one. A number with more digits than any value needs is refused. The
+// parser's characters are charged to the budget. Not thread-safe.
 #pragma once
 
 #include <cstddef>

@@ -14,11 +14,11 @@ struct MaterialSource {
   int image = -1;     // index in the model
   int texcoord = 0;   // the n of TEXCOORD_n
   TextureTransform transform;
-  std::string problem;  // why its texture cannot be read; "" if it can or has none
+  std::string problem;  // why the texture cannot be read; "" for a readable or missing texture
 };
 
-// Reads material `index` of the model. If it has KHR_materials_pbrSpecularGlossiness, uses this
-// instead of metallic-roughness. Ignores members of a wrong type.
+// Reads material `index` of the model. Uses KHR_materials_pbrSpecularGlossiness, if the material
+// has it, instead of metallic-roughness. Ignores members of a wrong type.
 MaterialSource read_material(const tinygltf::Model& model, int index);
 
 }  // namespace voxdag::gltf

@@ -1,5 +1,5 @@
-// KHR_texture_transform: offset + rotation * scale of texture coordinates. Uses only + - * / and
-// fmod of IEEE doubles, so that all machines get the same bits.
+// KHR_texture_transform: scales and rotates texture coordinates and adds an offset. Uses only
+// IEEE doubles with + - * / and fmod, so that all machines get the same bits.
 #pragma once
 
 #include <array>

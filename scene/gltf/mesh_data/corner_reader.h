@@ -1,6 +1,6 @@
-// Returns the vertex indices of the triangles of a primitive, three each, from triangle lists,
-// strips and fans, indexed or not. Does not correct the winding of strips: surfaces mark their
-// flipped triangles. Not thread-safe.
+// Reads the triangles of a primitive as three vertex indices each, from triangle lists, strips and
+// fans, indexed or not. Does not correct the winding of strips, because surfaces mark their flipped
+// triangles. Not thread-safe.
 #pragma once
 
 #include <cstddef>

@@ -34,7 +34,7 @@ class GlobalTransforms {
   }
 
  private:
-  // Memory in the map, whose table of buckets is copied when it grows, and in the chain.
+  // Memory per node in the map (whose table of buckets is copied when it grows) and in the chain.
   static constexpr uint64_t kBytesPerNode = sizeof(Transform) + 72;
 
   int parent_of(int node) const { return document_.nodes[static_cast<size_t>(node)].parent; }

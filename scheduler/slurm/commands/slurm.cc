@@ -147,8 +147,8 @@ bool Slurm::may_be_starting(const CommandResult& refused) {
 }
 
 void Slurm::check(const std::vector<std::string>& options, double pause_s, Progress& progress) {
-  // Options that voxdag itself sets: without them a task would not be found or would build another
-  // batch.
+  // voxdag itself sets these options. With other values a task would not be found or would build
+  // another batch.
   for (const std::string& option : options)
     for (const std::string name :
          {"--array", "--job-name", "--comment", "--wrap", "--wait", "--parsable", "--test-only",

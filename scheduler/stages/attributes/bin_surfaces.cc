@@ -62,8 +62,8 @@ class SurfacePiece {
     uint32_t bin, record;
   };
   static constexpr size_t kNone = ~size_t{0};
-  // A piece whose triangles all cross the complete grid has more; those bins are found in a second
-  // step.
+  // If all triangles of a piece cross the complete grid, the piece has more places. Bins of the
+  // records beyond this limit are found in a second step.
   static constexpr size_t kMaxPlaces = 4 * kPieceTriangles;
 
   std::span<const std::byte> bytes_of(const Record& record) const {
@@ -107,7 +107,7 @@ class SurfacePiece {
   std::vector<std::byte> bytes_, triangles_;
   std::vector<Record> records_;  // their data is in bytes_
   std::vector<Place> places_;
-  size_t late_ = kNone;  // the first record without places
+  size_t late_ = kNone;  // first record whose places were not added
   Checksum128 checksum_;
 };
 

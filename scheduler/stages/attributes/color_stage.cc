@@ -268,9 +268,9 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
   if (report.cells > 0) section.finish();
 }
 
-// Adds the section of an attribute other than the first, whose section is written while cubes are
-// baked. Sections are contiguous in the output, so the records of the other attributes are stored
-// in the work folder until then, and read here.
+// Adds the section of an attribute other than the first one. The first attribute's section is
+// written while cubes are baked. Sections are contiguous in the output, so the records of the other
+// attributes are stored in the work folder until then. This function reads them.
 void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute,
                                    GlobalFileWriter& out, const ColorReport& report) {
   const BuildContext& build = context.build;

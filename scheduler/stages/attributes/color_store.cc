@@ -137,7 +137,8 @@ ColorStore::Place ColorStore::add(const Checksum128& key, uint64_t number, bool 
     reader_ = files_.open_read(path_);
   }
   const Place place{end_ + kHeaderBytes, part.size(), checksum};
-  // The header is written last, so that its data exists unless the power was cut.
+  // The header is written after its data, so that the data of every header exists unless the power
+  // was cut.
   writer_->write_at(place.offset, part);
   writer_->write_at(end_, header);
   end_ = place.offset + place.bytes;

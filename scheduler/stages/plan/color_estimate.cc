@@ -10,8 +10,7 @@ namespace voxdag {
 namespace {
 
 // Measured on Sponza at 4096: 4 bits for each cell, a third of that for the coarser levels, and
-// prefixes.
-// The padding of regions with few cells is more.
+// prefixes. Does not include the padding of regions with few cells.
 constexpr double kColorBytesPerCell = 0.69;
 // Values are not compressed. The coarser levels add a third, and there are prefixes.
 constexpr double kCellsOfAllLevels = 1.36;

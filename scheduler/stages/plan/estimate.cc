@@ -63,8 +63,8 @@ class CountingSink : public SubDagSink {
   uint64_t words = 0;
 };
 
-// Builds triangles that are snapped to 2^levels (or to a grid finer by `shift` levels) on a grid of
-// 2^levels. Returns nullopt if the build does not fit the budget.
+// Builds a pilot of 2^levels voxels per edge. `triangles` are snapped to a grid that is finer by
+// `shift` levels (0: to the pilot's grid). Returns nullopt if the build does not fit the budget.
 std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t shift,
                                        uint32_t levels, Backend& backend, MemoryBudget& budget,
                                        const CancelToken& cancel) {
@@ -111,8 +111,8 @@ std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot
   return pilots;
 }
 
-// Returns a R^2 + b R, fitted to the last two pilots, `doublings` after the last one (before it if
-// negative).
+// Returns a R^2 + b R at the resolution `doublings` above the last pilot (below it if negative). a
+// and b are fitted to the values of the last two pilots, `coarse` and `fine`.
 double grow_as_surface(double coarse, double fine, int doublings) {
   const double ratio = std::exp2(doublings);
   const double square = 2 * (fine - 2 * coarse),
@@ -122,7 +122,9 @@ double grow_as_surface(double coarse, double fine, int doublings) {
   return doublings < 0 ? std::max(grown, 1.0) : std::max(grown, fine);
 }
 
-// Starts with the growth between the last two pilots. The growth falls with each further doubling.
+// Returns the number of DAG nodes at the resolution `doublings` above the last pilot. Starts from
+// the growth between the last two pilots, and reduces its excess over kLateGrowth with each
+// doubling.
 double grow_as_dag(const std::vector<PilotCounts>& pilots, int doublings) {
   const double nodes = pilots.back().dag_nodes;
   if (pilots.size() < 2 || nodes == 0) return nodes * std::exp2(1.5 * doublings);
@@ -158,8 +160,9 @@ void add_colors(const ColorEstimate& colors, Estimate& estimate) {
 // actual size.
 double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
                       BuildScene& source, const StageContext& context) {
-  // For every A + E + 1 cubes of half the edge, a triangle touches about A/4 + E/2 + 1 cubes
-  // (expected_work()). So over all levels it touches twice its bricks, plus one cube per level.
+  // If a triangle touches A + E + 1 cubes (from its area and extents, see expected_work()), it
+  // touches about A/4 + E/2 + 1 cubes of twice the edge. So over all levels it touches at most
+  // twice its bricks, plus one cube per level.
   double bricks = 0;
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.state.counts.triangles);
@@ -191,8 +194,9 @@ void check_disk(const char* what, const EstimateRange& bytes, const std::string&
   if (bytes.high > free_bytes) progress.warn(need);
 }
 
-// Throws Error{kNoSpace} with the estimate if even its low end does not fit on the disk of the work
-// folder, or the output file on the output folder's disk. Warns if the high end may not fit.
+// Compares the estimate with the free space on the disks of the work folder and the output folder.
+// Throws Error{kNoSpace} with the estimate if even the low end does not fit. Warns if the high end
+// may not fit.
 void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
                     const std::string& output_folder, Progress& progress) {
   const uint64_t work_free = files.free_space(work_folder);

@@ -21,8 +21,8 @@ constexpr int64_t kCoarseTickNs = 2 * kSecondNs;
 // After the partition the file contains each triangle at least twice, and some triangles more
 // often.
 constexpr double kDurableCopies = 2.2;
-// Required free disk space, relative to the size of all copies of the scene's triangles. The build
-// needs as much again.
+// Free disk space that optional checkpoints require, relative to the size of all copies of the
+// scene's triangles: once for the copies, and once for the rest of the build.
 constexpr double kFreePerCopy = 2;
 
 std::string request_of(const BuildSpec& spec) {
