@@ -24,7 +24,7 @@ constexpr size_t kMaxLoggedChars = 200;
 ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
   check_config(config);
   files.make_directories(config.data_folder);
-  // Clients must leave enough file descriptors for jobs, transfers and stores.
+  // At least half of the file descriptors must remain for jobs, transfers and stores.
   const uint64_t sockets = max_open_files() / 2;
   if (config.http.limits.max_connections > sockets) {
     log("connections are limited to " + std::to_string(sockets) + ", not " +
@@ -42,7 +42,7 @@ std::unique_ptr<FileLock> lock_folder(FileSystem& files, const std::string& fold
   return lock;
 }
 
-// Removes the folders of plans, left by a service that crashed during a dry run.
+// Removes the folders of dry runs (plans) that a crashed service left behind.
 void remove_plans(FileSystem& files, const ServerConfig& config) {
   const std::string folder = config.data_folder + "/plans";
   if (!files.exists(folder)) return;

@@ -18,8 +18,8 @@ namespace voxdag::server {
 class Service {
  public:
   // Checks the configuration, locks the data folder, opens the stores, resumes the jobs of the
-  // previous service, and listens. `log` receives failures, and changes with their author. Throws
-  // Error.
+  // previous service, and listens. `log` receives failures, and also each change with the name of
+  // its author. Throws Error.
   Service(ServerConfig config, FileSystem& files, Log log);
 
   int port() const { return http_.port(); }

@@ -11,7 +11,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kDrainS = 1;
-// Two files while one is being replaced: the old and the new one.
+// Enough for the old and the new file while the file is being replaced.
 constexpr size_t kMaxOpen = 2;
 
 HttpOptions options(int port) {
@@ -49,8 +49,8 @@ std::string ViewService::url() const {
 }
 
 void ViewService::run() {
-  // The cameras are computed while a browser starts. If this fails, the request for them also
-  // fails.
+  // Computes the cameras in advance, while the browser starts. If this fails, the later request for
+  // the cameras also fails.
   const std::jthread cameras([this, file = open_sources_.open(path_)] {
     try {
       file->manifest(stopping_);

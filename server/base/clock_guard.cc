@@ -6,7 +6,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kMaxStepS = 3600;
-constexpr double kMaxPauseS = kSecondsPerDay;  // maximum time without a running service
+constexpr double kMaxPauseS = kSecondsPerDay;  // maximum time between two runs of the service
 constexpr double kUncertainS = kSecondsPerDay;
 
 }  // namespace

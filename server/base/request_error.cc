@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-// Returns a text for clients that replaces the message of an Error.
+// Returns a text that replaces the message of an Error in answers to clients.
 const char* public_text(ErrorCode code) {
   static constexpr std::pair<ErrorCode, const char*> kTexts[] = {
       {ErrorCode::kInvalidInput, "the request is invalid"},

@@ -14,12 +14,12 @@ namespace voxdag::server {
 
 struct JobLimits {
   unsigned max_concurrent = 1;
-  uint64_t memory_bytes = 0;  // all running jobs together; 0: half of the machine's memory
-  unsigned threads = 0;       // default per job; 0: all cores
-  uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // with less free space, no job starts
+  uint64_t memory_bytes = 0;  // for all running jobs together; 0: half of the machine's memory
+  unsigned threads = 0;       // default number per job; 0: all cores
+  uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // no job starts if less space is free
   int nice = 5;                                      // of the building processes
   unsigned max_attempts = 5;
-  double backoff_s = 15;  // before the second attempt; doubles with each further attempt
+  double backoff_s = 15;  // pause before the second attempt; doubles with each further attempt
   double max_backoff_s = 900;
   double stop_timeout_s = 8;    // time for a build to stop at a checkpoint before it is killed
   uint64_t max_queued = 20000;  // unfinished jobs
@@ -30,11 +30,11 @@ struct JobLimits {
 struct TransferLimits {
   uint64_t max_scene_bytes = uint64_t{64} << 30;
   uint64_t max_body_bytes = 64 << 10;  // JSON bodies
-  size_t max_concurrent = 64;          // uploads; the same limit for downloads
-  size_t max_per_client = 16;          // the same two limits per client
+  size_t max_concurrent = 64;          // limit for uploads, and separately for downloads
+  size_t max_per_client = 16;          // limit per client, in the same way
   size_t max_event_streams = 256;
   size_t max_event_streams_per_client = 64;
-  // Per address, with bursts of twice that number; the loopback is exempt.
+  // Rate limit per address. A burst may have twice this number of requests. The loopback is exempt.
   double max_requests_per_s = 200;
 };
 
@@ -47,14 +47,15 @@ struct Retention {
 struct ServerConfig {
   HttpOptions http;
   std::string data_folder;
-  std::string token_file;                // "": no tokens, loopback only
+  std::string token_file;                // "": no tokens; only the loopback has access
   std::vector<std::string> scene_roots;  // absolute folders whose scenes jobs may name by path
   std::vector<std::string> hosts;  // names allowed in a Host header in addition to the loopback's
-  // The program that runs jobs: this program, even if another one was installed under the same
-  // name.
+  // The program that runs jobs. The default is the running program itself, even if another version
+  // was installed under the same name since.
   std::string program = "/proc/self/exe";
   JobLimits jobs;
-  ClusterOptions cluster;  // where subvolumes are built; without an engine on this machine
+  // The cluster that builds subvolumes. Without an engine, this machine builds them.
+  ClusterOptions cluster;
   TransferLimits transfers;
   Retention retention;
   bool adopt = false;          // creates new records for jobs and scenes without records

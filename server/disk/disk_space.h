@@ -17,8 +17,8 @@ namespace voxdag::server {
 
 class DiskSpace {
  public:
-  // Keeps `min_free_bytes` free, and in any case a little for the databases. Drops the ballast,
-  // because the databases need space to open.
+  // Always keeps `min_free_bytes` free, or a small reserve for the databases if that is more. Drops
+  // an existing ballast, because the databases need space to open.
   DiskSpace(FileSystem& files, const std::string& data_folder, uint64_t min_free_bytes);
 
   uint64_t free() const { return files_.free_space(folder_); }
@@ -26,12 +26,13 @@ class DiskSpace {
   // The disk space of one upload, reserved during the lifetime of this object. Used by one thread.
   class Reservation {
    public:
-    // `announced`: the expected number of bytes, 0 if unknown. Throws Error{kNoSpace} if they do
-    // not fit now. Others may still use the space before the bytes arrive.
+    // `announced`: the expected number of bytes, 0 if unknown. Throws Error{kNoSpace} if this
+    // number of bytes is not free now. Only a part of it is reserved, so others may use the space
+    // before the bytes arrive.
     Reservation(DiskSpace& disk, uint64_t announced);
     ~Reservation();
     Reservation(const Reservation&) = delete;
-    // Call it before writing `bytes`. If the reserved space is used up, reserves more; throws
+    // Call it before writing `bytes`. If the reserved space is used up, reserves more. Throws
     // Error{kNoSpace} if the disk is full by then.
     void use(uint64_t bytes);
 
@@ -41,8 +42,8 @@ class DiskSpace {
     uint64_t not_reserved_;  // announced, not yet reserved
   };
 
-  // Calls `act`, which deletes or cancels something. If the disk has no space to record this, drops
-  // the ballast and calls `act` again. The first call may have done a part of the work.
+  // Calls `act`, which deletes or cancels something. If the disk has no space to record that, drops
+  // the ballast and calls `act` again. The failed first call may have done a part of the work.
   template <class Act>
   auto with_ballast(const Act& act) {
     try {
@@ -58,7 +59,7 @@ class DiskSpace {
   void restore_ballast();
 
  private:
-  // Throws Error{kNoSpace} unless max(bytes, expected) is free. Reserves `bytes`.
+  // Reserves `bytes`. Throws Error{kNoSpace} unless max(bytes, expected) bytes are free.
   void reserve(uint64_t bytes, uint64_t expected);
 
   FileSystem& files_;

@@ -102,7 +102,8 @@ bool Exchange::answer(Response response, bool last) {
 }
 
 bool Exchange::send_pieces(ReadableFile& file, const std::vector<FilePiece>& pieces) {
-  // The API limits the concurrent answers of this kind per client, so a large buffer is safe.
+  // A large buffer per answer is safe, because the API limits each client's concurrent answers of
+  // this kind.
   connection_.allow_large_send_buffer();
   std::string buffer;
   for (const FilePiece& piece : pieces) {

@@ -64,7 +64,7 @@ class HttpServer::Engine {
   }
 
  private:
-  // An exception (no memory, no thread) only closes this connection.
+  // An exception (no memory for the connection, or no thread) closes only this connection.
   void accept(int socket, const std::string& address) try {
     ConnectionTable::Place place;
     if (draining_ || !table_.admit(socket, address, place)) {

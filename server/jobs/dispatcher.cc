@@ -101,7 +101,7 @@ void Dispatcher::dispatch() {
     if (stopping()) return;
     steps_.run("start jobs", [this] {
       std::lock_guard lock(mutex_);
-      if (stops_) return;  // nothing would stop a worker started now
+      if (stops_) return;  // no worker may start now, because nothing would stop it
       if (!recovered_) recover();
       recovered_ = true;
       start_ready_jobs();
@@ -147,7 +147,7 @@ bool Dispatcher::start_next_job() {
   try {
     needed = tasks_.memory_of(parse_job_request(job->request));
   } catch (const RequestError& error) {
-    // The task was written by another version of this program, or is damaged.
+    // The task cannot be read: another version of this program wrote it, or it is damaged.
     log_("job " + job->id + " failed: " + error.message());
     queue_.change(job->id, [&](Job& j) {
       j.state = JobState::kFailed;
@@ -258,9 +258,9 @@ void Dispatcher::run_job(const Job& job, LiveJob& live) {
 }
 
 void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProcess::End& end) {
-  // While the queue cannot be written, for example because the disk is full, the job counts as
-  // running. This ends when the queue becomes writable, or when the next service runs the job
-  // again.
+  // While the queue cannot be written, for example because the disk is full, the job remains
+  // recorded as running. The loop repeats until the queue is writable again. If the service ends
+  // first, the next service runs the job again.
   std::optional<Job> after;
   while (!steps_.run("record how job " + job.id + " ended", [&] {
     std::lock_guard lock(mutex_);
@@ -372,7 +372,8 @@ Job Dispatcher::suspend(const std::string& id) {
     is_running = worker != workers_.end() && worker->second.is_running();
     if (is_running) worker->second.live->stop();
   }
-  // The job may have been queued again since a killed service left its tasks running.
+  // A killed service may have left tasks of this job running, even if the job was queued again
+  // since.
   if (!is_running) stop_tasks(id);
   return job;
 }
@@ -389,7 +390,7 @@ Job Dispatcher::resume(const std::string& id) {
 }
 
 Job Dispatcher::retry(const std::string& id) {
-  std::lock_guard lock(mutex_);  // while locked, no deletion can begin
+  std::lock_guard lock(mutex_);  // no deletion can begin while the mutex is locked
   return queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kRunning) return;
     if (j.state != JobState::kQueued && j.state != JobState::kFailed &&
@@ -412,7 +413,7 @@ void Dispatcher::remove(const std::string& id) {
   stop_tasks(id);
   const FilesLock files_lock(*this, id);
   {
-    std::lock_guard lock(mutex_);  // while locked, the job cannot be retried
+    std::lock_guard lock(mutex_);  // the job cannot be retried while the mutex is locked
     queue_.check_removable(id);
     folders_.mark(id);
   }

@@ -1,14 +1,15 @@
 // Runs the queue's jobs, each in a separate process, within the limits of number, memory and disk.
 // Stops and resumes jobs, and cleans up after them. Thread-safe.
 //
-// Reasons for processes: a memory limit applies to a process; a scene that crashes a build harms
-// nothing else; and a build can be stopped, killed and reniced without touching the threads that
-// answer requests. A process dies with the service. Started again with the same task, it resumes
-// from its work folder. So the queue and the folders are enough to continue after any crash.
+// Reasons for running each job in a process of its own: a memory limit applies to a process; a
+// scene that crashes a build harms nothing else; and a build can be stopped, killed and reniced
+// without touching the threads that answer requests. A job's process dies with the service. If it
+// is started again with the same task, it resumes from the job's work folder. So the queue and the
+// folders are enough to continue after any crash.
 //
-// A failure in a thread here ends neither the thread nor the service (Steps). If a job cannot be
-// handled, the job fails. If a folder cannot be handled, it is left alone. All other work
-// continues.
+// A failure in a thread of the dispatcher ends neither the thread nor the service (Steps in
+// server/base/steps.h). If a job cannot be handled, the job fails. If a folder cannot be handled,
+// it is left alone. All other work continues.
 #pragma once
 
 #include <condition_variable>
@@ -47,13 +48,14 @@ class Dispatcher {
   // The jobs remain in the queue.
   void stop();
 
-  // Each of these throws RequestError: kNotFound, or kConflict for a job in another state.
+  // Each of these functions throws RequestError: kNotFound for an unknown job, or kConflict if the
+  // job's state does not allow the change.
   Job cancel(const std::string& id);
   Job suspend(const std::string& id);
   Job resume(const std::string& id);
   Job retry(const std::string& id);
-  // Deletes the files first, so that it frees space on a full disk. An interrupted removal is
-  // finished later; until then the job cannot be retried.
+  // Deletes a job. Removes its files before its record, so that this frees space even on a full
+  // disk. An interrupted removal is finished later; until then the job cannot be retried.
   void remove(const std::string& id);
 
   // Null unless the job's process is running.
@@ -72,8 +74,9 @@ class Dispatcher {
     // True if the worker will still record the job's outcome.
     bool is_running() const { return !recorded && !done; }
   };
-  // Reserves the files of an ended job for the thread that removes them. Other removals wait, and a
-  // retried job does not start.
+  // Reserves the files of an ended job for one thread that removes them. During the lifetime of
+  // this object, other removals of these files wait, and the job does not start even if it is
+  // retried.
   class FilesLock {
    public:
     FilesLock(Dispatcher& dispatcher, const std::string& id);
@@ -91,9 +94,9 @@ class Dispatcher {
   void retire_old_jobs();
   // Finishes deletions that a crash or an error interrupted.
   void finish_deletions();
-  // Stops the job's tasks on the cluster, because no process follows them.
+  // Stops the tasks that a job has left on the cluster. No process of this service follows them.
   void stop_tasks(const std::string& id);
-  // True if the job no longer needs its work folder.
+  // Removes the job's work folder if the job has been canceled or has succeeded.
   void remove_work(const std::string& id);
 
   // The loop of the thread that starts jobs.
@@ -110,8 +113,8 @@ class Dispatcher {
   void run_job(const Job& job, LiveJob& live);
   void record_outcome(const Job& job, LiveJob& live, const ChildProcess::End& end);
   void draw_preview(const Job& job, LiveJob& live);
-  // Runs a process to its end. Requests it to stop when `live` has a stop request, and kills it
-  // JobLimits::stop_timeout_s later. Also kills it after `max_s`.
+  // Runs a process to its end. If `live` gets a stop request, requests the process to stop, and
+  // kills it JobLimits::stop_timeout_s later. Also kills it after it has run for `max_s` seconds.
   ChildProcess::End run_child(const ChildProcess::Start& start, LiveJob& live, double max_s);
 
   const ServerConfig& config_;
@@ -124,14 +127,15 @@ class Dispatcher {
   Steps steps_;
   ClockGuard clock_;  // used by the thread that starts jobs
 
-  // Guards all members below. Held while a job's state and process change together, but not while
-  // files are removed.
+  // Guards the members below, up to live_mutex_. Held while a job's state and process change
+  // together, but not while files are removed.
   mutable std::mutex mutex_;
   JobFolders folders_;
-  std::map<std::string, Worker> workers_;  // keyed by job; the worker "preview" draws a picture
-  std::set<std::string> locked_;           // jobs with a FilesLock
+  // Keyed by job id. The worker with the key "preview" draws a picture.
+  std::map<std::string, Worker> workers_;
+  std::set<std::string> locked_;  // jobs with a FilesLock
   std::condition_variable files_unlocked_;
-  double next_deletions_s_ = 0;  // in wall_seconds(); infinite if no deletion must be finished
+  double next_deletions_s_ = 0;  // in wall_seconds(); infinite if no deletion is pending
   bool stops_ = false;
   bool recovered_ = false;
 

@@ -1,10 +1,11 @@
 // The folders of jobs, DATA/jobs/ID: their assignment to jobs, and their deletion. Thread-safe for
 // different jobs.
 //
-// A deletion first marks the folder by renaming it. Then it removes the folder's files, the job's
-// record and the renamed folder. A crash in between loses neither, and deletions work on a full
-// disk. Only folders marked by a deletion are removed. A folder without a record is kept, because
-// the queue may come from an old backup.
+// A deletion first marks the job's folder by renaming it. Then it removes the folder's files, the
+// job's record and the renamed folder, in this order. The renamed folder remains until the end, so
+// a deletion that a crash interrupts can be finished. Deletions work even on a full disk. Only
+// folders marked by a deletion are removed. A folder without a record is kept, because the queue
+// may come from an old backup.
 #pragma once
 
 #include <string>
@@ -23,14 +24,14 @@ class JobFolders {
 
   JobFolder of(const std::string& id) const { return {path_ + "/" + id}; }
 
-  // Creates records for folders that the queue does not know. Jobs with a result have succeeded,
-  // all others are suspended.
+  // Creates records for folders that the queue does not know. The jobs of folders with a result
+  // become succeeded, all others suspended.
   void adopt();
   // Removes the work folders of jobs that no longer need them.
   void clean_up();
   void remove_work(const std::string& id);
-  // Marks the folder of a job, if it has one. From this call on the job is being deleted. This is
-  // fast unless an earlier deletion left files under the marked name.
+  // Marks the folder of a job, if it has one. From this call on the job counts as being deleted.
+  // The call is fast, unless an earlier deletion left files under the marked name.
   void mark(const std::string& id);
   bool is_marked(const std::string& id) const { return files_.exists(of(id).path + kDeleted); }
   std::vector<std::string> marked() const;

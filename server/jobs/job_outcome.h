@@ -8,7 +8,7 @@
 
 namespace voxdag::server {
 
-// Returns the seconds to wait after this number of failed attempts. The time doubles with each
+// Returns the pause in seconds after `attempts` failed attempts. The pause doubles with each
 // attempt.
 double pause_s(const JobLimits& limits, unsigned attempts);
 

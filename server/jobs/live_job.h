@@ -20,11 +20,12 @@ class LiveJob {
   uint64_t memory_bytes() const { return memory_bytes_; }
 
   void apply(const Message& message);
-  // PROGRESS of docs/api.md; "" before the first stage. The text is created once per version.
+  // Returns the JSON object PROGRESS of docs/api.md; "" before the first stage. The text is created
+  // only once per version of the progress.
   std::string progress_json() const;
   // Number of messages so far.
   uint64_t version() const { return locked(version_); }
-  // Tasks of the last attempt; nullopt for a build without a cluster.
+  // Returns the cluster tasks of the last attempt; nullopt for a build without a cluster.
   std::optional<ClusterTasks> cluster_tasks() const { return locked(cluster_tasks_); }
   std::vector<std::string> warnings() const { return locked(warnings_); }
   std::optional<Failure> failure() const { return locked(failure_); }
@@ -33,7 +34,7 @@ class LiveJob {
 
   // Requests a stop. Only the first call counts.
   void stop();
-  // Time (wall_seconds()) of the first call of stop(); 0 if there was no call.
+  // Returns the time (wall_seconds()) of the first call of stop(); 0 if stop() was not called.
   double stop_requested_s() const { return locked(stop_requested_s_); }
 
  private:

@@ -26,7 +26,8 @@ class TaskResolver {
 
   // Memory limit of all running jobs together.
   uint64_t memory_bytes() const { return memory_bytes_; }
-  // Returns the memory of one job: the requested memory, or its share.
+  // Returns the memory for one job: the requested memory, or an equal share if the request has
+  // none.
   uint64_t memory_of(const JobRequest& request) const;
 
  private:

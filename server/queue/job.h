@@ -32,13 +32,13 @@ inline constexpr std::array<const char*, 7> kJobStateNames = {
 
 inline const char* state_name(JobState state) { return kJobStateNames[static_cast<size_t>(state)]; }
 std::optional<JobState> parse_state(std::string_view name);
-// True for states that change only if a client requests it.
+// True for states that change only on request of a client.
 inline bool has_ended(JobState state) { return state >= JobState::kCanceled; }
 
 struct JobError {
   std::string code;  // docs/errors.md, or "internal"
   std::string message;
-  double at_s = 0;  // Unix time, like all times of jobs; 0 for never
+  double at_s = 0;  // Unix time, as in all times of jobs; 0: never
   bool transient = false;
 };
 

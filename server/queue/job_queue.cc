@@ -17,9 +17,9 @@ namespace {
 
 constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 
-// Number of consecutive interrupted runs after which a job no longer restarts immediately, and
-// after which it fails. With the pauses in between, a failing job has interrupted the service for
-// over an hour.
+// Limits for the number of consecutive interrupted runs. Above the first limit, a job no longer
+// restarts immediately; above the second limit, it fails. Because of the pauses in between, a job
+// has been interrupting the service for over an hour before it fails.
 constexpr unsigned kFreeInterruptions = 5;
 constexpr unsigned kMaxInterruptions = 15;
 
@@ -112,8 +112,9 @@ JobRow row_of(const Job& job) {
 
 constexpr const char* kNoRequest = R"({"scene":[],"resolution":0,"options":{}})";
 
-// Returns the job in the current row of a statement of select_rows<JobRow>(). Leaves out damaged
-// members, so that the job can be listed and deleted, and the service can handle the other jobs.
+// Returns the job in the current row of a statement from select_rows<JobRow>(). Replaces damaged
+// members by defaults, so that the job can be listed and deleted, and the service can handle the
+// other jobs.
 Job read_job(const SqlStatement& statement) {
   JobRow row = read_row<JobRow>(statement);
   Job& job = row.job;
@@ -163,7 +164,8 @@ void write_event(SqlDatabase& database, const Job& job) {
       .run();
 }
 
-// Only names of states become part of the SQL text. All values from callers are bound.
+// Builds the SQL condition for a list of states. Only the names of states become part of the SQL
+// text; values from callers are always bound.
 std::string states_in(const std::vector<JobState>& states) {
   std::string list;
   for (const JobState state : states)
@@ -250,7 +252,7 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
 std::optional<Job> JobQueue::find(const std::string& id) {
   std::lock_guard lock(read_mutex_);
   std::optional<Job> job;
-  find_.reset();  // the last call may have thrown
+  find_.reset();  // needed if the previous call has thrown
   if (find_.bind(0, id).step()) job = read_job(find_);
   find_.reset();
   return job;
@@ -346,7 +348,7 @@ void JobQueue::remove(const std::string& id) {
 
 std::optional<Job> JobQueue::next(double now_s, double max_wait_s,
                                   const std::set<std::string>& except) {
-  // `except` is small: it has at most the jobs that are stopping.
+  // `except` is small: it contains at most the jobs whose processes are stopping.
   const auto jobs =
       query("WHERE " + states_in({JobState::kQueued}) +
                 " AND (not_before_s <= " + std::to_string(now_s) + " OR not_before_s > " +

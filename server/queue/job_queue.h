@@ -1,6 +1,6 @@
-// The service's jobs, durable: one SQLite file (WAL, synchronous = FULL). Results of a call are
-// committed when it returns. A SIGKILL between any two instructions leaves every job in a state
-// that recover() repairs.
+// The service's jobs, stored durably in one SQLite file (WAL, synchronous = FULL). When a call
+// returns, its changes are committed. A SIGKILL between any two instructions leaves every job in a
+// state that recover() repairs.
 //
 // Order of the queue: priority, then jobs that were running before, then the order of submission.
 // Thread-safe; readers never wait for a writer's sync.
@@ -47,9 +47,9 @@ class JobQueue {
     Job job;
     bool replayed = false;
   };
-  // Queues the job under its id, or a new id; or returns the job that was added with this key.
-  // Throws RequestError: kKeyReused if the key came with another request, kBusy if `max_open` jobs
-  // have not ended.
+  // Queues the job under its id, or under a new id if it has none. If a job was already added with
+  // this key, returns that job instead. Throws RequestError: kKeyReused if the key was used with a
+  // different request, kBusy if `max_open` unfinished jobs exist.
   Added add(Job job, const IdempotencyKey& key, uint64_t max_open);
 
   std::optional<Job> find(const std::string& id);
@@ -73,20 +73,21 @@ class JobQueue {
   void remove(const std::string& id);
 
   // Returns the first queued job that may start at `now_s` and is not in `except`. A job that would
-  // have to wait for more than `max_wait_s` may also start, because its time shows that the clock
-  // was set back.
+  // have to wait longer than `max_wait_s` may start immediately: such a long wait shows that the
+  // clock was set back.
   std::optional<Job> next(double now_s, double max_wait_s, const std::set<std::string>& except);
   // Returns a job that succeeded and has no preview yet.
   std::optional<Job> next_without_preview();
-  // Call it after a crash. Jobs that are running or canceling, but not among `running`, are queued
-  // again at the front, or canceled. A job with many interruptions may be their cause. It loses its
-  // place at the front and waits `pause_s` before each further attempt (1, 2, ...); finally it
-  // fails. Returns the jobs that have ended.
+  // Call it after a crash. `running` are the jobs whose processes are known to run. All other jobs
+  // in the state running are queued again at the front, and those in the state canceling are
+  // canceled. A job with many interruptions may be their cause. So it loses its place at the front
+  // and waits `pause_s` before each further attempt (1, 2, ...); finally it fails. Returns the jobs
+  // that have ended by this call.
   std::vector<Job> recover(const std::set<std::string>& running,
                            const std::function<double(unsigned attempt)>& pause_s);
-  // Returns ended jobs that finished before `finished_before_s`, or that are not among the
-  // `max_count` last-finished jobs of their poster. A poster's jobs never make other posters' jobs
-  // expire.
+  // Returns the ended jobs that finished before `finished_before_s`, and the ended jobs that are
+  // not among the `max_count` last-finished jobs of the same poster. A poster's jobs never make
+  // other posters' jobs expire.
   std::vector<std::string> expired(double finished_before_s, uint64_t max_count);
 
   // Time of the last recorded change of a state; 0 for never.
@@ -102,11 +103,12 @@ class JobQueue {
   uint64_t changes() const;
   // Waits until version() differs from `seen`, or for `max_s` seconds.
   void wait_for_change(uint64_t seen, double max_s) const;
-  // Wakes waiting threads like a change, for events outside the database (progress).
+  // Wakes the threads in wait_for_change(), as a change does. For events outside the database
+  // (progress).
   void announce();
 
  private:
-  // Announces a change. `moves`: it may have moved jobs in the queue.
+  // Announces a change of the database. `moves`: the change may have moved jobs in the queue.
   void announce_change(bool moves);
   std::vector<Job> query(const std::string& rest, const std::vector<int64_t>& numbers);
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t kMaxNameBytes = 128;
 
-// `total` is -1 while unknown. `sha256` is "" until the upload is complete.
+// The column `total` is -1 while the size is unknown. `sha256` is "" until the upload is complete.
 constexpr const char* kSceneSchema = R"sql(
 CREATE TABLE scene (
   name TEXT PRIMARY KEY, size INTEGER NOT NULL, sha256 TEXT NOT NULL, modified_s REAL NOT NULL
@@ -181,7 +181,8 @@ bool SceneStore::remove(const std::string& name) {
   const bool found = find(name).has_value();
   if (files_.exists(path(name))) {
     files_.rename(path(name), marked_path(name));
-    files_.create(marked_path(name))->close();  // an empty file, which frees the scene's space
+    // An empty marked file takes the place of the scene, which frees its space.
+    files_.create(marked_path(name))->close();
   }
   drop_upload(name);
   drop_scene(name);
@@ -219,7 +220,7 @@ void SceneStore::remove_stale_uploads(double before_s) {
   for (const std::string& name : stale("*")) {
     try {
       const NameLock lock(*this, name);
-      if (stale(name).empty()) continue;  // a part has arrived in the meantime
+      if (stale(name).empty()) continue;  // a part has arrived since the first query
       check_file();
       drop_upload(name);
       log_("scene " + name +
@@ -268,7 +269,7 @@ void SceneStore::publish(const std::string& name, uint64_t size, const std::stri
         .run();
     transaction.commit();
   }
-  // The marked file is left over from a deletion that failed. It does not belong to this scene.
+  // A file marked as deleted is left over from a failed deletion. It does not belong to this scene.
   if (files_.exists(marked_path(name))) files_.remove(marked_path(name));
   move_into_place(name, size, sha256);
 }
@@ -312,8 +313,8 @@ void SceneStore::put_scene(const std::string& name, uint64_t size, const std::st
   transaction.commit();
 }
 
-// Removes the file first, so that it frees space on a full disk. A record without its file is an
-// upload that starts over.
+// Removes an upload: first its file, so that this frees space on a full disk, then its record. If a
+// crash leaves the record without its file, the upload starts over.
 void SceneStore::drop_upload(const std::string& name) {
   if (files_.exists(part_path(name))) files_.remove(part_path(name));
   std::lock_guard lock(mutex_);

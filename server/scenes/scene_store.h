@@ -34,7 +34,7 @@ std::string scene_name_pattern();
 struct Scene {
   std::string name;
   bool complete = false;
-  std::optional<uint64_t> size;  // of the complete scene, if known
+  std::optional<uint64_t> size;  // size of the complete scene; nullopt while unknown
   uint64_t offset = 0;           // bytes received
   std::string sha256;            // of complete scenes
   double modified_s = 0;
@@ -64,7 +64,7 @@ class SceneStore {
   void finish_removals();
   // Unix time of the newest record; 0 without records.
   double last_change_s();
-  // Removes uploads that have received nothing since `before_s` (Unix time).
+  // Removes unfinished uploads that have received no bytes since `before_s` (Unix time).
   void remove_stale_uploads(double before_s);
   std::string path(const std::string& name) const { return folder_ + "/files/" + name; }
   // Throws Error{kIo} if the database was removed or replaced.
@@ -91,7 +91,8 @@ class SceneStore {
   void record(const std::string& name, const UploadState& state);
   // Records the digest of a finished upload, then renames it to its final path.
   void publish(const std::string& name, uint64_t size, const std::string& sha256);
-  // Finishes an interrupted publish(). Throws Error{kCorrupt} if the bytes are missing.
+  // Finishes an interrupted publish() call. Throws Error{kCorrupt} if bytes of the scene are
+  // missing.
   void finish_publishing(const std::string& name, uint64_t size, const std::string& sha256);
   void check_part(const std::string& name, uint64_t size);
   void move_into_place(const std::string& name, uint64_t size, const std::string& sha256);
@@ -111,8 +112,8 @@ class SceneStore {
   std::set<std::string> busy_;  // names that requests are writing to
 };
 
-// Returns the SHA-256 of the first `size` bytes of a file. Calls `check` often; `check` may throw
-// to stop.
+// Returns the SHA-256 of the first `size` bytes of a file. Calls `check` often, so that `check` can
+// stop the calculation by throwing.
 std::string file_sha256(
     FileSystem& files, const std::string& path, uint64_t size,
     const std::function<void()>& check = [] {});

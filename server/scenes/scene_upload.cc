@@ -56,7 +56,8 @@ SceneUpload::~SceneUpload() {
     else
       store_.drop_upload(name_);
   } catch (const std::exception&) {
-    // The record still has an earlier offset, which is also valid.
+    // The bytes of this part are not recorded. The record still has an earlier offset, which is
+    // also valid.
   }
 }
 

@@ -1,6 +1,6 @@
-// One request's part of an upload, written as it arrives. Received bytes are recorded unless their
-// digest was wrong, so that the client can continue from there. An upload that received nothing
-// leaves nothing. Used by one thread.
+// Writes one request's part of an upload to the store as the bytes arrive. Received bytes are
+// recorded, unless the part's digest was wrong, so that the client can continue after them. If an
+// upload received no bytes, nothing of it remains. Used by one thread.
 #pragma once
 
 #include <functional>
@@ -27,12 +27,14 @@ class SceneUpload {
   void write(std::string_view bytes);
   uint64_t offset() const { return offset_; }
 
-  // Ends the part; its digest must be `part_digest` ("" for any). Returns true if it was the last
-  // part. The scene then has `whole_digest` ("" for any) and waits for publish(). On a mismatch,
-  // discards the part or the complete scene and throws RequestError{kInvalid}.
+  // Ends the part. Its SHA-256 must be `part_digest` ("": not checked). Returns true if it was the
+  // last part. The complete scene must then have the SHA-256 `whole_digest` ("": not checked), and
+  // waits for publish(). If a digest differs, discards the part or the complete scene, and throws
+  // RequestError{kInvalid}.
   //
-  // Calls `check` often while it reads the scene. If `check` throws, or if publish() is not called,
-  // the upload has all its bytes, and an empty part finishes it later.
+  // Calls `check` often while it reads the scene. If `check` throws, or if publish() is not called
+  // afterwards, the upload keeps all its bytes, and the client can finish it later with an empty
+  // part.
   bool finish(
       const std::string& part_digest, const std::string& whole_digest, bool is_last,
       const std::function<void()>& check = [] {});

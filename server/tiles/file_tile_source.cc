@@ -14,7 +14,8 @@ namespace {
 constexpr size_t kHeaderBytes = 4096;
 constexpr size_t kDigestDigits = 32;
 
-// Digests the header page, which has the checksum of the checksum table for all other bytes.
+// Returns a digest of the header page. It identifies the complete file, because this page contains
+// the checksum of the checksum table, which covers all other bytes.
 std::string digest_of(const voxdag_reader::File& file) {
   std::string text(reinterpret_cast<const char*>(file.data()), kHeaderBytes);
   text += "tiles 1 " + std::to_string(kTileLevels);
@@ -65,7 +66,7 @@ std::unique_ptr<voxdag_reader::File> FileTileSource::read_header(const std::stri
   try {
     return open_global_bytes(path, bytes_);
   } catch (const Error&) {
-    expect_readable();  // if pages were unreadable, the problem is not the file's format
+    expect_readable();  // throws if pages were unreadable: then the error is not in the format
     throw;
   }
 }

@@ -15,9 +15,9 @@ namespace voxdag::server {
 
 class FileTileSource : public TileSource {
  public:
-  // Throws Error if the file is not a valid DAG. Reads only its header and checksum table.
-  // Unreadable pages do not end the process; while the file is being opened, they are an
-  // Error{kIo}. `manifests`, if given, caches manifests.
+  // Throws Error if the file is not a valid DAG. Reads only the file's header and checksum table.
+  // Pages that cannot be read while the file is being opened cause Error{kIo}; they never end the
+  // process. `manifests`, if not null, caches manifests.
   FileTileSource(const std::string& path, const FileIdentity& identity,
                  std::shared_ptr<ManifestCache> manifests = nullptr);
   // The same for a file that is already mapped.
@@ -30,15 +30,17 @@ class FileTileSource : public TileSource {
   const voxdag_reader::File* colored_file() const override { return file_.get(); }
   // Identity of the file when it was opened.
   const FileIdentity& identity() const { return identity_; }
-  // Digest of the file's contents and of the version of tiles.
+  // Returns a digest of the file's contents and of the version of the tile format.
   const std::string& digest() const override { return digest_; }
   // The first call computes the cameras, which may take a second, or longer if the file is not in
-  // memory. Other calls wait for it. If the first call is canceled, the next one starts again.
+  // memory. Concurrent calls wait for it. If the first call is canceled, the next call starts
+  // again.
   const std::string& manifest(const CancelToken& cancel) const override;
   void expect_readable() const override;
-  // True if expect_readable() throws. The file must then be opened again.
+  // True if expect_readable() throws. The file must then be opened again before it can be used.
   bool is_broken() const { return mapping_.is_damaged(); }
-  // Returns false for a removed file, because it still has its contents.
+  // True if the file's contents were changed. False for a removed file, because its contents remain
+  // until it is closed.
   bool was_overwritten() const override;
   bool is_first_damage() const override { return !has_damage_.exchange(true); }
 

@@ -17,12 +17,13 @@ struct GridPlace {
   double edge = 1;
 };
 
-// Returns the members that all manifests have. `root` is the word offset of the root; nullopt for a
-// DAG without voxels.
+// Returns the members that every manifest has. `root` is the word offset of the DAG's root node;
+// nullopt if the DAG has no voxels.
 nlohmann::ordered_json manifest_of(const query::DagView& dag, const std::string& digest,
                                    const GridPlace& place, std::optional<uint64_t> root);
 
-// Returns a named view of a DAG that is not empty. Throws like `views`.
+// Returns the camera of the named view of a DAG, which must not be empty. Throws the errors of
+// `views`.
 nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& views,
                                  const query::DagView& dag, const GridPlace& place);
 

@@ -13,11 +13,12 @@ std::shared_ptr<const FileTileSource> OpenTileSources::open(const std::string& p
     const std::lock_guard lock(mutex_);
     if (const auto found = find(path, identity); found != entries_.end()) return found->file;
   }
-  // Opens the file without the lock, so that requests for other files need not wait for its disk.
+  // Opens the file while the mutex is not locked, so that requests for other files need not wait
+  // for this file's disk.
   auto file = std::make_shared<const FileTileSource>(path, identity, manifests_);
   const std::lock_guard lock(mutex_);
-  // Another request opened the file first. Its object is used, so that one file has one manifest
-  // and its blocks are verified once.
+  // Another request has opened the same file first. Its object is used, so that the file has only
+  // one manifest and its blocks are verified only once.
   if (const auto found = find(path, identity); found != entries_.end()) return found->file;
   entries_.remove_if([&](const Entry& e) { return e.path == path; });
   entries_.push_front({path, file, wall_seconds()});

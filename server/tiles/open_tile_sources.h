@@ -1,6 +1,7 @@
-// Caches the most recently requested open files of viewers, so that requests need not open and
-// check them again. A removed or replaced file is closed by its next request, by close(), or by
-// close_stale(), which must be called periodically. A file with an unreadable part is opened again.
+// Caches the files that viewers requested last, open and checked, so that a request need not open
+// them again. A file that was removed or replaced is closed when it is requested next, by close(),
+// or by close_stale(), which must be called periodically. A file with an unreadable part is opened
+// again.
 // Manifests remain in the cache longer than files. Thread-safe.
 #pragma once
 
@@ -18,7 +19,8 @@ class OpenTileSources {
  public:
   OpenTileSources(FileSystem& files, size_t max_open) : files_(files), max_open_(max_open) {}
 
-  // Throws Error{kNotFound}, or like FileTileSource. Requests that still use a closed file finish.
+  // Throws Error{kNotFound}, or the errors of FileTileSource. A request that still uses a file
+  // after it was closed here can finish.
   std::shared_ptr<const FileTileSource> open(const std::string& path);
   void close(const std::string& path);
   // Closes files that were removed or replaced, or were not requested for `max_idle_s`.
@@ -32,8 +34,8 @@ class OpenTileSources {
     double used_s;
   };
   using Entries = std::list<Entry>;
-  // Returns the entry of a file with this identity after moving it to the front; end() if none
-  // exists.
+  // Returns the entry of the file with this identity, and moves it to the front of the list; end()
+  // if there is no such entry.
   Entries::iterator find(const std::string& path, const FileIdentity& identity);
   bool is_current(const Entry& entry) const;
 

@@ -24,17 +24,18 @@ class TileSource {
   virtual ~TileSource() = default;
 
   virtual const query::DagView& dag() const = 0;
-  // The checksum blocks of the DAG's nodes, verified before they are read; may be null.
+  // Returns the checksum blocks of the DAG's nodes. A block is verified before its nodes are read.
+  // May return null.
   virtual const CheckedBlocks* blocks() const { return nullptr; }
   // The file with the colors; may be null.
   virtual const voxdag_reader::File* colored_file() const { return nullptr; }
-  // 32 hex digits. In a DAG with this digest, neither the contents of an address nor the version of
-  // tiles ever change.
+  // Returns 32 hex digits that identify the DAG and the version of the tile format. As long as the
+  // digest is the same, the contents of every address are also the same.
   virtual const std::string& digest() const = 0;
   // Returns the data that a viewer needs to begin, as JSON (docs/api.md).
   virtual const std::string& manifest(const CancelToken& cancel) const = 0;
-  // Throws Error{kIo} if a part of the file could not be read since it was opened, because it was
-  // truncated or its disk failed. Results made since then are wrong.
+  // Throws Error{kIo} if, at any time since the file was opened, a part of it could not be read,
+  // because the file was truncated or its disk failed. Results made after that are wrong.
   virtual void expect_readable() const {}
   // True if the file was changed after it was opened, so that the read bytes may mix both versions.
   virtual bool was_overwritten() const { return false; }

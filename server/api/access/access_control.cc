@@ -9,7 +9,8 @@
 namespace voxdag::server {
 namespace {
 
-// Limits the load caused by guessing. 256-bit tokens cannot be guessed at any rate.
+// Limits the load from clients that guess tokens. Secrecy does not depend on this limit: a 256-bit
+// token cannot be guessed at any rate.
 constexpr double kWrongTokensPerSecond = 5;
 
 std::string without_port(const std::string& host) {
@@ -43,8 +44,9 @@ AccessControl::AccessControl(const ServerConfig& config, FileSystem& files)
   hosts_.insert(hosts_.end(), {"localhost", "127.0.0.1", "[::1]", config.http.address});
 }
 
-// Without tokens, access is limited to the loopback. But a browser on this machine lets any page
-// send requests there, under the page's host name (DNS rebinding) or as cross-site requests.
+// Without tokens, only clients on the loopback have access. But any web page in a browser on this
+// machine can send requests to the loopback, under the page's own host name (DNS rebinding) or as
+// cross-site requests. This function refuses such requests.
 void AccessControl::check_site(const Request& request) const {
   const auto is_ours = [&](const std::string& host) {
     return std::any_of(hosts_.begin(), hosts_.end(),
@@ -53,8 +55,8 @@ void AccessControl::check_site(const Request& request) const {
   const std::string host = request.header("Host");
   if (!host.empty() && !is_ours(without_port(host)))
     throw Problem(403, "forbidden", "the Host header does not name this service");
-  // A page cannot read this answer, but it could waste the service's time, and could infer existing
-  // names from response times.
+  // A browser hides the answer to a cross-site request from the page. But the page could still
+  // waste the service's time, and could infer existing names from response times.
   const auto& segments = request.target.segments;
   if (!segments.empty() && segments[0] == "api" && request.header("Sec-Fetch-Site") == "cross-site")
     throw Problem(403, "forbidden", "cross-site request: expected one of this service's pages");

@@ -1,5 +1,5 @@
-// Limits the number of concurrent operations of a kind, in total and per client, so that no client
-// can use up all of them. Thread-safe.
+// Limits the number of concurrent operations of one kind, in total and per client, so that no
+// client can use up the total. Thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +15,8 @@ class ConcurrencyLimiter {
   ConcurrencyLimiter(size_t max, size_t max_per_client)
       : state_(std::make_shared<State>()), max_(max), max_per_client_(max_per_client) {}
 
-  // Returns a permit, which is released when the last copy of the pointer is destroyed; null if
-  // none is free.
+  // Returns a permit, or null if no permit is free. The permit is released when the last copy of
+  // the pointer is destroyed.
   std::shared_ptr<void> acquire(const std::string& client) {
     {
       std::lock_guard lock(state_->mutex);

@@ -6,7 +6,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kDepthS = 2;
-// Above this count, full buckets are dropped: a new bucket would also be full.
+// Above this number of buckets, full buckets are dropped. This changes no limit, because a client's
+// new bucket is also full.
 constexpr size_t kMaxBuckets = 10000;
 constexpr double kSweepIntervalS = 1;
 

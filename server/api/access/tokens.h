@@ -24,7 +24,8 @@ std::optional<Role> parse_role(std::string_view name);
 struct Caller {
   Role role = Role::kNone;
   std::string name;  // for the audit log
-  // Limits are shared by all requests with this text: the name of a token, else an address.
+  // Identifies the client for limits: all requests with the same text share one limit. The text
+  // contains the token's name, or the client's address for a request without a token.
   std::string client;
 };
 

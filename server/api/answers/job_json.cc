@@ -32,7 +32,8 @@ std::string links(const std::string& self) {
   return text + ",\"preview\":\"" + self + "/preview.png\"}";
 }
 
-// Returns the members of a stored request, and nothing else that a damaged record may contain.
+// Returns the JSON members "scene", "resolution" and "options" of a stored request. Leaves out any
+// other members, which a damaged record may contain.
 std::string request_members(const std::string& request) {
   using nlohmann::ordered_json;
   const auto stored = ordered_json::parse(request, nullptr, false);

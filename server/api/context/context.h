@@ -42,11 +42,12 @@ struct Context {
   PartialViews partial{files, 16};
   // Canceled when the service stops.
   CancelToken stopping = {};
-  // Held while a job that uses scenes is added or retried, and while an unused scene is replaced or
-  // removed. So neither happens between the other's check and its change.
+  // Held while a job that uses scenes is added or retried, and while a scene is replaced or removed
+  // after a check that it is unused. So neither operation can run between the other's check and the
+  // other's change.
   std::mutex scene_mutex = {};
-  // Uploads that dry runs read, guarded by scene_mutex. They must not be removed. They may be
-  // replaced, because readers keep the old file.
+  // Scenes that dry runs are reading, guarded by scene_mutex. These scenes must not be removed.
+  // They may be replaced, because a reader keeps the old file open.
   std::multiset<std::string> planned_scenes = {};
 };
 

@@ -29,7 +29,8 @@ std::string state_data(const JobEvent& event) {
 // The event stream of one client for one job (docs/api.md, "Events of a job"). Used by one thread.
 class EventFeed {
  public:
-  // Sends the state changes after event `last_seen`. Without a value, sends only the current state.
+  // Sends the state changes after event `last_seen`. If `last_seen` is nullopt, sends only the
+  // current state.
   EventFeed(Context& context, std::string id, std::optional<int64_t> last_seen)
       : context_(context), id_(std::move(id)), last_number_(last_seen.value_or(-1)) {}
 
@@ -72,7 +73,8 @@ std::optional<std::string> EventFeed::next() {
 }
 
 void EventFeed::wait() {
-  // Wakes up when progress may be sent that came too soon after the last event.
+  // Wakes up as soon as progress may be sent that was held back because it came too soon after the
+  // last event.
   const double left_s = last_progress_s_ + kProgressIntervalS - wall_seconds();
   context_.queue.wait_for_change(seen_version_, left_s > 0 ? left_s : kMaxWaitS);
 }

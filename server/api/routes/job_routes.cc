@@ -75,7 +75,7 @@ class TemporaryTask {
     try {
       remove_tree(files_, folder.path);
     } catch (const std::exception&) {
-      // The next start of the service removes the remaining folder.
+      // The service removes the remaining folder when it starts the next time.
     }
   }
   const JobFolder folder;
@@ -84,7 +84,7 @@ class TemporaryTask {
   FileSystem& files_;
 };
 
-// The task of a dry run. Its scenes are not removed during the lifetime of this object.
+// The task of a dry run. The task's scenes cannot be removed during the lifetime of this object.
 class Plan {
  public:
   Plan(Context& context, const JobRequest& request)
@@ -193,7 +193,7 @@ JobFilter filter_of(const Call& call) {
 
 Response list_jobs(Context& context, Call& call) {
   JobFilter filter = filter_of(call);
-  const size_t limit = filter.limit++;  // one more, which shows if there is a next page
+  const size_t limit = filter.limit++;  // one more job than the page: shows if there is a next page
   std::vector<Job> jobs = context.queue.list(filter);
   std::string next = "null";
   if (jobs.size() > limit) {
@@ -228,13 +228,13 @@ Response delete_job(Context& context, Call& call) {
   const std::string result = context.dispatcher.folder(call.names[0]).result();
   context.open_sources.close(result);
   context.dispatcher.remove(call.names[0]);
-  // A tile may have been requested since the file was removed.
+  // A request for a tile may have opened the file again between the first close() and the removal.
   context.open_sources.close(result);
   context.partial.close(call.names[0]);
   return no_content();
 }
 
-// A job whose scenes were deleted is refused, like a new one.
+// Refuses to retry a job whose scenes were deleted, as for a new job.
 Response retry_job(Context& context, Call& call) {
   expect_no_body(call.request);
   std::lock_guard lock(context.scene_mutex);
@@ -255,8 +255,8 @@ Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
   };
 }
 
-// Returns a handler of requests that free disk space. It works even if the disk has no space to
-// record them.
+// Wraps a handler of requests that free disk space. The wrapped handler works even if the disk has
+// no space to record such a request.
 Router::Handler freeing_space(Router::Handler handler) {
   return [handler = std::move(handler)](Context& context, Call& call) {
     return context.disk.with_ballast([&] { return handler(context, call); });

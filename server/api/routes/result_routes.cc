@@ -50,7 +50,8 @@ std::string content_range(const ByteRange& range, uint64_t size) {
 
 RangeAnswer requested_ranges(const Request& request, const std::string& tag, uint64_t size) {
   const auto condition = request.headers.find("If-Range");
-  // With a date or a different entity tag, the answer is the complete file.
+  // If-Range may also contain a date or another entity tag. In both cases the answer is the
+  // complete file.
   if (condition != request.headers.end() && trimmed(condition->second) != tag) return {};
   // Only GET has ranges (RFC 9110, 14.2).
   return request.method == "GET" ? parse_ranges(request.header("Range"), size) : RangeAnswer{};
@@ -66,9 +67,9 @@ void add_multipart(Response& response, const std::vector<ByteRange>& ranges, uin
   response.headers.emplace("Content-Type", "multipart/byteranges; boundary=" + boundary);
 }
 
-// Answers with a large file, which must not be empty: complete, one range or several ranges (RFC
-// 9110, sections 13 and 14), as 200, 206 or 304. Its SHA-256 in hex is its ETag. Throws Problem
-// (416).
+// Answers with a large file, which must not be empty. The answer is the complete file (200), one
+// range or several ranges (206), or 304 (RFC 9110, sections 13 and 14). The ETag is the file's
+// SHA-256 in hex. Throws Problem (416).
 Response answer_with_file(const Request& request, std::shared_ptr<ReadableFile> file,
                           const std::string& sha256, const std::string& name) {
   const uint64_t size = file->size();

@@ -107,7 +107,8 @@ Part part_of(const Request& request) {
   return {range.begin, range.end, total};
 }
 
-// Returns the bytes still to come, as far as the client has announced them.
+// Returns the number of bytes that the client has announced but not sent yet; 0 if the client has
+// not announced a total.
 uint64_t announced_bytes(Context& context, const Part& part) {
   const uint64_t max_bytes = context.config.transfers.max_scene_bytes;
   const uint64_t size = part.total.value_or(0);
@@ -134,14 +135,14 @@ BodyEnd receive(Context& context, Call& call, const Part& part, DiskSpace::Reser
   return end;
 }
 
-// Returns the SHA-256 in a digest header; "" without the header.
+// Returns the SHA-256 in a digest header; "" if the request has no such header.
 std::string digest_of(const Request& request, const char* name) {
   const auto found = request.headers.find(name);
   return found == request.headers.end() ? "" : parse_digest_field(found->second);
 }
 
-// Refuses uploads while the service is stopping: it accepts no new parts, and does not read a scene
-// to its end.
+// Throws Problem while the service is stopping. The service then accepts no new parts and does not
+// finish reading a scene.
 void check_running(const Context& context) {
   if (context.draining) throw busy("the service is stopping; resume at Upload-Offset");
 }
@@ -157,7 +158,8 @@ Response put_scene(Context& context, Call& call) {
   const std::string part_digest = digest_of(call.request, "Content-Digest");
   const std::string whole_digest = digest_of(call.request, "Repr-Digest");
   SceneUpload upload(context.scenes, name, part.first, part.total);
-  // Reserved only here, because an upload that starts over has now freed its old bytes.
+  // The space is reserved only after `upload` exists: an upload that starts over has then freed the
+  // space of its old bytes.
   DiskSpace::Reservation space(context.disk, announced);
   switch (receive(context, call, part, space, upload)) {
     case BodyEnd::kComplete:

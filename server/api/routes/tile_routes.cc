@@ -69,7 +69,8 @@ std::vector<uint32_t> make_page(query::ColorPages& pages, const query::ColorPage
   }
 }
 
-// Parses LEVEL.OFFSET of a tile. Throws Problem with `status` unless a file can have such a node.
+// Parses the address LEVEL.OFFSET of a tile. Throws Problem with `status` if no file can have a
+// node at this address.
 query::TileAddress parse_address(const std::string& text, int status) {
   const auto numbers = parse_numbers<uint64_t, 2>(text, '.');
   if (!numbers || (*numbers)[0] > kMaxLevel || (*numbers)[1] > kMaxOffset)
@@ -123,7 +124,8 @@ Response immutable_response(const Call& call, const TileSource& dag, const std::
   response.headers.emplace("ETag", "W/\"" + tag + '"');
   response.headers.emplace("Vary", "Accept-Encoding, Authorization");
   const std::string known = call.request.header("If-None-Match");
-  // "*" tests if the tile exists, which is unknown until it is made.
+  // The header value "*" means "if the tile exists". The service knows that only after it has made
+  // the tile.
   if (trimmed(known) != "*" && has_tag(known, '"' + tag + '"')) {
     response.status = 304;
     return response;
@@ -132,8 +134,8 @@ Response immutable_response(const Call& call, const TileSource& dag, const std::
   return response;
 }
 
-// Returns the problem for clients. It omits the error's message, which contains the name of the
-// file.
+// Returns the problem that is sent to clients. The problem's text omits the error's message,
+// because this message contains the name of the file.
 Problem damaged(const TileSource& dag, const Error& error) {
   Problem result = problem(ErrorCode::kCorrupt,
                            "the requested part of the DAG or of its colors is damaged: "
@@ -148,9 +150,9 @@ void expect_unchanged(const TileSource& dag) {
     throw Problem(410, "gone", "the file was replaced while being read: get the manifest again");
 }
 
-// Returns the answer, or throws the error, if the file was readable and unchanged all the time.
-// Unreadable pages are zeros, and a file that is being overwritten has old and new parts. Both can
-// cause any answer or error.
+// Calls `answer` and returns its response, or throws its error, only if the file was readable and
+// unchanged during the call. Otherwise the result is meaningless: unreadable pages read as zeros,
+// and a file that is being overwritten is a mixture of old and new parts.
 template <class Answer>
 Response consistent_response(const Call& call, const TileSource& dag, const Answer& answer) {
   dag.expect_readable();  // a file known to be damaged is not read again
@@ -187,8 +189,9 @@ Response get_tile(const Call& call, const TileSource& dag) {
   });
 }
 
-// Returns the words from `make` for each address, each preceded by its length in bytes. Ends early
-// if the client has left, because disks may be slow. A stopping service closes all connections.
+// Calls `make` for each address and returns the resulting words, each result preceded by its length
+// in bytes. Disks may be slow, so the function throws as soon as the client has disconnected. This
+// also covers a stopping service, because it closes all connections.
 template <class Addresses, class Make>
 std::string batch_of(const Call& call, const Addresses& addresses, const Make& make) {
   std::string bytes;
@@ -253,7 +256,8 @@ auto with_unfinished_job(Context& context, const Call& call, const Make& make) {
   try {
     return make(job.id, context.dispatcher.folder(job.id), resolution);
   } catch (const Error& error) {
-    // A new store has no tables yet, and a job that ends removes its store while it is being read.
+    // Errors are expected in two cases: a new store has no tables yet, and a job that ends removes
+    // its store, perhaps during this read.
     const bool is_read = find_job(context.queue, call.names[0]).state != JobState::kSucceeded;
     if (is_read && !error.is_corruption() && error.code() != ErrorCode::kInvalidInput) throw;
     throw not_found("the subvolumes of the job are not known yet");
@@ -273,7 +277,8 @@ Response get_partial(Context& context, Call& call) {
 
 TileAccess open_unfinished_job(Context& context, const Call& call) {
   auto permit = tile_permit(context, call);
-  // When the job ends, viewers can finish with the last tiles.
+  // Tiles of the requested version are still served after the job has ended, so that viewers can
+  // finish loading them.
   auto dag = context.partial.known(find_job(context.queue, call.names[0]).id, call.query("v"));
   if (!dag)
     dag = with_unfinished_job(context, call, [&](const auto& id, const auto& folder, uint64_t r) {

@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kBufferBytes = 16384;
 constexpr double kLingerS = 1;
 constexpr size_t kLingerBytes = 1 << 20;
-constexpr double kSteadyRates = 8;  // multiple of the minimum rate
+constexpr double kSteadyRates = 8;  // the steady rate as a multiple of the minimum rate
 
 }  // namespace
 
@@ -152,7 +152,8 @@ void Connection::allow_large_send_buffer() {
 #endif
 }
 
-// There may be unread bytes before the end, such as the last bytes of a TLS session.
+// poll() is used instead of a read, because unread bytes may precede the end of the stream, such as
+// the last bytes of a TLS session.
 bool Connection::peer_disconnected() const {
   pollfd peer{socket_, POLLRDHUP, 0};
   return poll(&peer, 1, 0) > 0;
@@ -162,7 +163,7 @@ void Connection::linger() {
   if (error_ == ErrorState::kBroken) return;
   tls_.shutdown();
   if (shutdown(socket_, SHUT_WR) != 0) return;
-  table_.set_waiting(place_, 0, true);  // it is the first to be closed
+  table_.set_waiting(place_, 0, true);  // makes this connection the first one to be evicted
   const double deadline = wall_seconds() + kLingerS;
   for (size_t bytes = 0; bytes < kLingerBytes;) {
     pollfd waiting{socket_, POLLIN, 0};

@@ -7,8 +7,8 @@
 //   - exchange: the body and the answer, each at min_bytes_per_s and never more than grace_s behind
 //
 // Only time in which the connection waits for its client counts. If a client exceeds its time, the
-// connection enters an error state, in which reads fail. While the connection waits, the table
-// knows this and may close it in favor of another one.
+// connection enters an error state, in which reads fail. A connection that waits for its client is
+// recorded as waiting in the table, which may close it in favor of a new connection.
 #pragma once
 
 #include <cstdint>
@@ -57,9 +57,9 @@ class Connection {
 
  private:
   enum class Phase { kWaiting, kHeader, kExchange };
-  // Time spent waiting for the client in this phase, minus the time that its bytes take at a given
-  // rate. One value uses the minimum rate. The other uses a multiple of it, and a client above this
-  // rate is not evicted.
+  // Time spent waiting for the client in this phase, minus the time that the transferred bytes take
+  // at a given rate. `behind_minimum_s` uses the minimum rate. `behind_steady_s` uses a multiple of
+  // it; a client above that rate is not evicted.
   struct Pace {
     double behind_minimum_s = 0;
     double behind_steady_s = 0;

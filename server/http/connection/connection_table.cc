@@ -11,7 +11,7 @@
 namespace voxdag::server {
 namespace {
 
-// A client that has been idle for less than this during a body or an answer counts as active.
+// During a body or an answer, a client that has been idle for less than this time counts as active.
 constexpr double kMinExchangeWaitS = 0.25;
 constexpr std::chrono::seconds kMaxEvictionWait{1};
 
@@ -23,7 +23,7 @@ bool is_loopback(const std::string& address) {
 
 std::string client_of(const std::string& address) {
   in6_addr parsed{};
-  // A link-local address has its interface after a percent sign.
+  // In a link-local address, the name of the network interface follows a percent sign.
   if (inet_pton(AF_INET6, address.substr(0, address.find('%')).c_str(), &parsed) != 1)
     return address;
   char text[INET6_ADDRSTRLEN];
@@ -39,7 +39,8 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
   const auto same = by_client_.find(client);
   if (same != by_client_.end() && same->second >= limits_.max_per_client && !is_loopback(address))
     return false;
-  // Evicted connections remain in the table until their threads have ended.
+  // The table may have more entries than connections, because an evicted connection remains in the
+  // table until its thread has ended.
   const size_t max_entries = limits_.max_connections + limits_.max_connections / 4 + 1;
   if (!removed_.wait_for(lock, kMaxEvictionWait, [&] { return entries_.size() < max_entries; }) ||
       (entries_.size() >= limits_.max_connections && !evict_one()))
@@ -49,8 +50,8 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
   return true;
 }
 
-// Closes the longest-waiting connection. Its thread then wakes up at the end of the stream and
-// removes the entry. Until then the table has one entry more than the limit.
+// Closes the connection that has waited longest. The connection's thread then finds the end of the
+// stream and removes the entry. Until then the table has one entry more than the limit.
 bool ConnectionTable::evict_one() {
   const double now = wall_seconds();
   Entry* longest = nullptr;

@@ -20,7 +20,7 @@ class ConnectionTable {
     int socket;
     std::string client;
     bool waiting;           // for the client
-    bool between_requests;  // waits for a request or the rest of its header
+    bool between_requests;  // waits for a request, or for the rest of a request's header
     double waiting_since_s;
     bool evicted;
   };
@@ -31,8 +31,8 @@ class ConnectionTable {
   explicit ConnectionTable(const HttpLimits& limits) : limits_(limits) {}
 
   // Adds a connection. Returns false if the client has too many connections, or if the table is
-  // full and none is waiting. Takes up to a second while many evicted connections are still ending.
-  // One thread calls it.
+  // full and no connection is waiting. May take up to a second while many evicted connections are
+  // still ending. Must be called by one thread only.
   bool admit(int socket, const std::string& address, Place& place);
   // Records that the connection has waited for its client since `since_s` (wall_seconds()).
   void set_waiting(Place place, double since_s, bool between_requests);

@@ -63,7 +63,8 @@ Listener::Listener(const std::string& address, int port) {
   const Addresses found = resolve(address, port);
   socket_ = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const int yes = 1;
-  // Allows a port whose old connections are still closing, but not a port in use.
+  // Allows the use of a port whose old connections are still closing, but not of a port on which
+  // another socket listens.
   setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   if (socket_ < 0 || bind(socket_, found->ai_addr, found->ai_addrlen) != 0 ||
       ::listen(socket_, kBacklog) != 0 || pipe2(wake_, O_CLOEXEC | O_NONBLOCK) != 0) {
@@ -91,8 +92,8 @@ void Listener::accept_all(const std::function<void(int, const std::string&)>& on
     auto* generic = reinterpret_cast<sockaddr*>(&address);
     const int client = accept4(socket_, generic, &size, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (client < 0) {
-      // There are no free file descriptors or no memory. The client waits in the backlog until
-      // there are.
+      // There are no free file descriptors, or there is no memory. The client waits in the backlog
+      // until the service has them again.
       if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM)
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
       continue;

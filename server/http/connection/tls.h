@@ -12,9 +12,9 @@ struct ssl_st;
 
 namespace voxdag::server {
 
-// The TLS state of one connection. If default constructed, bytes pass unencrypted. read() and
-// write() return the number of bytes moved, 0 at the end of the stream, or one of the negative
-// constants. Used by one thread.
+// The TLS state of one connection. A default-constructed session passes bytes unencrypted. read()
+// and write() return the number of transferred bytes, 0 at the end of the stream, or one of the
+// negative constants below. Used by one thread.
 class TlsSession {
  public:
   static constexpr ssize_t kNeedsRead = -1, kNeedsWrite = -2, kBroken = -3;

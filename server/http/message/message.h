@@ -29,8 +29,8 @@ struct Request {
   std::optional<uint64_t> content_length;
   bool has_body = false;  // a Content-Length above 0, or chunked
 
-  // Passes the body to `sink` in pieces until `sink` returns false. Called at most once. If the
-  // body is not read to its end, the connection is closed after the answer.
+  // Passes the body to `sink` in pieces until the body ends or `sink` returns false. Call it at
+  // most once. If the body is not read to its end, the connection is closed after the answer.
   using Sink = std::function<bool(std::string_view piece)>;
   std::function<BodyEnd(const Sink& sink)> read_body;
 
@@ -40,14 +40,14 @@ struct Request {
   std::string header(std::string_view name) const { return header_value(headers, name); }
 };
 
-// A piece of an answer from a file: a text, followed by a range of the file, which may be empty.
+// A piece of an answer: a text, followed by a range of a file. The range may be empty.
 struct FilePiece {
   std::string text;
   ByteRange range;
 };
 
-// The source of an event stream. A call returns the next bytes to send, "" for none yet, or nullopt
-// at the end. It takes at most about a second.
+// The source of an event stream. A call returns the next bytes to send, "" if there are none yet,
+// or nullopt at the end of the stream. A call takes at most about a second.
 using EventSource = std::function<std::optional<std::string>()>;
 
 struct Response {

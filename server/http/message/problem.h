@@ -21,7 +21,7 @@ struct Problem : std::exception {
   std::string code;
   std::string detail;
   std::string state;     // state of a job that does not allow the request; "" otherwise
-  std::string log_text;  // only for the log; "" for nothing
+  std::string log_text;  // for the log only; "" for no text
   HeaderMap headers;     // fields of the answer: Retry-After, Allow, Content-Range, ...
 };
 

@@ -12,7 +12,7 @@ constexpr size_t kMaxMethodChars = 32;
 constexpr size_t kMaxTargetBytes = 8192;
 constexpr size_t kMaxFields = 100;
 
-// Returns the text up to the next CRLF. Removes both from `rest`.
+// Returns the text up to the next CRLF. Removes the text and the CRLF from `rest`.
 std::string_view take_line(std::string_view& rest) {
   const size_t end = rest.find("\r\n");
   if (end == std::string_view::npos) throw bad_request("expected lines that end with CRLF");
@@ -59,12 +59,13 @@ void parse_field(std::string_view line, HeaderMap& headers) {
   headers.emplace(line.substr(0, colon), value);
 }
 
-// Fields that must occur only once: a proxy in front may have used another occurrence.
+// Header fields that must occur only once: if a field occurred twice, a proxy in front of the
+// service might have used the other value.
 constexpr const char* kSingleFields[] = {"Authorization", "Content-Encoding", "Content-Range",
                                          "Content-Type",  "Idempotency-Key",  "If-Range",
                                          "Last-Event-ID", "Origin",           "Range"};
 
-// True if a list field, such as Connection, has this element.
+// True if a header field that contains a list, such as Connection, has this element.
 bool lists(const HeaderMap& headers, std::string_view name, std::string_view element) {
   const auto [begin, end] = headers.equal_range(name);
   return std::any_of(begin, end, [&](const auto& field) {
@@ -77,7 +78,7 @@ bool lists(const HeaderMap& headers, std::string_view name, std::string_view ele
   });
 }
 
-// Determines how the body ends: after its length, or after the last chunk.
+// Determines where the body ends: after Content-Length bytes, or after the last chunk.
 void parse_framing(RequestHead& head) {
   const size_t lengths = head.headers.count("Content-Length");
   if (lengths > 0) {

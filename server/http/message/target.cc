@@ -40,7 +40,7 @@ void parse_query(std::string_view text, std::map<std::string, std::string>& quer
   });
 }
 
-// Returns the target without its origin: "http://host/path" is "/path" of this host.
+// Returns a target without scheme and host: "/path" for "http://host/path".
 std::string_view without_origin(std::string_view text) {
   for (const std::string_view scheme : {"http://", "https://"}) {
     if (!text.starts_with(scheme)) continue;

@@ -19,8 +19,8 @@ namespace {
 constexpr int kTickMs = 100;
 constexpr size_t kMaxLineBytes = 4 << 20;
 
-// Blocks all signals of this thread during its lifetime. A child forked in that time receives
-// pending signals when it unblocks them.
+// Blocks all signals of this thread during the lifetime of this object. A child that is forked
+// during that time receives pending signals as soon as it unblocks them.
 class BlockedSignals {
  public:
   BlockedSignals() {
@@ -35,8 +35,9 @@ class BlockedSignals {
   sigset_t before_;
 };
 
-// The child inherits the parent's signal handlers. They would receive a stop request, and the
-// program that runs next would not learn of it.
+// Resets the signal handlers that the child inherits from the parent. Otherwise an inherited
+// handler could receive a stop request before exec, and the new program would not learn of the
+// request.
 void drop_signal_handlers() {
   for (int signal = 1; signal < NSIG; ++signal) {
     struct sigaction action {};
@@ -131,7 +132,8 @@ void ChildProcess::send(int signal) {
 
 ChildProcess::End ChildProcess::wait() {
   if (pid_ <= 0) return {};
-  // Waits without reaping, so that no signal goes to a process id that has become free.
+  // Waits for the end of the child without reaping it. Until it is reaped, its process id remains
+  // reserved, so no signal can go to another process.
   siginfo_t info{};
   while (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
   }

@@ -1,5 +1,6 @@
 // A child process: starts it, reads its output line by line, requests its stop, and waits for it.
-// It dies with this process, even if this process crashes, and inherits none of its open files.
+// The child dies with this process, even if this process crashes. It inherits none of its open
+// files.
 #pragma once
 
 #include <sys/types.h>
@@ -29,14 +30,14 @@ class ChildProcess {
   // least every tenth of a second. When `tick` returns true, the child is killed.
   void read_lines(const std::function<void(std::string_view line)>& use,
                   const std::function<bool()>& tick);
-  // Sends SIGTERM. A build then stops at a checkpoint; a program that has not begun yet ends. May
-  // be called from any thread.
+  // Sends SIGTERM. A build then stops at its next checkpoint; a program that has not begun to run
+  // ends. May be called from any thread.
   void request_stop();
   void kill();
 
   struct End {
     int exit_status = 0;
-    int signal = 0;  // the signal that ended it, 0 for none
+    int signal = 0;  // number of the signal that ended the child; 0 if it exited by itself
   };
   End wait();
 

@@ -12,7 +12,8 @@
 namespace voxdag::server {
 namespace {
 
-// Compares the opened file with the checked path, because a link may have been changed in between.
+// Compares the opened file with the checked path, because a symbolic link in the path may have
+// changed between check and open.
 bool is_same_file(const std::string& resolved, const FileIdentity& opened) {
   struct stat found {};
   return lstat(resolved.c_str(), &found) == 0 && found.st_ino == opened.inode;
@@ -41,7 +42,8 @@ ConfinedFiles::ConfinedFiles(FileSystem& files, const std::vector<std::string>& 
 }
 
 std::unique_ptr<ReadableFile> ConfinedFiles::open_read(const std::string& path) {
-  // Missing and forbidden files give the same error, so that a scene cannot probe for files.
+  // Missing files and forbidden files give the same error, so that a scene cannot find out which
+  // files exist.
   std::string resolved = resolved_path(path);
   std::error_code failure;
   if (resolved.empty()) resolved = std::filesystem::weakly_canonical(path, failure);

@@ -1,5 +1,6 @@
-// A file system that reads only given files, because an uploaded scene may refer to any file as its
-// buffers, by dots or through symbolic links. All other calls are forwarded.
+// A file system that reads only the given files. It protects against uploaded scenes, which may
+// refer to any file as their buffers, by "..", or through symbolic links. All other calls are
+// forwarded.
 #pragma once
 
 #include <string>
@@ -15,8 +16,8 @@ class ConfinedFiles : public ForwardingFiles {
   // exist yet must not contain symbolic links or dots.
   ConfinedFiles(FileSystem& files, const std::vector<std::string>& readable);
 
-  // Opens a file. Errors use the given name. Throws Error{kInvalidInput} if the file is not
-  // readable.
+  // Opens a file for reading. Error messages contain `path` as given. Throws Error{kInvalidInput}
+  // if reading the file is not allowed.
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override;
 
  private:

@@ -84,7 +84,7 @@ ordered_json levels_of(const std::string& path) {
   return levels;
 }
 
-// Returns the members of a build's report that are for clients, and the sizes of the levels.
+// Returns the members of a build's report that clients may see, and the sizes of the DAG's levels.
 std::string result_json(const std::string& report_text, const std::string& output) {
   const auto report = ordered_json::parse(report_text);
   ordered_json result;
@@ -95,7 +95,8 @@ std::string result_json(const std::string& report_text, const std::string& outpu
   return result.dump();
 }
 
-// The report is written last. If it exists, only the removal of the work folder was interrupted.
+// The report is the last file that a build writes. If it exists, the build is complete, and at most
+// the removal of its work folder was interrupted.
 std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildContext& context) {
   if (!context.files.exists(folder.report()))
     return result_json(report_json(run_build(spec, context)), spec.run.output);
@@ -112,7 +113,8 @@ std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progre
   const BuildContext context{readable, progress, cancel};
   const BuildSpec spec = spec_of(task, folder);
   if (task.kind == JobTask::Kind::kPlan) return estimate_json(plan_build(spec, context));
-  // The list of an earlier run is useless now, because the scene may be different.
+  // Without a work folder and a report, this run starts from the beginning. The subvolume list of
+  // an earlier run is then useless, because the scene may have changed.
   if (!files.exists(WorkFolder::store_path(folder.work())) && !files.exists(folder.report()) &&
       files.exists(folder.subvolumes()))
     files.remove(folder.subvolumes());

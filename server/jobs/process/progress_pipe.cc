@@ -79,7 +79,7 @@ void ProgressPipe::set_subvolumes(uint64_t resolution, std::span<const Subvolume
   subvolumes_.set(resolution, all);
   subvolumes_changed_ = !all.empty();
   report_subvolumes(true);
-  next_subvolumes_s_ = 0;  // the first subvolume is reported as soon as it begins
+  next_subvolumes_s_ = 0;  // so that the first begun subvolume is reported without delay
   if (!ticker_.joinable())
     ticker_ = std::jthread([this](const std::stop_token& end) { tick(end); });
 }
@@ -174,8 +174,8 @@ void ProgressPipe::write_subvolumes() {
     file->close();
     files_.rename(temporary, subvolumes_path_);
   } catch (const std::exception&) {
-    // The next attempt may succeed, even after a lack of memory. Nothing catches exceptions of
-    // tick().
+    // Ignores all exceptions, because nothing catches them in tick(). The next call may succeed,
+    // even after a lack of memory.
   }
 }
 

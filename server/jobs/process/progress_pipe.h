@@ -38,16 +38,18 @@ class ProgressPipe : public Progress {
   void finish(const std::string& result_json);
 
  private:
-  // Call these with the mutex held. `now`: send even if the last message was just sent.
+  // Call these functions with the mutex held. `now`: send even if the previous message was just
+  // sent.
   void send(const Message& message);
   void send_advance(bool now);
   void report_subvolumes(bool now);
-  // Reports changes that came too soon after the last report, because the next change may be
-  // minutes later.
+  // The loop of a thread that reports changes held back because they came too soon after the
+  // previous report. Without it they would be reported only with the next change, perhaps minutes
+  // later.
   void tick(const std::stop_token& end);
   void log(const std::string& text);
-  // Replaces subvolumes.json atomically. Does not sync it, because it can be created again. Ignores
-  // failures, because they must not fail the build.
+  // Replaces subvolumes.json atomically. Does not sync the file, because it can be created again.
+  // Ignores failures, because they must not fail the build.
   void write_subvolumes();
 
   FileSystem& files_;

@@ -34,7 +34,8 @@ constexpr std::string_view kNames[] = {
 constexpr size_t kKinds = std::variant_size_v<Message>;
 static_assert(std::size(kNames) == kKinds);
 
-// True if all numbers are integers. The library would silently convert others.
+// True if all numbers in the object are integers. The JSON library would silently convert other
+// numbers.
 bool has_whole_numbers(const nlohmann::json& object, int depth) {
   for (const auto& member : object) {
     if (member.is_number() && !member.is_number_unsigned()) return false;

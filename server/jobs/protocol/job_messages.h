@@ -1,11 +1,11 @@
-// The messages from a job's process to the service. A message is one JSON object per line of the
-// standard output. It has the name of the message as "message" and the members of its struct under
-// their own names.
+// The messages from a job's process to the service. Each line of the process's standard output is
+// one message: a JSON object. The JSON object has the name of the message as its member "message",
+// and one member for each member of the message's struct, with the same name.
 //
 //   {"message":"stage_advanced","done":12,"total":64}
 //
-// The service does not trust a job's process: a line that is broken, incomplete or unknown is no
-// message.
+// The service does not trust a job's process. It ignores a line that is broken, incomplete or not a
+// known message.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,8 @@
 
 namespace voxdag::server {
 
-// "stage_begun": the first message of a stage; `total` counts `unit`s, 0 if unknown.
+// "stage_begun": the first message of a stage. `total` is the number of `unit`s in the stage; 0 if
+// unknown.
 struct StageBegun {
   std::string stage, unit;
   uint64_t total = 0;
@@ -33,8 +34,8 @@ struct StageAdvanced {
 };
 // "stage_ended"
 struct StageEnded {};
-// "subvolumes": the number of subvolumes, the number of built ones, and the totals of the built
-// ones.
+// "subvolumes": the number of all subvolumes, the number of built subvolumes, and totals over the
+// built subvolumes.
 struct SubvolumeTotals {
   uint64_t built = 0, total = 0;
   uint64_t voxels = 0, nodes = 0, bytes = 0;

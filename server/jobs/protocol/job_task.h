@@ -17,8 +17,8 @@ struct JobTask {
   std::string request;                         // the text of a JobRequest
   std::map<std::string, std::string> uploads;  // its uploaded scenes: name to path
   std::vector<std::string> readable;  // files, and folders ending in '/', that scenes may refer to
-  uint64_t memory_bytes = 0;          // unless the request has its own value
-  unsigned threads = 0;               // unless the request has its own value
+  uint64_t memory_bytes = 0;          // limit if the request has no value of its own
+  unsigned threads = 0;               // number if the request has no value of its own
   ClusterOptions cluster;             // as in ServerConfig
 };
 void write_task(FileSystem& files, const std::string& path, const JobTask& task);

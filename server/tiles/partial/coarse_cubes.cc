@@ -16,7 +16,7 @@
 namespace voxdag {
 namespace {
 
-// The rows of one artifact. One frame of each level is in memory.
+// Reads the rows of one artifact. Keeps one frame of each level in memory.
 class ArtifactRows {
  public:
   ArtifactRows(std::shared_ptr<ReadableFile> segment, const ArtifactRef& ref)
@@ -24,7 +24,8 @@ class ArtifactRows {
 
   const ArtifactRef& ref() const { return ref_; }
 
-  // Returns the occupied cells of a quarter of the cube's edge. Throws Error{kCorrupt}.
+  // Returns the occupied cells of the cube, with a quarter of its edge as cell size. Throws
+  // Error{kCorrupt}.
   uint64_t coarse_brick(const Cube& cube) {
     const auto roots = reader_.roots();
     const auto root = std::find_if(roots.begin(), roots.end(),
@@ -92,7 +93,8 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, dou
   std::map<SubvolumeId, CoarseCube> cubes;
   std::erase_if(leaves, [&](const StoredSubvolume& leaf) {
     if (leaf.summary.empty()) return true;
-    // The job may have been restarted. Only the same artifact has the same cells.
+    // Keeps a known cube only if it was read from the same artifact, because a restarted job may
+    // have built different cells under the same id.
     const auto known = cubes_.find(leaf.id);
     if (known == cubes_.end() || known->second.cube != leaf.cube ||
         known->second.artifact != leaf.artifact)
@@ -100,8 +102,8 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, dou
     cubes.insert(*known);
     return true;
   });
-  // Unreadable cubes are retried each time. The list is rotated so that the others are also
-  // reached.
+  // Unreadable artifacts are retried in every call. The list begins where the last call stopped, so
+  // that the other artifacts are also reached.
   std::rotate(leaves.begin(),
               std::find_if(leaves.begin(), leaves.end(),
                            [&](const StoredSubvolume& leaf) { return leaf.id >= next_; }),

@@ -1,6 +1,6 @@
-// A coarse view of an unfinished build: each built subvolume with its occupied cells of a quarter
-// of its edge. It is read from the work folder and can be updated at any time, even while another
-// process builds there. Not thread-safe.
+// A coarse view of an unfinished build: each built subvolume with its occupied cells, which have a
+// quarter of the subvolume's edge. The view is read from the work folder. It can be updated at any
+// time, even while another process builds there. Not thread-safe.
 #pragma once
 
 #include <cmath>
@@ -16,18 +16,18 @@ namespace voxdag {
 
 struct CoarseCube {
   Cube cube;
-  // 4x4x4 cells, with bits in the order of a brick's voxels (docs/format.md). For a cube of edge 4
-  // the cells are voxels.
+  // 4x4x4 cells, with bits in the order of a brick's voxels (docs/format.md). In a cube with an
+  // edge of 4 voxels, the cells are the voxels.
   uint64_t brick = 0;
-  ArtifactRef artifact;  // the artifact that it was read from
+  ArtifactRef artifact;  // the artifact that `brick` was read from
 };
 
 class CoarseCubes {
  public:
-  // Reads the folder again, and reads new artifacts. An unreadable artifact is left out, because
-  // the merge may have freed its bytes. After `max_read_s`, and after at least one artifact, the
-  // remaining artifacts are left for the next calls. Throws Error{kNotFound} if the folder has no
-  // job store, and the errors of JobStore.
+  // Reads the work folder again, and its new artifacts. Leaves out an unreadable artifact, because
+  // the merge may have freed its bytes. Reads at least one artifact; after `max_read_s` it leaves
+  // the remaining artifacts to the next calls. Throws Error{kNotFound} if the folder has no job
+  // store, and the errors of JobStore.
   void refresh(FileSystem& files, const std::string& work_folder, double max_read_s = HUGE_VAL);
 
   uint64_t total() const { return total_; }

@@ -1,9 +1,9 @@
-// A job's built subvolumes as a DAG of the job's grid, for viewers. Each subvolume has the 4x4x4
-// cells of a coarse brick, and a cell with voxels is solid. Equal subtrees are one node, so solid
-// cells cost almost nothing at any resolution.
+// The built subvolumes of a job as a DAG of the job's grid, for viewers. Each subvolume is
+// represented by the 4x4x4 cells of a coarse brick, and a cell that contains voxels is completely
+// solid. Equal subtrees are one node, so solid cells cost almost nothing at any resolution.
 //
 // The DAG only grows: add() adds new nodes and a new root. So the contents of an address never
-// change, and a viewer keeps all of its tiles when the root changes. Used by one thread.
+// change, and a viewer can keep all its tiles when the root changes. Used by one thread.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,9 @@ class PartialDag {
 
   explicit PartialDag(uint32_t grid_levels);
 
-  // Returns the word offset of the root of a DAG of these parts; nullopt without parts. Throws
-  // Error{kCorrupt} if two parts overlap, or if one is outside the grid.
+  // Adds nodes for these parts, and returns the word offset of the root of the DAG that contains
+  // exactly these parts; nullopt if `parts` is empty. Throws Error{kCorrupt} if two parts overlap,
+  // or if a part is outside the grid.
   std::optional<uint64_t> add(const std::vector<Part>& parts);
 
   // The words of each level, from the root's down to the bricks'.
@@ -48,8 +49,8 @@ class PartialDag {
   const uint32_t brick_level_;
   std::vector<std::vector<uint32_t>> levels_;
   std::vector<std::map<std::vector<uint32_t>, uint64_t>> known_;  // offsets of nodes, by level
-  // Offsets of coarse bricks by level, and of solid cells. They make one search per brick and cell
-  // enough.
+  // Offsets of the nodes of coarse bricks and of solid cells, by level. They make one search per
+  // brick and per cell sufficient.
   std::vector<std::map<uint64_t, uint64_t>> coarse_;
   std::vector<std::optional<uint64_t>> solid_;
   uint64_t word_count_ = 0;

@@ -14,7 +14,8 @@ namespace {
 
 constexpr uint64_t kMaxPlanBytes = uint64_t{1} << 30;
 
-// Returns the planned subvolumes as solid parts, from the list written by the job's process.
+// Returns the planned subvolumes as solid parts, read from the subvolume list that the job's
+// process wrote.
 std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, uint64_t resolution) {
   const uint32_t levels = levels_of_resolution(resolution);
   std::vector<PartialDag::Part> parts;

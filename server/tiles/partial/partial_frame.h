@@ -15,9 +15,9 @@ namespace voxdag::server {
 // The built subvolumes, each with its coarse brick.
 std::string describe_cubes(const CoarseCubes& cubes, uint64_t resolution);
 
-// Returns the manifest members that the plan determines: the grid's place, the planned subvolumes'
-// bounding box, and a camera that sees all of them. Throws Error: kNotFound before the plan exists,
-// kCorrupt if the plan is damaged.
+// Returns the manifest members that the plan determines: the position of the grid, the bounding box
+// of the planned subvolumes, and a camera that sees all of them. Throws Error: kNotFound before the
+// plan exists, kCorrupt if the plan is damaged.
 nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, uint64_t resolution);
 
 }  // namespace voxdag::server

@@ -144,8 +144,8 @@ void PartialView::refresh(const std::string& work_folder) {
   ++version_;
 }
 
-// The job's folder was removed. If it is created again, the job may build a scene with another
-// grid.
+// Forgets everything that was read, because the job's folder was removed. If the folder is created
+// again, the job may build a scene with a different grid.
 void PartialView::restart() {
   cubes_ = {};
   frame_ = nullptr;

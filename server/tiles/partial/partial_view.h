@@ -1,8 +1,8 @@
-// The subvolumes that one job has built so far, coarsely, as a list and as a DAG.
+// A coarse view of the subvolumes that one job has built so far, as a list and as a DAG.
 //
-// 1. The job's folder is read at most once per second, by one of the requests; the other requests
-//    get the last answer. Reading and converting take at most a twentieth of one core.
-// 2. One reading handles a limited number of subvolumes, so a large job appears step by step.
+// 1. The job's folder is read at most once per second, by the thread of one request; other
+//    requests get the previous answer. Reading and converting take at most a twentieth of a core.
+// 2. One reading handles a limited number of subvolumes, so a large job appears in several steps.
 // 3. Nodes never move while a digest is in use: a new digest replaces all nodes in one step.
 //
 // Thread-safe.
@@ -43,11 +43,11 @@ class ReadLimiter {
 
  private:
   double next_s_ = 0;        // in wall_seconds(): one interval after the last read
-  double idle_until_s_ = 0;  // until the charged CPU time is a small share of the wall time
+  double idle_until_s_ = 0;  // in wall_seconds(): end of the pause that limits the CPU share
 };
 
-// The DAG of the built subvolumes. It grows under one digest until too many of its nodes are
-// unreachable from any root. Then it is built again under a new digest. Used by one thread.
+// The DAG of the built subvolumes. It grows under one digest until too many of its nodes can no
+// longer be reached from any root. Then a new DAG is built, with a new digest. Used by one thread.
 class GrowingDag {
  public:
   GrowingDag(std::string job, uint64_t max_words) : job_(std::move(job)), max_words_(max_words) {}
@@ -64,7 +64,7 @@ class GrowingDag {
     Nodes(uint32_t levels, std::string name) : dag(levels), digest(std::move(name)) {}
     PartialDag dag;
     const std::string digest;
-    uint64_t max_words = 0;  // above this size the DAG is built again
+    uint64_t max_words = 0;  // above this number of words a new DAG is built
   };
   const std::string job_;
   const uint64_t max_words_;
@@ -76,7 +76,8 @@ class PublishedAnswers {
  public:
   std::shared_ptr<const std::string> json() const;
   std::shared_ptr<const TileSource> tiles() const;
-  // Returns the last tiles set, even after clear(), if they have this digest; else null.
+  // Returns the tiles of the last set_tiles(), even after clear(), if they have this digest; else
+  // null.
   std::shared_ptr<const TileSource> known(const std::string& digest) const;
 
   void set_json(std::string json);
@@ -102,11 +103,11 @@ class PartialView {
   std::shared_ptr<const TileSource> known(const std::string& digest) const {
     return answers_.known(digest);
   }
-  // True if the job's folder disappeared before its tiles were requested.
+  // True if the job's folder was removed before any request for tiles.
   bool is_worthless() const { return is_worthless_; }
 
  private:
-  // Returns a new answer, or the last one if another thread is reading the folder.
+  // Returns an updated answer, or the previous one if another thread is reading the folder.
   template <class Answer, class Update>
   Answer read(const JobFolder& folder, Answer (PublishedAnswers::*answer)() const,
               const Update& update);

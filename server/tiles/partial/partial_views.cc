@@ -82,8 +82,8 @@ std::shared_ptr<PartialView> PartialViews::view_of(const std::string& job,
   const std::lock_guard lock(mutex_);
   if (auto view = find(job)) return view;
   if (entries_.size() == max_jobs_) {
-    // A job that is being viewed keeps its entry. Otherwise its viewers' next requests would take
-    // the entry of another job.
+    // A view that was requested a moment ago keeps its entry. If it were replaced, the next
+    // requests of its viewers would in turn replace the entry of another job.
     if (wall_seconds() - entries_.back().used_s < kMinIdleS) {
       RequestError busy(RequestError::Kind::kBusy, "too many running jobs are being viewed");
       busy.retry_after_s = kMinIdleS;

@@ -12,21 +12,21 @@ namespace voxdag::server {
 
 class PartialViews {
  public:
-  // A DAG of more than `max_words` words is built again without nodes that no root reaches.
+  // `max_words`: a DAG with more words than this is built again, without its unreachable nodes.
   PartialViews(FileSystem& files, size_t max_jobs, uint64_t max_words = uint64_t{1} << 21)
       : files_(files), max_jobs_(max_jobs), max_words_(max_words) {}
 
-  // Returns the built subvolumes as JSON (docs/api.md). Throws Error{kNotFound} before the
-  // subvolumes are planned and if the folder is removed during the call, RequestError{kBusy} if all
+  // Returns the built subvolumes as JSON (docs/api.md). Throws Error{kNotFound} if the subvolumes
+  // are not planned yet or the folder is removed during the call, RequestError{kBusy} if all
   // remembered jobs were requested in the last seconds, and the errors of CoarseCubes::refresh().
   std::string json(const std::string& job, const JobFolder& folder, uint64_t resolution);
   // Returns them as the tiles of a DAG of the job's grid.
   std::shared_ptr<const TileSource> tiles(const std::string& job, const JobFolder& folder,
                                           uint64_t resolution);
-  // Returns the last result of tiles() if it is remembered and has this digest; else null. Does not
-  // read the job's folder.
+  // Returns the previous result of tiles() if it is remembered and has this digest; else null. Does
+  // not read the job's folder.
   std::shared_ptr<const TileSource> known(const std::string& job, const std::string& digest);
-  // Forgets a job that is deleted or restarted. Requests in progress finish.
+  // Forgets a job that was deleted or restarted. Requests in progress can finish.
   void close(const std::string& job);
   // Forgets jobs that were not requested in the last `max_idle_s`.
   void close_stale(double max_idle_s);
@@ -39,7 +39,8 @@ class PartialViews {
   template <class Read>
   auto read(const std::string& job, const JobFolder& folder, const Read& read);
   std::shared_ptr<PartialView> view_of(const std::string& job, const JobFolder& folder);
-  // Returns the view of a job, now the most recently used, or null. Call it with the mutex held.
+  // Returns the view of a job and makes it the most recently used one; null if the job has none.
+  // Call it with the mutex held.
   std::shared_ptr<PartialView> find(const std::string& job);
 
   FileSystem& files_;
