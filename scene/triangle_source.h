@@ -37,7 +37,7 @@ class TriangleCursor {
   // earlier triangles takes longer. Throws Error with scene file, node, mesh, primitive or
   // accessor.
   virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
-  // Does the same with each vertex snapped to `grid`.
+  // Like read(), but with each vertex snapped to `grid`.
   virtual void read_snapped(uint64_t first, uint64_t count, const Grid& grid, const Visitor& visit);
   // Visits the triangles with their surfaces. The default implementation makes all triangles white,
   // with material 0.
@@ -98,7 +98,7 @@ class TriangleSource {
   // The materials that TriangleCursor::read_surfaces() refers to. Opens image files, but reads no
   // image. An image that cannot be opened is not an error.
   virtual SceneMaterials materials() const { return {}; }
-  // Number of these materials.
+  // Number of materials that materials() would return.
   virtual uint32_t material_count() const { return 1; }
   // All files that the triangles come from, with their identity when they were first opened. If a
   // file has a different identity when it is opened again, this is an error.

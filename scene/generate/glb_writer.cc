@@ -46,7 +46,7 @@ GlbWriter::~GlbWriter() {
     file_.reset();
     files_.remove(path_ + ".partial");
   } catch (const Error&) {
-    // The error that ended the writing is reported instead.
+    // Ignored, because the error that ended the writing is reported.
   }
 }
 

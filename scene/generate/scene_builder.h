@@ -65,7 +65,7 @@ class SceneBuilder {
   BlockSink& sink_;
   const bool instances_, colors_;
   Paint paint_;
-  // By material; without colors only the first is used.
+  // One mesh per material. Without colors only the first mesh is used.
   std::array<MeshBuilder, kMaxMaterials> meshes_;
   std::vector<Part> parts_;
 };

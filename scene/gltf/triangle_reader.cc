@@ -222,7 +222,7 @@ void TriangleReader::place_all(const uint32_t* corners, uint64_t count) {
   }
 }
 
-// The batch must have space for them.
+// Adds the surfaces of `count` triangles to the batch, which must have space for them.
 void TriangleReader::place_all_surfaces(const uint32_t* corners, uint64_t count) {
   const bool is_mirrored = mirrors(world_);
   const bool is_strip =

@@ -73,7 +73,7 @@ class PlyFile {
   uint64_t triangles_ = 0;
   std::deque<uint64_t> vertex_blocks_;
   std::deque<FaceBlock> face_blocks_;
-  GrowingCharge charge_;  // for the blocks
+  GrowingCharge charge_;  // charge for the blocks
   std::vector<std::string> warnings_;
 };
 

@@ -29,7 +29,7 @@ uint32_t page_checksum(std::span<const uint64_t> texels);
 struct TextureLevel {
   uint32_t width = 0, height = 0;
   uint32_t tiles_per_row = 0;
-  uint64_t first_page = 0;  // in the scratch file, or in memory
+  uint64_t first_page = 0;  // number of the page in the scratch file, or in memory
 
   uint64_t pages() const {
     return uint64_t{tiles_per_row} * ((height + kTileEdge - 1) >> kTileShift);

@@ -102,7 +102,7 @@ void BatchTable::add(std::span<const StoredSubvolume> subvolumes, std::span<cons
   save();
 }
 
-// The subvolumes' share of ClusterOptions::tasks.
+// Returns the share of ClusterOptions::tasks for subvolumes of this total weight.
 uint64_t BatchTable::tasks_for(double weight, uint64_t subvolumes) const {
   if (cluster_.options.tasks == 0) return default_tasks(weight, subvolumes);
   double all = 0;

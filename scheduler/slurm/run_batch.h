@@ -15,7 +15,7 @@ struct BatchRun {
   std::string work_folder;  // the build's work folder, on the shared disk
   uint32_t batch = 0;
   std::string program;           // this program's version
-  std::string temporary_folder;  // on this machine; "" for $TMPDIR or /tmp
+  std::string temporary_folder;  // local folder; "" means $TMPDIR or /tmp
   uint64_t memory_bytes = 0;     // 0: the task's Slurm allocation, else half of the RAM
   unsigned threads = 0;          // 0: the CPUs of the Slurm allocation, else all CPUs
   std::string attempt;           // unique id of the attempt; "" for a new one

@@ -94,7 +94,8 @@ class SlurmMergeJob : public MergeJob {
   bool is_running_ = false;
   uint64_t shown_built_ = 0;
   std::set<std::string> warned_reasons_;  // why the job waits
-  // Names from the last state that was read, because a finished job removes the state.
+  // Names from the last cluster state that was read. They are kept because a finished job removes
+  // the state.
   std::string name_, task_name_;
 };
 

@@ -123,7 +123,7 @@ bool TaskPoller::is_over(const OpenBatch& batch) {
 TaskPoller::Next TaskPoller::end_attempt(OpenBatch& batch) {
   const auto end = cluster_.slurm.end_of(batch.task->name());
   if (!end) return Next::kStop;
-  // Only squeue's list lacked this active task.
+  // The task is still active, although squeue did not list it.
   if (end->is_active() && !(batch.error && batch.error->has_ended)) return Next::kWait;
   const bool is_out_of_time = end->state == "TIMEOUT" || end->state == "DEADLINE";
   const bool is_split = is_out_of_time && batches_.can_be_split(batch);

@@ -25,7 +25,7 @@ struct BuildReport {
   uint64_t dropped_invalid = 0;
   uint64_t subvolumes = 0;  // built, including empty ones
   uint64_t subvolumes_split = 0;
-  uint64_t subvolumes_reused = 0;  // from an earlier run of this job, or from the cache
+  uint64_t subvolumes_reused = 0;  // taken from an earlier run of this job, or from the cache
   uint64_t subvolumes_cached = 0;  // reused subvolumes that came from the cache
   uint64_t artifact_bytes = 0;
   uint64_t artifact_nodes = 0;

@@ -93,7 +93,7 @@ struct ColorMemory {
   }
 
   unsigned workers = 1;
-  uint64_t region_bytes = kRegionBytes;  // per worker
+  uint64_t region_bytes = kRegionBytes;  // bytes per worker
   uint64_t surface_bytes = 0;
   uint64_t texture_bytes = 0;
 
@@ -120,7 +120,7 @@ struct WorkerMemory {
   static constexpr uint64_t kOutsideShareBytes = kSegmentWriterBytes + BackendMemory::kMinPageBytes;
 
   unsigned workers = 1;
-  uint64_t share_bytes = 0;  // per worker, for Backend::build()
+  uint64_t share_bytes = 0;  // bytes per worker for Backend::build()
 
   // Returns `wanted` workers, or fewer if their shares could not hold the smallest subvolume.
   static constexpr WorkerMemory divide(uint64_t free_bytes, unsigned wanted) {

@@ -14,7 +14,7 @@ namespace voxdag {
 struct StageTime {
   std::string name;
   double wall_s = 0;
-  double cpu_s = 0;  // of the whole process
+  double cpu_s = 0;  // CPU time of all threads of the process
   // CPU time of the busiest thread as a fraction of cpu_s, from 0 to 1 (ThreadTimes).
   double largest_thread_share = 0;
 };

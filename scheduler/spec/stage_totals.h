@@ -22,7 +22,7 @@ struct ClusterTotals {
 
 // Totals of the attributes stage.
 struct ColorReport {
-  uint64_t resolution = 0;               // of the color grid; 0 for a file without colors
+  uint64_t resolution = 0;               // color grid's resolution; 0 for a file without colors
   uint64_t cells = 0;                    // cells of the color grid that have a color
   uint64_t images = 0, image_bytes = 0;  // decoded images, and bytes of their pyramids
   uint64_t cubes = 0, cubes_reused = 0;  // cubes with surfaces; cubes baked by an earlier run

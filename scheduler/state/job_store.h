@@ -36,7 +36,7 @@ namespace voxdag {
 
 // Properties that must be equal to resume a build.
 struct JobIdentity {
-  std::string scene_digest;  // of the grid and the snapped triangles
+  std::string scene_digest;  // digest of the grid and the snapped triangles
   std::string geometry;      // geometry options as JSON, for messages
   int64_t format_version = 0;
   bool operator==(const JobIdentity&) const = default;
@@ -80,8 +80,8 @@ struct ProgressSnapshot {
   uint64_t resumed_at = 0;     // units completed by earlier runs
   double stage_started_s = 0;  // Unix time
   double updated_s = 0;
-  uint64_t memory_bytes = 0;  // resident
-  uint64_t disk_bytes = 0;    // in the work folder
+  uint64_t memory_bytes = 0;  // resident memory
+  uint64_t disk_bytes = 0;    // bytes of all files in the work folder
   std::string last_error;
 };
 

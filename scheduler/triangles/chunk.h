@@ -24,7 +24,7 @@ void encode_triangle(const FixedTriangle& triangle, size_t record_bytes, std::by
 
 struct Chunk {
   std::vector<std::byte> memory = {};  // empty if the records are in a file
-  Extent extent = {};                  // in that file
+  Extent extent = {};                  // position of the records in that file
   uint32_t records = 0;
   uint64_t first = 0;  // number of records in the list before this chunk
 };

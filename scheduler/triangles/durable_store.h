@@ -81,7 +81,7 @@ class DurableStore : public TriangleStore {
   const std::shared_ptr<TriangleFile> file_;
   std::vector<CubeBin> cube_bins_;
   Extent cubes_;
-  MemoryCharge charge_;       // for the lists of chunks
+  MemoryCharge charge_;       // charge for the lists of chunks
   mutable std::mutex mutex_;  // guards all members below; the list of a filled bin needs no lock
                               // because it is final
   std::vector<std::unique_ptr<Bin>> bins_;

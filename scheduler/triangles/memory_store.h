@@ -1,4 +1,5 @@
-// Triangles in memory within a share of the budget; the rest is in a spill file. Not durable.
+// Keeps triangles in memory up to a share of the budget, and further triangles in a spill file. Not
+// durable.
 // Thread-safe as documented at TriangleStore.
 #pragma once
 

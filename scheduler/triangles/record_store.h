@@ -1,5 +1,5 @@
-// Records of triangles or surfaces in chunks: in memory within a share of the memory budget, the
-// rest in a spill file. Not durable.
+// Stores records of triangles or surfaces in chunks: in memory up to a share of the memory budget,
+// and further chunks in a spill file. Not durable.
 //
 // Threads may use a store concurrently if they use different lists. A complete list may be read by
 // several threads.

@@ -41,7 +41,7 @@ class DecodedBuffers {
   struct Decoded {
     std::mutex mutex;
     std::atomic<bool> is_there = false;
-    uint64_t begin = 0;  // in the temporary file
+    uint64_t begin = 0;  // offset in the temporary file
   };
 
   void decode(const BufferSource& buffer, uint64_t begin, const ReadFile& read_file);

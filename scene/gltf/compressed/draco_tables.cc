@@ -22,7 +22,7 @@ constexpr int kTagBits = 5, kMaxRawBits = 18, kMaxTag = 32;
 constexpr int kValenceContexts = 6;
 constexpr int kCreaseContexts = 4;
 constexpr uint64_t kOctahedralComponents = 2;
-constexpr uint64_t kTypeBytes = 4;  // per attribute: use, number type, components, normalized
+constexpr uint64_t kTypeBytes = 4;  // bytes per attribute: use, number type, components, normalized
 
 [[noreturn]] void refuse_damaged() { throw BrokenData{"its Draco data are damaged"}; }
 
@@ -128,7 +128,7 @@ uint64_t count_vertices(const CornerTable& table) {
   return count;
 }
 
-// Attributes with the same order of values.
+// A group of attributes that store their values in the same order.
 struct Group {
   bool is_per_corner = false;
   std::vector<uint8_t> coders;  // draco::SequentialAttributeEncoderType of each attribute

@@ -14,7 +14,7 @@ constexpr uint64_t kMaxShownCharacters = 4096;
 // The parser stores a string twice (raw and decoded), in buffers that grow by doubling, and passes
 // a copy.
 constexpr uint64_t kCopies = 6;
-constexpr uint64_t kMaxWordCharacters = 1024;  // of a number or literal
+constexpr uint64_t kMaxWordCharacters = 1024;  // max length of a number or literal
 
 // ASCII that JSON does not escape within a string.
 bool is_plain(char c) { return c >= ' ' && c <= '~'; }

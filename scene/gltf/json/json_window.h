@@ -53,7 +53,7 @@ class JsonWindow : public std::streambuf {
   int hex_digits_left_ = 0;       // remaining digits of an escape \uXXXX
   bool in_escape_ = false;        // the last character is part of an escape
   bool after_blank_ = false;      // the last character outside of strings is blank
-  bool is_second_blank_ = false;  // the character before it is also blank
+  bool is_second_blank_ = false;  // the character before that one is also blank
   uint64_t word_ = 0;             // characters of the number or literal so far
   // Characters passed to the parser for the current string or number.
   uint64_t collected_ = 0;

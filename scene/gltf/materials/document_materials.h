@@ -17,7 +17,7 @@ struct DocumentMaterials {
   // any; copies of the file's materials without image, for primitives without texture coordinates.
   // `image` is an index into `images`.
   std::vector<Material> materials;
-  std::vector<TextureTransform> transforms;  // for each material's texture coordinates
+  std::vector<TextureTransform> transforms;  // transform of each material's texture coordinates
   std::vector<int> images;                   // indices of used images in the model
   std::vector<std::string> warnings;         // the first few, and a line with the number of others
 };

@@ -52,11 +52,11 @@ class SurfaceReader {
   const Document& document_;
   BufferReader& buffers_;
   uint32_t material_ = 0;
-  bool is_plain_ = true;  // without texture coordinates and colors
+  bool is_plain_ = true;  // the primitive has no texture coordinates and no colors
   TextureTransform transform_;
   std::optional<AccessorReader> texture_coordinates_, colors_;
   size_t color_components_ = 4;
-  double color_scale_ = 1;  // for integers that are not normalized, although they should be
+  double color_scale_ = 1;  // divisor for integer colors without the required `normalized` flag
   uint64_t vertices_ = 0;
 
   PageBuffer<SurfaceCorner> corners_;

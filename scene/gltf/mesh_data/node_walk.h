@@ -29,7 +29,7 @@ class NodeWalk {
   const Node& node_at(int i) const { return document_.nodes[static_cast<size_t>(i)]; }
 
   const Document& document_;
-  std::vector<Step> path_;  // from a root to the current node
+  std::vector<Step> path_;  // the nodes from a root to the current node
   GrowingCharge charge_;
   size_t next_root_ = 0;
 };

@@ -91,7 +91,7 @@ bool takes_next_word(const std::string& option) {
                                   : option.starts_with('-') && option.size() == 2;
 }
 
-// True if a later attempt may succeed.
+// True if Slurm could not be reached or did not answer, so that a later attempt may succeed.
 bool is_unreachable(const CommandResult& result) {
   for (const char* sign : {"Unable to contact", "Connection refused", "timed out", "Socket timed",
                            "Zero Bytes", "communications", "temporarily", "try again"})
@@ -223,8 +223,8 @@ void Slurm::submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTas
                     "--comment=" + std::to_string(first), "--array=" + ranges(indexes) + limit});
     const CommandResult submitted =
         run(command, line + " $((" + std::to_string(first) + " + SLURM_ARRAY_TASK_ID))\n");
-    // Slurm may accept half of the array now. Once it has accepted some tasks, the rest waits until
-    // they have ended.
+    // Slurm may accept half of the array now. Once Slurm has accepted some tasks, the remaining
+    // tasks are submitted after these have ended.
     if (submitted.exit_status != 0 && is_too_much(submitted) && indexes.size() > 1 &&
         tasks.empty()) {
       const auto middle = indexes.begin() + static_cast<ptrdiff_t>(indexes.size() / 2);

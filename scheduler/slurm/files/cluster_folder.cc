@@ -32,7 +32,7 @@ void try_to_remove(const Remove& remove) {
   try {
     remove();
   } catch (const Error&) {
-    // It is removed with the work folder.
+    // A remaining file is removed with the work folder.
   }
 }
 

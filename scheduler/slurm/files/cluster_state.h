@@ -52,7 +52,7 @@ struct ClusterState {
   DagShape shape;
   double submitted_s = 0;  // Unix time of the first submission
   uint32_t next_batch = 0;
-  std::vector<OpenBatch> open;  // by number
+  std::vector<OpenBatch> open;  // sorted by number
   ClusterTotals totals;
 
   std::string task_name() const { return "voxdag-" + build; }

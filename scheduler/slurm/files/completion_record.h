@@ -23,7 +23,7 @@ struct BuiltSubvolume {
 };
 
 struct CompletionRecord {
-  std::string program;  // as in Batch
+  std::string program;  // same meaning as in Batch
   std::string build;
   uint32_t batch = 0;
   std::string attempt;

@@ -24,7 +24,7 @@ struct SurfaceBinning {
   std::span<const Cube> cubes;         // these cubes cover the grid
   size_t record_bytes;                 // bytes per triangle in ingest's digest (triangles/chunk.h)
   std::string digest;                  // digest of the triangles that ingest read
-  size_t buffer_bytes;                 // for records not yet in the bins; uncharged
+  size_t buffer_bytes;                 // max bytes of records not yet in the bins; uncharged
 };
 
 struct BinnedSurfaces {

@@ -51,15 +51,15 @@ T number_at(const ReadableFile& file, uint64_t offset) {
   return ByteSource(bytes).get<T>();
 }
 
-// Counts the cells with attributes on the finest level of a valid global file. All its sections
-// have the same cells.
+// Returns the number of cells with attributes on the finest level of a valid global file. All
+// sections of the file have the same cells.
 uint64_t count_finest_cells(const ReadableFile& file) {
   namespace layout = global_layout;
   if (number_at<uint64_t>(file, layout::kAttributeCountAt) == 0) return 0;
   return number_at<uint64_t>(file, layout::kAttributesAt + layout::kAttributeFinestCellsAt);
 }
 
-// Readers refuse a list with more.
+// Throws Error{kLimit} for a list of names that readers of the file would refuse.
 void check_list(std::span<const std::string> materials) {
   const uint64_t bytes = list_bytes(materials) + 2 * color_layout::kUnitBytes;
   if (materials.size() > color_layout::kMaxMaterials || bytes > color_layout::kMaxNamesBytes)
@@ -99,7 +99,7 @@ struct ColorStage::State {
   const std::vector<Cube> cubes;
   SceneMaterials materials;
   std::vector<StoredAttribute> attributes;
-  std::vector<std::string> images;  // their digests
+  std::vector<std::string> images;  // digests of the images
   // Set after the surfaces are read:
   std::optional<MemoryBudget> share;
   std::optional<RecordStore> store;

@@ -23,7 +23,7 @@ namespace voxdag {
 
 struct ColorSource {
   BuildScene& scene;
-  const GeometryOptions& options;  // with attributes and a color resolution
+  const GeometryOptions& options;  // must have attributes and a color resolution
   Grid grid;
   std::string digest;            // digest of the triangles that ingest read
   std::string work_folder;       // for scratch files

@@ -17,15 +17,15 @@ namespace {
 constexpr std::string_view kColorMagic = "VDAGCOL\n";
 constexpr size_t kHeaderBytes = 56;
 constexpr size_t kReadBytes = 256 << 10;
-// Added to the number of the last part of an artifact.
+// Flag in `part` of a header: this part is the last part of its artifact.
 constexpr uint64_t kLastPart = uint64_t{1} << 63;
-// Less garbage than this is not worth copying the rest.
+// The artifacts in use are copied to a new file only if the garbage takes more than this.
 constexpr uint64_t kTolerableBytes = 64 << 10;
 
 struct Header {
   Checksum128 key;
   uint64_t part = kLastPart;
-  uint64_t bytes = 0, checksum = 0;  // of the part
+  uint64_t bytes = 0, checksum = 0;  // size and checksum of the part
 };
 
 void append_header(const Header& header, std::vector<std::byte>& out) {

@@ -66,7 +66,7 @@ class CubeBaker {
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   const MemoryCharge charge_;
-  MemoryCharge sum_charge_;  // for sums that exceed ColorMemory::kValueSumBytes
+  MemoryCharge sum_charge_;  // charge for sums that exceed ColorMemory::kValueSumBytes
   RegionBaker<TextureReader> baker_;
   std::vector<FixedSurface> surfaces_;  // surfaces of the cube
   std::vector<FixedSurface> touching_;  // surfaces of a region, or a part of them

@@ -113,7 +113,7 @@ class TopTree {
 
   const uint32_t grid_levels_;
   const uint32_t depth_;
-  PageBuffer<Cell> cells_;  // by Morton code
+  PageBuffer<Cell> cells_;  // indexed by Morton code
   double total_weight_ = 0;
 };
 

@@ -16,7 +16,7 @@
 namespace voxdag {
 namespace {
 
-// Maximum number of damaged subvolumes named in warnings; the rest is only counted.
+// Maximum number of damaged subvolumes named in warnings. Further ones are only counted.
 constexpr size_t kMaxWarnings = 5;
 
 struct DamagedSubvolume {
@@ -41,7 +41,7 @@ void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
 }
 
 // Reads the artifacts of all built subvolumes and returns the damaged ones. Reads only levels above
-// `level` (with smaller numbers), because the others may already be released.
+// `level` (with smaller numbers), because deeper levels may already be released.
 std::vector<DamagedSubvolume> find_damaged(std::span<const StoredSubvolume> subvolumes,
                                            uint32_t level, const WorkFolder& work,
                                            const CancelToken& cancel) {

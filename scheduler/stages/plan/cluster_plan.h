@@ -11,7 +11,7 @@ namespace voxdag {
 struct ClusterPlan {
   uint64_t tasks = 0;
   uint64_t memory_bytes = 0;   // recommended per task; with less memory, a task needs more passes
-  EstimateRange cpu_hours;     // of all tasks
+  EstimateRange cpu_hours;     // CPU hours of all tasks together
   EstimateRange task_s;        // CPU time per task, if all tasks were equal
   EstimateRange shared_bytes;  // peak space on the shared disk
   EstimateRange merge_s;       // CPU time of the merge, on the machine that submits

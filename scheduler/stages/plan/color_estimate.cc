@@ -24,7 +24,7 @@ constexpr double kArtifactOverFile = 1.02;
 constexpr double kExpectedSurfaceBytes = 65;
 constexpr EstimateRange kSurfaceCopies = {1, 1.5, 3};
 constexpr double kSecondsPerCell = 1.2e-7;
-constexpr double kSecondsPerValue = 2e-8;  // per other attribute
+constexpr double kSecondsPerValue = 2e-8;  // per cell, for each attribute after the first
 // Time to decode, filter and store a page of an image.
 constexpr double kSecondsPerPage = 3e-5;
 

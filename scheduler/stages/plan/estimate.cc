@@ -46,7 +46,7 @@ constexpr uint32_t kPilotLevelsBelow = 5;
 // A pilot build: the complete scene as one subvolume on a coarser grid. Its output is counted and
 // discarded.
 struct PilotCounts {
-  uint32_t levels = 0;  // of the pilot's grid
+  uint32_t levels = 0;  // levels of the pilot's grid
   double voxels = 0;
   double svo_nodes = 0;
   double dag_nodes = 0;

@@ -25,14 +25,14 @@ struct Estimate {
   double expected_bricks = 0;  // sum of the expected bricks of each triangle
   uint64_t pilot_resolution = 0;
   EstimateRange voxels, svo_nodes, dag_nodes;
-  EstimateRange file_bytes;    // of the global file
+  EstimateRange file_bytes;    // size of the global file
   EstimateRange disk_bytes;    // peak, including spilled triangles, artifacts and the file
   EstimateRange memory_bytes;  // peak resident memory within the budget
   EstimateRange cpu_s;
   EstimateRange wall_s;
   std::optional<ColorEstimate>
       colors;                // only for a build with colors; included in the totals above
-  uint64_t free_disk = 0;    // on the disk of the work folder; 0 if unknown
+  uint64_t free_disk = 0;    // free bytes on the work folder's disk; 0 if unknown
   uint64_t free_memory = 0;  // the budget
 };
 

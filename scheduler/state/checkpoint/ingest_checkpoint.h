@@ -96,7 +96,7 @@ class IngestCheckpoint {
   const BuildContext& context_;
   bool is_disabled_;
   DurableStore* store_ = nullptr;       // the open store, if it is durable
-  std::optional<IngestRecord> record_;  // as last saved; none unless checkpoints are enabled
+  std::optional<IngestRecord> record_;  // the last saved record, if checkpoints are enabled
   double last_save_s_ = 0;
   std::future<void> pending_;  // while valid, its thread uses record_
 };
