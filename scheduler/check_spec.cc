@@ -17,7 +17,8 @@
 namespace voxdag {
 namespace {
 
-// Default resolution of the color grid: colors repeat less than geometry.
+// Limit of the default resolution of the color grid. A finer grid is not the default, because
+// colors repeat less than geometry.
 constexpr uint64_t kColorResolution = 4096;
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }

@@ -236,7 +236,8 @@ void run_stages(BuildJob& job, SubvolumeBuilder& builder, double start_s) {
   remove_finished_work(job);
 }
 
-// True if the work folder has a job, or a partly read scene and the error is not the scene's fault.
+// True if the work folder has a job. Also true if it has the checkpoint of a partly read scene,
+// unless the scene caused the error.
 bool is_worth_resuming(BuildJob& job, const Error& error) {
   const bool scene_is_at_fault =
       error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;

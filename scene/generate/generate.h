@@ -21,7 +21,7 @@ enum class SceneKind { kCity, kMenger, kTerrain, kSoup, kSpheres };
 class SceneBuilder;
 struct GenerateOptions;
 
-// A material of a scene with colors. It is multiplied by the colors of the vertices.
+// A material of a scene with colors. Its base color is multiplied by the colors of the vertices.
 struct SceneMaterial {
   const char* name;
   float base_color[3];  // linear

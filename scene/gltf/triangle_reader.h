@@ -35,8 +35,8 @@ class TriangleReader {
                  MemoryBudget& budget, const CancelToken& cancel);
 
   // Visits the triangles of [first, first + count), numbered in the order in which the document
-  // declares them, in batches of up to 1024. They are in world space, or snapped to `grid` if it is
-  // not null. An invalid triangle is dropped if `skip_invalid` is set; otherwise throws
+  // declares them, in batches of up to 1024. The triangles are in world space, or snapped to `grid`
+  // if it is not null. An invalid triangle is dropped if `skip_invalid` is set; otherwise throws
   // Error{kInvalidInput} with its node, mesh and primitive.
   void read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit);
   // Visits the same triangles in world space with their surfaces, in batches of the same size.

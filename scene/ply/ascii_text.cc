@@ -3,7 +3,8 @@
 namespace voxdag::ply {
 namespace {
 
-// Longer words are not numbers that a program writes. They are truncated, and so refused.
+// Maximum length of a word. No program writes longer numbers. A longer word is truncated, so that
+// the row is refused.
 constexpr size_t kMaxWord = 64;
 
 bool is_line_end(char c) { return c == '\n' || c == '\r'; }

@@ -47,8 +47,8 @@ class HeaderParser {
       : path_(path), text_(text), is_whole_file_(is_whole_file) {}
 
   Header parse() {
-    // The first line determines how lines end: with "\n", "\r\n" or "\r". This must be known after
-    // end_header, because the data may begin with any byte.
+    // The first line determines how lines end: with "\n", "\r\n" or "\r". The line end must be
+    // known after end_header, because the data may begin with any byte.
     const size_t end = text_.find_first_of("\r\n");
     if (end == text_.npos) refuse("has no end of its first line");
     line_end_ = text_.substr(end).starts_with("\r\n") ? "\r\n" : text_.substr(end, 1);

@@ -1,4 +1,4 @@
-// Reads texels of the pyramids of a TextureSet, for one thread. They come from memory if the
+// Reads texels of the pyramids of a TextureSet, for one thread. The texels come from memory if the
 // pyramids fit, and otherwise from pages of the scratch file. A reader caches as many pages as its
 // memory can hold. Not thread-safe; any number of readers may be open.
 //
@@ -44,11 +44,11 @@ struct TextureLayout {
 
 class TextureReader {
  public:
-  // Reads pyramids in memory. They and the layout must outlive the reader.
+  // Makes a reader of pyramids in memory. `layout` and `pages` must outlive the reader.
   TextureReader(const TextureLayout& layout, const uint64_t* pages)
       : layout_(layout), all_(pages) {}
-  // Reads pyramids in a file. Caches pages of about `memory_bytes`, at least one. `checksums` has
-  // one value per page. The references must outlive the reader.
+  // Makes a reader of pyramids in a file. Caches pages of about `memory_bytes`, at least one.
+  // `checksums` has one value per page. The references must outlive the reader.
   TextureReader(const TextureLayout& layout, const ReadableFile& file, const uint32_t* checksums,
                 uint64_t memory_bytes, MemoryBudget& budget);
 

@@ -41,10 +41,10 @@ std::unique_ptr<ClusterBuilder> make_cluster_builder(BuildJob& job);
 // process submits the tasks and a merge job that depends on them, and unlocks the work folder. Then
 // it follows the merge job. The merge job runs the same voxdag command: it resumes the work folder
 // as any later run does, resubmits failed batches, waits for their tasks and merges. The following
-// process may be stopped and started again with the same command. This also submits the merge job
-// again if Slurm has lost it. A process finds a running merge job by the job's name, which depends
-// only on the state of the build. It finds an ended merge job by the report next to the output,
-// which contains the job's request.
+// process may be stopped and started again with the same command. That command also submits the
+// merge job again if Slurm has lost it. A process finds a running merge job by the job's name,
+// which depends only on the state of the build. It finds an ended merge job by the report next to
+// the output, which contains the job's request.
 class MergeJob {
  public:
   virtual ~MergeJob() = default;

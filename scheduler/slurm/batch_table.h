@@ -48,8 +48,8 @@ class BatchTable {
   // the new batches.
   std::vector<uint32_t> split(uint32_t batch);
   bool can_be_split(const OpenBatch& batch) const;
-  // Records a built batch in the job store and closes it. Its segment is already in the work
-  // folder.
+  // Records the subvolumes of a built batch in the job store and closes the batch. The batch's
+  // segment must already be in the work folder.
   void record_built(const CompletionRecord& record);
   void record_submission(double now_s);
   void record_failed_attempt() { ++state_.totals.attempts; }

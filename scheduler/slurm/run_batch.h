@@ -21,9 +21,10 @@ struct BatchRun {
   std::string attempt;           // unique id of the attempt; "" for a new one
 };
 
-// Returns the completion record, or the valid record of an earlier attempt. On failure, writes the
-// error to a file for the submitting process and rethrows it. Throws Error{kUnsupportedVersion}
-// with both versions if another version of voxdag wrote the batch.
+// Runs one attempt at a batch and returns its completion record. Returns the record of an earlier
+// attempt instead if a valid one exists. On failure, writes the error to a file for the submitting
+// process and rethrows it. Throws Error{kUnsupportedVersion} with both versions if another version
+// of voxdag wrote the batch.
 CompletionRecord run_batch(const BatchRun& run, const BuildContext& context);
 
 // A task's allocation according to Slurm's environment variables; 0 if unknown.

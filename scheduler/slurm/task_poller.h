@@ -24,9 +24,9 @@ class TaskPoller {
   // has no task and, after a grace period for the shared file system, no record. Throws Error with
   // the last reason if a batch has failed too often; other tasks continue to run.
   void poll();
-  // Submits a job that starts when all tasks have ended. Waits until Slurm accepts a task or there
-  // are no open batches, so that the job has something to wait for. Returns "" if Slurm does not
-  // accept the job now.
+  // Calls poll() if there are open batches. Then submits the merge job, which starts when all tasks
+  // have ended, and returns its id. Returns "" if Slurm does not accept the job now. Also returns
+  // "" if there are open batches but no tasks yet, because the job would have nothing to wait for.
   std::string try_submit_merge_job();
 
  private:

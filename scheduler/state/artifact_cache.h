@@ -1,11 +1,11 @@
 // Artifacts shared between builds. A subvolume whose content was built before, here or in another
 // place of the grid, is copied instead of built.
 //
-// The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube (each
-// with its corners sorted, all sorted, duplicates removed), the cube's edge, hash-bits and the
-// format's version. The cache is a folder with one file per entry. When the limit is exceeded, the
-// least recently used entries are removed. Several builds may share the cache: entries appear
-// atomically, by renaming, and a removed or damaged entry is a miss. Thread-safe.
+// The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube
+// (corners sorted within each triangle, triangles sorted, duplicates removed), the cube's edge,
+// hash-bits and the format's version. The cache is a folder with one file per entry. When the limit
+// is exceeded, the least recently used entries are removed. Several builds may share the cache:
+// entries appear atomically, by renaming, and a removed or damaged entry is a miss. Thread-safe.
 #pragma once
 
 #include <atomic>

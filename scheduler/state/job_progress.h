@@ -2,7 +2,7 @@
 // `voxdag status` can show it from another process. Thread-safe.
 //
 // When a write is due, the calling thread lists the work folder and writes the row; no other thread
-// waits for it. This is too little work for a separate thread.
+// waits for it. Writing the row takes too little time to need a separate thread.
 #pragma once
 
 #include <mutex>

@@ -1,5 +1,5 @@
-// Holds a build's snapped triangles from ingest until their subvolumes are built. They are in bins:
-// one for the scene, then one for each cube of the plan, then one for each part of a split
+// Holds a build's snapped triangles from ingest until their subvolumes are built. The triangles are
+// in bins: one for the scene, then one for each cube of the plan, then one for each part of a split
 // subvolume. MemoryStore holds them for this process, DurableStore also for later processes.
 //
 // Life of a bin:

@@ -28,7 +28,7 @@ class SurfaceReader {
   // Changes to another primitive of the document. Throws Error{kInvalidInput} if a buffer of its
   // surface is shorter than declared.
   void bind(const Primitive& primitive);
-  // Sets material and corners of a triangle of this primitive. Its vertices must exist.
+  // Sets material and corners of a triangle of this primitive. The triangle's vertices must exist.
   void read(const uint32_t* vertices, SurfaceTriangle& out) {
     out.material = material_;
     for (size_t k = 0; k < 3; ++k) out.corners[k] = is_plain_ ? SurfaceCorner{} : at(vertices[k]);

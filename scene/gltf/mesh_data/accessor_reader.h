@@ -1,6 +1,6 @@
-// Decodes the elements of one accessor in windows. They can be interleaved or packed, normalized
-// integers or not, and have sparse replacements. Every 1024th index of a sparse accessor is kept in
-// memory, to find the replacements of a range. Not thread-safe.
+// Decodes the elements of one accessor in windows. The elements can be interleaved or packed,
+// normalized integers or not, and have sparse replacements. Every 1024th index of a sparse accessor
+// is kept in memory, to find the replacements of a range. Not thread-safe.
 #pragma once
 
 #include <cstddef>

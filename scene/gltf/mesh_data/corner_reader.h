@@ -16,7 +16,7 @@ class CornerReader {
  public:
   CornerReader(const Document& document, BufferReader& buffers, const Primitive& primitive);
 
-  // Reads the indices of triangles [first, first + count). They may be out of range.
+  // Reads the indices of triangles [first, first + count). The indices may be out of range.
   void read(uint64_t first, size_t count, uint32_t* corners);
 
  private:

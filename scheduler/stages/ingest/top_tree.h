@@ -1,5 +1,5 @@
-// The dense top tree. It stores for every cell of a coarse level how many triangles touch it and
-// how much work they are expected to be. This decides which cubes of the grid become subvolumes.
+// The dense top tree. It stores for every cell of a coarse level the number of triangles that touch
+// it and their expected work. These counters decide which cubes of the grid become subvolumes.
 // Threads fill separate tallies, which are added to the tree serially.
 #pragma once
 

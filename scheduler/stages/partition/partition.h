@@ -85,9 +85,10 @@ void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const
                      size_t buffer_bytes, uint64_t first, const StageContext& context,
                      const AfterPartitionPiece& after_piece);
 
-// Returns a bin with the triangles of each of `cubes`, in the same order: the cube's bin, or a part
-// filled from the bin of the smallest enclosing cube. Each returned bin has one reference. Releases
-// the other cube bins. Throws DamagedTriangles for a cube without an enclosing cube bin.
+// Returns one bin for each of `cubes`, in the same order, with the triangles that touch this cube.
+// It is the cube's own bin if there is one, and otherwise a part that is filled from the bin of the
+// smallest enclosing cube. Each returned bin has one reference. Releases the other cube bins.
+// Throws DamagedTriangles for a cube without an enclosing cube bin.
 std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
                                std::span<const Cube> cubes, size_t buffer_bytes,
                                const StageContext& context);

@@ -1,6 +1,7 @@
 // Checkpoints of scan, ingest and partition of a large scene. About every two seconds the progress
-// becomes durable, in the file of a DurableStore and a row of the job store that refers to it. The
-// next run resumes there. The checkpoint also chooses the build's triangle store.
+// becomes durable: the triangles in the file of a DurableStore, and the state in a row of the job
+// store, which refers to that file. The next run resumes at this progress. The checkpoint also
+// chooses the build's triangle store.
 //
 // Invariants:
 //   1. The row refers to no bytes of the file that were not synced before.
@@ -62,9 +63,9 @@ class IngestCheckpoint {
 
   // True if a checkpoint is due and the last one is durable.
   bool is_due();
-  // Makes the triangles in the store durable, then a row with `state` and, if given, `top`. Sets
-  // the extents in `state`. Does nothing if checkpoints are not enabled, and disables them if a
-  // file of the scene has changed.
+  // Makes the triangles in the store and, if given, `top` durable. Then writes a row of the job
+  // store with `state`, which refers to them. Sets the extents in `state`. Does nothing if
+  // checkpoints are not enabled, and disables them if a file of the scene has changed.
   void save(IngestState& state, std::optional<TopTreeCells> top = {});
   // Saves on another thread, so that ingest does not wait for the disk. The next call throws the
   // thread's error.
