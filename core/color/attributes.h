@@ -1,6 +1,6 @@
-// The attributes of voxels, a row of kAttributeTable each, and the encodings of their values, a row
-// of kEncodingTable each. Code that treats all attributes alike loops over the tables. An attribute
-// whose values have one of the encodings is a row here and the code that bakes it;
+// The attributes of voxels, one row of kAttributeTable each, and the encodings of attribute values,
+// one row of kEncodingTable each. Code that treats all attributes alike loops over the tables. A
+// new attribute with one of these encodings needs only a row here and the code that bakes it.
 // docs/architecture.md, "Adding things", lists the places.
 #pragma once
 
@@ -130,14 +130,15 @@ static_assert([] {
 constexpr const char* name_of(Attribute attribute) { return traits_of(attribute).name; }
 
 // Returns the bytes per value in the global file, for attributes other than color. `names` is the
-// length of the list.
+// length of the list of names.
 constexpr uint32_t value_bytes(Attribute attribute, uint64_t names) {
   const uint32_t block_bytes = traits_of(traits_of(attribute).encoding).block_bytes;
   if (block_bytes > 0) return block_bytes / 32;
   return names <= 256 ? 1 : names <= 65536 ? 2 : 4;
 }
 
-// Returns the expectation that a stored value violates; null if the value is valid.
+// Returns a text with the expectation that a stored value violates. Returns null if the value is
+// valid.
 constexpr const char* value_error(Encoding encoding, uint32_t value, uint64_t names) {
   if (encoding == Encoding::kOctahedral && ((value & 255) == 255 || value >> 8 == 255))
     return "expected bytes up to 254";

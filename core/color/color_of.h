@@ -1,4 +1,4 @@
-// The stored color of a cell: the mean of what its surfaces look like, in sRGB.
+// Computes the stored color of a cell: the mean color of its surfaces, in sRGB.
 #pragma once
 
 #include <array>
@@ -74,9 +74,9 @@ VOXDAG_HD inline uint64_t rounded_quotient(uint64_t numerator, uint64_t denomina
   return quotient + (rest >= denominator - rest ? 1 : 0);
 }
 
-// In doubles, for numerators below 2^52 and a denominator below 2^35. For an integer k < 2^16, a
-// quotient below k + 1/2 is below it by at least 2^-36, and remains below it after rounding to
-// 2^-37.
+// Returns the quotient rounded to the nearest integer, computed in doubles. Requires numerators
+// below 2^52 and a denominator below 2^35. For an integer k < 2^16, a quotient below k + 1/2 is
+// below it by at least 2^-36, and remains below it after rounding to 2^-37.
 VOXDAG_HD inline uint32_t rounded_quotient_in_doubles(uint64_t numerator, double denominator) {
   const double quotient = static_cast<double>(static_cast<int64_t>(numerator)) / denominator;
   return static_cast<uint32_t>(static_cast<int32_t>(quotient + 0.5));

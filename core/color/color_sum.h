@@ -11,7 +11,8 @@
 
 namespace voxdag {
 
-// Weights and weighted intensities (linear, 16 bits). Alpha has 8 bits here.
+// Sums of weights and of weighted intensities. Intensities are linear with 16 bits; alpha has 8
+// bits.
 struct ColorSum {
   std::array<uint64_t, 3> seen{};   // of weight x alpha x intensity: red, green, blue
   uint64_t seen_weight = 0;         // of weight x alpha
@@ -19,7 +20,7 @@ struct ColorSum {
   uint64_t weight = 0;
 
   VOXDAG_HD void add(const ColorSum& other) {
-    // Adds them as eight numbers of one type, which compilers vectorize.
+    // Adds the members as eight numbers of one type, because compilers vectorize such a loop.
     uint64_t sums[8], more[8];
     static_assert(sizeof sums == sizeof(ColorSum));
     std::memcpy(sums, this, sizeof sums);

@@ -1,5 +1,5 @@
-// What a triangle of a scene looks like: base color in the terms of glTF 2.0 (section 3.9), reduced
-// to integers, so that the color of a voxel is the same on every machine.
+// The appearance of a triangle of a scene: its base color in the terms of glTF 2.0 (section 3.9),
+// converted to integers, so that the color of a voxel is the same on every machine.
 #pragma once
 
 #include <array>

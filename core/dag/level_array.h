@@ -29,7 +29,7 @@ struct NodeLevelView {
   std::span<const uint32_t> children;
 };
 
-// Lexicographic order of two child lists of the same mask: < 0, 0 or > 0.
+// Compares two child lists of the same mask lexicographically. Returns a number < 0, 0 or > 0.
 VOXDAG_HD inline int compare_children(const uint32_t* a, const uint32_t* b, int count) {
   for (int i = 0; i < count; ++i)
     if (a[i] != b[i]) return a[i] < b[i] ? -1 : 1;

@@ -19,7 +19,8 @@ VOXDAG_HD inline uint64_t hash_brick(uint64_t mask) {
   return h ^ h >> 32;
 }
 
-// The running hash of a node: begin with its mask, add the hash of each child in child order, end.
+// Compute the hash of a node step by step: node_hash_begin() with its mask, node_hash_add() for the
+// hash of each child in child order, then node_hash_end().
 VOXDAG_HD inline uint64_t node_hash_begin(uint32_t child_mask) {
   return child_mask * 0x9e3779b97f4a7c15ull ^ 0xe7037ed1a0b428dbull;
 }
@@ -30,8 +31,8 @@ VOXDAG_HD inline uint64_t node_hash_end(uint64_t state) {
   return fold_multiply(state, 0x1d8e4e27c47d124full);
 }
 
-// The hash of a node. `child_hashes` has the hashes of the `count` children in `child_mask`, in
-// child order.
+// Returns the hash of a node. `child_hashes` has the hashes of the `count` children in
+// `child_mask`, in child order.
 VOXDAG_HD inline uint64_t hash_node(uint32_t child_mask, int count, const uint64_t* child_hashes) {
   uint64_t h = node_hash_begin(child_mask);
   for (int i = 0; i < count; ++i) h = node_hash_add(h, child_hashes[i]);

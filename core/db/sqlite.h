@@ -90,7 +90,7 @@ class SqlTransaction {
 };
 
 // Runs `sql`, which creates or changes tables, and marks the database with its kind (PRAGMA
-// application_id) and the version of its schema (PRAGMA user_version), all or nothing.
+// application_id) and the version of its schema (PRAGMA user_version). Does all of this or nothing.
 void change_schema(SqlDatabase& database, const std::string& sql, int64_t application_id,
                    int64_t version);
 

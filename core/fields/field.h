@@ -34,8 +34,8 @@
 
 namespace voxdag {
 
-// The first of the commands submit, plan and build that offers an option. The later ones also offer
-// it.
+// The first of the commands submit, plan and build (in this order) that offers an option. The
+// commands after it also offer the option.
 enum class Scope { kSubmit, kPlan, kBuild };
 
 // A member's name, and everything that the interfaces document about it. The name is also the JSON
@@ -62,7 +62,8 @@ struct Field {
   bool is_required = false;
   bool is_positional = false;     // positional on the command line
   bool is_left_if_empty = false;  // JSON leaves the member out if it is empty
-  // True if geometry_json() contains the field. Not set: contained if it differs from its default.
+  // True if geometry_json() contains the field. If not set, geometry_json() contains the field only
+  // if its value differs from the default.
   std::optional<bool> in_key;
 
   constexpr Field(const char* its_name, const char* its_help = "")
@@ -144,7 +145,7 @@ struct IsNumbers : std::false_type {};
 template <size_t kCount>
 struct IsNumbers<std::array<double, kCount>> : std::true_type {};
 
-// Visits nothing. `fields` functions may use only the members that it has.
+// Visits nothing. `fields` functions may use only the members that NoVisitor has.
 struct NoVisitor {
   template <class T>
   void operator()(const Field&, T&) {}

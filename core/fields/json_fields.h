@@ -1,6 +1,6 @@
-// Structs with a description (field.h) as JSON, in both directions. A *record* has all of its
-// members in JSON; a decoder ignores others. *Options* have the members that differ from their
-// defaults; a decoder refuses others.
+// Structs with a description (field.h) as JSON, in both directions. The JSON of a *record* has all
+// members; a decoder ignores unknown members. The JSON of *options* has only the members that
+// differ from their defaults; a decoder refuses unknown members.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@ using FieldJson = nlohmann::ordered_json;
 namespace json_fields {
 
 [[noreturn]] void refuse(const std::string& name, const std::string& expected);
-// Reads a whole number; also accepts 64.0. Calls `take` with an int64_t or uint64_t. Returns false
-// if that is impossible.
+// Reads a whole number; also accepts 64.0. Calls `take_unsigned` or `take_signed` with the number
+// and returns its result. Returns false if `json` is not a whole number.
 bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,
                   const std::function<bool(int64_t)>& take_signed);
 

@@ -3,7 +3,7 @@
 namespace voxdag::json_fields {
 namespace {
 
-// Sizes in whole MiB or GiB. Only for these can the pattern check the minimum of 64MiB.
+// Sizes in whole MiB or GiB. The pattern can check the minimum of 64MiB only for these sizes.
 constexpr const char* kSizePattern =
     "^((6[4-9]|[7-9][0-9]|[1-9][0-9]{2,5})MiB|[1-9][0-9]{0,5}GiB)$";
 constexpr const char* kLinePattern = "^[^\\u0000-\\u001f\\u007f]+$";

@@ -15,7 +15,8 @@ void write_schema(FieldJson& schema, Members members);
 
 FieldJson integer_schema(const Field& field, bool is_unsigned);
 FieldJson line_schema(const Field& field);
-// Schema of `kCount` numbers. If the field requires it, the last one must be above 0.
+// Returns the schema of an array of `count` numbers. If the field requires it, the last number must
+// be above 0.
 FieldJson numbers_schema(const Field& field, size_t count);
 
 template <class T>

@@ -1,6 +1,6 @@
 // XXH64 detects damage and is simple enough for the header-only reader to have its own
-// implementation. XXH3 distinguishes large contents, SHA-256 identifies them. Also a checksum of
-// words that can be computed in parts.
+// implementation. XXH3 distinguishes large contents, SHA-256 identifies them. indexed_checksum() is
+// a checksum of words that can be computed in parts.
 #pragma once
 
 #include <cstddef>

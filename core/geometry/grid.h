@@ -29,7 +29,7 @@ struct RealTriangle {
 };
 // In world space.
 using WorldTriangle = RealTriangle;
-// On the lattice of a grid: whole odd numbers, of any magnitude.
+// A triangle on the lattice of a grid. Its coordinates are odd integers of any magnitude.
 using SnappedTriangle = RealTriangle;
 
 // Returns the bounds of triangles with finite vertices.
@@ -67,7 +67,8 @@ SnapResult to_fixed(const Grid& grid, const SnappedTriangle& snapped, FixedTrian
 // Snaps a triangle with finite vertices and converts it with to_fixed().
 SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out);
 
-// log2 of a resolution; throws Error{kInvalidInput} unless it is a power of two in [4, 2^20].
+// Returns log2 of a resolution. Throws Error{kInvalidInput} unless it is a power of two in [4,
+// 2^20].
 uint32_t levels_of_resolution(uint64_t resolution);
 
 }  // namespace voxdag

@@ -1,5 +1,5 @@
-// Descends the octree with a triangle: finds the children of a cube that it touches. Exact (closed
-// triangle, closed cube), so every way of walking the tree finds the same cubes.
+// Descends the octree with a triangle: finds the children of a cube that the triangle touches.
+// Exact (closed triangle, closed cube), so every way of walking the tree finds the same cubes.
 #pragma once
 
 #include <cstdint>
@@ -59,7 +59,7 @@ struct CellBox {
     for (int a = 0; a < 3; ++a) inside &= low[a] >= 0 && high[a] >> level == 0;
     return inside;
   }
-  // The smallest cube that contains all of these cells, which must be inside the grid.
+  // Returns the smallest cube that contains all of these cells. The cells must be inside the grid.
   Cube cube_around() const {
     uint32_t up = 0;
     for (int a = 0; a < 3; ++a)
@@ -74,8 +74,8 @@ struct CellBox {
   int64_t low[3], high[3];
 };
 
-// Bit c of the result is set if the triangle touches child c of the cube. `parent_units` is the
-// cube's edge in lattice units. The triangle must touch the cube itself.
+// Returns a mask whose bit c is set if the triangle touches child c of the cube. `parent_units` is
+// the cube's edge in lattice units. The triangle must touch the cube itself.
 inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube,
                                  int64_t parent_units) {
   const int64_t half = parent_units / 2;

@@ -38,7 +38,7 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
   if (lowest > 0 || highest < 0) return false;
 
   // Edges in the projection along axis c onto (a, b): the triangle's inside is where all three edge
-  // functions are >= 0, once oriented by the sign of the normal (fixed to + where that is 0).
+  // functions are >= 0, once oriented by the sign of the normal (a sign of 0 counts as +).
   for (int c = 0; c < 3; ++c) {
     const int a = (c + 1) % 3, b = (c + 2) % 3;
     const int64_t sign = normal[c] < 0 ? -1 : 1;
@@ -54,11 +54,12 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
   return true;
 }
 
-// Edges of the triangle are then below 2^20, its normal below 2^41, the plane's sums below 2^63.
+// Reach for which 64 bits suffice: edges of the triangle are then below 2^20, its normal below
+// 2^41, the plane's sums below 2^63.
 inline constexpr int64_t kNarrowReach = int64_t{1} << 19;
 
-// `low`: the cube's low corner, `edge`: its edge, in lattice units (1/256 voxel). Requires
-// |coordinates| <= 2^40 for triangle and cube.
+// True if the triangle touches the cube. `low`: the cube's low corner, `edge`: the cube's edge,
+// both in lattice units (1/256 voxel). Requires |coordinates| <= 2^40 for triangle and cube.
 VOXDAG_HD inline bool triangle_touches_cube(const FixedTriangle& t, const int64_t (&low)[3],
                                             int64_t edge) {
   bool narrow = edge < kNarrowReach;

@@ -23,7 +23,7 @@ class EncodedBytes {
   virtual size_t read(std::span<std::byte> out) = 0;
 };
 
-// The end of a message "<image> ...", for example "is a WebP image, expected PNG or JPEG".
+// The message completes "<image> ...", for example "is a WebP image, expected PNG or JPEG".
 struct BrokenImage {
   std::string message;
 };

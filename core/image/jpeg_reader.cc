@@ -16,7 +16,8 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kJpegStateBytes = uint64_t{1} << 20;
-// Repeating the scan of a large image costs a file only a few bytes.
+// Limits the work for small files, because a file needs only a few bytes to repeat the scan of a
+// large image.
 constexpr int kMaxScans = 500;
 
 class JpegReader : public ImageReader {

@@ -10,8 +10,8 @@
 
 namespace voxdag {
 
-// A source whose first bytes were inspected. It stores exceptions, because they must not pass
-// through a decoder written in C.
+// A source whose first bytes were inspected. The source stores exceptions instead of throwing them,
+// because they must not pass through a decoder written in C.
 class PeekedSource {
  public:
   explicit PeekedSource(EncodedBytes& source) : source_(source) {

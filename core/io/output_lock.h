@@ -1,8 +1,9 @@
 // Keeps two processes from writing the same output, because they would share its temporary files.
 //
 // Only the holder removes the lock's file; a process that waits for the lock then creates a new
-// one. The partial output could not be the lock: after its rename the name would be free while the
-// lock is still held. A killed process leaves the empty file, which the next process locks again.
+// one. The partial output file cannot serve as the lock file: after its rename, its name would be
+// free while the lock is still held. A killed process leaves the empty lock file behind, and the
+// next process locks this file.
 #pragma once
 
 #include <memory>
@@ -19,7 +20,7 @@ class OutputLock {
   // Throws Error{kIo} if another process holds the lock.
   OutputLock(FileSystem& files, const std::string& output)
       : OutputLock(files, output, files.try_lock(path_of(output))) {}
-  // Takes `lock`, the lock of path_of(output). Throws as above if it is null.
+  // Takes `lock`, the lock of path_of(output). Throws as above if `lock` is null.
   OutputLock(FileSystem& files, const std::string& output, std::unique_ptr<FileLock> lock);
   // Removes the file.
   ~OutputLock();

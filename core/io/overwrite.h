@@ -1,5 +1,5 @@
-// Decides which files may be overwritten. Inputs never may. Files that were not created by the
-// program may with --force.
+// Decides which files may be overwritten. Inputs are never overwritten. Files that the program did
+// not create are overwritten only with --force.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,8 @@
 
 namespace voxdag {
 
-// Returns null if the file does not exist, because another process may just have removed it.
+// Opens a file. If the file does not exist, returns null instead of throwing: another process may
+// just have removed the file.
 std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string& path);
 
 // Throws Error{kInvalidInput} if one of `paths`, which need not exist, is the same file as one of
@@ -26,7 +27,7 @@ void refuse_foreign_file(FileSystem& files, const std::string& path,
                          const std::function<bool(const ReadableFile& file)>& is_own,
                          const std::string& otherwise = "");
 
-// True if the file begins with `bytes`, or is a shorter prefix of them.
+// True if the file begins with `bytes`, or is shorter than `bytes` and a prefix of them.
 bool begins_with(const ReadableFile& file, std::string_view bytes);
 
 }  // namespace voxdag

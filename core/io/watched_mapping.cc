@@ -29,7 +29,8 @@ void on_bus_error(int number, siginfo_t* info, void* context) {
   if (info->si_code == BUS_ADRERR) {
     for (Slot& slot : g_slots) {
       const uintptr_t begin = slot.begin, end = slot.end;
-      // Both values were from one mapping, even if the slot has been reused since.
+      // The second comparison ensures that `begin` and `end` belong to the same mapping, even if
+      // the slot has been reused since.
       if (address < begin || address >= end || slot.begin != begin || slot.end != end) continue;
       slot.damaged = true;
       void* page = reinterpret_cast<void*>(address / g_page_bytes * g_page_bytes);

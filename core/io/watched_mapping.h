@@ -20,8 +20,8 @@ class WatchedMapping {
   ~WatchedMapping();
   WatchedMapping(const WatchedMapping&) = delete;
 
-  // True if pages of it were read as zeros. Then discard all results computed from the mapping
-  // since it began.
+  // True if pages of the mapping were read as zeros. If so, discard all results computed from the
+  // mapping since it was created.
   bool is_damaged() const;
 
  private:

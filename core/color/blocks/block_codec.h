@@ -2,9 +2,9 @@
 // blocks", documents the layout. voxdag_reader_colors.h decodes the blocks.
 //
 // A block has two ends and, for each cell, a weight between them. The ends follow from the colors'
-// principal axis and one step of least squares. They are computed for both modes, and the mode with
-// the smaller squared error is used. All arithmetic is exact, so that the same colors produce the
-// same bytes on every machine. Blocks of one or two colors are lossless.
+// principal axis and one step of least squares. They are computed for both modes of the format, and
+// the mode with the smaller squared error is used. All arithmetic is exact, so that the same colors
+// produce the same bytes on every machine. Blocks of one or two colors are lossless.
 #pragma once
 
 #include <array>

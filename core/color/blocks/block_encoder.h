@@ -1,7 +1,7 @@
 // The encoder of color blocks (block_codec.h), in code that compilers vectorize: it is compiled for
-// each instruction set, with a separate type `Set`, local to the file. All of it is integer
-// arithmetic, or doubles whose results are exact, so the bytes are the same. Nothing here calls
-// inline functions that other files may also contain.
+// each instruction set, with a separate type `Set` that is local to the including file. The
+// arithmetic uses integers, or doubles whose results are exact, so every instruction set gives the
+// same bytes. Nothing here calls inline functions that other files may also contain.
 #pragma once
 
 #include <cstddef>

@@ -6,7 +6,7 @@
 
 namespace voxdag {
 
-// Encodes cells of a level. They may continue the level of the previous call.
+// Encodes cells of a level. They may continue the level that the previous call began.
 template <class ColorOf>
 void RegionEncoder::add_level(uint32_t up, std::span<const ColoredCell> cells, uint32_t first_code,
                               const ColorOf& color) {

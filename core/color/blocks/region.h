@@ -1,7 +1,8 @@
-// The colors of a region, in the order and the bytes in which the file stores them: the cells of
-// its finest level in Morton order, then the next coarser level, and so on up to the one cell that
-// is the region, in blocks of 32 cells that begin again in each region. A coarser cell is the sum
-// of its children, not the mean of their stored colors.
+// Encodes the colors of a region as the file stores them. The cells of the region's finest level
+// come first, in Morton order, then the cells of the next coarser level, and so on up to the one
+// cell that is the region. The cells are stored in blocks of 32; each region begins a new block.
+// The sum of a coarser cell is the sum of its children. Its color is made from this sum, not from
+// the stored colors of the children.
 #pragma once
 
 #include <array>
@@ -25,9 +26,10 @@ struct EncodedRegion {
   uint64_t morton = 0;  // of the region, among cubes of the region's level
   std::array<uint32_t, kRegionLevels + 1> counts{};  // cells by level, the finest first
   std::vector<std::byte> blocks;
-  // Two tables: for the finest level and for the next one. A table exists if the level
-  // kPrefixLevels above is below the region. It has an entry for each cell of that level above, in
-  // Morton order: the number of cells of the finer level before it.
+  // Two tables of ranks: for the finest level and for the next coarser level. A table exists if the
+  // level that is kPrefixLevels above the table's level is below the region. It has an entry for
+  // each cell of that upper level, in Morton order: the number of cells of the table's level that
+  // come before this cell.
   std::vector<uint32_t> prefix;
   ColorSum total;
 };

@@ -1,7 +1,7 @@
-// Computes how the surfaces in a region of the color grid look, by the rule of docs/color.md. The
-// sum of a cell is a function of the triangles that touch the cell, of their materials and of the
-// images. It does not depend on the order of the triangles, or on the region in which the cell is
-// baked.
+// Computes the colors and other attributes of the cells in a region of the color grid, by the rule
+// of docs/color.md. The sum of a cell is a function of the triangles that touch the cell, of their
+// materials and of the images. It does not depend on the order of the triangles, or on the region
+// in which the cell is baked.
 //
 // `Textures` is a reader of images. An image is a pyramid of box-filtered levels, linear and with
 // 16 bits per channel. The first level is the image itself. The members of `Textures` are
@@ -57,7 +57,7 @@ class RegionBaker {
   }
 
   // `region`: a cube of at most 64^3 color cells. `triangles`: all triangles that may touch it, at
-  // most 2^32. Sets `cells` to the cells that they touch, in Morton order.
+  // most 2^32. Sets `cells` to the cells that the triangles touch, in Morton order.
   void bake(const Cube& region, std::span<const FixedSurface> triangles,
             std::vector<ColoredCell>& cells) {
     begin(region);
@@ -65,8 +65,8 @@ class RegionBaker {
     finish(cells);
   }
 
-  // begin(), add() and finish() do the same for triangles in any number of parts. `max_cells` may
-  // stop add().
+  // begin(), add() and finish() do the same for triangles that come in any number of parts. add()
+  // stops when there are more than `max_cells` cells.
   void begin(const Cube& region, uint32_t max_cells = color::RegionCells::kMaxCells) {
     max_cells_ = max_cells;
     cells_.reserve(std::min(max_cells + kTriangleCells, color::RegionCells::kMaxCells));
@@ -77,7 +77,7 @@ class RegionBaker {
     }
   }
   // Returns false if the triangles touch more than `max_cells` cells (up to kTriangleCells more).
-  // finish() must then still be called, but returns no colors.
+  // finish() must then still be called, but its result is incomplete.
   bool add(std::span<const FixedSurface> triangles) {
     triangles_ = triangles;
     for (uint32_t i = 0; i < triangles.size() && cells_.count() <= max_cells_; ++i) add_triangle(i);

@@ -51,7 +51,8 @@ VOXDAG_HD inline void normal_of(const FixedTriangle& t, Int (&n)[3]) {
   }
 }
 
-// Along x, y, z. IEEE 754 square roots are exact for planes perpendicular to an axis.
+// Returns the length of n, whose components are along x, y, z. IEEE 754 square roots are exact for
+// planes perpendicular to an axis.
 template <class Int>
 VOXDAG_HD inline double length_of(const Int (&n)[3]) {
   const double x = to_double(n[0]), y = to_double(n[1]), z = to_double(n[2]);

@@ -25,8 +25,8 @@ VOXDAG_HD inline Vector cross(const Vector& a, const Vector& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-// Returns the position (0 to 1) on the segment from a to b that is closest to the origin. Sets
-// `distance` to the square of its distance.
+// Returns the position of the point closest to the origin on the segment from a (0) to b (1). Sets
+// `distance` to the square of the point's distance from the origin.
 VOXDAG_HD inline double closest_on_segment(const Vector& a, const Vector& b, double& distance) {
   const Vector along = b - a;
   const double length = dot(along, along), forward = -dot(a, along);

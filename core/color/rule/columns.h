@@ -15,7 +15,7 @@ struct ColumnTotals {
   int64_t count, sum_i, sum_j;
 };
 
-// The same totals for the 256 sets of columns of two rows: j is 0 or 1.
+// ColumnTotals of the 256 sets of columns in two rows (j is 0 or 1).
 struct ColumnTable {
   uint8_t count[256] = {}, sum_i[256] = {}, sum_j[256] = {};
   constexpr ColumnTable() {
@@ -50,7 +50,8 @@ VOXDAG_HD inline uint32_t negative_columns_one_by_one(Int first, Int a, Int b) {
   return columns;
 }
 
-// The same with SSE2, which every x86-64 has: two columns per step.
+// Does the same as negative_columns_one_by_one(). Uses SSE2, which every x86-64 has, for two
+// columns per step.
 template <class Int>
 VOXDAG_HD inline uint32_t negative_columns(Int first, Int a, Int b) {
 #ifdef VOXDAG_SSE2

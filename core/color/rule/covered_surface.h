@@ -10,8 +10,9 @@
 
 namespace voxdag::color {
 
-// Weight of a column where the surface is perpendicular to it. Oblique surfaces have more area and
-// up to sqrt(3) times the weight. If nothing covers a column, each triangle weighs 1.
+// Weight of a covered column if the surface is perpendicular to it. Oblique surfaces have more area
+// and up to sqrt(3) times this weight. If no triangle covers a column of the cell, each triangle
+// has weight 1.
 inline constexpr double kColumnWeight = 64;
 
 struct Reciprocals {
@@ -36,7 +37,7 @@ class CoveredSurface {
     return column_weight_ * static_cast<uint32_t>(totals.count);
   }
 
-  // Returns the mean of the covered columns of a cell. There must be at least one.
+  // Returns the mean point of the covered columns of a cell. At least one column must be covered.
   VOXDAG_HD SurfacePoint mean_point(int64_t p, int64_t q, const ColumnTotals& totals) const {
     constexpr Reciprocals kReciprocals{};
     const Int sum_p = 4 * p * totals.count + totals.sum_i;

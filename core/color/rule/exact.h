@@ -18,7 +18,7 @@ namespace voxdag::color {
 template <class Int>
 using UnsignedOf = std::conditional_t<sizeof(Int) == 8, uint64_t, uint128>;
 
-// Products and sums whose intermediate values may not fit in Int, but whose result does.
+// Return products and sums whose intermediate values may not fit in Int, but whose result does.
 template <class Int>
 VOXDAG_HD inline Int wrapping_product(Int a, Int b) {
   return static_cast<Int>(static_cast<UnsignedOf<Int>>(a) * static_cast<UnsignedOf<Int>>(b));

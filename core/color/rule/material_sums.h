@@ -1,5 +1,5 @@
-// The materials of the cells of a region: the weights of the materials that surfaces bring to each
-// cell. Sums are integers and commute.
+// The materials of the cells of a region. For each cell, the weights of the surfaces are summed by
+// material. Sums are integers and commute.
 #pragma once
 
 #include <algorithm>

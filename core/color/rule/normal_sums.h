@@ -25,8 +25,8 @@ struct NormalSum {
   }
 };
 
-// Returns the normal of the sum of all areas, or of the turned areas if the sum is less than 1/64
-// of them.
+// Returns the normal of the sum of all areas, or, if that sum is less than 1/64 of the sum of the
+// turned areas, the normal of the turned sum.
 VOXDAG_HD inline NormalCode normal_of_sum(const NormalSum& sum) {
   const auto largest = [](const int64_t(&v)[3]) {
     int64_t most = 0;

@@ -1,9 +1,9 @@
 // The cells of a region that surfaces touch, and their sums, found by Morton code in the region.
 //
 // A cell is covered if a surface covers a column of it. In a covered cell, surfaces that cover no
-// column are ignored. This is known only at the end. So a cell has the sum of non-covering surfaces
-// until the first surface that covers a column restarts it from zero. The sums do not depend on the
-// order of the surfaces.
+// column are ignored. Whether a cell is covered is known only at the end. So a cell has the sum of
+// non-covering surfaces until the first surface that covers a column restarts it from zero. The
+// sums do not depend on the order of the surfaces.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ namespace voxdag::color {
 class RegionCells {
  public:
   static constexpr uint32_t kMaxCells = 1u << (3 * kRegionLevels);
-  // Upper bound of all vectors while they grow, without AttributeSums.
+  // Upper bound of the memory of all vectors while they grow, without AttributeSums.
   static constexpr uint64_t kMaxBytes =
       uint64_t{kMaxCells} * (4 + 3 * sizeof(ColorSum)) + (64 << 10);
 
@@ -35,7 +35,7 @@ class RegionCells {
   bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
   // Call it some time before touch() or cover().
   void prefetch(uint32_t code) const { __builtin_prefetch(&places_[code]); }
-  // Adds the cell if it is new, and returns the number of its sum.
+  // Adds the cell if it is new, and returns the number of the cell's sum.
   uint32_t touch(uint32_t code) {
     uint32_t& place = places_[code];
     if (place == 0) {
@@ -91,7 +91,8 @@ class RegionCells {
   static constexpr uint32_t kCovered = 1u << 31;
 
   AttributeSums attributes_;
-  // Number in sums_, counted from 1, plus kCovered if the cell is covered; 0: not touched.
+  // For each Morton code: the cell's number in sums_, counted from 1, plus kCovered if the cell is
+  // covered; 0 if no surface touches the cell.
   std::vector<uint32_t> places_;
   std::vector<uint64_t> touched_;
   std::vector<ColorSum> sums_;

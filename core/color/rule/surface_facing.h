@@ -10,7 +10,7 @@
 
 namespace voxdag::color {
 
-// The area of a covered column, measured square to the triangle's dominant axis.
+// The area of a covered column in the projection along the triangle's dominant axis.
 inline constexpr double kColumnArea = 1 << 20;
 
 // A triangle's contribution to each cell that it touches.

@@ -34,7 +34,8 @@ VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
 // Returns the level of the image's pyramid that has one to two texels along the edge of a color
 // cell, on average over the triangle: the largest l with 4^l <= texels in the triangle / its area
 // in cells. `area`: twice the triangle's area, in lattice units. A triangle without area counts as
-// a square over its longest edge, or over a lattice unit. All in IEEE doubles, in this order.
+// a square over its longest edge, or over a lattice unit. All values are computed in IEEE doubles,
+// in this order.
 template <class Textures>
 VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& textures,
                                         uint32_t image, int cell_bits, double area) {
@@ -92,7 +93,8 @@ VOXDAG_HD inline void add_weighted_one_by_one(Texel texel, uint64_t weight, uint
   sum.weight += weight;
   sum.seen_weight += seen;
 }
-// The same with SSE2 if available: two of the eight sums per step.
+// Does the same as add_weighted_one_by_one(). Uses SSE2, if available, for two of the eight sums
+// per step.
 VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, ColorSum& sum) {
 #ifdef VOXDAG_SSE2
   static_assert(sizeof(ColorSum) == 4 * sizeof(__m128i));

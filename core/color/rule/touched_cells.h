@@ -4,9 +4,9 @@
 // The search visits columns of cells along the triangle's dominant axis. The triangle's shadow is
 // its projection along this axis. If the shadow contains a column's whole closed square, the
 // triangle touches exactly the cells of the column that its plane touches. If the shadow only
-// touches the square, the edges in the other two projections decide too. From one column to the
-// next the plane climbs by at most one cell. So its height is updated by additions, and starts from
-// an estimate in doubles that exact values correct.
+// touches the square, the edge tests in the other two projections also decide. From one column to
+// the next the plane climbs by at most one cell. So its height is updated by additions, and starts
+// from an estimate in doubles that exact values correct.
 #pragma once
 
 #include <cstdint>
@@ -156,8 +156,10 @@ class TouchedCells {
     return ~outside & kAllColumns;
   }
 
-  // The columns in which the surface's plane is above a bottom of a cell, or, if possible and
-  // requested, in it. `at_bottom`: the plane's value at the first column there, rounded down.
+  // Returns the columns in which the surface's plane is above the bottom of a cell. With `or_in`,
+  // also returns the columns in which the plane is exactly at the bottom; then the plane's values
+  // must not need rounding. `at_bottom`: the plane's value at the cell's first column and bottom,
+  // rounded down.
   VOXDAG_HD uint32_t columns_above(Int at_bottom, bool or_in) const {
     return negative_columns<Int>(wrapping_sum(at_bottom, Int{or_in ? -1 : 0}), t_.normal[0],
                                  t_.normal[1]);

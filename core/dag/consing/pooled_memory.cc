@@ -14,7 +14,7 @@ constexpr char kWhat[] = "a subvolume";
 constexpr size_t kPage = size_t{4} << 10;
 constexpr size_t kLargestPower = size_t{4} << 20;
 // A subvolume has up to some hundred arrays. With a lower limit, the small ranges, which are freed
-// last, would evict the large ones.
+// last, would evict the large ranges.
 constexpr size_t kMaxRanges = 1024;
 
 }  // namespace

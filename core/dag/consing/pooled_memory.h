@@ -25,8 +25,8 @@ class PagePool {
   PagePool& operator=(const PagePool&) = delete;
   ~PagePool() { clear(); }
 
-  // Returns the size of a new page range for `bytes`: a power of two up to 4 MiB, whole pages
-  // above.
+  // Returns the size of a new page range for `bytes`: a power of two up to 4 MiB, and a multiple of
+  // the page size above 4 MiB.
   static size_t range_bytes(size_t bytes);
   // Removes and returns the smallest cached range of `bytes` to `max_bytes` bytes; null if there is
   // none.
@@ -50,9 +50,9 @@ class PooledMemory {
   MemoryBudget& budget;
   PagePool& pool;
 
-  // Returns zeroed pages of range_bytes(bytes). If `zero` is false, returns up to twice as many,
-  // with undefined contents. Throws OutOfBudget if the budget has no space, Error{kOutOfMemory} if
-  // the system has none.
+  // Returns zeroed pages of range_bytes(bytes). If `zero` is false, returns up to twice as many
+  // bytes, with undefined contents. Throws OutOfBudget if the budget has no space,
+  // Error{kOutOfMemory} if the system has none.
   PagePool::Pages allocate(size_t bytes, bool zero);
   // Enlarges a range and preserves its contents. Throws like allocate(); the range is then
   // unchanged.
@@ -83,8 +83,8 @@ class PooledArray {
     if (pages_.data) memory_->free(pages_);
   }
 
-  // Increases the size to at least `size`, and by at least a quarter. Elements are preserved; new
-  // ones are undefined.
+  // Increases the size to at least `size`, and by at least a quarter. Old elements are preserved;
+  // new elements are undefined.
   void grow(PooledMemory& memory, size_t size) {
     if (!pages_.data) {
       *this = PooledArray(memory, size);

@@ -35,8 +35,8 @@ struct OctreeCounts {
   }
 };
 
-// The numbers of entries in the tables for one cube, indexed by s. They are an estimate for the
-// next cube.
+// The numbers of entries in the tables of one cube; entries[s] is for the table of cubes of edge
+// 2^s. The numbers of one cube are an estimate for the next cube.
 struct TableSizes {
   uint64_t entries[kMaxGridLevels + 1] = {};
 };

@@ -6,8 +6,8 @@
 //
 // A frame has kFrameRows consecutive rows of one level (the last frame of a level has the rest) as
 // columns, compressed where that pays, with a checksum of its bytes as stored. The index lists
-// roots, levels and frames and has a separate checksum. An ArtifactRef points to it, so that a
-// reader never scans a segment. An artifact of one subvolume has one root; a merge pass writes
+// roots, levels and frames and has a separate checksum. An ArtifactRef points to the index, so that
+// a reader never scans a segment. An artifact of one subvolume has one root; a merge pass writes
 // artifacts with many.
 //
 // Rows are checked before they are written and after they are read: total order, masks not 0,

@@ -12,10 +12,11 @@
 namespace voxdag {
 namespace {
 
-// Level 1 makes artifacts an eighth smaller and a build 5 % slower.
+// Level 1 would make artifacts an eighth smaller and builds 5 % slower.
 constexpr int kZstdLevel = -1;
 constexpr uint32_t kCompressedFlag = 0x80000000u;
-// Frames without compression after one in which a column shrank too little.
+// Number of frames in which a column is not compressed after a frame in which the column shrank too
+// little.
 constexpr uint32_t kFramesToSkip = 15;
 constexpr size_t kBrickColumn = 0, kMaskColumn = 1;
 

@@ -8,7 +8,7 @@
 
 namespace voxdag {
 
-// The row before the checked rows; none at the start of a level.
+// The row before the checked rows. `present` is false at the start of a level.
 struct LastRow {
   bool present = false;
   uint64_t hash = 0;

@@ -39,8 +39,8 @@ class SegmentWriter {
   // Flushes. Returns after all bytes so far and the file's directory entry are on the disk.
   void sync();
   // Syncs the bytes flushed before the call. Another thread may call any function concurrently,
-  // except sync() and this one. After a failure it always fails, because the system reports lost
-  // bytes only once.
+  // except sync() and sync_written(). After one failure, every later call fails, because the system
+  // reports lost bytes only once.
   void sync_written();
   // Bytes that were flushed.
   uint64_t written() const { return written_; }

@@ -21,23 +21,23 @@ namespace voxdag {
 
 class AttributeSectionWriter {
  public:
-  // Encodes a region of colors in a tier above the first. Each cell has the sum of the totals of
-  // its regions.
+  // Encodes a region of colors in a tier above tier 0. The sum of each cell is the sum of the
+  // totals of the regions in the cell.
   using EncodeColors = std::function<EncodedRegion(uint32_t tier, uint64_t morton,
                                                    std::span<const ColoredCell> cells)>;
 
   // The levels of `file` must be complete and not empty. The set cells of level `cell_levels` (2 to
-  // 20, at most the grid's) and of all coarser levels have the attribute. `names`: the list indexed
-  // by the values, if the attribute has one. Without `encode_coarse`, coarser cells have the colors
-  // of their sums.
+  // 20, at most the grid's) and of all coarser levels have the attribute. `names`: the list of
+  // names that the values index, if the attribute has such a list. Without `encode_coarse`, coarser
+  // cells have the colors of their sums.
   AttributeSectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
                          std::span<const std::string> names, MemoryBudget& budget,
                          EncodeColors encode_coarse = nullptr);
   ~AttributeSectionWriter();
 
-  // Adds a region of tier 0: cubes of level max(cell_levels - 6, 0), in increasing Morton order.
-  // Throws Error{kCorrupt} for a region out of order or with inconsistent parts,
-  // Error{kOutOfMemory}.
+  // Adds a region of tier 0: a cube of level max(cell_levels - 6, 0). Regions must come in
+  // increasing Morton order. Throws Error{kCorrupt} for a region out of order or with inconsistent
+  // parts. Throws Error{kOutOfMemory} if the budget is too small.
   void add_region(const EncodedRegion& region);
   // Writes the other tiers and ends the section. There must be at least one region.
   void finish();

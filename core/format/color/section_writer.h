@@ -22,24 +22,26 @@ namespace voxdag {
 
 class SectionWriter {
  public:
-  // The levels of `file` must be complete, and there must be some. The cells of the levels 0 to
-  // `cell_levels` (2 to 20, at most the grid's) have the attribute, 32 of them in `block_bytes`.
+  // The levels of `file` must be complete and not empty. The set cells of the levels 0 to
+  // `cell_levels` (2 to 20, at most the grid's) have the attribute. The values of 32 cells take
+  // `block_bytes` bytes.
   SectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
                 uint32_t block_bytes, MemoryBudget& budget);
 
   uint32_t tier_count() const { return static_cast<uint32_t>(tiers_.size()); }
-  // Levels of a region of the tier, below that which is the region.
+  // Returns the number of levels from the tier's finest level to the level of its regions.
   uint32_t region_levels(uint32_t tier) const { return tiers_[tier].levels(); }
   uint64_t region_count(uint32_t tier) const { return tiers_[tier].regions; }
-  // Adds a region; a tier's regions come in increasing Morton order. Throws Error{kCorrupt} for a
-  // region out of order or with inconsistent parts, Error{kOutOfMemory}.
+  // Adds a region. The regions of a tier must come in increasing Morton order. Throws
+  // Error{kCorrupt} for a region out of order or with inconsistent parts. Throws
+  // Error{kOutOfMemory} if the budget is too small.
   void add(uint32_t tier, const EncodedRegion& region);
-  // Ends the section, in which tier 0 must have a region. `list`: what stands before the tier
-  // table.
+  // Ends the section, in which tier 0 must have a region. `list`: bytes that are written before the
+  // tier table.
   void finish(std::span<const std::byte> list = {});
 
  private:
-  // What has been added of a tier.
+  // The data added to a tier so far.
   struct Tier {
     Tier(MemoryBudget& budget, uint32_t finest_level)
         : finest(finest_level),

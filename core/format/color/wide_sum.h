@@ -1,5 +1,5 @@
-// Sums of colors that no scene overflows. A ColorSum is full with about 10^9 white cells, which are
-// not too many for the levels near the root.
+// Sums of colors that no scene can overflow. A ColorSum overflows after about 10^9 white cells, and
+// a cell near the root can contain that many.
 #pragma once
 
 #include <algorithm>
@@ -28,8 +28,8 @@ struct WideSum {
     weight += other.weight;
   }
 
-  // How many bits have to go so that the sum fits a ColorSum, with room for what narrow() rounds
-  // up; 0 if it fits as it is.
+  // Returns the number of low bits to drop so that the sum fits a ColorSum, with space for the
+  // values that narrow() rounds up. Returns 0 if the sum already fits.
   int excess_bits() const {
     uint128 all = seen_weight | weight;
     for (size_t c = 0; c < 3; ++c) all |= seen[c] | plain[c];
@@ -37,7 +37,8 @@ struct WideSum {
     return high == 0 ? 0 : static_cast<int>(std::bit_width(high)) + 1;
   }
 
-  // Without the lowest `bits`. A small sum keeps its color, and a weight of 1 at least.
+  // Returns the sum without its lowest `bits` bits. A small sum keeps its color, and a weight of at
+  // least 1.
   ColorSum narrow(int bits) const {
     constexpr uint64_t kPrecise = uint64_t{1} << 16;
     ColorSum sum;

@@ -1,5 +1,6 @@
-// The cells of a global file's DAG, one below the other, down to voxels. The place of a cell is the
-// word offset of its node or brick, and below the bricks the mask of its children.
+// Functions to descend from cell to cell in a global file's DAG, down to voxels. The place of a
+// cell is the word offset of its node or brick. Below the bricks it is the mask of the cell's
+// children.
 #pragma once
 
 #include <cstdint>
@@ -9,13 +10,13 @@
 
 namespace voxdag {
 
-// A bit for each child that the cell of this level has.
+// Returns a bit for each child of a cell of level `level`.
 inline uint32_t child_mask_at(const voxdag_reader::File& file, uint32_t level, uint64_t place) {
   if (level < file.brick_level()) return file.node(level, place).child_mask;
   return level == file.brick_level() ? octants(file.brick(place)) : static_cast<uint32_t>(place);
 }
 
-// The place of a child, which must be there.
+// Returns the place of a child, which must exist.
 inline uint64_t child_place_at(const voxdag_reader::File& file, uint32_t level, uint64_t place,
                                int index) {
   if (level < file.brick_level()) return voxdag_reader::File::child(file.node(level, place), index);

@@ -26,20 +26,22 @@ class DamagedBlock : public Error {
 class CheckedBlocks {
  public:
   static constexpr uint64_t kBlockBytes = 65536;
-  // Memory for a file whose checksum table begins at this offset.
+  // Returns the memory for a file whose checksum table begins at byte `table_offset`.
   static constexpr uint64_t memory_bytes(uint64_t table_offset) {
     return sizeof(uint64_t) * (table_offset / kBlockBytes / 64 + 1);
   }
 
-  // The file, which must outlive it, has checked its header page and its checksum table.
+  // `file` must outlive this object. Opening it has already checked its header page and its
+  // checksum table.
   explicit CheckedBlocks(const voxdag_reader::File& file);
 
-  // To be called before these bytes are read. They are the file's, behind its header page and
-  // before its checksum table. Throws DamagedBlock.
+  // Compares the blocks of these bytes. Call it before the bytes are read. The bytes must be in the
+  // mapped file, after its header page and before its checksum table. Throws DamagedBlock.
   void expect_intact(const void* begin, uint64_t bytes) const {
     expect_intact_at(place_of(begin), bytes);
   }
-  // The same, faster, for callers that store an array's offset in bytes behind the header page.
+  // expect_intact_at() does the same faster, for callers that store the place_of() an array: its
+  // offset in bytes from the end of the header page.
   uint64_t place_of(const void* begin) const {
     return static_cast<uint64_t>(static_cast<const unsigned char*>(begin) - first_);
   }

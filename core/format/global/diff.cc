@@ -105,7 +105,8 @@ class SharedPairTable {
     mutable std::mutex mutex;
     PairTable table;
   };
-  // Selected by the high bits of the hash; a table uses the low bits.
+  // Returns the part for a hash, selected by the high bits of the hash. The table of a part uses
+  // the low bits.
   Part& part_of(uint64_t hash) const { return *parts_[hash >> 58]; }
 
   std::vector<std::unique_ptr<Part>> parts_;

@@ -22,13 +22,14 @@ inline constexpr uint32_t kNodeOrderByHash = 1;
 inline constexpr uint64_t kPageBytes = 4096;
 inline constexpr uint64_t kChecksumBlockBytes = uint64_t{1} << 16;
 inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 40;
-// Pointers into a level of more words are 64 bits wide, others 32. Tests choose fewer words.
+// Pointers into a level of more words than this are 64 bits wide, all other pointers 32. Tests
+// define a smaller limit.
 #ifndef VOXDAG_NARROW_LEVEL_WORDS
 #define VOXDAG_NARROW_LEVEL_WORDS (uint64_t{1} << 32)
 #endif
 inline constexpr uint64_t kNarrowLevelWords = VOXDAG_NARROW_LEVEL_WORDS;
 
-// Offsets in an entry of the attribute table; the rest is reserved: 0.
+// Offsets in an entry of the attribute table. All other bytes of an entry are reserved and 0.
 inline constexpr size_t kAttributeKindAt = 0;
 inline constexpr size_t kAttributeLevelsAt = 4;
 inline constexpr size_t kAttributeOffsetAt = 8;

@@ -43,7 +43,8 @@ struct GlobalLevel {
   uint64_t words = 0;
 };
 
-// What an attribute section holds: something for every set cell of the levels 0 to `cell_levels`.
+// An attribute section of the file. It has a value for every set cell of the levels 0 to
+// `cell_levels`.
 struct GlobalAttribute {
   uint32_t kind = 0;
   uint32_t cell_levels = 0;
@@ -52,7 +53,7 @@ struct GlobalAttribute {
   uint64_t finest_cells = 0;  // of the finest
 };
 
-// What an unfinished file holds, so that a later run can resume it.
+// The contents of an unfinished file, so that a later run can resume it.
 struct GlobalFileProgress {
   std::vector<GlobalLevel> levels;  // complete ones, from the bricks upwards
   std::vector<uint64_t> checksums;  // of their checksum blocks; the last one may be partial
@@ -60,7 +61,7 @@ struct GlobalFileProgress {
 
 // True if the file begins with the magic of a global file.
 bool is_global_file(const ReadableFile& file);
-// True if it may be an incomplete global file: its first page is written last.
+// True if `file` may be an incomplete global file. The first page of a global file is written last.
 bool is_partial_global_file(const ReadableFile& file);
 
 class GlobalFileWriter {

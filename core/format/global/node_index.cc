@@ -8,7 +8,8 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMaxNodeWords = 17;
-// Words that look like nodes by chance never form a chain of this length.
+// A chain of this many nodes is taken as real: words that look like nodes by chance never form such
+// a long chain.
 constexpr int kConvincingNodes = 32;
 
 }  // namespace

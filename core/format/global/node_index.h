@@ -1,7 +1,7 @@
-// Finds where the nodes of a level of the global file begin. Nodes vary in size, so this requires a
-// walk over the level from its first word. The level is cut into spans for several threads. Each
-// span but the first is walked from a word that looks like the beginning of a node. If the previous
-// span does not end there, the span is walked again.
+// Finds the word offsets at which the nodes of a level of the global file begin. Nodes vary in
+// size, so this requires a walk over the level from its first word. The level is cut into spans for
+// several threads. Each span but the first is walked from a word that looks like the beginning of a
+// node. If the previous span does not end there, the span is walked again.
 #pragma once
 
 #include <algorithm>
@@ -59,7 +59,8 @@ class NodeIndex {
       for (uint64_t bits = starts_[i]; bits != 0; bits &= bits - 1)
         visit(index++, i * 64 + static_cast<uint64_t>(std::countr_zero(bits)));
   }
-  // Returns where the last node before the span begins. The span must not be the first.
+  // Returns the word offset of the last node that begins before the span. The span must not be the
+  // first.
   uint64_t last_before(uint64_t span) const;
 
  private:

@@ -54,7 +54,8 @@ static_assert(std::ranges::all_of(kAttributeTable, [](const AttributeTraits& row
          voxdag_reader::kKindBlockBytes[kind] == traits_of(row.encoding).block_bytes;
 }));
 
-// Returns the section of an attribute; one without tiers if the file has none.
+// Returns the section of an attribute. If the file does not have the attribute, the section has no
+// tiers.
 inline const voxdag_reader::ColorSection& section_of(const voxdag_reader::File& file,
                                                      Attribute attribute) {
   return file.section(static_cast<uint32_t>(attribute));
@@ -92,8 +93,9 @@ void put_value(Attribute attribute, const voxdag_reader::ColorRegion& region, ui
   }
 }
 
-// Two steps: maps the file's bytes, and opens the file in them. A caller that watches the mapping
-// for unreadable pages (WatchedMapping) starts watching between the two.
+// map_global_file() maps the file's bytes, and open_global_bytes() opens the file in them. A caller
+// that watches the mapping for unreadable pages (WatchedMapping) starts watching between the two
+// calls.
 inline std::shared_ptr<const voxdag_reader::Bytes> map_global_file(const std::string& path) {
   system_files().open_read(path);  // refuses a folder or a pipe like every other input
   return with_reader_errors([&] {

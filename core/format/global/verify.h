@@ -25,7 +25,8 @@
 namespace voxdag {
 
 // Throws Error{kCorrupt} with the problem, the place and the expectation. Works on up to `threads`
-// threads. Levels of more than `narrow_words` words must be wide, and only those.
+// threads. A level must be wide if it has more than `narrow_words` words, and must not be wide
+// otherwise.
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
                         Progress& progress, const CancelToken& cancel,
                         uint64_t narrow_words = global_layout::kNarrowLevelWords);

@@ -1,6 +1,6 @@
 // Checks the sections of colors and of other attributes of a global file whose levels are valid:
 //
-//   1. Its tiers, sizes and counts fit together; padding and reserved fields are 0.
+//   1. The tiers, sizes and counts of a section agree; padding and reserved fields are 0.
 //   2. Each tier has exactly the regions where the DAG has set cells, in Morton order, and each
 //      region has exactly the counts and prefixes of the DAG's cells.
 //   3. Each block of colors has the canonical form of its mode: the larger end first, 0 for missing

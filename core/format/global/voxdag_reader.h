@@ -61,7 +61,7 @@ struct Node {
   const uint32_t* child_words = nullptr;
   bool wide = false;
 
-  // Word offset of the n-th child that the node has, in child order.
+  // Returns the word offset of the node's n-th existing child, in child order.
   uint64_t child(int n) const {
     return wide ? child_words[2 * n] | static_cast<uint64_t>(child_words[2 * n + 1]) << 32
                 : child_words[n];
@@ -133,7 +133,7 @@ class Bytes {
     return static_cast<const unsigned char*>(map_ ? map_ : copy_.data());
   }
   uint64_t size() const { return size_; }
-  // The pages of a mapping leave memory until they are used again.
+  // Drops the resident pages of a mapping. They are loaded again when they are used.
   void release_pages() const {
     if (map_) madvise(map_, size_, MADV_DONTNEED);
   }
@@ -167,12 +167,12 @@ class Bytes {
 
 class File {
  public:
-  // Throws Error if the file cannot be read, is no global file, has an unsupported version or a
-  // damaged header.
+  // Throws Error if the file cannot be read, is not a global file, has an unsupported version, or
+  // has a damaged header.
   explicit File(const std::string& path, Access access = Access::kMap)
       : File(path, std::make_shared<const Bytes>(path, access)) {}
-  // The same for already loaded bytes, for programs that prepare the mapping before they read it.
-  // `path` is for messages.
+  // Opens a file whose bytes are already loaded, for programs that prepare the mapping before they
+  // read it. `path` is for messages.
   File(const std::string& path, std::shared_ptr<const Bytes> bytes)
       : path_(path), bytes_(std::move(bytes)) {
     read_header();
@@ -208,15 +208,15 @@ class File {
   // bytes between the header page (4096 bytes) and the table.
   uint64_t checksum_table_offset() const { return table_offset_; }
 
-  // The mask of the 64 voxels of the brick at word `offset` of level brick_level(). Throws Error if
-  // the offset is outside the level.
+  // Returns the mask of the 64 voxels of the brick at word `offset` of level brick_level(). Throws
+  // Error if the offset is outside the level.
   uint64_t brick(uint64_t offset) const {
     const Level& bricks = levels_[brick_level()];
     if (bricks.word_count < 2 || offset > bricks.word_count - 2) outside(brick_level(), offset);
     return bricks.words[offset] | static_cast<uint64_t>(bricks.words[offset + 1]) << 32;
   }
-  // The node at word `offset` of level `l`, which is above the bricks. Throws Error if no node can
-  // begin there.
+  // Returns the node at word `offset` of level `l`. The level must be above the bricks. Throws
+  // Error if no node can begin there.
   Node node(uint32_t l, uint64_t offset) const {
     const Level& nodes = levels_[l];
     if (offset >= nodes.word_count) outside(l, offset);
@@ -227,11 +227,12 @@ class File {
       outside(l, offset);
     return {mask, nodes.words + offset + 1, wide};
   }
-  // Word offset of child `index` (0 to 7) in the next level; the child mask must have it.
+  // Returns the word offset of child `index` (0 to 7) in the next level. The child must exist.
   static uint64_t child(const Node& node, int index) {
     return node.child(count_bits(node.child_mask & ((1u << index) - 1)));
   }
-  // The bit of a voxel in the mask of its brick; only the two low bits of each coordinate count.
+  // Returns the bit of a voxel in the mask of its brick; only the two low bits of each coordinate
+  // count.
   static int brick_bit(int64_t x, int64_t y, int64_t z) {
     return static_cast<int>((x & 2) << 4 | (y & 2) << 3 | (z & 2) << 2 | (x & 1) << 2 |
                             (y & 1) << 1 | (z & 1));
@@ -262,14 +263,15 @@ class File {
   const ColorSection& alphas() const { return section(kAlphas); }
   const ColorSection& normals() const { return section(kNormals); }
   const ColorSection& materials() const { return section(kMaterials); }
-  // The color of a cell of level `level`, 0 to grid_levels(), which has 2^level cells along each
-  // axis. If the level is finer than color_levels(), it is the color of the cell's ancestor of that
-  // level. None if the cell is not set or the file has no colors. A ColorCursor is faster if many
-  // cells are near each other.
+  // Returns the color of a cell of level `level`, 0 to grid_levels(). A level has 2^level cells
+  // along each axis. For a level finer than color_levels(), returns the color of the cell's
+  // ancestor at level color_levels(). Returns nullopt if the cell is not set or the file has no
+  // colors. A ColorCursor is faster for many cells that are near each other.
   std::optional<Rgb> color(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     return BasicColorCursor<File>(*this).color(x, y, z, level);
   }
-  // The other attributes, for the same cells. Alpha is 0 to 255, linear.
+  // alpha(), material() and normal() return the other attributes in the same way as color(). Alpha
+  // is 0 to 255, linear.
   std::optional<unsigned char> alpha(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     const auto value = BasicColorCursor<File>(*this, alphas()).value(x, y, z, level);
     return value ? std::optional(static_cast<unsigned char>(*value)) : std::nullopt;
@@ -285,7 +287,7 @@ class File {
     return index;
   }
   const std::vector<std::string>& material_names() const { return materials().names(); }
-  // Throws Error: the colors, or other attributes, do not fit the DAG.
+  // Throws the Error for colors, or other attributes, that do not fit the DAG.
   [[noreturn]] void broken_colors(const std::string& what) const { corrupt("colors: " + what); }
 
   // Walks the octree depth first, children in child order, and calls

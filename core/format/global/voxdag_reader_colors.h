@@ -5,8 +5,8 @@
 // All set cells of the levels from 0 to the finest level of a section have a color, or another
 // value. The values are stored by regions of up to 64^3 cells of a tier's finest level: first for
 // the region's cells of that level in Morton order, then for the next coarser level, and so on. The
-// position of a cell's value follows from the cell's rank: the number of set cells of its level
-// before it in the region. The DAG determines this rank.
+// position of a cell's value follows from the cell's rank: the number of set cells of the same
+// level that come before the cell in the region. The DAG determines this rank.
 #pragma once
 
 #include <algorithm>
@@ -64,7 +64,7 @@ inline Normal octahedral_normal(const unsigned char* bytes) {
           static_cast<float>(z * scale)};
 }
 
-// The color of cell `i`, 0 to 31, in a block of 16 bytes. Any bytes are valid colors.
+// Returns the color of cell `i`, 0 to 31, in a block of 16 bytes. Any bytes are valid colors.
 inline Rgb block_color(const unsigned char* block, unsigned i) {
   const auto u16 = [&](unsigned at) {
     return static_cast<unsigned>(block[at] | block[at + 1] << 8);
@@ -94,7 +94,8 @@ inline int count_set_bits(uint64_t x) {
   return static_cast<int>(((x + (x >> 4)) & 0x0f0f0f0f0f0f0f0fu) * 0x0101010101010101u >> 56);
 }
 
-// Bits x, y and z interleaved, x highest: the order of the cells of a level. 21 bits each.
+// Returns the bits of x, y and z interleaved, x highest: the order of the cells of a level. Uses 21
+// bits of each coordinate.
 inline uint64_t morton_code(int64_t x, int64_t y, int64_t z) {
   const auto spread = [](int64_t coordinate) {
     uint64_t v = static_cast<uint64_t>(coordinate) & 0x1fffff;
@@ -107,8 +108,8 @@ inline uint64_t morton_code(int64_t x, int64_t y, int64_t z) {
   return spread(x) << 2 | spread(y) << 1 | spread(z);
 }
 
-// The levels finest_level, finest_level - 1, ... region_level. Its regions are cells of
-// region_level. The pointers point into memory of the File.
+// A tier: the levels finest_level, finest_level - 1, ... region_level. The regions of the tier are
+// cells of region_level. The pointers point into memory of the File.
 struct ColorTier {
   const unsigned char* data = nullptr;  // of its regions
   uint64_t units = 0;                   // of 16 bytes
@@ -119,7 +120,7 @@ struct ColorTier {
   uint32_t block_bytes = 16;  // for 32 cells
 };
 
-// The colors, or other values, of a region. They belong to the File.
+// The colors, or other values, of a region. Their memory belongs to the File.
 struct ColorRegion {
   uint64_t morton = 0;      // among the cubes of the tier's region level
   uint64_t first_unit = 0;  // of its data
@@ -129,7 +130,8 @@ struct ColorRegion {
   const unsigned char* blocks = nullptr;
   uint32_t block_bytes = 16;
 
-  // Alpha, a material or the code of a normal, the `i`-th of all cells; not for colors.
+  // Returns the value of the `i`-th of all cells: alpha, a material or the code of a normal. Not
+  // for colors.
   uint32_t value(uint64_t i) const {
     const uint32_t bytes = block_bytes / 32;
     uint32_t value = 0;
@@ -140,8 +142,9 @@ struct ColorRegion {
   // The color of the `i`-th of all cells; below `cells`.
   Rgb color(uint64_t i) const { return block_color(blocks + i / 32 * 16, unsigned(i % 32)); }
   // Table 0 is for the cells of the finest level, table 1 for the cells of the next coarser level.
-  // An entry is for an ancestor four levels above these cells, in order: the number of cells that
-  // come before the cells below this ancestor.
+  // A table has one entry for each ancestor four levels above these cells, in order. The entry is
+  // the number of cells that come before the cells below this ancestor. prefix_count() returns the
+  // number of entries of a table.
   uint64_t prefix_count(uint32_t table) const {
     return table + 5 < level_count ? counts[table + 4] : 0;
   }
@@ -157,15 +160,16 @@ struct ColorRegion {
   }
 };
 
-// The kinds of attribute sections, and the bytes that 32 values take in each. 0 means that the
-// values are indexes in a list of names, whose length determines their width.
+// The kinds of attribute sections, and the bytes that 32 values take in a section of each kind. 0
+// bytes means that the values are indexes in a list of names; the length of the list determines the
+// width of the values.
 enum Kind : uint32_t { kColors = 1, kAlphas, kNormals, kMaterials, kEndOfKinds };
 constexpr uint32_t kKindBlockBytes[kEndOfKinds] = {0, 16, 32, 64, 0};
 
 // The colors of a file, or another attribute of its cells.
 class ColorSection {
  public:
-  // Opens the section of a known kind. Returns the error, or null.
+  // Opens the section of a known kind. Returns an error message, or null if there is no error.
   const char* open(const unsigned char* section, uint64_t bytes, uint32_t color_levels,
                    uint32_t kind = kColors, uint32_t block_bytes = 16) {
     const bool has_names = kKindBlockBytes[kind] == 0;
@@ -208,7 +212,8 @@ class ColorSection {
   // The tier that has level `l`, 0 to color_levels().
   const ColorTier& tier_of(uint32_t l) const { return tiers_[(color_levels_ - l) / 7]; }
 
-  // The i-th region of a tier, which owns all bytes that it names. False if the entry is damaged.
+  // Sets `region` to the i-th region of a tier. All bytes of the region are then inside the tier.
+  // Returns false if the directory entry is damaged.
   static bool region(const ColorTier& tier, uint64_t i, ColorRegion& region) {
     const unsigned char* const entry = tier.directory + 32 * i;
     region.morton = get<uint64_t>(entry);
@@ -230,7 +235,8 @@ class ColorSection {
     region.blocks = tier.data + 16 * region.first_unit;
     return true;
   }
-  // Index of the first region that is not before `morton`, or region_count.
+  // Returns the index of the first region that is not before `morton`; region_count if there is
+  // none.
   static uint64_t lower_bound(const ColorTier& tier, uint64_t morton) {
     uint64_t low = 0, high = tier.region_count;
     while (low < high) {
@@ -282,7 +288,7 @@ template <class Dag>
 class BasicColorCursor {
  public:
   explicit BasicColorCursor(const Dag& dag) : BasicColorCursor(dag, dag.colors()) {}
-  // For a lookup with find() in another section, such as dag.normals().
+  // Creates a cursor for lookups with find() in another section, such as dag.normals().
   BasicColorCursor(const Dag& dag, const ColorSection& section) : dag_(&dag), section_(&section) {
     path_[0] = 0;
   }
@@ -304,8 +310,9 @@ class BasicColorCursor {
     const ColorRegion* const region = find(x, y, z, level, i);
     return region ? std::optional(region->normal(i)) : std::nullopt;
   }
-  // The place of a value: cell `i` of a region. The region is valid until the next call, and null
-  // if the cell is not set or has no value.
+  // Finds the place of a value: returns its region, and sets `i` to the number of the cell in the
+  // region. The region is valid until the next call. Returns null if the cell is not set or has no
+  // value.
   const ColorRegion* find(int64_t x, int64_t y, int64_t z, uint32_t level, uint64_t& i) {
     if (section_->tier_count() == 0 || level > dag_->grid_levels()) return nullptr;
     const int64_t edge = int64_t{1} << level;
@@ -334,7 +341,8 @@ class BasicColorCursor {
     if (level < brick_level()) return Dag::child(dag_->node(level, place), static_cast<int>(index));
     return level == brick_level() ? dag_->brick(place) >> 8 * index & 255 : 0;
   }
-  // Set cells of level `target` in the cube at `place`, or in its first children only.
+  // Returns the number of set cells of level `target` in the cube at `place`, counting only its
+  // first `children` children.
   uint64_t count(uint32_t level, uint64_t place, uint32_t target, unsigned children = 8) const {
     if (level == target) return 1;
     const uint32_t there = mask(level, place) & ((1u << children) - 1);
@@ -349,7 +357,8 @@ class BasicColorCursor {
   unsigned step(uint32_t level) const {  // the child of path_[level] that the path goes to
     return static_cast<unsigned>(path_code_ >> 3 * (depth_ - level - 1) & 7);
   }
-  // Set cells of level `target` that are before path_[to] in the cube path_[from].
+  // Returns the number of set cells of level `target` in the cube path_[from] that come before
+  // path_[to].
   uint64_t count_before(uint32_t from, uint32_t to, uint32_t target) const {
     uint64_t cells = 0;
     for (uint32_t level = from; level < to; ++level)

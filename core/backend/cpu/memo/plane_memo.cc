@@ -10,11 +10,12 @@ namespace {
 
 constexpr int64_t kSmallNormal = 64;       // sum of magnitudes
 constexpr uint64_t kMinPlaneSlots = 1024;  // slots; a power of two
-// More slots than are used before the next reserve_small_nodes().
+// An upper bound of the slots that are filled before the next reserve_small_nodes().
 constexpr uint64_t kSpareSlots = 64;
 constexpr uint32_t kMaxPlanes = 1 << 20;
 
-// All inputs of small_node(): 24 + 1 + 5 + 28 bits, and one more so that no key is 0.
+// Packs all inputs of small_node() into a key: 24 + 1 + 5 + 28 bits, and one more bit so that no
+// key is 0.
 uint64_t small_key(const Plane& plane, int64_t f, int size_log2) {
   uint64_t key = 1;
   for (const int64_t x : plane.n) key = key << 8 | static_cast<uint64_t>(x + kSmallNormal);

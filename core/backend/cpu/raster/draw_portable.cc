@@ -21,7 +21,8 @@ constexpr uint64_t line_along(int axis) {
          uint64_t{1} << (low_bit(axis) + high_bit(axis));
 }
 
-// The differences between the plane's value at the 64 voxels of a brick and at its first voxel.
+// For each of the 64 voxels of a brick: the plane's value there minus its value at the brick's
+// first voxel.
 template <class Int>
 struct VoxelOffsets {
   Int of[64];

@@ -33,8 +33,8 @@ inline constexpr ByteOrder<D> kByteOrder;
 template <int D>
 class Spread {
  public:
-  // The half of a column is the high bit of its q. For D = 1 this bit selects the vector of its
-  // voxels, otherwise the half of a vector.
+  // The high bit of a column's q tells which half of `bounds` has the column. For D = 1 this bit
+  // selects the vector of the column's voxels, otherwise the half of a vector.
   VOXDAG_INLINE explicit Spread(HeightBounds bounds) {
     const __m256i halves[2] = {D == 1 ? _mm256_permute4x64_epi64(bounds, 0x44) : bounds,
                                D == 1 ? _mm256_permute4x64_epi64(bounds, 0xee) : bounds};

@@ -54,7 +54,8 @@ int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbe
   return list_blocks_with(tile, groups, existing, numbers, keys, summarize);
 }
 
-// Lanes of a set of four bricks without gaps, in halves of 32 bits, indexed by the set.
+// For each subset of four bricks: the 32-bit lanes that move the bricks of the subset to the front
+// without gaps.
 struct Packing {
   alignas(32) int32_t lanes[16][8] = {};
   constexpr Packing() {
