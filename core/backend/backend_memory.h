@@ -14,11 +14,11 @@
 namespace voxdag {
 
 struct BackendMemory : ConsingMemory {
-  // Each table of the plane memo.
+  // Maximum size of each table of the plane memo.
   static constexpr uint64_t plane_table_bytes(uint64_t budget_bytes, uint64_t free_bytes) {
     return std::min(budget_bytes / 16, free_bytes / 8);
   }
-  // The block memo.
+  // Maximum size of the block memo.
   static constexpr uint64_t block_memo_bytes(uint64_t free_bytes) { return free_bytes / 16; }
 };
 

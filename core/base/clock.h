@@ -16,11 +16,11 @@ inline double clock_seconds(clockid_t clock) {
   clock_gettime(clock, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
-// Seconds since an arbitrary start; never goes back.
+// Returns the seconds since an arbitrary start. The time never goes back.
 inline double wall_seconds() { return clock_seconds(CLOCK_MONOTONIC); }
-// Seconds since 1970-01-01 UTC.
+// Returns the seconds since 1970-01-01 UTC.
 inline double unix_seconds() { return clock_seconds(CLOCK_REALTIME); }
-// User and system time of all threads of this process.
+// Returns the user and system time of all threads of this process, in seconds.
 inline double process_cpu_seconds() { return clock_seconds(CLOCK_PROCESS_CPUTIME_ID); }
 inline double thread_cpu_seconds() { return clock_seconds(CLOCK_THREAD_CPUTIME_ID); }
 

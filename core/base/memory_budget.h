@@ -31,7 +31,7 @@ class MemoryBudget {
   // Bytes that can be charged now. The parents' limits are considered.
   uint64_t available() const;
 
-  // Returns false and charges nothing if it does not fit.
+  // Charges `bytes`. Returns false and charges nothing if they do not fit.
   bool try_charge(uint64_t bytes);
   // Throws Error{kOutOfMemory} with `what` if it does not fit.
   void charge(uint64_t bytes, std::string_view what);

@@ -17,7 +17,7 @@ struct Popcount8Table {
 inline constexpr Popcount8Table kPopcount8Table;
 inline constexpr const uint8_t (&kPopcount8)[256] = kPopcount8Table.of;
 
-// Number of ones in the lowest eight bits.
+// Returns the number of ones in the lowest eight bits.
 inline int popcount8(uint32_t bits) { return kPopcount8[bits & 0xff]; }
 
 }  // namespace voxdag

@@ -47,7 +47,7 @@ class Progress {
   // Reports a total that became known or has changed, for example because a subvolume was split.
   virtual void set_total(uint64_t total) = 0;
   virtual void end_stage() = 0;
-  // A warning that a user should read, one sentence.
+  // Reports a warning that a user should read: one sentence.
   virtual void warn(std::string_view message) = 0;
 
   // The position of the grid in the scene. Called before set_subvolumes().
@@ -66,7 +66,7 @@ class Progress {
   virtual void set_cluster_tasks(const ClusterTasks& /*tasks*/) {}
 };
 
-// Ignores everything.
+// Ignores all reports.
 class NoProgress : public Progress {
  public:
   void begin_stage(std::string_view, uint64_t, std::string_view) override {}

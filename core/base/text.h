@@ -18,11 +18,11 @@ namespace voxdag {
 // Parses a size: "512MiB", "8GiB", "64M" (binary), "1000000". Returns bytes. Throws
 // Error{kInvalidInput} with `option` unless the text is a number with an optional unit.
 uint64_t parse_size(const std::string& text, const std::string& option);
-// "1.25 GiB"
+// Returns a size as text: "1.25 GiB".
 std::string size_text(uint64_t bytes);
-// "2 567 687 158"
+// Returns a count as text: "2 567 687 158".
 std::string count_text(uint64_t count);
-// "1 m 04 s", "12.3 s"
+// Returns a duration as text: "1 m 04 s" or "12.3 s".
 std::string duration_text(double seconds);
 
 // Returns the shortest text that reads back as the same number, in any locale.
@@ -31,7 +31,7 @@ std::string number_text(double number);
 // Formats a Unix time in UTC, with a format of strftime().
 std::string utc_text(time_t time, const char* format);
 
-// Two lower-case hexadecimal digits per byte.
+// Returns bytes as text, with two lower-case hexadecimal digits per byte.
 std::string hex_text(std::span<const unsigned char> bytes);
 // Decodes a percent-encoded text (RFC 3986); nullopt if an escape is broken.
 std::optional<std::string> percent_decoded(std::string_view text);

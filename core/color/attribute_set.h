@@ -37,7 +37,7 @@ class AttributeSet {
     return rest;
   }
   constexpr bool any() const { return *this != AttributeSet(); }
-  // True if any of them depends on the scene's textures.
+  // True if any attribute of the set depends on the scene's textures.
   constexpr bool use_images() const { return any_row(&AttributeTraits::uses_images); }
   // True if the values of any attribute of the set are indexes of a list of names.
   constexpr bool have_names() const { return any_row(&AttributeTraits::has_names); }

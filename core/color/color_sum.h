@@ -14,9 +14,9 @@ namespace voxdag {
 // Sums of weights and of weighted intensities. Intensities are linear with 16 bits; alpha has 8
 // bits.
 struct ColorSum {
-  std::array<uint64_t, 3> seen{};   // of weight x alpha x intensity: red, green, blue
-  uint64_t seen_weight = 0;         // of weight x alpha
-  std::array<uint64_t, 3> plain{};  // of weight x intensity; used if all alpha values are 0
+  std::array<uint64_t, 3> seen{};   // sums of weight x alpha x intensity: red, green, blue
+  uint64_t seen_weight = 0;         // sum of weight x alpha
+  std::array<uint64_t, 3> plain{};  // sums of weight x intensity; used if all alpha values are 0
   uint64_t weight = 0;
 
   VOXDAG_HD void add(const ColorSum& other) {

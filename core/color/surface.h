@@ -26,7 +26,7 @@ struct SurfaceCorner {
   std::array<uint16_t, 4> color{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
 };
 
-// A triangle in world space with its look.
+// A triangle in world space with its appearance.
 struct SurfaceTriangle {
   WorldTriangle position;
   std::array<SurfaceCorner, 3> corners;
@@ -36,7 +36,7 @@ struct SurfaceTriangle {
   bool is_flipped = false;
 };
 
-// The same, snapped to the lattice of the grid.
+// A SurfaceTriangle snapped to the lattice of the grid.
 struct FixedSurface {
   FixedTriangle position;
   std::array<SurfaceCorner, 3> corners;

@@ -36,7 +36,7 @@ VOXDAG_HD inline int compare_children(const uint32_t* a, const uint32_t* b, int 
   return 0;
 }
 
-// The total order of nodes: < 0, 0 (the same node) or > 0.
+// Compares two nodes in the total order. Returns a number < 0, 0 (the same node) or > 0.
 VOXDAG_HD inline int compare_nodes(uint64_t hash_a, uint32_t mask_a, const uint32_t* children_a,
                                    uint64_t hash_b, uint32_t mask_b, const uint32_t* children_b) {
   if (hash_a != hash_b) return hash_a < hash_b ? -1 : 1;

@@ -31,7 +31,7 @@ class SqlStatement {
     return bind(parameter, static_cast<int64_t>(word));
   }
 
-  // True if there is a row to read.
+  // Advances to the next row. Returns true if there is a row to read.
   bool step();
   // Runs a statement that returns no rows. Afterwards it can be bound again.
   void run();

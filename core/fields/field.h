@@ -61,7 +61,7 @@ struct Field {
   bool accepts_unset = false;  // 0 or an empty text on the command line means "not given"
   bool is_required = false;
   bool is_positional = false;     // positional on the command line
-  bool is_left_if_empty = false;  // JSON leaves the member out if it is empty
+  bool is_left_if_empty = false;  // JSON omits the member if it is empty
   // True if geometry_json() contains the field. If not set, geometry_json() contains the field only
   // if its value differs from the default.
   std::optional<bool> in_key;

@@ -44,7 +44,7 @@ class ByteSource {
     if (!field.empty()) std::memcpy(&value, field.data(), sizeof(T));
     return value;
   }
-  // Returns the next `count` bytes; none if there are fewer.
+  // Returns the next `count` bytes; an empty span if fewer bytes are left.
   std::span<const std::byte> take(size_t count) {
     if (count > bytes_.size()) {
       ok_ = false;

@@ -27,7 +27,7 @@ struct Checksum128 {
 };
 Checksum128 checksum128(std::span<const std::byte> bytes);
 
-// A running XXH64.
+// Computes XXH64 over bytes that are added in parts.
 class Checksum64 {
  public:
   Checksum64();
@@ -35,7 +35,7 @@ class Checksum64 {
   Checksum64& operator=(Checksum64&&) noexcept;
   ~Checksum64();
   void add(std::span<const std::byte> bytes);
-  // The checksum of all bytes added so far.
+  // Returns the checksum of all bytes added so far.
   uint64_t value() const;
   // Forgets all bytes that were added.
   void reset();
@@ -50,7 +50,7 @@ class Checksum64 {
 // words is the sum of the parts' checksums. `first` is the index of words[0].
 uint64_t indexed_checksum(uint64_t first, std::span<const uint32_t> words);
 
-// A running SHA-256.
+// Computes SHA-256 over bytes that are added in parts.
 class Sha256 {
  public:
   Sha256();
@@ -63,7 +63,7 @@ class Sha256 {
   struct Context;
   std::unique_ptr<Context> context_;
 };
-// The SHA-256 of a text: 64 lower-case hex digits.
+// Returns the SHA-256 of a text as 64 lower-case hex digits.
 std::string sha256_hex(std::string_view text);
 // Returns the SHA-256 of a file, reading it once from beginning to end. Advances `progress` by its
 // bytes.

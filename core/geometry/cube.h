@@ -35,7 +35,7 @@ struct Cube {
   VOXDAG_HD int child_index() const {
     return static_cast<int>(4 * (position[0] & 1) + 2 * (position[1] & 1) + (position[2] & 1));
   }
-  // Edge in voxels on a grid of 2^grid_levels.
+  // Returns the edge in voxels, on a grid of 2^grid_levels voxels per edge.
   VOXDAG_HD int64_t edge_voxels(uint32_t grid_levels) const {
     return int64_t{1} << (grid_levels - level);
   }

@@ -27,7 +27,7 @@ struct WorldBounds {
 struct RealTriangle {
   double v[3][3];
 };
-// In world space.
+// A triangle in world space.
 using WorldTriangle = RealTriangle;
 // A triangle on the lattice of a grid. Its coordinates are odd integers of any magnitude.
 using SnappedTriangle = RealTriangle;
@@ -62,7 +62,7 @@ enum class SnapResult {
 
 // Snaps vertices, three coordinates each, in place. NaN remains NaN.
 void snap_vertices(const Grid& grid, std::span<double> coordinates);
-// Sets `out` only if it returns kInside.
+// Converts a snapped triangle to integers. Sets `out` only if the result is kInside.
 SnapResult to_fixed(const Grid& grid, const SnappedTriangle& snapped, FixedTriangle& out);
 // Snaps a triangle with finite vertices and converts it with to_fixed().
 SnapResult snap_triangle(const Grid& grid, const WorldTriangle& world, FixedTriangle& out);

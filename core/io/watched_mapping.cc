@@ -10,7 +10,7 @@
 namespace voxdag {
 namespace {
 
-// The signal handler reads it and must not take a lock.
+// A watched mapping. The signal handler reads slots, and must not take a lock.
 struct Slot {
   std::atomic<bool> taken{false};
   std::atomic<uintptr_t> begin{0}, end{0};  // while they change, no address is inside

@@ -41,7 +41,7 @@ struct BuildOptions {
   std::vector<std::string> scenes;
   std::optional<Mesh> mesh;
 
-  // Options of geometry.
+  // Geometry options.
   uint64_t resolution = 0;  // voxels per edge of the grid, a power of two from 4 to 2^20
   // The cube of the grid, in the units of the scene: its low corner, and its edge. At most one of
   // `bounds` and `voxel_size` can be given; without both, the cube encloses the scene.
@@ -62,7 +62,7 @@ struct BuildOptions {
   bool keep_work = false;    // keep the work folder after success
   bool restart = false;      // discard the job in the work folder and start over
   bool force = false;        // build although the estimate predicts a lack of memory or disk space
-  std::string cache_folder;  // folder for subvolumes shared between builds; "": none
+  std::string cache_folder;  // folder for subvolumes shared between builds; "": no cache
   uint64_t cache_bytes = uint64_t{16} << 30;
 
   // Resources. Resident memory, without `mesh`, exceeds memory_bytes by at most 64 MiB.
@@ -76,7 +76,7 @@ struct BuildOptions {
 // The state of a running build.
 struct BuildProgress {
   std::string_view stage;  // "ingest", "build", "merge", ...
-  std::string_view unit;   // counted by done and total: "triangles", "subvolumes", ...
+  std::string_view unit;   // the unit of done and total: "triangles", "subvolumes", ...
   uint64_t done = 0;
   uint64_t total = 0;  // 0 while unknown
 };
@@ -92,7 +92,7 @@ struct BuildHooks {
 
 struct BuildResult {
   std::string output;
-  std::string sha256;  // of the output, in hexadecimal digits
+  std::string sha256;  // SHA-256 of the output, in hexadecimal digits
   uint64_t bytes = 0;  // size of the output
   uint32_t grid_levels = 0;
   std::array<double, 3> origin{};  // the low corner of the grid, in the units of the scene
@@ -103,9 +103,9 @@ struct BuildResult {
   uint64_t voxels = 0;
   uint64_t dag_nodes = 0;
   uint64_t subvolumes = 0;
-  uint64_t subvolumes_reused = 0;  // taken from an interrupted run or from the cache
+  uint64_t subvolumes_reused = 0;  // subvolumes from an interrupted run or the cache
   double wall_s = 0, cpu_s = 0;
-  uint64_t peak_memory_bytes = 0;  // resident memory of the complete process
+  uint64_t peak_memory_bytes = 0;  // peak resident memory of the complete process
   std::string json;                // the complete report, as `voxdag build --json` prints it
 };
 
@@ -126,7 +126,7 @@ struct BuildPlan {
   EstimateRange disk_bytes;    // output and work folder at their peak
   EstimateRange memory_bytes;  // peak resident memory
   EstimateRange cpu_s, wall_s;
-  uint64_t free_disk = 0;    // on the disk of the work folder; 0 if unknown
+  uint64_t free_disk = 0;    // free bytes on the disk of the work folder; 0 if unknown
   uint64_t free_memory = 0;  // the build's memory limit
   std::string json;          // the complete estimate, as `voxdag plan --json` prints it
 };

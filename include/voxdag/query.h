@@ -63,7 +63,7 @@ struct RayHit {
 
 struct Nearest {
   Position cell{};
-  uint64_t squared_distance = 0;  // between the centers of the cells, in cells
+  uint64_t squared_distance = 0;  // squared distance between cell centers, in cells
   bool found = false;
 };
 
@@ -84,7 +84,7 @@ class DagFile {
   DagFile(DagFile&&) noexcept;
   DagFile& operator=(DagFile&&) noexcept;
 
-  // The file has 2^grid_levels() voxels per edge.
+  // The grid of the file has 2^grid_levels() voxels per edge.
   uint32_t grid_levels() const;
   int64_t resolution() const { return int64_t{1} << grid_levels(); }
   // The low corner of the grid and the length of its edge, in the units of the scene.

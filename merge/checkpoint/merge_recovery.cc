@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// Releasing fewer bytes per call is not worth the call.
+// Minimum number of bytes per call of release(). Fewer bytes are not worth a call.
 constexpr uint64_t kMinReleasedBytes = uint64_t{32} << 10;
 
 }  // namespace

@@ -13,7 +13,7 @@ constexpr uint32_t kMaxEncodedWords = 1 + kMaxRowWords;  // a row in the scratch
 // The rows of the group in one run.
 struct GroupRun {
   size_t run = 0;
-  uint64_t first_row = 0;  // in the run
+  uint64_t first_row = 0;  // first row of the group in the run
   uint64_t rows = 0;
   uint64_t begin_word = 0, end_word = 0;  // in the scratch file
 };

@@ -33,7 +33,7 @@ class OrderedRowWriter {
   void flush();
 
   uint64_t nodes() const { return nodes_; }
-  // The position of the next new row.
+  // Returns the position of the next new row.
   uint64_t end_position() const { return flushed_ + buffered_positions(); }
   static uint64_t bytes() { return MergedRows::bytes_for(kBuffered); }
 

@@ -95,7 +95,7 @@ class HashPartition {
   void load(const PositionMaps* child_maps, const PartitionWorkers& workers, MemoryBudget& budget,
             const CancelToken& cancel);
 
-  // Row format, the same for all runs.
+  // Returns the row format. It is the same for all runs.
   const RowFormat& format() const { return runs_[0]->format(); }
   std::span<const RunSlice> slices() const { return slices_; }
   size_t bucket_count() const { return bucket_count_; }

@@ -40,7 +40,7 @@ class LevelRun {
   uint64_t rows_before(size_t index) const {
     return index < frames_.size() ? frames_[index].first_row : rows_;
   }
-  // Returns the number of words of these rows.
+  // Returns the number of words of the rows before frame `index`.
   uint64_t words_before(size_t index) const {
     if (format_.bricks) return kBrickWords * rows_before(index);
     return (index < frames_.size() ? frames_[index].first_child : children_) << format_.wide;

@@ -32,11 +32,11 @@ class PositionMaps {
   // True if the maps are in memory.
   bool is_resident() const { return file_ == nullptr; }
   bool wide() const { return wide_; }
-  // Number of words per position.
+  // Returns the number of words per position.
   uint32_t position_words() const { return wide_ ? 2 : 1; }
   uint64_t rows(size_t run) const { return first_[run + 1] - first_[run]; }
   std::vector<uint64_t> rows() const;
-  // Number of rows of the longest map.
+  // Returns the number of rows of the longest map.
   uint64_t max_rows() const;
   // Returns the words of a complete map. Requires is_resident().
   uint32_t* words(size_t run) { return words_.data() + first_word(run); }

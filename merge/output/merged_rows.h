@@ -15,7 +15,7 @@ namespace voxdag {
 // its low half followed by its high half. A wide child also has its low half first.
 class MergedRows {
  public:
-  // Has space for up to `max` rows.
+  // Creates a list with space for up to `max` rows.
   MergedRows(MemoryBudget& budget, const RowFormat& format, const RowCount& max)
       : format_(format),
         words_(budget, max.words + (format.bricks ? 0 : max.rows) + kMaxRowWords,

@@ -20,11 +20,11 @@ struct SurveyedArtifact {
   // Minimum memory of this artifact in a merge pass: its index, and a hash partition that can hold
   // any two neighboring frames of it.
   uint64_t min_bytes = 0;
-  uint64_t rows = 0;  // of all its levels
+  uint64_t rows = 0;  // rows of all levels of the artifact
   // Checksum of its roots and of the row counts of its levels, independent of its position in a
   // file.
   uint64_t content_checksum = 0;
-  std::vector<Cube> cubes;  // of its roots
+  std::vector<Cube> cubes;  // cubes of its roots
 };
 
 struct ArtifactSurvey {

@@ -23,10 +23,10 @@ class PendingArtifacts {
   PendingArtifacts(const PendingArtifacts&) = delete;
   PendingArtifacts& operator=(const PendingArtifacts&) = delete;
 
-  // In Morton order.
+  // Returns the pending artifacts in Morton order.
   std::span<const SurveyedArtifact> artifacts() const { return artifacts_; }
   size_t size() const { return artifacts_.size(); }
-  // Number of rows of all pending artifacts.
+  // Returns the number of rows of all pending artifacts.
   uint64_t rows() const { return rows_; }
   bool has_inputs() const;
   // Identifies the inputs by their content.
@@ -42,7 +42,7 @@ class PendingArtifacts {
 
   // Adds the segment that a pass writes next.
   PassSegment& add_segment(std::unique_ptr<PassSegment> segment);
-  // The scratch files of all segments.
+  // Returns the scratch files of all segments.
   std::vector<std::shared_ptr<ScratchPath>> segment_paths() const;
   // Call it after a pass: `merged`, all in `segment`, replace all artifacts. Returns the replaced
   // artifacts.

@@ -22,14 +22,14 @@ class BucketSorter {
   // Maximum rows of a bucket for sort().
   static constexpr uint64_t kMaxRows = uint64_t{1} << 20;
 
-  // For buckets of up to `max` rows.
+  // Creates a sorter for buckets of up to `max` rows.
   BucketSorter(MemoryBudget& budget, const RowFormat& format, const RowCount& max);
   static uint64_t bytes_for(const RowCount& max);
 
-  // Positions count words if `in_words`, else rows.
+  // Sorts a bucket. Positions count words if `in_words` is set, otherwise rows.
   void sort(const HashPartition& partition, size_t bucket, bool in_words);
 
-  // The unique rows of the bucket that was sorted last.
+  // Returns the unique rows of the bucket that was sorted last.
   const MergedRows& unique() const { return unique_; }
   // Position of every row, relative to the first position of the bucket: slice after slice, in the
   // order of each slice.

@@ -1,4 +1,4 @@
-// The inputs of a merge. A plain value.
+// The inputs of a merge.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The report of a finished merge. A plain value.
+// The report of a finished merge.
 #pragma once
 
 #include <cstdint>

@@ -23,7 +23,7 @@ namespace voxdag {
 inline constexpr uint32_t kPrefixLevels = 4;
 
 struct EncodedRegion {
-  uint64_t morton = 0;  // of the region, among cubes of the region's level
+  uint64_t morton = 0;  // code of the region among the cubes of its level
   std::array<uint32_t, kRegionLevels + 1> counts{};  // cells by level, the finest first
   std::vector<std::byte> blocks;
   // Two tables of ranks: for the finest level and for the next coarser level. A table exists if the

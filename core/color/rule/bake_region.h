@@ -39,7 +39,7 @@ namespace voxdag {
 template <class Textures>
 class RegionBaker {
  public:
-  // Upper bound of its allocations, without `cells`.
+  // Upper bound of the memory that this object allocates, without `cells`.
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
   // Maximum number of cells of a region that a triangle touches: 4 for each cell of its projection.
   static constexpr uint32_t kTriangleCells = 4u << (2 * kRegionLevels);
@@ -228,7 +228,7 @@ class RegionBaker {
     if (waiting_.size() == kMaxWaiting) add_waiting();
     waiting_.push_back({index, code});
   }
-  // Adds closest points to the cells that nothing has covered.
+  // Adds closest points to the cells in which no triangle covers a column.
   void add_waiting() {
     std::optional<color::SurfaceLook<Textures>> look;
     color::SurfaceFacing facing;

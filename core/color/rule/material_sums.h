@@ -1,5 +1,5 @@
-// The materials of the cells of a region. For each cell, the weights of the surfaces are summed by
-// material. Sums are integers and commute.
+// The materials of the cells of a region. For each cell and material, the weights of the surfaces
+// are added up. Sums are integers and commute.
 #pragma once
 
 #include <algorithm>

@@ -81,7 +81,7 @@ class TouchedCells {
     lowest_ = wrapping_sum(wrapping_sum(at_cell, t_.plane_ceil), fall_);
     correct();
   }
-  // Updates them from the previous column.
+  // Updates first_, last_, highest_ and lowest_ from the previous column.
   VOXDAG_HD void climb() {
     if (t_.degenerate) return;
     // The plane rises by at most one cell. One step without branches, which would often be

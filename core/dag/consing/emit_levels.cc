@@ -116,7 +116,7 @@ class LevelEmitter {
   const uint32_t hash_bits_;
   SubDagSink& sink_;
   PooledArray<uint32_t> brick_places_;  // indexed by brick id
-  PooledArray<uint64_t> hashes_;        // of a level's nodes; masks of the bricks
+  PooledArray<uint64_t> hashes_;        // hashes of a level's nodes; for bricks, their masks
   PooledArray<uint8_t> masks_;
   PooledArray<uint32_t> children_;
 };

@@ -54,7 +54,7 @@ struct ArtifactRoot {
 // A frame in its level.
 struct FrameInfo {
   uint64_t first_row = 0;
-  uint64_t first_child = 0;  // children of all rows before this frame, in the same level
+  uint64_t first_child = 0;  // number of children of all earlier rows of the level
   uint64_t first_hash = 0;   // truncated hash of the frame's first row
   uint64_t offset = 0;       // in the segment
   uint32_t bytes = 0;        // stored size

@@ -47,10 +47,11 @@ class FrameEncoder {
 };
 
 // Decodes `bytes`, which may be in `out.stored`, and computes the hashes of the bricks, truncated
-// to `hash_bits`. Returns nullptr or the error.
+// to `hash_bits`. Returns an error message, or nullptr if there is no error.
 const char* decode_brick_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t hash_bits,
                                Frame& out);
-// Decodes `bytes`, which may be in `out.stored`. Returns nullptr or the error.
+// Decodes `bytes`, which may be in `out.stored`. Returns an error message, or nullptr if there is
+// no error.
 const char* decode_node_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t children,
                               Frame& out);
 

@@ -30,7 +30,7 @@ class SegmentWriter {
   SegmentWriter(FileSystem& files, const std::string& folder, uint32_t id, MemoryBudget& budget);
   ~SegmentWriter();
   uint32_t id() const { return id_; }
-  // Bytes appended so far, including buffered bytes.
+  // Returns the number of bytes appended so far, including buffered bytes.
   uint64_t size() const { return written_ + buffered_; }
   // Writes the buffer to the file, so that readers see all bytes. Does not wait for the disk.
   void flush();
@@ -42,7 +42,7 @@ class SegmentWriter {
   // except sync() and sync_written(). After one failure, every later call fails, because the system
   // reports lost bytes only once.
   void sync_written();
-  // Bytes that were flushed.
+  // Returns the number of bytes that were flushed.
   uint64_t written() const { return written_; }
   // Frees the disk space left by a flush that failed because the disk was full.
   void release_unwritten();

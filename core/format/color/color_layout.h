@@ -13,11 +13,11 @@
 
 namespace voxdag::color_layout {
 
-// What the data of a region begin and end at multiples of.
+// The data of a region begin and end at multiples of this size.
 inline constexpr size_t kUnitBytes = 16;
 static_assert(kBlockBytes == kUnitBytes);
 
-// Offsets in an entry of a directory: a region.
+// Offsets in an entry of a directory. An entry describes a region.
 inline constexpr size_t kRegionMortonAt = 0;
 inline constexpr size_t kRegionFirstUnitAt = 8;
 inline constexpr size_t kRegionCountsAt = 16;  // u32, u16, u16, u16, u8, u8, u8
@@ -25,10 +25,12 @@ inline constexpr size_t kRegionReservedAt = 29;
 inline constexpr size_t kRegionEntryBytes = 32;
 
 // Offsets in an entry of the tier table.
-inline constexpr size_t kTierOffsetAt = 0;  // of its data, from the section's first byte
-inline constexpr size_t kTierUnitsAt = 8;   // of its data; its directory follows
+inline constexpr size_t kTierOffsetAt =
+    0;  // offset of the tier's data from the section's first byte
+inline constexpr size_t kTierUnitsAt =
+    8;  // size of the tier's data in units; its directory follows
 inline constexpr size_t kTierRegionsAt = 16;
-inline constexpr size_t kTierCellsAt = 24;  // of all levels
+inline constexpr size_t kTierCellsAt = 24;  // cells of all levels of the tier
 inline constexpr size_t kTierEntryBytes = 32;
 
 // Limits of the list of materials.

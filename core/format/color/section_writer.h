@@ -50,8 +50,8 @@ class SectionWriter {
 
     uint32_t finest;
     GrowingBuffer<std::byte> directory;
-    GrowingBuffer<std::byte> data;  // of its regions; tier 0 has none here
-    uint64_t last_morton = 0;       // of the last region
+    GrowingBuffer<std::byte> data;  // data of the regions; unused in tier 0
+    uint64_t last_morton = 0;       // code of the last region
     uint64_t regions = 0, units = 0, cell_count = 0, finest_cells = 0;
 
     uint32_t levels() const { return color_layout::levels_in_region(finest); }

@@ -17,7 +17,7 @@
 
 namespace voxdag {
 
-// Bytes of a file differ from the written ones.
+// Thrown if bytes of a file differ from the bytes that were written.
 class DamagedBlock : public Error {
  public:
   explicit DamagedBlock(const std::string& message) : Error(ErrorCode::kCorrupt, message) {}
@@ -59,7 +59,7 @@ class CheckedBlocks {
   void compare(uint64_t block) const;
   // The same for a block that the caller has read, and its checksum in the table.
   void compare(uint64_t block, std::span<const std::byte> bytes, uint64_t expected) const;
-  // The offset of a block in the file, and its size.
+  // Return the offset of a block in the file and the size of the block.
   uint64_t offset_of(uint64_t block) const;
   uint64_t size_of(uint64_t block) const;
 
@@ -67,8 +67,8 @@ class CheckedBlocks {
   void compare_all(uint64_t place, uint64_t bytes) const;
 
   const voxdag_reader::File& file_;
-  const unsigned char* const first_;  // of the first block
-  const uint64_t bytes_;              // of all blocks
+  const unsigned char* const first_;  // first byte of the first block
+  const uint64_t bytes_;              // size of all blocks together
   const std::unique_ptr<std::atomic<uint64_t>[]> intact_;
 };
 

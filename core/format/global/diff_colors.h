@@ -13,13 +13,13 @@ namespace voxdag {
 // Differences of channels, in sRGB bytes.
 struct ColorDiff {
   uint32_t levels = 0;            // cells of the grid of 2^levels per edge were compared
-  uint64_t cells = 0;             // that are set in both files
-  uint64_t different_cells = 0;   // whose colors differ
-  uint32_t largest = 0;           // difference
-  uint64_t sum = 0, squares = 0;  // of all differences
+  uint64_t cells = 0;             // cells that are set in both files
+  uint64_t different_cells = 0;   // cells whose colors differ
+  uint32_t largest = 0;           // largest difference
+  uint64_t sum = 0, squares = 0;  // sums of all differences and of their squares
   // Compares one more cell.
   void add(const voxdag_reader::Rgb& a, const voxdag_reader::Rgb& b);
-  // Mean difference of a channel of a cell; 0 without cells.
+  // Returns the mean difference per channel of a cell; 0 if no cells were compared.
   double mean() const;
   // The peak signal-to-noise ratio in dB; infinite if nothing differs.
   double psnr() const;

@@ -54,7 +54,7 @@ void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const 
 class BlockChecksums {
  public:
   BlockChecksums() = default;
-  // Continues after complete blocks with these checksums.
+  // Continues after complete blocks that have these checksums.
   explicit BlockChecksums(std::span<const uint64_t> whole_blocks)
       : checksums_(whole_blocks.begin(), whole_blocks.end()) {}
 

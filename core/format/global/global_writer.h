@@ -31,7 +31,7 @@ struct GlobalFileSummary {
   std::string sha256;  // 64 lower-case hex digits
 };
 
-// What the octree has that the levels do not show.
+// Totals of the octree that cannot be computed from the sizes of the levels.
 struct VoxelCounts {
   uint64_t voxels = 0;
   uint64_t svo_nodes = 0;
@@ -49,14 +49,14 @@ struct GlobalAttribute {
   uint32_t kind = 0;
   uint32_t cell_levels = 0;
   uint32_t block_bytes = 0;   // for 32 cells
-  uint64_t cells = 0;         // of all levels
-  uint64_t finest_cells = 0;  // of the finest
+  uint64_t cells = 0;         // cells of all levels
+  uint64_t finest_cells = 0;  // cells of the finest level
 };
 
 // The contents of an unfinished file, so that a later run can resume it.
 struct GlobalFileProgress {
-  std::vector<GlobalLevel> levels;  // complete ones, from the bricks upwards
-  std::vector<uint64_t> checksums;  // of their checksum blocks; the last one may be partial
+  std::vector<GlobalLevel> levels;  // complete levels, from the bricks upwards
+  std::vector<uint64_t> checksums;  // one for each checksum block; the last block may be partial
 };
 
 // True if the file begins with the magic of a global file.
@@ -102,7 +102,7 @@ class GlobalFileWriter {
   // kinds. The bytes of a section are appended in order. A run that resumes writes them again.
   void begin_section();
   void append(std::span<const std::byte> bytes);
-  uint64_t section_bytes() const;  // of the open section, so far
+  uint64_t section_bytes() const;  // bytes of the open section so far
   void end_section(const GlobalAttribute& attribute);
 
   // Writes checksums and header, syncs the file, and reads it to verify and digest it.

@@ -49,7 +49,7 @@ struct Level {
   const uint32_t* words = nullptr;
   uint64_t word_count = 0;
   uint64_t node_count = 0;   // nodes, or bricks on brick_level()
-  uint64_t file_offset = 0;  // of the first word, in bytes
+  uint64_t file_offset = 0;  // offset of the first word in the file, in bytes
   // Width of the offsets that point into this level: 32, or 64 for a large level.
   uint32_t pointer_bits = 32;
 };
@@ -68,7 +68,7 @@ struct Node {
   }
 };
 
-// The XXH64 of `size` bytes, with seed 0.
+// Returns the XXH64 of `size` bytes, with seed 0.
 inline uint64_t xxh64(const unsigned char* bytes, size_t size) {
   constexpr uint64_t p1 = 0x9e3779b185ebca87u, p2 = 0xc2b2ae3d27d4eb4fu, p3 = 0x165667b19e3779f9u,
                      p4 = 0x85ebca77c2b2ae63u, p5 = 0x27d4eb2f165667c5u;
@@ -128,7 +128,7 @@ class Bytes {
   ~Bytes() {
     if (map_) munmap(map_, size_);
   }
-  // Aligned to 8 bytes.
+  // The bytes of the file, aligned to 8 bytes.
   const unsigned char* data() const {
     return static_cast<const unsigned char*>(map_ ? map_ : copy_.data());
   }
@@ -238,7 +238,7 @@ class File {
                             (y & 1) << 1 | (z & 1));
   }
 
-  // True if a voxel is set. Voxels outside the grid are not.
+  // True if a voxel is set. Voxels outside the grid are not set.
   bool voxel(int64_t x, int64_t y, int64_t z) const {
     const int64_t r = resolution();
     if (empty() || x < 0 || y < 0 || z < 0 || x >= r || y >= r || z >= r) return false;
@@ -279,7 +279,7 @@ class File {
   std::optional<Normal> normal(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     return BasicColorCursor<File>(*this, normals()).normal(x, y, z, level);
   }
-  // An index into material_names().
+  // Returns an index into material_names().
   std::optional<uint32_t> material(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     const auto index = BasicColorCursor<File>(*this, materials()).value(x, y, z, level);
     if (index && *index >= material_names().size())

@@ -21,7 +21,7 @@
 
 namespace voxdag_reader {
 
-// What kind of error an Error is.
+// The kinds of errors.
 enum class Problem { kNotFound, kIo, kCorrupt, kUnsupportedVersion };
 
 // The only exception that the reader throws, besides std::bad_alloc. Its message names the file.
@@ -111,22 +111,22 @@ inline uint64_t morton_code(int64_t x, int64_t y, int64_t z) {
 // A tier: the levels finest_level, finest_level - 1, ... region_level. The regions of the tier are
 // cells of region_level. The pointers point into memory of the File.
 struct ColorTier {
-  const unsigned char* data = nullptr;  // of its regions
-  uint64_t units = 0;                   // of 16 bytes
+  const unsigned char* data = nullptr;  // data of the regions
+  uint64_t units = 0;                   // size of `data` in units of 16 bytes
   const unsigned char* directory = nullptr;
   uint64_t region_count = 0;
-  uint64_t cell_count = 0;  // of all levels
+  uint64_t cell_count = 0;  // cells of all levels
   uint32_t finest_level = 0, region_level = 0;
-  uint32_t block_bytes = 16;  // for 32 cells
+  uint32_t block_bytes = 16;  // bytes for 32 cells
 };
 
 // The colors, or other values, of a region. Their memory belongs to the File.
 struct ColorRegion {
-  uint64_t morton = 0;      // among the cubes of the tier's region level
-  uint64_t first_unit = 0;  // of its data
+  uint64_t morton = 0;      // code among the cubes of the tier's region level
+  uint64_t first_unit = 0;  // first unit of its data
   uint32_t level_count = 0;
-  uint32_t counts[7] = {};  // cells, the finest level first
-  uint64_t cells = 0;       // of all levels
+  uint32_t counts[7] = {};  // cells of each level, the finest level first
+  uint64_t cells = 0;       // cells of all levels
   const unsigned char* blocks = nullptr;
   uint32_t block_bytes = 16;
 
@@ -139,7 +139,7 @@ struct ColorRegion {
     return value;
   }
   Normal normal(uint64_t i) const { return octahedral_normal(blocks + 2 * i); }
-  // The color of the `i`-th of all cells; below `cells`.
+  // Returns the color of the `i`-th of all cells. `i` must be below `cells`.
   Rgb color(uint64_t i) const { return block_color(blocks + i / 32 * 16, unsigned(i % 32)); }
   // Table 0 is for the cells of the finest level, table 1 for the cells of the next coarser level.
   // A table has one entry for each ancestor four levels above these cells, in order. The entry is
@@ -154,7 +154,7 @@ struct ColorRegion {
     std::memcpy(&value, blocks + block_bytes * ((cells + 31) / 32) + 4 * entry, sizeof value);
     return value;
   }
-  // Size of its data: blocks and prefixes.
+  // Returns the size of the region's data (blocks and prefixes) in units of 16 bytes.
   uint64_t units() const {
     return (cells + 31) / 32 * (block_bytes / 16) + (prefix_count(0) + prefix_count(1) + 3) / 4;
   }
@@ -209,7 +209,7 @@ class ColorSection {
   uint32_t color_levels() const { return color_levels_; }
   uint32_t tier_count() const { return tier_count_; }
   const ColorTier& tier(uint32_t t) const { return tiers_[t]; }
-  // The tier that has level `l`, 0 to color_levels().
+  // Returns the tier that has level `l`. The level is 0 to color_levels().
   const ColorTier& tier_of(uint32_t l) const { return tiers_[(color_levels_ - l) / 7]; }
 
   // Sets `region` to the i-th region of a tier. All bytes of the region are then inside the tier.
@@ -384,7 +384,7 @@ class BasicColorCursor {
     return true;
   }
 
-  // Index of the value of a cell on the path, in region_.
+  // Returns the index in region_ of the value of a cell on the path.
   uint64_t stored_index(uint32_t level, uint64_t code) {
     const ColorTier& tier = section_->tier_of(level);
     const uint32_t above = std::min<uint32_t>(3, level - tier.region_level);  // to the group
@@ -451,7 +451,7 @@ class BasicColorCursor {
   const Dag* dag_;
   const ColorSection* section_;
   uint64_t path_[21] = {};  // places from the root to the cell looked up last
-  uint64_t path_code_ = 0;  // of that cell
+  uint64_t path_code_ = 0;  // code of that cell
   uint32_t depth_ = 0;      // its level
   const ColorTier* region_tier_ = nullptr;
   ColorRegion region_;

@@ -86,7 +86,7 @@ struct OctantTest {
     }
   }
 
-  // The children that the plane may cross.
+  // Returns the children that the plane may cross.
   uint32_t plane_test() const {
     double rising = 0, falling = 0, at_low = 0;
     for (int a = 0; a < 3; ++a) {

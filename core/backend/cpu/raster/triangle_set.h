@@ -73,7 +73,7 @@ inline NarrowTriangle narrowed(const WideTriangle& t) {
 // A triangle during the descent of the octree: its number, and two flags.
 struct Entry {
   static constexpr uint32_t kInside = 1u << 31;  // covers the cube: only its plane matters there
-  static constexpr uint32_t kWide = 1u << 30;    // number counts wide triangles
+  static constexpr uint32_t kWide = 1u << 30;    // the number is an index of wide triangles
   uint32_t bits;
 
   bool inside() const { return bits & kInside; }

@@ -65,7 +65,7 @@ struct SameWord {
   VOXDAG_HD bool operator()(uint32_t a, uint32_t b) const { return words[a] == words[b]; }
 };
 
-// 1 if a sorted item differs from the previous one, else 0.
+// Marks each sorted item: 1 if it differs from the previous item, else 0.
 template <class Same>
 struct MarkFirstOfEquals {
   Same same;

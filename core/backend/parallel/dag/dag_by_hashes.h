@@ -67,7 +67,7 @@ struct RemoveDuplicates {
   }
 };
 
-// The position of `hash` in an ascending array, or `count`.
+// Returns the position of `hash` in an ascending array of `count` hashes; `count` if it is absent.
 VOXDAG_HD inline uint32_t find_hash(const uint64_t* hashes, uint32_t count, uint64_t hash) {
   uint32_t begin = 0, end = count;
   while (begin < end) {

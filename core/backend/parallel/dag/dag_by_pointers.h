@@ -189,7 +189,7 @@ Reduced<Space> reduce_nodes(Space& space, uint32_t node_count, const LinkedNodes
                        });
 }
 
-// The level array of the surviving nodes.
+// Returns the level array of the surviving nodes.
 template <class Space>
 DagLevel<Space> make_level(Space& space, const LinkedNodes& links, Reduced<Space>& reduced) {
   DagLevel<Space> level;

@@ -115,7 +115,7 @@ struct TriangleOnLattice {
     return repeat_along<N>(axis == 2 ? 1 : 2, cells);
   }
 
-  // Cells with corners on both sides of the plane.
+  // Returns the cells with corners on both sides of the plane.
   template <int N, class Int>
   VOXDAG_HD uint64_t at_plane(const int (&at)[3], Int far) const {
     int128 here = plane;

@@ -14,7 +14,7 @@
 
 namespace voxdag::parallel {
 
-// A voxel as (code of its brick, its bit).
+// Splits the code of a voxel into the code of its brick and the bit of the voxel in the brick.
 struct SplitVoxelCode {
   uint64_t* codes;  // voxel in, brick out
   uint64_t* bits;
