@@ -46,7 +46,7 @@ voxdag_status status_of(voxdag::ErrorCode code) {
     case voxdag::ErrorCode::kLimit:
       return VOXDAG_LIMIT;
     default:
-      return VOXDAG_INTERNAL;  // queries use no disk space and no device, and cannot be canceled
+      return VOXDAG_INTERNAL;  // other codes cannot occur: queries use no disk space and no device
   }
 }
 
@@ -89,10 +89,11 @@ voxdag::query::Selection selection_of(uint32_t grid_levels, const voxdag_region*
   return selection;
 }
 
-// Larger sizes than later headers can have are uninitialized memory.
+// Maximum plausible struct_size, above the size in any later header. A larger number means that the
+// caller left struct_size uninitialized.
 constexpr size_t kMaxStructBytes = 4096;
 
-// `first_bytes` is the size of the struct in the first header that had it.
+// `first_bytes`: the size of the struct in the first header that contained the struct.
 void check_struct_size(const char* name, size_t struct_size, size_t first_bytes) {
   if (struct_size < first_bytes || struct_size > kMaxStructBytes)
     refuse(std::string(name) + " has the struct_size " + std::to_string(struct_size) +
@@ -167,7 +168,7 @@ voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts) {
     known.svo_nodes = dag.svo_nodes();
     known.dag_nodes = dag.dag_nodes();
     known.bytes = dag.file_bytes();
-    // Sets members to 0 that were added in a later header and are unknown to this library.
+    // A caller's later header may have more members than this library knows. This sets them to 0.
     std::memset(facts, 0, known.struct_size);
     std::memcpy(facts, &known, std::min(known.struct_size, sizeof known));
   });

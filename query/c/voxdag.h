@@ -6,10 +6,10 @@
  *     voxdag_lookup(file, 13, positions, count, set);
  *     voxdag_close(file);
  *
- * Positions are voxels, or cells of the coarser grid of 2^grid_levels per edge. A cell is set where
- * any voxel in it is set. Every function that can fail returns a status; voxdag_error() returns the
- * message of the last failure on the calling thread. A file is immutable: any number of threads may
- * query it concurrently. docs/library.md describes conventions and units.
+ * Positions are voxels, or cells of the coarser grid with 2^grid_levels cells per edge. A cell is
+ * set if any voxel in it is set. Every function that can fail returns a status; voxdag_error()
+ * returns the message of the last failure on the calling thread. A file is immutable: any number of
+ * threads may query it concurrently. docs/library.md describes conventions and units.
  *
  * A struct that may grow begins with `struct_size`: set it to its sizeof. Programs compiled with
  * this header run with every later libvoxdag.so of the same soname. */
@@ -35,7 +35,7 @@ typedef enum voxdag_status {
   VOXDAG_NOT_FOUND,           /* no such file */
   VOXDAG_CORRUPT,             /* the file is damaged, or not a .vdag file */
   VOXDAG_UNSUPPORTED_VERSION, /* the file has a later format version */
-  VOXDAG_IO,                  /* the system refused to read it */
+  VOXDAG_IO,                  /* the system failed to read the file */
   VOXDAG_OUT_OF_MEMORY,
   VOXDAG_LIMIT,
   VOXDAG_INTERNAL /* a defect of this library */
@@ -60,11 +60,11 @@ typedef struct voxdag_facts {
   uint32_t attributes;   /* VOXDAG_HAS_... */
   uint32_t materials;    /* the number of materials */
   double origin[3];      /* the low corner of the grid in the units of the scene */
-  double edge;           /* of the grid, in the units of the scene */
-  uint64_t voxels;       /* set voxels */
-  uint64_t svo_nodes;    /* nodes of the octree without sharing */
+  double edge;           /* the edge of the grid in the units of the scene */
+  uint64_t voxels;       /* the number of set voxels */
+  uint64_t svo_nodes;    /* the number of octree nodes without sharing */
   uint64_t dag_nodes;
-  uint64_t bytes; /* of the file */
+  uint64_t bytes; /* the size of the file */
 } voxdag_facts;
 
 /* The half-open box low <= p < high. It may extend beyond the grid. */
@@ -81,38 +81,39 @@ typedef struct voxdag_ray {
 typedef struct voxdag_ray_limits {
   size_t struct_size;  /* sizeof(voxdag_ray_limits), set by the caller */
   double max_distance; /* in voxels; INFINITY for no limit */
-  double stop_size;    /* rays hit cells of at most this edge, in voxels, as one cell; 0: voxels */
+  double stop_size;    /* in voxels; set cells with at most this edge count as solid */
 } voxdag_ray_limits;
 
 typedef struct voxdag_hit {
   double distance;  /* in voxels; infinite without a hit */
   int64_t voxel[3]; /* the low corner of the hit cell, in voxels; -1 without a hit */
-  int8_t normal[3]; /* of the face; 0 if the ray began in the cell, and without a hit */
+  int8_t normal[3]; /* of the hit face; zeros without a hit or if the ray began in the cell */
   int8_t reserved[5];
 } voxdag_hit;
 
 /* The version of the library, such as "0.1.0". */
 VOXDAG_API const char* voxdag_version(void);
 
-/* The message of the last function that failed on this thread. Never null; valid until the next
- * call on this thread. */
+/* Returns the message of the last function that failed on this thread. The result is never null. It
+ * is valid until the next call on this thread. */
 VOXDAG_API const char* voxdag_error(void);
 
 VOXDAG_API voxdag_status voxdag_open(const char* path, voxdag_file** file);
-/* Ignores a null pointer. No other thread may be using the file. */
+/* Closes a file. Ignores a null pointer. No other thread may be using the file. */
 VOXDAG_API void voxdag_close(voxdag_file* file);
-/* Fills the first facts->struct_size bytes. */
+/* Fills the first facts->struct_size bytes of `facts`. */
 VOXDAG_API voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts);
-/* The name of a material, or null for an unknown number. The last name is "", for
- * triangles without a material. Valid while the file is open. */
+/* Returns the name of a material; null for an unknown number. The last material has the name "" and
+ * stands for triangles without a material. The result is valid while the file is open. */
 VOXDAG_API const char* voxdag_material_name(const voxdag_file* file, uint32_t material);
 
 /* set[i] = 1 if cell i is set, else 0. Cells outside the grid are not set. */
 VOXDAG_API voxdag_status voxdag_lookup(const voxdag_file* file, uint32_t grid_levels,
                                        const int64_t (*cells)[3], size_t count, uint8_t* set);
 
-/* Attributes of each cell. A cell finer than the color grid has the value of the cell that contains
- * it. VOXDAG_INVALID_INPUT for an attribute that the file does not have.
+/* Get an attribute of each cell. A cell that is finer than the color grid has the value of the
+ * color grid's cell that contains it. Returns VOXDAG_INVALID_INPUT if the file does not have the
+ * attribute.
  *   colors      red, green and blue in sRGB, and 255; zeros for a cell that is not set
  *   alphas      0 to 255, linear; 0 for a cell that is not set
  *   normals     unit vectors; zeros for a cell that is not set
@@ -128,29 +129,30 @@ VOXDAG_API voxdag_status voxdag_materials(const voxdag_file* file, uint32_t grid
                                           const int64_t (*cells)[3], size_t count,
                                           uint32_t* materials);
 
-/* The first set cell on each ray. Null for `limits`: voxels at any distance. */
+/* Finds the first set cell on each ray. If `limits` is null, the rays have no maximum distance and
+ * hit single voxels. */
 VOXDAG_API voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_ray* rays,
                                           size_t count, const voxdag_ray_limits* limits,
                                           voxdag_hit* hits);
 
-/* The number of set cells in a region. */
+/* Counts the set cells in a region. */
 VOXDAG_API voxdag_status voxdag_count(const voxdag_file* file, uint32_t grid_levels,
                                       const voxdag_region* region, uint64_t* count);
 
-/* All cells of a region, 1 or 0 each: the cell low + (x, y, z) is cells[(x * ny + y) * nz + z],
- * where ny and nz are the lengths of the region along y and z. */
+/* Writes 1 (set) or 0 for each cell of a region: the cell low + (x, y, z) is written to
+ * cells[(x * ny + y) * nz + z], where ny and nz are the lengths of the region along y and z. */
 VOXDAG_API voxdag_status voxdag_dense(const voxdag_file* file, uint32_t grid_levels,
                                       const voxdag_region* region, uint8_t* cells);
 
-/* The set cells of a region, in Morton order. VOXDAG_INVALID_INPUT unless `capacity`, the length of
- * `cells`, is at least the region's voxdag_count(). */
+/* Writes the set cells of a region to `cells`, in Morton order. Returns VOXDAG_INVALID_INPUT unless
+ * `capacity`, the length of `cells`, is at least the region's voxdag_count(). */
 VOXDAG_API voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_levels,
                                      const voxdag_region* region, size_t capacity,
                                      int64_t (*cells)[3]);
 
-/* For each voxel the nearest set voxel, by the distance between the centers; among equally near
- * voxels, the first in Morton order. -1 and an infinite distance if none is within max_distance.
- * `distances` may be null. */
+/* Finds the nearest set voxel for each voxel, by the distance between the centers. Of equally near
+ * voxels, the first in Morton order is taken. If none is within max_distance, the result is -1 on
+ * each axis and an infinite distance. `distances` may be null. */
 VOXDAG_API voxdag_status voxdag_nearest(const voxdag_file* file, const int64_t (*voxels)[3],
                                         size_t count, double max_distance, int64_t (*nearest)[3],
                                         double* distances);

@@ -1,11 +1,13 @@
-// A finished DAG as cells of any size, from the complete grid down to a voxel. It reads the words
-// of each level in place, in the layout of the global file. The part below a cell is its `content`:
-//     a node        its word offset in its level
-//     a brick       its 64-bit mask                  (edge 4)
+// A finished DAG as cells of any size, from the complete grid down to a voxel. The view reads the
+// words of each level in place, in the layout of the global file. The part of the DAG below a cell
+// is called the cell's `content`:
+//     cell          content
+//     a node        the node's word offset in its level
+//     a brick       the brick's 64-bit mask          (edge 4)
 //     half a brick  the 8 bits of its 2x2x2 voxels   (edge 2)
 //     a voxel       1                                (edge 1)
-// The file may be damaged, so every offset is checked. A bad offset is Error{kCorrupt}.
-// Immutable; any number of threads may read.
+// The file may be damaged, so every offset is checked. A bad offset throws Error{kCorrupt}.
+// Immutable; any number of threads may read concurrently.
 #pragma once
 
 #include <cstdint>
@@ -21,12 +23,12 @@ namespace voxdag::query {
 
 class DagView {
  public:
-  // The words of a level, and whether pointers into it take two words, low half first.
+  // The words of a level. `wide`: pointers into this level take two words, low half first.
   struct Level {
     std::span<const uint32_t> words;
     bool wide = false;
   };
-  // Takes levels 0 to L - 2, or no levels for a scene without voxels.
+  // `levels`: the levels 0 to L - 2 of the DAG, or no levels for a scene without voxels.
   explicit DagView(std::vector<Level> levels, uint32_t grid_levels)
       : grid_levels_(grid_levels), levels_(std::move(levels)) {}
   explicit DagView(const voxdag_reader::File& file);
@@ -35,7 +37,8 @@ class DagView {
   uint32_t grid_levels() const { return grid_levels_; }
   // Returns the level at `depth`, 0 to L - 2, in its memory layout. The DAG must not be empty.
   const Level& level(uint32_t depth) const { return levels_[depth]; }
-  // Prefetches the node or brick at this word offset. Does nothing if there is no such word.
+  // Prefetches the node or brick at this word offset of the level at `depth`. Does nothing if the
+  // level has no such word.
   void prefetch(uint32_t depth, uint64_t offset) const {
     const std::span<const uint32_t> words = levels_[depth].words;
     if (offset < words.size()) __builtin_prefetch(words.data() + offset);
@@ -43,8 +46,8 @@ class DagView {
   [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
 
-  // The occupied children of a cell that is larger than a voxel, at `depth` below the root (0 to L
-  // - 1).
+  // The occupied children of a cell that is larger than a voxel. `depth` is the cell's number of
+  // levels below the root, 0 to L - 1.
   class Children {
    public:
     uint32_t mask = 0;
@@ -65,7 +68,8 @@ class DagView {
   uint64_t offset(const Children& children, int index) const {
     return children.node_.child(kPopcount8[children.mask & ((1u << index) - 1)]);
   }
-  // Returns the content of child `index`, which must be occupied, of a parent at `depth`.
+  // Returns the content of a parent's child `index`, which must be occupied. `depth` is the
+  // parent's depth.
   uint64_t content(uint32_t depth, const Children& children, int index) const {
     if (depth + kBrickLevels < grid_levels_) {
       const uint64_t offset = this->offset(children, index);
@@ -80,8 +84,8 @@ class DagView {
     Vec low;             // low corner, in voxels
   };
   // Calls `visit` with each occupied cell at `depth` (0 to L). On the way down, calls `select` with
-  // each cell above, which returns the mask of the children to descend into. The DAG must not be
-  // empty.
+  // each cell above that depth; `select` returns the mask of the children to descend into. The DAG
+  // must not be empty.
   template <class Select, class Visit>
   void for_each_cell(uint32_t depth, const Select& select, const Visit& visit) const {
     visit_below({0, static_cast<double>(resolution()), {}}, root(), depth, select, visit);
@@ -120,7 +124,8 @@ inline DagView::Children DagView::children(uint32_t depth, uint64_t content) con
   return c;
 }
 
-// Returns the cells two levels below a node or brick at `depth`, as the mask of a brick.
+// Returns the occupied cells two levels below a node or brick at `depth`, in the form of a brick's
+// mask.
 inline uint64_t brick_of_cells(const DagView& dag, uint32_t depth,
                                const DagView::Children& children) {
   uint64_t mask = 0;
@@ -142,7 +147,8 @@ void DagView::visit_below(const Cell& cell, uint64_t content, uint32_t depth, co
   if (selected == 0) return;
   const Children c = children(cell.depth, content);
   const double half = cell.edge / 2;
-  // Opposite corners first: a search for a bounding box can then skip most of the rest.
+  // Visits opposite corners first. After them, a search for a bounding box can skip most of the
+  // other children.
   for (const int i : {0, 7, 3, 4, 5, 2, 1, 6}) {
     if (!(selected & c.mask & 1u << i)) continue;
     const Vec low = cell.low + Vec{{i & 4 ? half : 0, i & 2 ? half : 0, i & 1 ? half : 0}};

@@ -35,8 +35,9 @@ void refuse_replacing(FileSystem& files, const Outputs& outputs) {
     }
 }
 
-// True if the last writer was killed. A lock file that is not empty was not created by voxdag. The
-// leftovers of a build are kept, because the build can resume from them.
+// True if a writer of this output was killed and its temporary files can be removed. A lock file
+// that is not empty was not created by voxdag. The files of a killed build are kept, because the
+// build can resume from them.
 bool is_left_behind(FileSystem& files, const std::string& output) {
   const auto lock = open_if_there(files, OutputLock::path_of(output));
   return lock && lock->size() == 0 && !files.exists(output + ".work");
@@ -45,7 +46,7 @@ bool is_left_behind(FileSystem& files, const std::string& output) {
 void remove_leftovers(FileSystem& files, const Outputs& outputs) {
   for (const std::string& path : outputs.paths)
     if (open_if_there(files, partial_path(path))) files.remove(partial_path(path));
-  // Random characters in the names of make_temporary_folder().
+  // Number of random characters at the end of the names that make_temporary_folder() creates.
   constexpr size_t kRandomCharacters = 6;
   const std::string& output = outputs.paths[0];
   const std::string folder = parent_directory(output);
@@ -56,9 +57,9 @@ void remove_leftovers(FileSystem& files, const Outputs& outputs) {
       remove_tree(files, folder + "/" + entry.name);
 }
 
-// Refuses outputs before the lock file exists. Otherwise a process killed in between would leave a
-// lock file next to another program's temporary file. Returns true if a killed process left its
-// files.
+// Checks the outputs before this process creates the lock file. If the lock file came first and the
+// process were killed before the check, the lock file would remain next to another program's
+// temporary file. Returns true if a killed process left its files.
 bool check_outputs(FileSystem& files, const Outputs& outputs) {
   refuse_impossible(files, outputs);
   const bool left_behind = is_left_behind(files, outputs.paths[0]);

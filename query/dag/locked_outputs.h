@@ -1,6 +1,7 @@
-// Locks the outputs of a command. Two writers of the same output would share its temporary files,
-// and an output must not destroy a file that the user wants to keep. The lock comes first, because
-// only its holder knows if a temporary file was left by a killed process.
+// Locks the outputs of a command. Without a lock, two writers of the same output would use the same
+// temporary files. An output must also not destroy a file that the user wants to keep. The lock is
+// taken before any temporary file is touched, because only the lock's holder knows if a temporary
+// file was left by a killed process.
 #pragma once
 
 #include <string>
@@ -10,15 +11,15 @@
 
 namespace voxdag::query {
 
-// The outputs of a command; each of `paths` is first written as PATH.partial.
+// The outputs of a command. Each output is first written as PATH.partial.
 struct Outputs {
   std::vector<std::string> paths;  // the first one is locked
-  std::string input;               // this file is read while the outputs are written
+  std::string input;               // a file that is read while the outputs are written
   bool replace = false;            // replace existing files
 };
 
-// Holds the OutputLock of the first output. Removes the temporary files of a killed process,
-// recognized by a lock file without a holder.
+// Holds the OutputLock of the first output. If a lock file exists that no process holds, a process
+// was killed; its temporary files are removed.
 class LockedOutputs {
  public:
   // Throws Error: kIo if another process holds the lock; kInvalidInput if an output has no name, is

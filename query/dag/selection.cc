@@ -12,7 +12,8 @@ namespace voxdag::query {
 
 namespace {
 
-// A build snaps vertices to 1/256 of its voxels, so differences below half of that are meaningless.
+// A build moves vertices to multiples of 1/256 voxel, so a difference of less than half of that has
+// no meaning.
 constexpr double kMaxSnapCells = 1.0 / 512;
 constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
 

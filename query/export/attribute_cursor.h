@@ -1,4 +1,5 @@
-// The attributes of selected cells, for table formats: a few numbers for each attribute.
+// Reads the attributes of selected cells, for formats that store a table with a few numbers for
+// each attribute.
 #pragma once
 
 #include <array>
@@ -40,7 +41,7 @@ class AttributeCursor {
   voxdag_reader::ColorCursor cursor_;
 };
 
-// Returns one cursor for each attribute of the file, without colors if the job has none.
+// Returns one cursor for each attribute of the file. Leaves out colors if the job exports none.
 inline std::vector<AttributeCursor> exported_attributes(const ExportJob& job) {
   std::vector<AttributeCursor> cursors;
   for (const Attribute attribute : attributes_of(job.file).list())

@@ -1,11 +1,12 @@
 // OctoMap's binary octree (Hornung et al. 2013): a text header, then two bytes for each inner node,
-// depth first. Bits 2i and 2i + 1 describe child i: 01 (the first bit set) free, 10 occupied, 11 an
-// inner node, 00 unknown. Child = x + 2y + 4z. Written directly, because the library would store
-// all nodes in memory.
+// depth first. Bits 2i and 2i + 1 of these bytes describe child i: 01 (the first bit set) free, 10
+// occupied, 11 an inner node, 00 unknown. The child at (x, y, z) has the index x + 2y + 4z. This
+// code writes the format without the OctoMap library, because the library would store all nodes in
+// memory.
 //
-// The octree has 16 levels, and the coordinates' origin is in its middle. The grid's low corner is
-// at the origin. A grid of 2^16 cells fills the octree, so its low corner is the octree's low
-// corner.
+// The octree has 16 levels, and the origin of its coordinates is in its middle. The low corner of
+// voxdag's grid is at this origin. Only a grid of 2^16 cells fills the complete octree; its low
+// corner is the octree's low corner.
 #include <array>
 #include <cstdio>
 #include <optional>
@@ -22,8 +23,8 @@ namespace {
 constexpr uint32_t kOctoMapLevels = 16;
 enum BtChild : uint32_t { kUnknown = 0, kFree = 1, kOccupied = 2, kInner = 3 };
 
-// Walks the octree depth first. Cubes without voxels inside the region are free, because the file
-// does not record the inside of objects.
+// Walks the octree depth first. Inside the region, cubes without voxels are written as free,
+// because the file does not record the interior of objects.
 template <class Inner>
 class BtWalk {
  public:
@@ -34,7 +35,8 @@ class BtWalk {
   void run() {
     const uint32_t levels = job_.selection.grid_levels;
     ++nodes;  // the root
-    // First the octant of the origin, then the low corner of each cube.
+    // Writes the nodes above the grid: from the root to the octant at the origin, then always to
+    // the child at the low corner.
     for (uint32_t level = kOctoMapLevels; level > levels; --level) {
       inner_(kInner << (level == kOctoMapLevels ? 14 : 0));
       ++nodes;
@@ -72,7 +74,7 @@ class BtWalk {
       bits |= state << 2 * octomap_child(i);
     }
     inner_(bits);
-    // Children are in OctoMap's order: voxdag's order with x and z exchanged.
+    // Writes the children in OctoMap's order, which is voxdag's order with x and z exchanged.
     for (int i = 0; i < 8; ++i) {
       const int ours = octomap_child(i);
       if (inner >> ours & 1)

@@ -1,6 +1,6 @@
 // Writes a finished DAG, or a part of it, in the formats of other programs. docs/export.md lists
-// the programs that read each format. Data that a format cannot hold is refused, usually before
-// anything is written.
+// the programs that read each format. If a format cannot hold the data, the export fails, usually
+// before anything is written.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace voxdag::query {
 struct ExportJob;
 
 struct ExportReport {
-  std::vector<std::string> files;  // written files, the requested one first
+  std::vector<std::string> files;  // all written files; the requested file is first
   uint64_t bytes = 0;              // of all files
   uint64_t voxels = 0;
   std::vector<std::string> notes;  // usage notes for the files, one sentence each
@@ -28,16 +28,17 @@ struct ExportReport {
 struct ExportFormat {
   const char* name;
   const char* summary;  // description in the list of formats
-  // Suffix that the output's name must have. In a format of two files, the second name has
-  // `second_suffix` instead. Null for formats without a required suffix.
+  // Required suffix of the output's name; null if the format requires none. In a format of two
+  // files, the second file's name has `second_suffix` instead of `suffix`.
   const char* suffix;
   const char* second_suffix;
   ExportReport (*write)(const ExportJob& job);
 };
 
-// The formats of this build. Formats that need a missing library are absent.
+// Returns the formats that this build of voxdag supports. A format that needs a missing library is
+// absent.
 std::span<const ExportFormat> export_formats();
-// Throws Error{kInvalidInput} with the list of names if there is no such format.
+// Throws Error{kInvalidInput} with the list of all names if no format has this name.
 const ExportFormat& export_format(const std::string& name);
 // Returns the names of all files of an export. Throws Error{kInvalidInput} if `output` does not
 // have the suffix that the format needs.
@@ -52,10 +53,11 @@ struct ExportRequest {
   bool replace = false;       // replace existing files
 };
 
-// Writes the selected voxels. The files get their final names when all are complete. After an error
-// no file remains, unless the second of two renames failed. The next export removes files of a
-// killed process. Throws Error{kLimit} if the format cannot hold the voxels, Error{kOutOfMemory} if
-// the memory cannot (the message names a selection that fits), and the errors of LockedOutputs.
+// Writes the selected voxels. The files get their final names when all of them are complete. After
+// an error no file remains, unless the first of two renames succeeded and the second failed. If the
+// process is killed, the next export removes its files. Throws Error{kLimit} if the format cannot
+// hold the voxels, Error{kOutOfMemory} if they do not fit in the memory (the message names a
+// selection that fits), and the errors of LockedOutputs.
 ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,
                         const CancelToken& cancel);

@@ -1,5 +1,5 @@
-// A buffered output file of an export, named "<path>.partial" until publish(). The destructor
-// removes an unpublished file. One thread uses it.
+// A buffered output file of an export. It has the name "<path>.partial" until publish(). The
+// destructor removes a file that was not published. Used by one thread.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class ExportFile {
 
   const std::string& path() const { return path_; }
   uint64_t size() const { return size_; }
-  // Continues at `offset`, which may be before or beyond the end.
+  // Moves the write position to `offset`, which may be before or beyond the end of the file.
   void seek(uint64_t offset);
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
@@ -31,7 +31,8 @@ class ExportFile {
     write(std::as_bytes(std::span(&value, 1)));
   }
 
-  // Makes the files durable and then renames them to their final names. Returns their total bytes.
+  // Makes the files durable and then renames them to their final names. Returns the total number of
+  // bytes in the files.
   static uint64_t publish(std::span<ExportFile* const> written);
 
  private:

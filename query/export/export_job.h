@@ -1,4 +1,4 @@
-// The inputs of a format's writer, and functions shared by the writers.
+// The inputs of the writer of each format, and functions shared by the writers.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ struct ExportJob {
   const WatchedFile& watched;
   Selection selection;
   std::string output;
-  std::string second_output;  // second file of a format with two files
+  std::string second_output;  // name of the second file, for formats with two files
   bool has_colors;            // write colors, if the format supports them
   MemoryBudget& budget;
   Progress& progress;
@@ -73,7 +73,7 @@ class ExportStage {
   uint64_t pending_ = 0, calls_ = 0;
 };
 
-// For long loops that are part of another stage: checks for cancellation from time to time.
+// Checks for cancellation from time to time in a long loop that is not an ExportStage of its own.
 class CancelCheck {
  public:
   explicit CancelCheck(const ExportJob& job) : job_(job) {}
@@ -89,11 +89,11 @@ class CancelCheck {
 
 // Returns the same part of the file on a coarser grid.
 Selection coarser(const Selection& selection, uint32_t grid_levels);
-// Returns the options for this selection: "--level 11", and "--region" with cells of that grid if
-// the selection is only a part.
+// Returns the command line options for the job's selection on a coarser grid: "--level 11", and
+// also "--region", in cells of that grid, if only a part is selected.
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
-// Publishes the files if the input has remained intact; throws otherwise.
+// Publishes the files. Throws instead if a part of the input could not be read.
 inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> written) {
   job.watched.check_readable();
   return ExportFile::publish(written);
@@ -102,17 +102,17 @@ inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> writt
 // Throws Error{kNoSpace} if the disk of the output has less than `bytes` free.
 void require_space(const ExportJob& job, uint64_t bytes);
 
-// Throws Error{code}: "OUTPUT: PROBLEM. --level 11 fits", or "Expected a smaller --region" if no
-// coarser level fits. `fits` returns true for a level that fits.
+// Throws Error{code} with the message "OUTPUT: PROBLEM. --level 11 fits", or "Expected a smaller
+// --region" if no coarser level fits. `fits` must return true for a level that fits.
 [[noreturn]] void refuse_size(const ExportJob& job, const std::string& problem,
                               const std::function<bool(uint32_t grid_levels)>& fits,
                               ErrorCode code = ErrorCode::kLimit);
 
 // Returns the number of selected voxels, or any number over `limit` if there are more.
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);
-// Finds the coarser grids on which the job's selection has at most `limit` cells. Query the
+// Determines on which coarser grids the job's selection has at most `limit` cells. Query the
 // coarsest grid first. Equal subtrees are counted once if the memory can hold their counts. For a
-// complete file, each level is read once for all grids; for a region, once per grid.
+// complete file, each level is read once for all grids together; for a region, once per grid.
 class CellLimit {
  public:
   CellLimit(const ExportJob& job, uint64_t limit);
@@ -121,23 +121,24 @@ class CellLimit {
  private:
   const ExportJob& job_;
   const uint64_t limit_;
-  std::optional<LevelCells> cells_;  // for a complete file, if the memory can hold them
+  std::optional<LevelCells> cells_;  // only for a complete file, if the memory can hold them
 };
 
-// Returns count_voxels() of the job's selection. Throws Error{kLimit} as above if there are more
-// than `limit`, with `reason` as the explanation, and Error{kInvalidInput} for an empty selection.
+// Returns count_voxels() of the job's selection. If this is over `limit`, throws Error{kLimit} like
+// refuse_size(), with `reason` as the explanation. Throws Error{kInvalidInput} for an empty
+// selection.
 uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string& reason);
 
 [[noreturn]] void refuse_empty(const ExportJob& job);
 
-// Throws Error{kCorrupt} unless `written` equals `expected`, the number of voxels in the header of
-// the file or in an earlier count.
+// Throws Error{kCorrupt} unless `written` equals `expected`, which is the number of voxels in the
+// file's header or from an earlier count.
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
 // Returns the color of a selected cell. Throws Error{kCorrupt}.
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
                                  const std::array<int64_t, 3>& cell);
 
-// One writer per format. Writers that need a missing library do not exist.
+// The writers, one per format. A writer that needs a missing library is not defined.
 ExportReport write_ply(const ExportJob& job);
 ExportReport write_npz(const ExportJob& job);
 ExportReport write_hashdag(const ExportJob& job);
@@ -146,7 +147,8 @@ ExportReport write_voxel(const ExportJob& job);
 ExportReport write_vox(const ExportJob& job);
 ExportReport write_bt(const ExportJob& job);
 ExportReport write_glb(const ExportJob& job);
-// Like write_glb(), with a smaller limit for tests, because files of 4 GiB take too long.
+// Like write_glb(), with a different size limit. Tests use a smaller one, because writing files of
+// 4 GiB takes too long.
 ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes);
 ExportReport write_vdb(const ExportJob& job);
 ExportReport write_nvdb(const ExportJob& job);

@@ -1,8 +1,8 @@
-// A surface as a binary glTF 2.0. It has the faces between set and empty voxels. Coplanar faces are
-// merged to rectangles, which have one color each if the file has colors. Positions are integer
-// numbers of cells from the low corner of the region, which floats represent exactly. The node's
-// transform places and scales them. COLOR_0 is linear light, as glTF requires, in 16 bits, because
-// dark sRGB bytes need this precision.
+// Writes the surface as binary glTF 2.0. The surface consists of the faces between set and empty
+// voxels. Coplanar faces are merged to rectangles. If the file has colors, each rectangle has one
+// color. Positions are numbers of cells from the low corner of the region; floats represent these
+// integers exactly. The transform of the glTF node scales and places them. COLOR_0 is linear light,
+// as glTF requires, in 16 bits, because dark sRGB bytes need this precision.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -33,14 +33,15 @@ uint64_t max_quads(const ExportJob& job, uint64_t max_bytes) {
 }
 
 struct GlbBrick {
-  uint64_t morton = 0;  // Morton code of its corner, in bricks
+  uint64_t morton = 0;  // Morton code of the brick's low corner, in bricks
   uint64_t mask = 0;
 };
 
-// A rectangle of faces: at `plane` of an axis, over [u0, u1) x [v0, v1) of the next two axes.
+// A rectangle of faces perpendicular to an axis: at the coordinate `plane` of this axis, over [u0,
+// u1) x [v0, v1) of the next two axes.
 struct GlbQuad {
   uint32_t plane = 0, u0 = 0, v0 = 0, u1 = 0, v1 = 0;
-  bool upward : 1 = false;  // it faces along the axis, not against it
+  bool upward : 1 = false;  // the faces look along the axis, not against it
   uint8_t axis : 2 = 0;
   voxdag_reader::Rgb color;
 };
@@ -48,7 +49,7 @@ static_assert(sizeof(GlbQuad) == 24);
 
 class GlbSurface {
  public:
-  // Stops as soon as there are more than `max_quads` rectangles.
+  // Stops searching as soon as there are more than `max_quads` rectangles.
   GlbSurface(const ExportJob& job, uint64_t max_quads)
       : job_(job), max_quads_(max_quads), colors_(job.file) {
     const uint64_t count = count_bricks();
@@ -67,7 +68,8 @@ class GlbSurface {
  private:
   static constexpr const char* kMemory =
       "the surface (a smaller --region or a coarser --level needs less)";
-  // Faces are sorted by plane, then v, then u, with 21 bits each.
+  // A face is stored as one number, with 21 bits each for plane, v and u. Faces are sorted by
+  // plane, then v, then u.
   static constexpr int kCoordinateBits = 21;
   static constexpr uint64_t kCoordinateMask = (uint64_t{1} << kCoordinateBits) - 1;
 
@@ -156,7 +158,7 @@ class GlbSurface {
     merge(faces, axis, upward);
   }
 
-  // Color of a face's cell; black for all cells without colors.
+  // Returns the color of the cell to which a face belongs; black if the job has no colors.
   voxdag_reader::Rgb color_of(uint64_t face, uint8_t axis, bool upward) {
     if (!job_.has_colors) return {};
     std::array<int64_t, 3> cell = job_.selection.region.low;
@@ -166,13 +168,13 @@ class GlbSurface {
     return color_of_cell(job_, colors_, cell);
   }
 
-  // Makes the longest runs of one color along u, and merges a run with an equal run of the previous
-  // row.
+  // Divides each row into the longest runs of one color along u, and merges a run with an equal run
+  // of the previous row.
   void merge(const std::vector<uint64_t>& faces, uint8_t axis, bool upward) {
-    std::vector<size_t> row, previous;  // rectangles of the current and of the previous row
+    std::vector<size_t> row, previous;  // rectangles of the current row and of the previous row
     size_t candidate = 0;
     GlbQuad last{};
-    voxdag_reader::Rgb next;  // color of the first face of the next run
+    voxdag_reader::Rgb next;  // color of the first face after the current run
     if (!faces.empty()) next = color_of(faces[0], axis, upward);
     for (size_t i = 0; i < faces.size() && quads_.size() <= max_quads_;) {
       GlbQuad run;
@@ -293,8 +295,8 @@ std::string glb_json(const ExportJob& job, const std::vector<GlbQuad>& quads) {
   return json;
 }
 
-// Writes the colors of four vertices. Alpha is included because elements must start at multiples of
-// four bytes.
+// Writes the colors of a rectangle's four vertices. Alpha is included because each color must start
+// at a multiple of four bytes.
 void put_colors(voxdag_reader::Rgb color, ExportFile& file) {
   const auto& linear = linear_of_srgb();
   const std::array<uint16_t, 4> vertex = {linear[color.r], linear[color.g], linear[color.b], 65535};
@@ -337,7 +339,7 @@ ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
   std::optional<GlbSurface> made(std::in_place, job, limit);
   const uint64_t quads = made->quads().size();
   if (quads > limit) {
-    made.reset();  // the search below also needs memory
+    made.reset();  // frees memory for the search below
     // Grids that fit even if no faces are merged.
     CellLimit cells(job, limit / 6);
     refuse_size(job,

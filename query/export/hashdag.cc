@@ -1,10 +1,11 @@
 // The files of HashDAG (Careil, Billeter, Eisemann 2020) and of the viewers derived from it:
 //     NAME.basic_dag.dag.bin                   f64 x 6 bounds | u32 levels | u64 words | u32 ...
 //     NAME.basic_dag.uncompressed_colors.bin   u32 top levels | u64 n, u64 ... | u64 m, u32 ...
-// A node is one word (child mask, and above it the voxels that the node encloses) and the absolute
-// word index of each child; a leaf is two words, like a brick. In the top levels the count is an
-// index into the 64-bit numbers of the color file instead. The colors are bytes R, G, B and 255 for
-// each voxel in Morton order, or one gray for a file without colors.
+// A node is one word (its child mask in the low byte, and in the bits above the number of voxels
+// that the node encloses) and the absolute word index of each child. A leaf is two words, like a
+// brick. In the top levels the bits above the mask are instead an index into the 64-bit numbers of
+// the color file. The colors are bytes R, G, B and 255 for each voxel in Morton order, or a single
+// gray for a file without colors.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -20,12 +21,13 @@ namespace {
 
 constexpr uint64_t kMaxHashDagWords = uint64_t{1} << 32;  // of 32-bit indices
 constexpr uint64_t kMaxHashDagColors = (uint64_t{1} << 32) - 1;
-constexpr uint64_t kMaxCount = uint64_t{1} << 24;  // limit of the bits above the mask
+constexpr uint64_t kMaxCount = uint64_t{1} << 24;  // limit of the number above the child mask
 constexpr uint32_t kGray = 0xffb0b0b0;             // A, B, G, R
 constexpr uint64_t kHashDagHeaderBytes = 6 * sizeof(double) + sizeof(uint32_t) + sizeof(uint64_t);
 
-// A node of level L - 7 encloses at most 128^3 voxels, so its count always fits. HashDAG supports
-// up to ten top levels, which are enough for L = 17.
+// Number of levels whose voxel counts are in the color file. A node of level L - 7 encloses at most
+// 128^3 voxels, so its count always fits above the mask. HashDAG supports up to ten such top
+// levels, which are enough for L = 17.
 uint32_t top_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels > 7 ? grid_levels - 7 : 1, 1, 10);
 }
@@ -63,7 +65,8 @@ class HashDagWriter {
     file_.put(dag_.word_count());
     ExportStage stage(job_, "export", dag_.node_count(), "nodes");
     NodeNumbers<uint64_t> below = write_bricks(stage);
-    // Goes from the bricks up, because a node's count is the sum of its children's counts.
+    // Goes from the bricks up, because the voxel count of a node is the sum of its children's
+    // counts.
     for (uint32_t level = dag_.brick_level(); level-- > 0;) {
       NodeNumbers<uint64_t> counts(job_, dag_, level);
       write_level(level, below, counts, stage);

@@ -1,6 +1,6 @@
-// Counts the set cells in the grid of each level of a file, starting with the coarsest. Each node
-// passes its number of occurrences in the octree to its children. So the levels above the requested
-// one are read once, and no level below it.
+// Counts the set cells in the grids of a file's levels, starting with the coarsest grid. Each node
+// passes the number of its occurrences in the octree on to its children. So each level above the
+// requested grid is read only once, and no level below that grid is read.
 #pragma once
 
 #include <cstdint>
@@ -17,16 +17,16 @@ namespace voxdag::query {
 // Used by one thread.
 class LevelCells {
  public:
-  // `dag` is the view of `file`, which has voxels. All references must outlive this object.
+  // `dag` is the view of `file`, which must have voxels. All references must outlive this object.
   LevelCells(const voxdag_reader::File& file, const DagView& dag, MemoryBudget& budget,
              const CancelToken& cancel)
       : file_(file), dag_(dag), budget_(budget), cancel_(cancel) {}
 
-  // Returns the number of set cells in the grid of 2^grid_levels cells per edge. If it is over
-  // `limit`, the returned number is any number over `limit`. The grid must be a brick or larger,
-  // coarser than the file's, and not coarser than in the previous call. Takes 8 bytes for each node
-  // two and three levels above the cells, and 2 bits for each word of these nodes. Throws
-  // Error{kOutOfMemory} if the budget is smaller, and Error{kCorrupt}.
+  // Returns the number of set cells in the grid of 2^grid_levels cells per edge. If this number is
+  // over `limit`, the returned number is an arbitrary number over `limit`. The grid must be a brick
+  // or larger, coarser than the file's grid, and not coarser than in the previous call. Takes 8
+  // bytes for each node that is two or three levels above the cells, and 2 bits for each word of
+  // these nodes. Throws Error{kOutOfMemory} if this is over the budget, and Error{kCorrupt}.
   uint64_t count(uint32_t grid_levels, uint64_t limit);
 
  private:
@@ -37,7 +37,7 @@ class LevelCells {
   };
 
   Level level(uint32_t depth) const;
-  // Calls visit(children, places) for each node of level_ that begins in the span.
+  // Calls visit(children, places) for each node of level_ that begins in this span of level_.index.
   template <class Visit>
   void visit_span(uint64_t span, const Visit& visit) const;
   void descend();

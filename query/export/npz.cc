@@ -57,7 +57,7 @@ struct NpzMember {
 
 constexpr uint16_t kZip64Version = 45;
 
-// Puts the fields that a member's local and central header share.
+// Writes the fields that are the same in a member's local header and in its central header.
 void put_member_fields(ByteSink& sink, const NpzMember& member, uint16_t extra_bytes) {
   sink.put(kZip64Version);  // version needed to read it
   sink.put<uint16_t>(0);    // flags
@@ -95,7 +95,7 @@ std::vector<std::byte> central_directory(std::span<const NpzMember> members, uin
     sink.put<uint16_t>(0);  // disk
     sink.put<uint16_t>(0);  // attributes
     sink.put<uint32_t>(0);
-    sink.put(~uint32_t{0});  // its offset is in the ZIP64 field
+    sink.put(~uint32_t{0});  // the offset is in the ZIP64 field
     sink.put_bytes(std::as_bytes(std::span(member.name)));
     sink.put<uint16_t>(1);
     sink.put<uint16_t>(24);
@@ -131,8 +131,8 @@ class NpzWriter {
  public:
   explicit NpzWriter(const ExportJob& job) : job_(job), file_(job.files, job.output) {}
 
-  // Adds an array of `rows` rows of `components` numbers of a numpy type, such as "<f4". fill(put)
-  // calls put(number) for each number.
+  // Adds an array with `rows` rows of `components` numbers. The numbers have a numpy type such as
+  // "<f4". fill(put) must call put(number) for each number.
   template <class Fill>
   void add(const std::string& name, const std::string& type, uint32_t components, uint64_t rows,
            const Fill& fill) {
@@ -237,8 +237,7 @@ std::string add_values(const ExportJob& job, uint64_t voxels, AttributeCursor& a
 
 ExportReport write_npz(const ExportJob& job) {
   ExportReport report;
-  // The limit of the format is never reached: 2^48 voxels have more bytes than file systems
-  // support.
+  // The limit can never be reached: 2^48 voxels have more bytes than file systems support.
   const uint64_t voxels = require_voxels(job, uint64_t{1} << 48, "an array takes");
   report.voxels = voxels;
   std::vector<AttributeCursor> attributes = exported_attributes(job);

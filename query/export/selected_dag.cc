@@ -19,13 +19,13 @@ uint64_t mix_bits(uint64_t x) {
   return x ^ x >> 32;
 }
 
-// An open-addressing table. Its slots have `hash` and `free()`.
+// An open-addressing hash table. `Slot` must have a member `hash` and a function `free()`.
 template <class Slot>
 class SlotTable {
  public:
   explicit SlotTable(MemoryBudget& budget) : budget_(budget) {}
-  // Returns the slot for which is_it(slot) is true. If none exists, returns the free slot for it,
-  // which then counts as used.
+  // Returns the slot for which is_it(slot) is true. If there is no such slot, returns the free slot
+  // where it belongs, and counts this slot as used.
   template <class IsIt>
   Slot& find(uint64_t hash, const IsIt& is_it) {
     if (4 * (used_ + 1) > 3 * slots_.size()) grow();
@@ -76,7 +76,7 @@ struct MemoSlot {
 class BuiltLevel {
  public:
   explicit BuiltLevel(MemoryBudget& budget) : budget_(budget), table_(budget) {}
-  // Returns the offset of an equal node, which is added if it is missing.
+  // Returns the offset of a node that equals `node`. Adds such a node if none exists.
   uint64_t offset_of(std::span<const uint32_t> node) {
     uint64_t hash = node.size();
     for (const uint32_t word : node) hash = mix_bits(hash ^ word) + word;
@@ -135,8 +135,9 @@ class DagBuilder {
   BuiltNode build(uint32_t depth, uint64_t content, const Position& corner) {
     const int64_t edge = int64_t{1} << (job_.selection.grid_levels - depth);
     if (!job_.selection.region.intersects(corner, edge)) return {};
-    // Only nodes completely inside the region are the same at all their places. A brick of the file
-    // has no offset here, and its content is only one word.
+    // Results are remembered only for nodes completely inside the region, because only such nodes
+    // are the same wherever they occur. Bricks of the file are not remembered: they have no offset
+    // here, and are as easy to build again.
     const bool is_brick = depth + kBrickLevels == job_.dag.grid_levels();
     if (is_brick || !job_.selection.region.contains(corner, edge))
       return build_node(depth, content, corner, edge);
@@ -144,8 +145,8 @@ class DagBuilder {
     const auto is_it = [&](const MemoSlot& slot) { return slot.source == content; };
     MemoSlot& known = memo_[depth].find(hash, is_it);
     if (!known.free()) return {known.offset, known.voxels};
-    // A node never contains another node of its depth, so building the node does not change this
-    // table.
+    // `known` remains valid while the node is built: a node never contains another node of its own
+    // depth, so the build does not change the table of this depth.
     const BuiltNode built = build_node(depth, content, corner, edge);
     known = {hash, content, built.offset, built.voxels};
     return built;

@@ -1,10 +1,10 @@
-// The selected cells as a DAG of the selection's grid, for formats that share equal subtrees. For a
-// complete file it is the file's levels in place. For a part it is built in memory, which is
-// charged to the budget: equal subtrees are shared again after clipping, and each node of the file
-// inside the region is visited once.
+// The selected cells as a DAG of the selection's grid, for formats that share equal subtrees. If
+// the complete file is selected, this DAG consists of the file's levels in place. If a part is
+// selected, the DAG is built in memory that is charged to the budget: equal subtrees are shared
+// again after clipping, and each node of the file that is inside the region is visited once.
 //
-// Levels are as in the global file: a node is its child mask and the word offsets of its children
-// in the next level, one word each; a brick is two words, low half first.
+// Levels have the layout of the global file. A node is its child mask and the word offsets of its
+// children in the next level, one word each. A brick is two words, low half first.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ namespace voxdag::query {
 
 class SelectedDag {
  public:
-  // Throws Error{kInvalidInput} if the selection has no voxels, Error{kOutOfMemory} if a DAG must
-  // be built and does not fit in the job's memory.
+  // Throws Error{kInvalidInput} if the selection has no voxels, and Error{kOutOfMemory} if a DAG
+  // must be built and does not fit in the job's memory.
   explicit SelectedDag(const ExportJob& job);
   ~SelectedDag();
 
@@ -33,15 +33,16 @@ class SelectedDag {
   uint64_t word_count() const;
   DagView view() const;
 
-  // Upper bounds of its size on a coarser grid. Bricks of this grid are made from the nodes two
-  // levels above its cells.
+  // Upper bounds of the DAG's size on a coarser grid. On such a grid, bricks are made from the
+  // nodes two levels above the grid's cells.
   struct Size {
     uint64_t words = 0, nodes = 0, bricks = 0;  // nodes without the bricks
   };
   Size size_at(uint32_t grid_levels) const;
 
-  // Calls visit(offset, mask, children) for each node of a level above the bricks, in order.
-  // Children are offsets in the next level. Throws Error{kCorrupt} for words that are not a node.
+  // Calls visit(offset, mask, children) for each node of a level above the bricks, in the order of
+  // the offsets. `children` are the children's offsets in the next level. Throws Error{kCorrupt}
+  // for words that are not a node.
   template <class Visit>
   void for_each_node(uint32_t level, const Visit& visit) const {
     const std::span<const uint32_t> words = words_[level], below = words_[level + 1];
@@ -75,8 +76,9 @@ class SelectedDag {
   std::unique_ptr<Built> built_;
 };
 
-// A number per node or brick of a level, charged to the job's memory. It is found by half the
-// node's offset, which is unique because each node has at least two words.
+// Holds one number per node or brick of a level, in memory charged to the job. The index of a
+// node's number is half the node's offset, which is unique because each node has at least two
+// words.
 template <class Number>
 class NodeNumbers {
  public:

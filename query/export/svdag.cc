@@ -1,8 +1,9 @@
 // .svdag of SymVox / SVDAG-Compression (Jaspe Villanueva, Marton, Gobbetti 2016):
 //     f32 x 3 low corner | f32 x 3 high corner | f32 edge | u32 levels | u32 nodes
 //     | u32 first leaf | u32 words | u32 ...
-// Nodes come level by level, the root first: a child mask, then the word index of each child, the
-// last child first. The last level are 2^3 voxels in one word, so that a brick is a node.
+// Nodes are stored level by level, the root first: a child mask, then the word index of each child,
+// the last child first. A node of the last level is one word with 2^3 voxels, so a brick is an
+// inner node here.
 #include <array>
 
 #include "core/base/text.h"
@@ -14,13 +15,14 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMaxSvdagWords = (uint64_t{1} << 32) - 1;  // its count has 32 bits
-// Maximum words for viewers whose shaders use 32-bit signed indices.
+// Maximum number of words for viewers whose shaders have 32-bit signed indices.
 constexpr uint64_t kMaxViewedWords = (uint64_t{1} << 31) - 1;
-constexpr uint32_t kLeafWords = 255;  // one for each nonzero mask of 8 voxels
+constexpr uint32_t kLeafWords = 255;  // one word for each nonzero mask of 8 voxels
 constexpr uint64_t kSvdagHeaderBytes = 7 * sizeof(float) + 4 * sizeof(uint32_t);
 
-// Word index at which each brick begins. A brick takes one word plus one per child. The begin of
-// every 16th brick is stored, and the others are counted from there.
+// The word index at which each brick begins in the output. A brick takes one word, plus one word
+// per child. Only the beginning of every 16th brick is stored; the beginnings of the others are
+// counted from there.
 class BrickOffsets {
  public:
   BrickOffsets(const ExportJob& job, const SelectedDag& dag)

@@ -1,6 +1,7 @@
-// MagicaVoxel .vox, version 150: a model of at most 256^3 voxels for each different node of the DAG
-// with that edge, and an instance of it for each place where the node occurs. With colors each
-// place has a separate model, because equal nodes have different colors.
+// MagicaVoxel .vox, version 150. Models have an edge of at most 256 voxels: the file has one model
+// for each different DAG node with this edge, and one instance of the model for each place where
+// the node occurs. With colors, each place has a separate model, because equal nodes can have
+// different colors.
 //     "VOX " | 150 | MAIN { (SIZE XYZI)... nTRN nGRP (nTRN nSHP)... RGBA }
 // MagicaVoxel's z is up: (x, y, z) of the file is (x, -z, y) in voxdag.
 #include <algorithm>
@@ -82,8 +83,8 @@ VoxChunk palette_chunk(std::span<const voxdag_reader::Rgb> colors) {
   return chunk;
 }
 
-// The voxels' colors, in two passes: the first collects them, the second maps each to a palette
-// index.
+// The colors of the voxels, in two passes: the constructor collects the colors, and index_of() then
+// maps each color to a palette index.
 class VoxColors {
  public:
   // `voxels`: number of voxels to be added.
@@ -127,7 +128,8 @@ class VoxWriter {
         level_words_(dag.words(depth_).size()),
         models_(job, dag, depth_),
         charge_(job.budget, dag.node_count(depth_) * sizeof(uint64_t), "the models") {
-    // If this lower bound is already too large, the nodes need not be visited.
+    // First computes a lower bound from the number of instances. If this bound is already too
+    // large, the nodes need not be visited.
     min_bytes_ = 4 + transform_node(0, 0, "0 0 0").size() + shape_node(0, 0).size();
     min_bytes_ *= count_instances(dag);
     if (min_bytes_ > kMaxVoxBytes) return;
@@ -135,7 +137,8 @@ class VoxWriter {
     find_instances(0, view_.root(), {0, 0, 0});
   }
 
-  // Returns the size of the file, or any number over the limit if it is larger.
+  // Returns the size of the file in bytes, or an arbitrary number over the limit if the file would
+  // be larger than the limit.
   uint64_t bytes() const {
     return std::max(min_bytes_, 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_);
   }
@@ -183,7 +186,7 @@ class VoxWriter {
           depth_, [&](uint64_t offset, uint32_t, std::span<const uint32_t>) { visit(offset); });
   }
 
-  // Returns the content of a model's node, as DagView defines it.
+  // Returns the content of a model's node; DagView defines `content`.
   uint64_t content_at(uint64_t offset) const {
     return depth_ + kBrickLevels == view_.grid_levels() ? view_.root() : offset;
   }
@@ -267,8 +270,8 @@ class VoxWriter {
     for (const uint64_t voxels : voxels_) models_bytes_ += model_bytes(voxels);
   }
 
-  // Position of an instance's center. The grid's center is at MagicaVoxel's x = y = 0, its floor at
-  // z = 0.
+  // Returns the position of an instance's center as text. The center of the grid is at
+  // MagicaVoxel's x = y = 0, and its floor at z = 0.
   std::string place_text(const Position& corner) const {
     const int64_t half = edge_ / 2, middle = int64_t{1} << (view_.grid_levels() - 1);
     return std::to_string(corner[0] + half - middle) + " " +
@@ -342,8 +345,8 @@ ExportReport write_vox(const ExportJob& job) {
   VoxWriter writer(job, dag);
   const uint64_t bytes = writer.bytes();
   if (bytes > kMaxVoxBytes || writer.instance_count() > kMaxVoxModels) {
-    // Grids that fit even if nothing is shared. A fourth of the size is left for models and
-    // instances.
+    // Finds grids that fit even if no models are shared. Voxels may use three fourths of the size;
+    // the last fourth is for models and instances.
     CellLimit cells(job, kMaxVoxBytes / 16 * 3);
     refuse_size(job,
                 size_text(bytes) + " or more are needed" +

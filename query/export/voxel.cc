@@ -3,7 +3,8 @@
 //     interior node   child mask << 24 | index of the first of its children's words
 //     mixed leaf      index of the leaf                         (bit = 16z + 4y + x)
 //     all solid       0xff000000                                (index 0 is never a child)
-// Child = 4z + 2y + x. Children are found by their index alone, so equal nodes share theirs.
+// The child at (x, y, z) has the index 4z + 2y + x. A node stores only the index of its children's
+// words, so equal nodes share their children.
 #include <array>
 #include <cstdio>
 
@@ -43,7 +44,7 @@ class VoxelWriter {
     dag_.for_each_brick([&](uint64_t offset, uint64_t mask) {
       below[offset] = mask == kFullBrick ? kSolid : leaves_++;
     });
-    bin_.put(uint32_t{0});  // the root's word, which comes last
+    bin_.put(uint32_t{0});  // space for the root's word, which is known last
     for (uint32_t level = dag_.brick_level(); level-- > 0;) {
       NodeNumbers<uint32_t> words(job_, dag_, level);
       dag_.for_each_node(level,

@@ -28,17 +28,18 @@
 namespace voxdag::query {
 namespace {
 
-// Minimum share of a worker, enough for every cube of a few bricks. kOutsideShareBytes is the
-// worker's additional memory: a segment to write, a window of the file, and pages retained for its
-// next cube.
+// Minimum share of the memory for a worker, enough for every cube of a few bricks.
+// kOutsideShareBytes is memory that a worker needs in addition to its share: for the segment that
+// it writes, for a window of the file, and for the pages that it retains for its next cube.
 constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
 constexpr uint64_t kOutsideShareBytes =
     kSegmentWriterBytes + NodeReader::kMemoryBytes + ConsingMemory::kMinPageBytes;
 constexpr unsigned kMaxWorkers = 256;  // each has a file open
-// Memory of a node while its cube is reduced, for a first estimate of the number of cubes.
+// Memory for a node while the node's cube is reduced. Used for a first estimate of the number of
+// cubes.
 constexpr uint64_t kBytesPerNode = 128;
-// Up to this number of nodes, one thread is faster than several threads that share none of the
-// work.
+// Up to this number of nodes, one thread is faster than several threads, because threads share none
+// of their work with each other.
 constexpr uint64_t kFewNodes = uint64_t{1} << 17;
 constexpr uint64_t kPartsPerWorker = 4;
 constexpr uint64_t kMaxFirstParts = 4096;
@@ -80,7 +81,7 @@ class Extraction {
     shape_ = {.grid_levels = report_.grid.levels, .hash_bits = file.hash_bits()};
   }
 
-  // before_publish() may throw to prevent the output from appearing.
+  // Writes the output. before_publish() may throw to prevent that the output gets its final name.
   ExtractReport run(const std::function<void()>& before_publish) {
     if (spec_.crop && crop_.level == 0 &&
         spec_.selection.region != whole_grid(spec_.selection.grid_levels))
@@ -178,7 +179,7 @@ uint64_t Extraction::wanted_parts(unsigned workers, uint64_t share_bytes) const 
                     workers * kPartsPerWorker, kMaxFirstParts);
 }
 
-// Divides the cube of the new grid until there are about `wanted` parts.
+// Divides the cube of the new grid into parts until there are about `wanted` of them.
 std::vector<SelectedPart> Extraction::first_parts(Worker& worker, uint64_t wanted) const {
   if (file_.empty()) return {};
   std::vector<SelectedPart> parts{{}};

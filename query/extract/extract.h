@@ -1,11 +1,12 @@
-// Writes a part of a global file as a global file: the grid of a coarser level, a region of it, or
-// both. Its levels are canonical: they depend only on the voxels.
+// Writes a part of a global file as a new global file. The part is the grid of a coarser level, a
+// region, or both. The levels of the new file are canonical: they depend only on the voxels.
 //
-// The grid is divided into octree-aligned cubes. For each cube the necessary part of the DAG is
-// read and reduced in memory (part_builder.h), by several threads, and written as an artifact. A
-// cube that does not fit its share of the budget is divided into its children. The merge then makes
-// the file, as for a build. So memory is bounded by the budget, not by the size of the file. If the
-// file has colors or other attributes, they are written last (part_colors.h).
+// The grid is divided into octree-aligned cubes. For each cube, one of several threads reads the
+// necessary part of the DAG, reduces it in memory (part_builder.h), and writes it as an artifact. A
+// cube that does not fit in the thread's share of the budget is divided into its children. The
+// merge then makes the file from the artifacts, as in a build. So memory is bounded by the budget,
+// not by the size of the file. If the file has colors or other attributes, they are written last
+// (part_colors.h).
 #pragma once
 
 #include <cstdint>
@@ -24,14 +25,15 @@ namespace voxdag::query {
 
 struct ExtractSpec {
   Selection selection;
-  // The new grid is the smallest octree-aligned cube around the region instead of the complete
-  // grid.
+  // If true, the new grid is the smallest octree-aligned cube around the region; otherwise it is
+  // the complete grid.
   bool crop = false;
   std::string output;
   bool replace = false;  // replace an existing file
   uint64_t memory_bytes = uint64_t{1} << 30;
   unsigned threads = 1;
-  // Maximum words of a narrow level; larger levels are wide. Tests use a smaller limit.
+  // Maximum number of words in a narrow level. A level with more words is wide. Tests use a smaller
+  // limit.
   uint64_t narrow_words = global_layout::kNarrowLevelWords;
 };
 
@@ -48,14 +50,14 @@ struct ExtractReport {
   uint64_t work_bytes = 0;  // bytes written to temporary files
 };
 
-// Returns the smallest octree cube, in the grid of a selection, that contains the selection's
-// region and has at least 4 cells per edge.
+// Returns the smallest octree cube that contains the selection's region, in the selection's grid.
+// The cube has at least 4 cells per edge.
 Cube crop_cube(const Selection& selection);
 
-// Writes spec.output, which gets its name when it is complete. Temporary files are in a folder next
-// to it, which is always removed. If the process is killed, the next extract to that output removes
-// the folder. Throws Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the
-// errors of LockedOutputs.
+// Writes spec.output, which gets its final name when it is complete. Temporary files are in a
+// folder next to the output, which is removed at the end, also after an error. If the process is
+// killed, the next extract with the same output removes the folder. Throws Error: kCorrupt for a
+// damaged file, kNoSpace, kOutOfMemory, kCanceled, and the errors of LockedOutputs.
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel);
 

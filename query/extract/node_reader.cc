@@ -10,8 +10,8 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMaxNodeWords = 17;  // a child mask and eight wide offsets
-// Gaps of up to this many words are read together with the nodes around them: another call costs
-// about as much as reading these words.
+// A gap of up to this number of words between two nodes is read together with them, because a
+// separate call costs about as much as reading the gap.
 constexpr uint64_t kGapWords = 2048;
 
 }  // namespace

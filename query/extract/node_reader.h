@@ -1,6 +1,6 @@
-// Reads nodes of a global file with bounded reads, never through a mapping, so that resident memory
-// does not grow with the file. Every checksum block is verified when it is first touched; only the
-// necessary blocks are read.
+// Reads nodes of a global file with bounded read calls, never through a mapping, so that resident
+// memory does not grow with the file. Only the necessary checksum blocks are read, and each block
+// is verified when it is read for the first time.
 #pragma once
 
 #include <cstdint>
@@ -17,15 +17,16 @@
 
 namespace voxdag::query {
 
-// Reads ranges of a global file and checks the checksum blocks that they touch. Thread-safe.
+// Reads ranges of a global file and verifies the checksum blocks that overlap these ranges.
+// Thread-safe.
 class CheckedReader {
  public:
   // `header` is the same file; only its header is read.
   CheckedReader(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget);
 
   const voxdag_reader::File& header() const { return header_; }
-  // Fills `words` from word `first` of the level. `block` is a buffer of
-  // kBlockBytes. Throws Error{kCorrupt} for a block that fails its checksum.
+  // Fills `words` with the words of the level from word `first` on. `block` is a buffer of
+  // kBlockBytes bytes. Throws Error{kCorrupt} for a block that fails its checksum.
   void read(uint32_t level, uint64_t first, std::span<uint32_t> words, std::span<std::byte> block);
 
   // Verifies the checksum blocks that contain these bytes of the file, as read() does.
@@ -42,13 +43,14 @@ class CheckedReader {
   const CheckedBlocks blocks_;
 };
 
-// An entry of a list of nodes: the node's offset, and its number among all wanted nodes.
+// An entry of a list of wanted nodes: the node's offset, and the node's number in the caller's
+// order.
 struct WantedNode {
   uint64_t offset = 0;
   uint64_t index = 0;
 };
 
-// Reads nodes one by one, or many in the order of their offsets. Not thread-safe.
+// Reads nodes one by one, or many nodes in the order of their offsets. Not thread-safe.
 class NodeReader {
  public:
   static constexpr uint64_t kBufferBytes = uint64_t{1} << 19;
@@ -63,20 +65,20 @@ class NodeReader {
 
   // Returns the node, valid until the next call.
   voxdag_reader::Node node(uint32_t level, uint64_t offset);
-  // Calls visit(node, words) for each wanted node. `words` begin with the node and contain all of
-  // its words in the level. `wanted` is in the order of the offsets.
+  // Calls visit(node, words) for each wanted node. `words` begins with the node's words and
+  // contains all of them. `wanted` must be in the order of the offsets.
   template <class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Visit&& visit) {
     for_each(
         level, wanted, [](std::span<const uint32_t>) {}, visit);
   }
-  // Like the above, and calls ahead(words) for most nodes some time before visit(), so that it can
-  // prefetch.
+  // Like the function above, but also calls ahead(words) for most nodes some time before visit(),
+  // so that ahead() can prefetch.
   template <class Ahead, class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Ahead&& ahead, Visit&& visit);
 
-  // Returns the node or brick that begins with `words`, at `offset` of its level. Throws
-  // Error{kCorrupt} if none can begin there.
+  // Returns the node or brick at the beginning of `words`; `offset` is its offset in the level.
+  // Throws Error{kCorrupt} if no node can begin there.
   voxdag_reader::Node parse_node(uint32_t level, uint64_t offset,
                                  std::span<const uint32_t> words) const;
   uint64_t parse_brick(uint64_t offset, std::span<const uint32_t> words) const;

@@ -9,11 +9,11 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kNodesBetweenChecks = 4096;  // checks of the cancel token
-// Expected new nodes in the level below a node: half of the average of surfaces.
+// Expected number of new nodes in the level below, per node: half of the average for surfaces.
 constexpr uint64_t kExpectedChildren = 2;
 constexpr uint64_t kPrefetchAhead = 8;  // nodes
 
-// Bit c of the result is set if byte c of the mask is not 0.
+// Returns a mask: bit c is set if byte c of `mask` is not 0.
 uint8_t coarser_cells(uint64_t mask) {
   uint8_t cells = 0;
   for (int c = 0; c < 8; ++c)
@@ -99,7 +99,8 @@ void PartBuilder::read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below,
   nodes.release_entries();
 }
 
-// Reads nodes of the file that become bricks. Cells outside the region are left out later.
+// Reads the file's nodes from which bricks are made, with all their children. Cells outside the
+// region are removed later.
 void PartBuilder::read_all_children(uint32_t level, PartLevel& nodes, PartLevel& below,
                                     Children& children) {
   read(level, nodes, below, children, [&](uint64_t index, const voxdag_reader::Node& node) {
@@ -109,7 +110,7 @@ void PartBuilder::read_all_children(uint32_t level, PartLevel& nodes, PartLevel&
   });
 }
 
-// Returns the occupied octants of each node or brick, which are its cells of the selected grid.
+// Returns the occupied octants of each node or brick. In the selected grid these octants are cells.
 PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
   const uint32_t level = brick_level() + 1;
   const PartLevel::Sorted sorted = nodes.sort();
@@ -125,7 +126,8 @@ PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
   return cells;
 }
 
-// Returns the masks of the bricks of the selected grid, before the region cuts them.
+// Returns the masks of the bricks of the selected grid. The masks still contain cells outside the
+// region.
 PooledArray<uint64_t> PartBuilder::read_bricks(PartLevel& bricks) {
   PooledArray<uint64_t> masks(memory_, bricks.size());
   if (selection_.grid_levels == file_.grid_levels()) {
@@ -225,7 +227,8 @@ SubDagSummary PartBuilder::build(const SelectedPart& part, const SubDagShape& sh
     built = build_nodes(l, levels[l - top].size(), children[l - top], built, tables);
     children[l - top] = {};
   }
-  // The tables count only added nodes, so shared nodes would be counted once.
+  // The tables would count a shared node only once, because they count nodes when they are added.
+  // So the counts that build_nodes() has added up are used.
   tables.counts() = built[0].counts;
   built = {};
   return emit_levels(tables, shape, sink);

@@ -1,16 +1,16 @@
-// Builds the sub-DAG of a selection in one octree-aligned cube, a part of the grid.
+// Builds the sub-DAG for one part of the grid: the selected cells in one octree-aligned cube.
 //
-// From the cube's root down, every level's nodes are collected (part_level.h) and then read in the
-// order of their offsets. A cell of a coarser grid is set where the octree has a node, so the
-// bricks of the selected grid are made from the nodes two levels above its cells and their
-// children:
+// From the cube's root down, the nodes of every level are collected (part_level.h) and then read in
+// the order of their offsets. On a coarser grid, a cell is set where the octree has a node. So the
+// bricks of the selected grid are made from the nodes two levels above the grid's cells and from
+// the children of these nodes:
 //
 //     selected grid   nodes   ...   bricks          cells
 //     file            nodes   ...   nodes at l-2    their children's masks, at l-1
 //
-// Then, from these bricks up, nodes that have become equal are merged (hash-consing), with the
-// tables that also build subvolumes. Cells outside the region are left out on the way down. Nodes
-// that the region cuts are added once per position, all others once.
+// Then, from these bricks up, nodes that have become equal are merged (hash-consing), with the same
+// tables that are used to build subvolumes. Cells outside the region are left out on the way down.
+// A node that the region cuts is added once per position, any other node only once.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ namespace voxdag::query {
 // A cube of the selected grid that has voxels of the file.
 struct SelectedPart {
   Cube cube;
-  uint64_t offset = 0;  // offset of its root in level cube.level of the file
+  uint64_t offset = 0;  // word offset of the cube's root in level cube.level of the file
 };
 
 class PartBuilder {
@@ -38,11 +38,11 @@ class PartBuilder {
               PooledMemory memory, const CancelToken& cancel)
       : file_(file), selection_(selection), reader_(reader), memory_(memory), cancel_(cancel) {}
 
-  // Passes the part's level arrays to the sink; `shape` belongs to the new grid. Throws
-  // OutOfBudget, before the first call of the sink, if the budget cannot hold the part.
+  // Passes the level arrays of the part to the sink; `shape` describes the new grid. If the budget
+  // cannot hold the part, throws OutOfBudget before the first call of the sink.
   SubDagSummary build(const SelectedPart& part, const SubDagShape& shape, SubDagSink& sink);
 
-  // Returns the parts that replace a part above the bricks: its children with selected cells.
+  // Divides a part whose root is above the bricks: returns its children that have selected cells.
   std::vector<SelectedPart> split(const SelectedPart& part);
 
  private:
@@ -50,9 +50,9 @@ class PartBuilder {
     NodeRef ref;
     OctreeCounts counts;
   };
-  // The children of a level's nodes, by their numbers in the level below.
+  // The children of the nodes of one level. A child is identified by its number in the level below.
   struct Children {
-    PooledArray<uint8_t> masks;   // by node number; without children outside the region
+    PooledArray<uint8_t> masks;   // by node number; children outside the region are left out
     PooledArray<uint32_t> first;  // by node number
     PooledArray<uint32_t> all;
     uint64_t count = 0;
@@ -66,7 +66,7 @@ class PartBuilder {
   }
   int64_t edge(uint32_t level) const { return int64_t{1} << (selection_.grid_levels - level); }
 
-  // Reads the nodes of a level. Their children are added to `below`.
+  // Reads the nodes of a level, and adds their children to `below`.
   template <class Visit>
   void read(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children, Visit visit);
   void read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);

@@ -30,7 +30,8 @@ constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
 constexpr uint64_t kWorkerBytes =
     kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) +
     CheckedReader::kBlockBytes;
-// Returns the encoded bytes of a region: colors, or values including the coarser levels.
+// Returns the encoded bytes of a region: of its colors, or of its values including the coarser
+// levels.
 uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
   if (traits_of(attribute).is_color()) return kMaxRegionCells * 3 / 4;
   return kMaxRegionCells * 5 / 4 *
@@ -39,7 +40,7 @@ uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
 // Regions encoded per batch.
 constexpr size_t kBatchRegions = 32;
 
-// A set cube of the file, by its Morton code among the cubes of its level.
+// A cube of the file that has set voxels. `code` is its Morton code among the cubes of its level.
 struct PlacedCube {
   uint64_t code = 0;
   uint64_t content = 0;  // see DagView
@@ -65,7 +66,8 @@ class ResidentPages {
     thread_local uint64_t visits_left = 0;
     if (visits_left-- == 0) visits_left = check();
   }
-  // Returns the number of nodes that this thread can read before the process may exceed its budget.
+  // Releases pages if the process is over its budget. Returns the number of nodes that this thread
+  // may read before the next call.
   uint64_t check() const {
     const uint64_t bytes = resident_bytes();
     if (bytes > limit_bytes_) file_.release_pages();
@@ -74,7 +76,7 @@ class ResidentPages {
   }
 
  private:
-  // Memory that the system may read in for one access to a page.
+  // Memory that the system may load for one access to a page that is not in memory.
   static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
   static constexpr uint64_t kMinVisits = 512;  // 32 MiB
   const voxdag_reader::File& file_;
@@ -101,10 +103,10 @@ class PartColors {
   }
 
   uint32_t levels() const { return levels_; }
-  // Returns the level of the file whose cubes are the regions of a tier of the part.
+  // Returns the level of the file on which the cubes are the regions of the part's tier `tier`.
   uint32_t region_level(uint32_t tier) const { return finest_of(tier) - depth_of(tier); }
 
-  // Verifies the checksums of the data that locate nodes and colors.
+  // Verifies the checksums of all data that is needed to find nodes and colors.
   void check_index() {
     std::vector<std::byte> block(CheckedReader::kBlockBytes);
     for (uint32_t l = 0; l <= std::min(finest_, file_.brick_level()); ++l) {
@@ -123,7 +125,7 @@ class PartColors {
                     list_bytes(section_.names()), block);
   }
 
-  // Calls visit(cube) for the regions of the finest tier, in Morton order.
+  // Calls visit(cube) for each region of the finest tier, in Morton order.
   template <class Visit>
   void for_each_region(const Visit& visit) const {
     const auto place = [&](const auto& self, uint32_t level, const PlacedCube& cube) -> void {
@@ -152,8 +154,9 @@ class PartColors {
     return encode_cells(0, cube.code, cells);
   }
 
-  // Encodes a region of an attribute other than color. Values of coarser cells follow from the
-  // finest ones, so cells that are not cut have the file's values.
+  // Encodes a region of an attribute other than color. The values of coarser cells are computed
+  // from the finest cells. So a cell that the region does not cut has the same value as in the
+  // file.
   EncodedRegion encode_valued(const PlacedCube& cube) const {
     voxdag_reader::ColorCursor cursor(file_, section_);
     std::vector<ValuedCell> cells;
@@ -176,7 +179,8 @@ class PartColors {
                          morton_in_part(region_level(0), cube.code), cells);
   }
 
-  // Encodes a region of a tier above the finest tier. `morton` is its code in the part.
+  // Encodes a region of a tier above the finest tier. `morton` is the region's Morton code in the
+  // part.
   EncodedRegion encode_coarse(uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
     const uint32_t level = region_level(tier);
     const uint64_t code = crop_code_ << 3 * (level - part_.crop.level) | morton;
@@ -233,7 +237,7 @@ class PartColors {
       if (children.has(i)) walk(level + 1, child(level, cube, children, i), target, visit);
   }
 
-  // True if the region's bytes equal the bytes of a region in the file.
+  // True if the encoded region can be copied, because the file has a region with the same bytes.
   bool is_copied(uint32_t tier, uint64_t code) const {
     const uint32_t finest = finest_of(tier);
     if (finest > section_.color_levels()) return false;
@@ -261,14 +265,15 @@ class PartColors {
     return copied;
   }
 
-  // Verifies the checksums of the colors of a cube's cells, down to level `finest`.
+  // Verifies the checksums of the colors of all cells in a cube, down to level `finest`.
   void check_colors(uint32_t finest, uint32_t level, uint64_t code) {
     std::vector<std::byte> block(CheckedReader::kBlockBytes);
     for (uint32_t t = 0; t < section_.tier_count(); ++t) {
       const ColorTier& tier = section_.tier(t);
       const bool is_coarser = t > 0 && tier.finest_level < level;
       if (is_coarser || tier.region_level > finest) continue;
-      // The first region with colors of the cube, and the first region after it without.
+      // `begin` and `end` limit the regions with colors of the cube: the first such region, and the
+      // first region after them.
       const bool within = tier.region_level < level;
       const uint32_t between = within ? level - tier.region_level : tier.region_level - level;
       const uint64_t begin = within ? code >> 3 * between : code << 3 * between;
@@ -313,8 +318,8 @@ class PartColors {
   CheckedReader source_;
   const ResidentPages pages_;
   const CancelToken& cancel_;
-  const uint32_t levels_;  // levels of the part's color grid
-  const uint32_t finest_;  // level of the file with the cells of this grid
+  const uint32_t levels_;  // number of levels of the part's color grid
+  const uint32_t finest_;  // level of the file that has the cells of the part's color grid
   uint64_t crop_code_ = 0;
 };
 

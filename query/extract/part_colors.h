@@ -1,24 +1,25 @@
-// Writes the colors of a part of a global file, or another attribute of its cells, after the
+// Writes the colors of a part of a global file, or another attribute of its cells, behind the
 // levels of the part's file.
 //
-// The color grid of the part is the part of the file's color grid, or of the selected level if that
-// is coarser. A part with fewer than 4 color cells per edge gets 4, with the colors of the cells
-// around them. A cell of the part has
+// The color grid of the part has the cell size of the file's color grid, or of the selected level
+// if that is coarser. If the part has fewer than 4 color cells per edge, its color grid gets 4
+// cells per edge, with the colors of the cells around the part. A cell of the part has
 //
 //   1. the color stored in the file, on the finest level of the color grid and if the region does
 //      not cut the cell;
-//   2. otherwise the mean of its remaining finest cells, in linear light.
+//   2. otherwise the mean of its finest cells that are inside the region, in linear light.
 //
-// The stored bytes of a region of colors are copied if the region is inside the selection and the
-// part has a tier with the same levels, which depends only on the finest and the coarsest level.
-// Other regions are decoded and encoded again, so their colors are close to the file's. The bytes
-// depend only on the file and the selection.
+// A region of colors is copied byte for byte if it is inside the selection and the part has a tier
+// with the same levels; whether it has depends only on the finest and the coarsest level. Other
+// regions are decoded and encoded again, so their colors are close to the file's colors. The
+// written bytes depend only on the file and the selection.
 //
-// For other attributes, the finest cells have the file's values, and coarser cells follow by the
-// rule: where the region does not cut them, they equal the file's.
+// For the other attributes, the finest cells have the file's values. The values of coarser cells
+// are computed by the attribute's rule, so cells that the region does not cut have the same values
+// as in the file.
 //
-// The file is mapped here. Every checksum block is verified before it is read, and pages are
-// released when the process exceeds the budget.
+// This code reads the file through a mapping. Every checksum block is verified before it is read,
+// and pages are released when the process exceeds the budget.
 #pragma once
 
 #include <cstdint>
@@ -38,14 +39,14 @@ namespace voxdag::query {
 struct ColoredPart {
   const voxdag_reader::File& file;  // has the attribute
   const Selection& selection;       // has at least one set cell
-  const Cube& crop;                 // the new grid: the complete grid, or a cube around the region
+  const Cube& crop;                 // the new grid: the complete grid or a cube around the region
 };
 
 // Returns the levels of the part's color grid, from 2 to the levels of the part's grid.
 uint32_t part_color_levels(const ColoredPart& part, Attribute attribute);
 
-// Writes the attribute. The levels of `out` must be complete. Throws Error{kCorrupt} for a damaged
-// file, Error{kOutOfMemory}, Error{kCanceled}, and voxdag_reader::Error.
+// Writes the attribute to `out`, in which the levels must be complete. Throws Error{kCorrupt} for a
+// damaged file, Error{kOutOfMemory}, Error{kCanceled}, and voxdag_reader::Error.
 void write_part_attribute(const ColoredPart& part, Attribute attribute, FileSystem& files,
                           GlobalFileWriter& out, MemoryBudget& budget, unsigned threads,
                           Progress& progress, const CancelToken& cancel);

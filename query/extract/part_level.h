@@ -1,13 +1,14 @@
-// The nodes of one level below a cube of the input that have selected cells. A node that the region
-// does not cut is added once, for any number of parents. A node that the region cuts is added once
-// per position. Nodes are numbered in the order in which they are added.
+// The nodes of one level below a cube of the input, as far as they have selected cells. A node that
+// the region does not cut is added once, for any number of parents. A node that the region cuts is
+// added once per position. Nodes are numbered in the order in which they are added.
 //
 //   slots     [tag | number + 1] ...    open addressing by the offset, for nodes that are not cut
 //
-// The tag is the lower half of the offset times an odd number, so that it determines the lower half
-// of the offset. Only in a wide level can two offsets have the same tag.
+// The tag is the lower half of the product of the offset and an odd number. It determines the lower
+// half of the offset. So two different offsets can have the same tag only in a wide level.
 //
-// Not thread-safe. Throws OutOfBudget when the budget, or 2^32 - 1 numbers, cannot hold more.
+// Not thread-safe. Throws OutOfBudget when a node does not fit in the budget, or when there would
+// be more than 2^32 - 1 nodes.
 #pragma once
 
 #include <array>
@@ -42,8 +43,8 @@ class PartLevel {
   void prefetch(uint64_t offset) const {
     __builtin_prefetch(&slots_[offset * kMultiplier >> shift_]);
   }
-  // Returns the number of the node at `offset`, which the region does not cut. Adds it if it is
-  // new.
+  // Returns the number of the node at `offset`, which must not be cut by the region. Adds the node
+  // if it is new.
   uint32_t find_or_add(uint64_t offset) {
     if (2 * count_ >= slots_size_) grow_slots(2 * count_ + 1);
     const uint64_t hash = offset * kMultiplier;
@@ -63,7 +64,7 @@ class PartLevel {
                             uint64_t{position[2]} << 2 * kAxisBits});
   }
 
-  // All nodes in the order of their offsets. No node may be added after sort().
+  // All nodes, sorted by their offsets. No node may be added after the call of sort().
   struct Sorted {
     PooledArray<WantedNode> nodes;
     uint64_t count = 0;

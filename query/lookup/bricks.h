@@ -1,6 +1,6 @@
-// Iterates over the bricks of a part of a file, in the grid of any of its octree's levels. Boxes,
-// lists of positions and exporters are built on this. Memory does not grow with the part. Time
-// grows with the part's bricks.
+// Iterates over the bricks of a part of a file, in the grid of any level of the octree. Box
+// queries, lists of positions and exporters use this iteration. Its memory does not grow with the
+// part; its time grows with the number of the part's bricks.
 #pragma once
 
 #include <bit>
@@ -26,13 +26,14 @@ void for_each_cell_of(Brick brick, const Visit& visit) {
     visit(brick_cell(brick, std::countr_zero(brick.mask)));
 }
 
-// Returns the low corner of child `index` of a cube. `edge` is the children's edge.
+// Returns the low corner of a cube's child `index`. `corner` is the cube's low corner, `edge` the
+// children's edge.
 inline Position child_corner(const Position& corner, int index, int64_t edge) {
   return {corner[0] + (index & 4 ? edge : 0), corner[1] + (index & 2 ? edge : 0),
           corner[2] + (index & 1 ? edge : 0)};
 }
 
-// Returns the cells of a brick at `low` that are in the region.
+// Returns the mask of the cells that are in the region, for a brick with the low corner `low`.
 uint64_t mask_within(const Region& region, const Position& low);
 
 // Throws Error{kInvalidInput} unless 0 <= grid_levels <= the file's levels.
@@ -50,7 +51,7 @@ class BrickWalk {
     if (dag_.empty() || selection_.region.empty()) return;
     if (selection_.grid_levels >= kBrickLevels)
       enter(0, origin, dag_.root());
-    else  // a grid of one or two cells per edge is part of one brick
+    else  // a grid of one or two cells per edge is smaller than one brick
       brick(origin, selection_.grid_levels == 0 ? 1 : dag_.children(0, dag_.root()).mask);
   }
 
@@ -88,10 +89,10 @@ class BrickWalk {
 };
 
 // Calls visit(const Brick&) for every brick that has set cells in the region, in Morton order. If
-// visit() returns a bool, false ends the walk. The mask is clipped to the region. Cells outside the
-// region or the grid are not visited. No node above a brick is read twice for it. Throws
-// Error{kInvalidInput} unless the selection's grid has at most the file's levels, and
-// Error{kCorrupt} for a damaged DAG.
+// visit() returns a bool, the iteration ends when it returns false. The brick's mask is clipped to
+// the region. Cells outside the region or the grid are not visited. Each node above a visited brick
+// is read only once for this brick. Throws Error{kInvalidInput} if the selection's grid has more
+// levels than the file, and Error{kCorrupt} for a damaged DAG.
 template <class Visit>
 void for_each_brick(const DagView& dag, const Selection& selection, Visit&& visit) {
   check_grid_levels(dag, selection.grid_levels);

@@ -26,7 +26,7 @@
 namespace voxdag::query {
 namespace {
 
-// Items per batch of a thread. It is a multiple of the rays in a packet.
+// Number of items in a thread's batch. It is a multiple of the number of rays in a packet.
 constexpr size_t kBatch = 4096;
 
 [[noreturn]] void refuse(const char* expected) {
@@ -45,8 +45,8 @@ void for_each_batch(unsigned threads, size_t items, const Body& body) {
   });
 }
 
-// Makes rays with directions of length 1, two per step, because their divisions would otherwise
-// take longer than the rays' walk through large cells.
+// Makes rays with directions of length 1. Computes two numbers per operation, because otherwise the
+// divisions would take longer than the walk of the rays through large cells.
 void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
                Ray* rays) {
   const DoublePair zero = DoublePair::of(0), one = DoublePair::of(1);
@@ -63,7 +63,8 @@ void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates
     }
     require(equal(nothing, zero) == 3 && less(zero, largest) == 3,
             "rays of finite numbers with directions that are not 0");
-    // Divides by the largest component first, so that no square overflows or becomes 0.
+    // Divides by the largest component first, so that no square of a component overflows or becomes
+    // 0.
     for (DoublePair& component : d) component = component / largest;
     const DoublePair scale = one / square_root(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -88,8 +89,8 @@ RayHit as_ray_hit(const Hit& hit, const Ray& ray) {
   return out;
 }
 
-// Returns the largest square whose root, as a double, is at most `distance`. Distances over 2^31 do
-// not occur.
+// Returns the largest squared distance whose root, as a double, is at most `distance`. Distances
+// between voxels are never over 2^31.
 uint64_t largest_square(double distance) {
   if (distance >= 0x1p31) return uint64_t{1} << 62;
   auto square = static_cast<uint64_t>(distance * distance);
@@ -100,7 +101,7 @@ uint64_t largest_square(double distance) {
 
 }  // namespace
 
-// The file, and tables that are worthwhile only for many queries.
+// The file, and additional tables that are worthwhile only for many queries.
 struct DagFile::State {
   State(const std::string& path, uint64_t memory_bytes)
       : file(open_global_file(path)), view(*file), budget(memory_bytes) {}
@@ -119,22 +120,24 @@ struct DagFile::State {
   std::array<std::unique_ptr<NodeCounts>, 21> counts_of;  // by grid levels; guarded by mutex
 };
 
-// A call with this many queries requests huge pages. The table of the top is created after this
-// many queries in total. These queries together reach most of the nodes that later ones need.
+// A call with at least this number of queries requests huge pages. The table of the top cells is
+// created after this number of queries in total: so many queries together reach most of the nodes
+// that later queries need.
 constexpr size_t kManyQueries = size_t{1} << 14;
 
-// For a few queries, reading 2 MiB for each node would be slow. The same is true for many queries
-// of a file that is larger than memory.
+// Requests huge pages for the file, except where this would be slow: for a few queries, because
+// each node would then require a read of 2 MiB, and for a file that is larger than memory.
 void DagFile::State::prepare_for_queries(size_t count) {
   if (count < kManyQueries || file->file_bytes() > default_memory()) return;
-  // Pages already in memory keep their size, and not every system supports huge pages for files.
+  // This is only a request: pages already in memory keep their size, and not every system supports
+  // huge pages for files.
   std::call_once(huge_pages, [&] {
     madvise(const_cast<unsigned char*>(file->data()), file->file_bytes(), MADV_HUGEPAGE);
   });
 }
 
-// Null for few queries, and if the top is damaged: then each descent reports the damage that it
-// finds.
+// Returns the table of the top cells; null after only a few queries. Also returns null if the top
+// levels are damaged: then each descent from the root reports the damage that it finds.
 const TopCells* DagFile::State::top_cells(size_t points) {
   if ((points_looked_up += points) < kManyQueries || !TopCells::serve(view, view.grid_levels()))
     return nullptr;
@@ -198,7 +201,7 @@ const std::vector<std::string>& DagFile::material_names() const {
 
 namespace {
 
-// An attribute's section, and the build option that adds the attribute.
+// The section of the file that stores an attribute, and the build option that adds this section.
 struct AttributeSource {
   const voxdag_reader::File& file;
   const voxdag_reader::ColorSection& section;

@@ -29,8 +29,8 @@ class NearestSearch {
     Position low;
   };
 
-  // Returns the squared distance from the point to the nearest cell of a cube. It is exact because
-  // both are integers.
+  // Returns the squared distance from the query point to the nearest cell of a cube. It is exact,
+  // because the coordinates are integers.
   uint64_t distance_to(const Position& low, int64_t edge) const {
     uint64_t squared = 0;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -44,8 +44,8 @@ class NearestSearch {
     return morton_encode(static_cast<uint32_t>(p[0]), static_cast<uint32_t>(p[1]),
                          static_cast<uint32_t>(p[2]));
   }
-  // True if a cube may have a better cell than the best so far. `low` is the cube's low corner,
-  // which has its lowest Morton code.
+  // True if a cube at the squared distance `squared` may have a better cell than the best cell so
+  // far. `low` is the cube's low corner, the cell with the cube's lowest Morton code.
   bool may_improve(const Position& low, uint64_t squared) const {
     if (squared != best_.squared_distance) return squared < best_.squared_distance;
     return !best_.found || morton_of(low) < morton_of(best_.cell);

@@ -8,11 +8,11 @@
 
 namespace voxdag::query {
 
-// Returns the set cell of the grid of 2^grid_levels per edge whose center is nearest to the center
-// of the cell `from`. On ties, the lowest Morton code wins. No result if the distance exceeds the
-// root of max_squared. Descends into near children first, and never into children farther than the
-// best cell so far. grid_levels is at most the file's, coordinates at most kMaxCoordinate. Throws
-// Error{kCorrupt} for a damaged DAG.
+// Finds the set cell whose center is nearest to the center of the cell `from`, in the grid of
+// 2^grid_levels cells per edge. On ties, the lowest Morton code wins. Finds nothing if the distance
+// exceeds the root of max_squared. Descends into near children first, and never into children that
+// are farther than the best cell so far. grid_levels must be at most the file's, coordinates at
+// most kMaxCoordinate. Throws Error{kCorrupt} for a damaged DAG.
 Nearest find_nearest(const DagView& dag, uint32_t grid_levels, const Position& from,
                      uint64_t max_squared);
 

@@ -21,8 +21,8 @@ NodeCounts::NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint
   }
 }
 
-// No numbers are stored for bricks and for the nodes just above the cells, because their masks
-// contain them.
+// Stores the counts of a level. Bricks and the nodes just above the cells need no stored counts,
+// because their masks contain them.
 void NodeCounts::store(const voxdag_reader::File& file, MemoryBudget& budget,
                        const CancelToken& cancel) {
   if (grid_levels_ < 2 || dag_.grid_levels() < 3) return;

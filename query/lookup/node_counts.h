@@ -18,10 +18,9 @@ namespace voxdag::query {
 // Counts the cells of one grid. Immutable after construction; safe to use from several threads.
 class NodeCounts {
  public:
-  // Takes 8 bytes per node above the bricks and 2 bits per word of these nodes. If this does not
-  // fit in the budget, no counts are stored, and every count walks the octree below its region.
-  // `dag` is the view of `file`; both must outlive this object. Throws Error{kCorrupt},
-  // Error{kCanceled}.
+  // Takes 8 bytes per node above the bricks, and 2 bits per word of these nodes. If this does not
+  // fit in the budget, stores no counts: count() then visits all nodes below its region. `dag` is
+  // the view of `file`; both must outlive this object. Throws Error{kCorrupt}, Error{kCanceled}.
   NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint32_t grid_levels,
              MemoryBudget& budget, const CancelToken& cancel = {});
 

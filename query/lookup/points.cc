@@ -7,7 +7,8 @@
 namespace voxdag::query {
 namespace {
 
-// Number of concurrent descents that hides the latency of memory. More gain nothing (measured).
+// Number of concurrent descents. It is enough to hide the latency of memory; a larger number is not
+// faster (measured).
 constexpr size_t kGroup = 32;
 
 // Runs descents in groups of kGroup.
@@ -44,7 +45,8 @@ class Descents {
     }
   };
 
-  // Returns true if the descent continues in a child of its cell of the top.
+  // Starts a descent at its cell of the top. Returns true if the descent continues in a child of
+  // this cell.
   bool begin_at_top(Descent& d) const {
     const uint32_t shift = grid_levels_ - TopCells::kLevels;
     const TopCells::Cell cell = top_->at(d.x >> shift, d.y >> shift, d.z >> shift);
@@ -64,8 +66,8 @@ class Descents {
     count_ = 0;
   }
 
-  // Moves the descents from the nodes at `depth` to their children. Ends descents without such a
-  // child.
+  // Moves each descent from its node at `depth` to the child that contains the point. Ends the
+  // descents whose node has no such child.
   void descend(uint32_t depth) {
     const std::span<const uint32_t> words = dag_.level(depth).words;
     const DagView::Level& below = dag_.level(depth + 1);
@@ -77,7 +79,7 @@ class Descents {
       if (d.content >= words.size()) dag_.corrupt(depth, d.content);
       const uint32_t mask = words[d.content];
       const uint32_t bit = 1u << d.child_index(shift);
-      // Has no branch, because the end of a descent is hard to predict.
+      // This code has no branch, because the CPU cannot predict which descents end here.
       const uint64_t place = uint64_t{kPopcount8[mask & (bit - 1)]} << below.wide;
       const bool has_child = mask & bit;
       if (has_child && place + below.wide + 1 >= words.size() - d.content)

@@ -1,5 +1,5 @@
-// The nodes of the grid of 32^3 cells, in a dense array of 256 KiB. Lookups of many points begin
-// there instead of at the root. In the grid of a surface, most points also end there.
+// The nodes of the level with 32^3 cells, in a dense array of 256 KiB. Lookups of many points begin
+// at these nodes instead of at the root. In the grid of a surface, most points also end there.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,14 @@ class TopCells {
  public:
   static constexpr uint32_t kLevels = 5;
 
-  // True if the 32^3 cells are nodes of the DAG that have children in the grid of `grid_levels`.
+  // True if the DAG has nodes on the level of 32^3 cells, and these nodes have children in the grid
+  // of `grid_levels`.
   static bool serve(const DagView& dag, uint32_t grid_levels) {
     return !dag.empty() && dag.grid_levels() > kLevels + kBrickLevels && grid_levels > kLevels;
   }
 
-  // `dag` must satisfy serve(). Reads the levels above the cells. Throws Error{kCorrupt} if they
-  // are damaged.
+  // `dag` must satisfy serve(). Reads the DAG's levels above the 32^3 cells. Throws Error{kCorrupt}
+  // if these levels are damaged.
   explicit TopCells(const DagView& dag) : cells_(size_t{1} << (3 * kLevels)) {
     fill(dag, 0, dag.root(), 0);
   }
@@ -36,7 +37,7 @@ class TopCells {
   }
 
  private:
-  // `place` is the index of the cell's low corner in the array.
+  // Fills the array below a node. `place` is the array index of the low corner of the node's cell.
   void fill(const DagView& dag, uint32_t depth, uint64_t offset, size_t place) {
     const DagView::Children children = dag.children_of_node(depth, offset);
     if (depth == kLevels) {

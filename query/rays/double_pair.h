@@ -1,5 +1,5 @@
-// Two doubles per operation: SSE2, which every x86-64 has, or plain C++ elsewhere. Each operation
-// rounds like the same operation on one double.
+// Two doubles that one operation processes together: with SSE2, which every x86-64 CPU has, or in
+// plain C++ on other CPUs. Each operation rounds like the same operation on one double.
 #pragma once
 
 #include <cmath>
@@ -30,12 +30,12 @@ inline DoublePair square_root(DoublePair a) { return {_mm_sqrt_pd(a.v)}; }
 inline DoublePair absolute(DoublePair a) { return {_mm_andnot_pd(_mm_set1_pd(-0.0), a.v)}; }
 inline DoublePair max(DoublePair a, DoublePair b) { return {_mm_max_pd(a.v, b.v)}; }
 inline DoublePair min(DoublePair a, DoublePair b) { return {_mm_min_pd(a.v, b.v)}; }
-// firsts() has the first number twice, seconds() the second number twice. first_second() has the
-// first number of `a` and the second number of `b`.
+// firsts() returns the first number of `a` twice, seconds() the second number twice. first_second()
+// returns the first number of `a` and the second number of `b`.
 inline DoublePair firsts(DoublePair a) { return {_mm_unpacklo_pd(a.v, a.v)}; }
 inline DoublePair seconds(DoublePair a) { return {_mm_unpackhi_pd(a.v, a.v)}; }
 inline DoublePair first_second(DoublePair a, DoublePair b) { return {_mm_shuffle_pd(a.v, b.v, 2)}; }
-// Bit 0 is for the first of the pair, bit 1 for the second.
+// Returns a mask: bit 0 is the result for the first numbers of the pairs, bit 1 for the second.
 inline unsigned less(DoublePair a, DoublePair b) {
   return static_cast<unsigned>(_mm_movemask_pd(_mm_cmplt_pd(a.v, b.v)));
 }

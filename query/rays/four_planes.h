@@ -1,5 +1,6 @@
-// The planes of a cell as two times four doubles, and the children that they bound. Each source
-// that includes this is compiled for its own instructions, so everything here has internal linkage.
+// The planes of a cell as two vectors of four doubles, and a test of which children a ray crosses.
+// Each source file that includes this header is compiled for a different instruction set, so
+// everything here has internal linkage.
 #pragma once
 
 #include <cstdint>
@@ -11,23 +12,24 @@
 namespace voxdag::query {
 namespace {
 
-// Masks of a cell's mirrored children: children with a nonempty interval of a ray, and children
-// with an interval of length 0.
+// Masks of a cell's mirrored children. `inside`: children in which the ray has a nonempty interval.
+// `touching`: children in which this interval has length 0.
 struct Crossed {
   uint32_t inside, touching;
 };
 
-// Planes on the axes x, y and z; the fourth number has no meaning. There is one set of planes for
-// the lower children of a cell and one for the upper children, either for entering or for leaving
-// them. Also the rays' parameters at these planes.
+// Four numbers per set of planes: for the planes on the axes x, y and z; the fourth number has no
+// meaning. `lower` is for the planes of a cell's lower children, `upper` for those of its upper
+// children. An object holds either the planes by which rays enter the children or the planes by
+// which they leave them, as coordinates or as the rays' parameters at these planes.
 template <class Four>
 struct FourPlanes {
   Four lower, upper;
   static FourPlanes of(double all) { return {Four::of(all), Four::of(all)}; }
-  // The same four numbers for the planes of the lower children and of the upper children.
+  // Uses the same four numbers for `lower` and `upper`.
   static FourPlanes twice(const double* four) { return {Four::load(four), Four::load(four)}; }
-  // The planes at which rays enter the children of the cell at `low`. `half` is the children's
-  // edge.
+  // Returns the planes at which rays enter the children of a cell. `low` is the cell's low corner,
+  // `half` the edge of its children.
   static FourPlanes of_cell(Int4 low, double half) {
     const Four l = Four::from(low);
     return {l, l + Four::of(half)};
@@ -54,7 +56,8 @@ VOXDAG_INLINE FourPlanes<Four> min(FourPlanes<Four> x, FourPlanes<Four> y) {
   return {min(x.lower, y.lower), min(x.upper, y.upper)};
 }
 
-// The parameters `in` may be lower bounds, and `out` upper bounds.
+// Returns the children that a ray with these parameters crosses. For a test of many rays, `in` may
+// be lower bounds of the parameters, and `out` upper bounds.
 template <class Four>
 VOXDAG_INLINE Crossed cross(FourPlanes<Four> in, FourPlanes<Four> out, double t_min, double t_max) {
   const Four first = Four::of(t_min), last = Four::of(t_max);

@@ -1,15 +1,17 @@
-// The walk of a packet of rays, for any implementation of vectors of four doubles. Each source that
-// includes this is compiled for different instructions, so everything here has internal linkage.
+// The walk of a packet of rays, for any implementation of vectors of four doubles. Each source file
+// that includes this header is compiled for a different instruction set, so everything here has
+// internal linkage.
 //
-// Large cells are visited depth first, once for all rays that may cross them. Common bounds of all
-// rays exclude most children. If several children remain, each ray is tested with each of them. If
-// few rays remain, each ray descends separately through its cells in order, so that it loads no
-// cells behind its hit. These rays take turns, one step each: while the others step, the memory
-// loads the next cell of a ray.
+// The walk visits large cells depth first, once for all rays that may cross them. Common bounds of
+// all rays exclude most children. If several children remain, each ray is tested with each of them.
+// If only few rays remain, each of them descends separately through its cells in order, and so
+// loads no cells behind its hit. The separate rays take turns, one step each. While the other rays
+// take their steps, memory loads the next cell of a ray.
 //
 // A ray crosses a cell if its interval in the cell is not empty. In two cases the result depends on
-// the path from the root: an interval of length 0 in an occupied cell, and two planes passed at the
-// parameter of a hit. Such a ray leaves the packet and is cast separately.
+// the path from the root: if the ray has an interval of length 0 in an occupied cell, and if it
+// passes two planes at the parameter of its hit. In both cases the ray is removed from the packet
+// and is cast separately.
 #pragma once
 
 #include <limits>
@@ -22,7 +24,7 @@
 namespace voxdag::query {
 namespace {
 
-// The child mask of a node with children in mirrored order.
+// Table of child masks: of[mirror][mask] is `mask` with the children in mirrored order.
 struct MirroredMasks {
   uint8_t of[8][256] = {};
   constexpr MirroredMasks() {
@@ -34,8 +36,8 @@ struct MirroredMasks {
 };
 constexpr MirroredMasks kMirroredMasks;
 
-// For each axis, all ones if the bit of this axis is set in the child index, that is for upper
-// children.
+// For each child index, a vector with all ones on the axes on which the child is an upper child
+// (the axis's bit is set in the index), and 0 on the others.
 constexpr Int4 kUpperOn[8] = {{0, 0, 0, 0},  {0, 0, -1, 0},  {0, -1, 0, 0},  {0, -1, -1, 0},
                               {-1, 0, 0, 0}, {-1, 0, -1, 0}, {-1, -1, 0, 0}, {-1, -1, -1, 0}};
 
@@ -59,7 +61,8 @@ class PacketWalk {
   }
 
  private:
-  // At most this many rays continue separately in any cell; in bricks all rays do. Measured.
+  // In a cell with at most this number of rays, the rays continue separately. In bricks, all rays
+  // do. Measured.
   static constexpr int kFewRays = 8;
 
   using Planes = FourPlanes<Four>;
@@ -84,7 +87,7 @@ class PacketWalk {
 #endif
   VOXDAG_INLINE static Int4 all(int32_t number) { return Int4{number, number, number, number}; }
 
-  // Bounds of the origins and inverse directions of all rays.
+  // Computes bounds of the origins and of the inverse directions of all rays.
   VOXDAG_INLINE void bound(uint64_t rays) {
     Four lows[6], highs[6];
     for (Four& low : lows) low = Four::of(std::numeric_limits<double>::infinity());
@@ -123,7 +126,7 @@ class PacketWalk {
     }
   }
 
-  // Like DagView::Children, whose functions are not compiled for this instruction set.
+  // Like DagView::Children. The functions of DagView are not compiled for this instruction set.
   struct Node {
     uint32_t mask;
     const uint32_t* children;
@@ -172,8 +175,8 @@ class PacketWalk {
                  job_.t_min, job_.t_max);
   }
 
-  // Returns the children of a cell that some ray may cross or touch. Rounding is monotonic, so
-  // bounds of origins and inverse directions give bounds of the parameters.
+  // Returns the children of a cell that at least one ray may cross or touch. Rounding is monotonic,
+  // so bounds of the origins and inverse directions give bounds of the parameters.
   VOXDAG_INLINE uint32_t cross_any(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);
@@ -183,7 +186,7 @@ class PacketWalk {
         cross(min(in * i0, in * i1), max(out * i0, out * i1), job_.t_min, job_.t_max);
     return crossed.inside | crossed.touching;
   }
-  // Returns the children of a cell that certainly all rays cross.
+  // Returns the children of a cell that all rays cross with certainty.
   VOXDAG_INLINE uint32_t cross_all(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);
@@ -255,8 +258,8 @@ class PacketWalk {
     }
   }
 
-  // Separates the rays in a cell: each continues alone. Cells are pushed in the order in which
-  // their rays cross them.
+  // Separates the rays in a cell: from here on, each ray continues alone. Cells must be pushed in
+  // the order in which a ray crosses them.
   void push(uint32_t depth, Int4 low, uint64_t offset, uint64_t rays) {
     for (; rays != 0; rays &= rays - 1) {
       const int ray = first_of(rays);
@@ -297,7 +300,8 @@ class PacketWalk {
     waiting_ = 0;
   }
 
-  // Lets the ray enter a cell. Returns true if the ray continues; `descent` then has its next cell.
+  // Advances a ray into the cell that its descent enters next. Returns true if the ray continues;
+  // its descent then has the next cell.
   VOXDAG_INLINE bool step(int ray) {
     RayDescent& descent = job_.descents[ray];
     const uint32_t depth = descent.depth;
@@ -321,8 +325,8 @@ class PacketWalk {
     return enter_next(descent);
   }
 
-  // Enters the first of these children of the path's node at `depth`. The others remain to be
-  // visited.
+  // Enters the first of the children `in` of the path's node at `depth`. The other children in `in`
+  // remain to be visited.
   VOXDAG_INLINE void enter_first(RayDescent& descent, uint32_t depth, uint32_t in, const Node& n) {
     const int index = first_of(in);
     descent.low = corner(descent.low, index, int32_t{1} << (job_.grid_levels - depth - 1));
@@ -335,7 +339,7 @@ class PacketWalk {
     prefetch(depth + 1, descent.offset);
   }
 
-  // Moves from a cell without a hit to the next cell. Returns false if none exists.
+  // Moves a descent from a cell without a hit to its next cell. Returns false if there is none.
   VOXDAG_INLINE bool enter_next(RayDescent& descent) {
     if (descent.open == 0) {
       if (descent.first_waiting < 0) return false;
@@ -383,7 +387,8 @@ class PacketWalk {
     return true;
   }
 
-  // Reports this cell as the ray's hit, unless a tie decides about the face.
+  // Reports this cell as the ray's hit. Gives the ray up instead if it enters the cell through two
+  // faces at the same parameter.
   VOXDAG_INLINE bool report(Int4 low, int32_t edge, int ray, uint32_t depth) {
     const PacketRay& r = job_.rays[ray];
     double t = job_.t_min;
@@ -412,7 +417,8 @@ class PacketWalk {
   PacketJob& job_;
   const uint8_t (&mirrored_)[256];
   const uint32_t brick_depth_;
-  // Rays that descend separately, as bits and as a list, and the cells waiting for them.
+  // The rays that descend separately, as bits and as a list, and the number of cells that wait for
+  // them.
   uint64_t under_way_ = 0;
   uint8_t list_[kPacketRays];
   int count_ = 0, waiting_ = 0;

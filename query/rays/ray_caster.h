@@ -1,12 +1,13 @@
 // Casts rays through the DAG.
 //
-// A ray descends the octree from the root, at each node through the children that it crosses,
-// nearest first. The parameters at which it crosses planes are computed from the planes' integer
-// coordinates by one formula: cells on both sides of a plane agree to the last bit, so there are no
-// cracks at any resolution. The ray is mirrored so that its direction is positive on every axis.
+// A ray descends the octree from the root. At each node it descends into the children that it
+// crosses, nearest first. A ray's parameter at a plane is computed from the plane's integer
+// coordinate, always by the same formula. So the cells on both sides of a plane agree to the last
+// bit, and there are no cracks at any resolution. The ray is mirrored so that its direction is
+// positive on every axis.
 //
-// A ray widens into a cone: an occupied cell that is no larger than the cone's width there
-// counts as solid. That ends the descent where finer cells would be invisible.
+// A ray widens into a cone: if an occupied cell is no larger than the width of the cone at the
+// cell, the cell counts as solid. So the descent ends where finer cells would be invisible.
 //
 // Immutable; any number of threads may cast rays.
 #pragma once
@@ -28,7 +29,8 @@ struct Hit {
   double t = 0;
   uint32_t depth = 0;    // levels below the root; the edge of the cell is R / 2^depth voxels
   int64_t cell[3] = {};  // position of the cell, in units of its edge
-  // Normal axis of the face by which the ray entered; -1 if the ray began in the cell.
+  // Axis of the normal of the face through which the ray entered the cell; -1 if the ray began in
+  // the cell.
   int axis = -1;
 };
 
@@ -39,8 +41,9 @@ class RayCaster {
   // Finds the first occupied cell between t_min and t_max. Returns false if none exists. Throws
   // Error{kCorrupt} for a damaged DAG.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit) const;
-  // Like the above, but reads at most `steps_left` nodes and bricks, and subtracts the number read.
-  // If the rest is 0, the ray ended early, and false does not mean that there is no hit.
+  // Like the function above, but reads at most `steps_left` nodes and bricks, and subtracts the
+  // number of reads from `steps_left`. If `steps_left` is then 0, the search ended early, and a
+  // result of false does not mean that there is no hit.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit,
             uint64_t& steps_left) const;
 

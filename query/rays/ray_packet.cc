@@ -37,7 +37,7 @@ uint64_t RayPacket::cast(std::span<const Ray> rays, Hit* hits) {
   job_.found = job_.single = 0;
   const uint64_t all = ~uint64_t{0} >> (kRays - rays.size());
   if (job_.leaf_depth == 0) {
-    job_.single = all;  // all rays hit the complete grid
+    job_.single = all;  // the complete grid counts as solid
   } else {
     load(rays);
     cast_packet(all);
@@ -53,7 +53,8 @@ uint64_t RayPacket::cast(std::span<const Ray> rays, Hit* hits) {
   return found;
 }
 
-// Like MirroredRay, with several divisions per step. Lanes without a ray have unused numbers.
+// Like MirroredRay, but with several divisions per operation. Unused lanes get the numbers of the
+// first ray.
 void RayPacket::load(std::span<const Ray> rays) {
   const double edge = static_cast<double>(dag_.resolution());
   for (size_t i = 0; i < kRays; ++i) {
@@ -78,7 +79,7 @@ void RayPacket::load(std::span<const Ray> rays) {
   }
 }
 
-// Walks once for each set of rays whose directions have the same signs.
+// Calls the walk once for each group of rays whose directions have the same signs.
 void RayPacket::cast_packet(uint64_t rays) {
   while (rays != 0) {
     job_.mirror = mirrors_[std::countr_zero(rays)];

@@ -1,6 +1,6 @@
-// Casts up to 64 rays together, with bit-identical results to RayCaster. Neighboring rays visit the
-// same large cells. A packet visits each cell once, for all rays that may cross it. See
-// query/rays/packet_walk.h.
+// Casts up to 64 rays together, with results that are bit-identical to RayCaster's. Neighboring
+// rays visit the same large cells, so a packet visits each such cell once, for all rays that may
+// cross it (query/rays/packet_walk.h).
 //
 // A packet takes about 30 KiB. Not thread-safe; each thread needs its own.
 #pragma once
@@ -14,7 +14,7 @@
 
 namespace voxdag::query {
 
-// The fastest walk that this machine can run; all have the same results.
+// Returns the fastest walk that this machine can run. All walks have the same results.
 WalkPacket fastest_packet_walk();
 
 class RayPacket {
@@ -25,8 +25,8 @@ class RayPacket {
   RayPacket(const DagView& dag, double stop_size, double t_min, double t_max,
             WalkPacket walk = fastest_packet_walk());
 
-  // Casts up to kRays rays. Bit i of the result is set if ray i has a hit, which is in hits[i].
-  // Throws Error{kCorrupt} for a damaged DAG.
+  // Casts up to kRays rays. Returns a mask: bit i is set if ray i has a hit, which is then in
+  // hits[i]. Throws Error{kCorrupt} for a damaged DAG.
   uint64_t cast(std::span<const Ray> rays, Hit* hits);
 
  private:

@@ -24,7 +24,7 @@ bool RayWalk::run(double t_min, Hit& hit) {
 template <class Has, class EnterChild>
 inline bool RayWalk::cross(const double (&low)[3], double half, const double (&out)[3], double t,
                            const Has& has, const EnterChild& enter_child) {
-  double next[3];  // parameters at which the ray leaves the child
+  double next[3];  // parameters at which the ray leaves the child, by axis
   int index = 0;   // mirrored index of the child
   for (int axis = 0; axis < 3; ++axis) {
     const double middle = ray_.time_of(axis, low[axis] + half);

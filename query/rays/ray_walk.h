@@ -1,9 +1,10 @@
 // The descent of one ray through the DAG.
 //
-// The ray is mirrored so that its direction is positive on every axis. A cell that it enters at `t`
-// is left at the least of `out`, the parameters of its three far planes. A plane's parameter is
-// computed from its integer coordinate by one formula, so a descent can begin in any cell that the
-// ray enters, with the same result as from the root.
+// The ray is mirrored so that its direction is positive on every axis. `out` are the ray's
+// parameters at the three far planes of a cell; a ray that enters the cell at `t` leaves it at the
+// smallest of them. The parameter at a plane is always computed from the plane's integer coordinate
+// by the same formula. So a descent can begin in any cell that the ray enters, with the same result
+// as from the root.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +19,8 @@ namespace voxdag::query {
 
 // A ray whose direction is positive on every axis.
 struct MirroredRay {
-  // Smaller components of a direction count as 0, because their inverse could be infinite.
+  // A component of a direction that is smaller than this counts as 0, because its inverse could be
+  // infinite.
   static constexpr double kMinComponent = 1e-18;
 
   static double component(double d) { return std::max(std::fabs(d), kMinComponent); }
@@ -37,12 +39,13 @@ struct MirroredRay {
   double time_of(int axis, double plane) const { return (plane - origin[axis]) * inverse[axis]; }
 
   double origin[3], inverse[3];
-  int mirror = 0;  // child index bits of the axes on which the ray was mirrored
+  int mirror = 0;  // bits of a child index, set for the axes on which the ray was mirrored
 };
 
 class RayWalk {
  public:
-  // Reads at most `max_steps` nodes and bricks. The walk then ends as if there were nothing more.
+  // `max_steps`: maximum number of nodes and bricks to read. After them, the walk ends as if the
+  // rest of the DAG were empty.
   RayWalk(const DagView& dag, const MirroredRay& ray, const Cone& cone, double t_max,
           uint64_t max_steps = ~uint64_t{0})
       : dag_(dag), ray_(ray), cone_(cone), t_max_(t_max), steps_left_(max_steps) {}
@@ -51,9 +54,9 @@ class RayWalk {
 
   // Walks from the root. The DAG must not be empty. Throws Error{kCorrupt} for a damaged DAG.
   bool run(double t_min, Hit& hit);
-  // Walks from a cell that has children. `low` is its low corner, mirrored like the ray, `size` its
-  // edge, both in voxels. `axis` belongs to the face by which the ray enters it at `t`; -1 if the
-  // ray begins there.
+  // Walks from a cell that has children. `low` is the cell's low corner, mirrored like the ray, and
+  // `size` the cell's edge, both in voxels. `axis` is the axis of the face through which the ray
+  // enters the cell at `t`; -1 if the ray begins in the cell.
   bool run_below(uint32_t depth, const double (&low)[3], double size, uint64_t content,
                  const double (&out)[3], double t, int axis, Hit& hit) {
     axis_ = axis;
@@ -62,8 +65,9 @@ class RayWalk {
   }
 
  private:
-  // Visits the children of a cell with has(index), nearest first: calls enter_child(index, low
-  // corner, out, t), which returns true for a hit.
+  // Visits the existing children of a cell, for which has(index) is true, nearest first. Calls
+  // enter_child(index, low corner, out, t) for each; the visit ends when it returns true, for a
+  // hit.
   template <class Has, class EnterChild>
   bool cross(const double (&low)[3], double half, const double (&out)[3], double t, const Has& has,
              const EnterChild& enter_child);

@@ -1,5 +1,5 @@
-// The share of light that a surface reflects, from the file's colors or gray plaster. Not
-// thread-safe. Refers to the file.
+// The share of light that a surface reflects: from the colors of a file, or of gray plaster. Refers
+// to the file. Not thread-safe.
 #pragma once
 
 #include <optional>
@@ -15,11 +15,12 @@ inline constexpr Vec kPlaster{{0.74, 0.70, 0.64}};
 
 class Albedo {
  public:
-  // `colors`: the file whose colors are shown, or null. The result is gray if it has no colors.
+  // `colors`: the file whose colors are shown; may be null. Without colors, the result is gray.
   explicit Albedo(const voxdag_reader::File* colors) {
     if (colors && colors->has_colors()) cursor_.emplace(*colors);
   }
-  // Returns red, green and blue, linear. Throws Error{kCorrupt} for damaged colors.
+  // Returns the reflected share of red, green and blue light, linear. Throws Error{kCorrupt} for
+  // damaged colors.
   Vec of(const SurfaceHit& surface);
 
  private:

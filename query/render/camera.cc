@@ -9,12 +9,12 @@
 namespace voxdag::query {
 namespace {
 
-constexpr double kMargin = 1.06;  // free space around the points
+constexpr double kMargin = 1.06;  // enlarges the picture to leave free space around the points
 
 double half_tangent(double fov_degrees) { return std::tan(fov_degrees * kPi / 360); }
 
-// Sets the right and up axes of a camera that looks along `forward`. If it looks straight down, up
-// is -z.
+// Sets the axes that point right and up in the picture of a camera that looks along `forward`. If
+// the camera looks straight down, the up axis is -z.
 void picture_axes(const Vec& forward, Vec& right, Vec& up) {
   const bool vertical = std::fabs(forward[1]) > 1 - 1e-9;
   const Vec reference = vertical ? Vec{{0, 0, forward[1] < 0 ? -1.0 : 1.0}} : Vec{{0, 1, 0}};
@@ -22,8 +22,8 @@ void picture_axes(const Vec& forward, Vec& right, Vec& up) {
   up = cross(right, forward);
 }
 
-// Returns the largest coordinate of the points along `axis`. The outermost 1/2000 of the points are
-// ignored as outliers if they alone account for a tenth of the extent.
+// Returns the largest coordinate of the points along `axis`. If the outermost 1/2000 of the points
+// account for more than a tenth of the extent, they are ignored as outliers.
 double bound(const std::vector<Vec>& points, const Vec& axis) {
   std::vector<double> along;
   for (const Vec& p : points) along.push_back(dot(p, axis));
@@ -59,9 +59,9 @@ Placement fit_camera(const std::vector<Vec>& points, const Vec& toward_eye, doub
   Vec right, up;
   picture_axes(back * -1.0, right, up);
   const double tangent_up = half_tangent(fov_degrees) / kMargin;
-  // With the eye at e, point p is in the picture if |p.right - e.right| <= tangent * (e.back -
-  // p.back), and likewise for up. Each inequality gives two linear bounds on e. e is centered
-  // between the tightest bounds.
+  // For an eye at e, the point p is in the picture if |p.right - e.right| <= tangent * (e.back -
+  // p.back), and likewise with up instead of right. Each of the two inequalities gives two linear
+  // bounds on e, and e is placed midway between the tightest bounds.
   double e[2] = {0, 0}, distance = bound(points, back) + 1;
   const Vec axes[2] = {right, up};
   const double tangents[2] = {tangent_up * aspect, tangent_up};

@@ -1,4 +1,5 @@
-// A pinhole camera in voxel units, and a placement of the camera for a set of points. Immutable.
+// A pinhole camera in voxel units, and a function that places a camera for a set of points.
+// Immutable.
 #pragma once
 
 #include <vector>
@@ -10,7 +11,7 @@ namespace voxdag::query {
 struct Placement {
   Vec eye;
   Vec target;
-  double fov_degrees = 35;  // from the lower to the upper edge of the picture
+  double fov_degrees = 35;  // angle between the lower and the upper edge of the picture
 };
 
 class Camera {
@@ -32,9 +33,9 @@ class Camera {
   double half_width_, half_height_;  // of the picture, in pixels
 };
 
-// Returns a placement in the direction `toward_eye` (of any length) with all of `points` centered
-// and as large as possible. A few outliers among thousands may be outside. Needs at least one
-// point.
+// Returns a placement from which all of `points` are centered in the picture and as large as
+// possible. The camera is in the direction `toward_eye` (of any length) from the points. A few
+// outliers among thousands of points may be outside the picture. Needs at least one point.
 Placement fit_camera(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
                      double aspect);
 

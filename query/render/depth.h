@@ -1,4 +1,4 @@
-// Depth maps: for each pixel the distance to the visible cell, for programs that compare or combine
+// Depth maps: the distance to the visible cell for each pixel, for programs that compare or combine
 // pictures.
 #pragma once
 
@@ -13,8 +13,8 @@ namespace voxdag::query {
 
 struct DepthMap {
   int width = 0, height = 0;
-  // Rows from the top. Each value is the distance in voxels along the ray through the center of the
-  // pixel, infinity if there is no surface.
+  // One value per pixel, in rows from the top: the distance in voxels along the ray through the
+  // center of the pixel; infinity if the ray meets no surface.
   std::vector<float> depths;
 };
 
@@ -25,7 +25,7 @@ DepthMap render_depth(const DagView& dag, const Placement& placement, int width,
 // Bytes per pixel of a map and its file.
 inline constexpr uint64_t kDepthBytesPerPixel = 2 * sizeof(float);
 
-// Returns the bytes of a file for numpy.load(): an array (height, width) of float32.
+// Returns the bytes of a file for numpy.load(): an array of float32 with the shape (height, width).
 std::string encode_npy(const DepthMap& map);
 
 }  // namespace voxdag::query

@@ -1,4 +1,4 @@
-// The G-buffer: the visible surface of each pixel and its light, before tone mapping, with a
+// The G-buffer: for each pixel the visible surface and its light before tone mapping. Also has a
 // filter that removes sampling noise.
 #pragma once
 
@@ -16,8 +16,8 @@ struct Float3 {
   operator Vec() const { return {{x, y, z}}; }
 };
 
-// Means over a pixel's samples: `floor` over the samples that met no surface, all others over the
-// samples that met one.
+// Averages over the samples of a pixel. `floor` is an average over the samples that met no surface,
+// all other members (except `coverage`) over the samples that met one.
 struct GBufferPixel {
   float coverage = 0;  // share of the samples that met a surface
   Float3 offset;       // from the eye to the surface, in voxels
@@ -38,10 +38,10 @@ struct GBuffer {
     return pixels[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
   }
 
-  // Returns the pixel with smoothed light. The sky light is averaged over the neighbors on the same
-  // plane, the floor light over neighbors on the floor. Sun and normal have finer detail and are
-  // averaged over fewer neighbors. `pixel_spread` is the width of a pixel at distance 1. Does not
-  // modify the buffer.
+  // Returns the pixel with smoothed light. The sky light is averaged over neighbor pixels on the
+  // same plane, the light of the floor over neighbors on the floor. Sun and normal have finer
+  // detail, so they are averaged over fewer neighbors. `pixel_spread` is the width of a pixel at
+  // distance 1. Does not modify the buffer.
   GBufferPixel smoothed(int x, int y, double pixel_spread);
 };
 

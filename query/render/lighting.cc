@@ -15,7 +15,8 @@ constexpr double kBounce = 0.42;        // share of light that an occluder refle
 constexpr double kSkyWidening = 0.1;    // spread of the cones of rays to the sky
 constexpr double kSunWidening = 0.004;  // spread of the cones of rays to the sun
 
-// Dimensions of the sampler. The renderer uses 0 for the position within the pixel.
+// Dimensions of the Sampler for rays to the sky and to the sun. The renderer uses dimension 0 for
+// the position within the pixel.
 constexpr uint64_t kSkyDimension = 1, kSunDimension = 2;
 
 Vec sky_color(const Vec& direction) {
@@ -90,9 +91,9 @@ double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
   return 1 - fade * (0.75 - 0.35 * open - 0.40 * (sees(s, sun_) ? 1 : 0));
 }
 
-// For a camera outside the scene, the sun is over its left shoulder. Within a scene, 48 positions
-// in all directions at three heights are tried, and the sun gets the one that lights about a third
-// of the visible surface.
+// If the camera is outside the scene, the sun is behind the camera's left shoulder. If it is
+// inside, 48 positions are tried, in all directions and at three heights. The sun gets the position
+// from which it lights about a third of the visible surface.
 void Lighting::place_sun(const std::vector<SurfaceHit>& seen, const Vec& back) {
   constexpr int kTurns = 16, kHeights = 3;
   constexpr double kLitTarget = 0.35;

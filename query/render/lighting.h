@@ -1,5 +1,5 @@
-// The light on a surface: a sun with shadows, and a sky that nearby surfaces occlude. Both are
-// found by casting rays. Immutable; thread-safe.
+// The light on a surface: a sun that casts shadows, and a sky that nearby surfaces hide in part.
+// Both lights are computed by casting rays. Immutable; thread-safe.
 #pragma once
 
 #include <vector>
@@ -14,8 +14,8 @@ namespace voxdag::query {
 
 class Lighting {
  public:
-  // Places the sun for the visible surface; `seen` are samples of the surface. A camera outside the
-  // scene also sees a floor below it, which receives the scene's shadow.
+  // Places the sun for the visible surface, of which `seen` contains samples. If the camera is
+  // outside the scene, it also sees a floor below the scene, on which the scene casts its shadow.
   Lighting(const DagView& dag, const Box& box, const Camera& camera,
            const std::vector<SurfaceHit>& seen);
 

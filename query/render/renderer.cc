@@ -23,7 +23,8 @@ uint8_t srgb_byte(double linear, double dither) {
   return static_cast<uint8_t>(std::min(255.0, 255 * s + dither));
 }
 
-// Returns the surfaces that the camera sees through a coarse grid of points, nearest first.
+// Casts rays through a coarse grid of points in the picture. Returns the surfaces that they meet,
+// nearest first.
 std::vector<SurfaceHit> probe_view(const DagView& dag, const Camera& camera, int width,
                                    int height) {
   constexpr int kColumns = 40, kRows = 24;
@@ -39,8 +40,9 @@ std::vector<SurfaceHit> probe_view(const DagView& dag, const Camera& camera, int
   return seen;
 }
 
-// Returns the exposure factor. If all probed surfaces were of plaster, their median light would be
-// a middle tone, and their brightest tenth would be below white. So dark surfaces remain dark.
+// Returns the exposure factor. It is chosen as if all probed surfaces were of plaster: their median
+// light would then be a middle tone, and their brightest tenth would be below white. So dark
+// surfaces remain dark.
 double choose_exposure(const Lighting& lighting, const std::vector<SurfaceHit>& seen) {
   constexpr int kSkyRays = 8;
   if (seen.empty()) return 1;

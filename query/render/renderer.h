@@ -1,4 +1,4 @@
-// Renders a picture of a DAG on several threads; the pixels do not depend on their number.
+// Renders a picture of a DAG on several threads. The pixels do not depend on the number of threads.
 #pragma once
 
 #include "core/base/progress.h"
@@ -21,8 +21,8 @@ struct RenderOptions {
 // Bytes that render_picture() allocates per pixel, including the picture.
 inline constexpr uint64_t kRenderBytesPerPixel = sizeof(GBufferPixel) + 3;
 
-// Shows a plain background if the DAG is empty. Throws Error{kCorrupt} for a damaged DAG, and
-// Error{kCanceled}.
+// Renders a picture. If the DAG is empty, the picture shows a plain background. Throws
+// Error{kCorrupt} for a damaged DAG, and Error{kCanceled}.
 Picture render_picture(const DagView& dag, const Placement& placement, const RenderOptions& options,
                        Progress& progress, const CancelToken& cancel);
 

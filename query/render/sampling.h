@@ -9,9 +9,10 @@ namespace voxdag::query {
 
 inline constexpr double kPi = 3.14159265358979323846;
 
-// Points in [0, 1)^2 that cover the square evenly (the R2 sequence). Each dimension of a sample
-// (its position in the pixel, its rays to the sky) shifts the sequence by a random amount. The
-// sequences of neighboring pixels start far apart, so the remaining noise is fine.
+// Points in [0, 1)^2 that cover the square evenly (the R2 sequence). A sample has several
+// dimensions (its position in the pixel, its rays to the sky), and each dimension shifts the
+// sequence by a random amount. The sequences of neighboring pixels start far apart, so the
+// remaining noise is fine-grained.
 class Sampler {
  public:
   struct Pair {

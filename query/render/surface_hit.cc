@@ -26,7 +26,7 @@ Moments moments_around(const DagView& dag, const Hit& hit) {
   Vec low;
   for (int axis = 0; axis < 3; ++axis) low[axis] = static_cast<double>(hit.cell[axis]) * edge;
   const auto near = [&](const DagView::Cell& cell) {
-    // The children in the lower and in the upper half of each axis.
+    // Masks of the children in the lower half and in the upper half of each axis.
     constexpr uint32_t kHalves[3][2] = {{0x0f, 0xf0}, {0x33, 0xcc}, {0x55, 0xaa}};
     uint32_t children = 0xff;
     for (int axis = 0; axis < 3; ++axis) {
@@ -49,9 +49,9 @@ Moments moments_around(const DagView& dag, const Hit& hit) {
   return m;
 }
 
-// Returns the normal of the plane that best fits the occupied cells near the hit: the eigenvector
-// of their covariance's smallest eigenvalue. If there are too few cells for a plane, returns the
-// normal of the entered face.
+// Returns the normal of the plane that best fits the occupied cells near the hit. It is the
+// eigenvector for the smallest eigenvalue of the covariance of these cells. If there are too few
+// cells for a plane, returns the normal of the face that the ray entered.
 Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
   constexpr int kIterations = 8;
   const Vec face = face_normal(hit, direction), toward_eye = face - direction;
@@ -62,7 +62,7 @@ Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
   // Regularization. Without it, the adjugate of a perfect plane's covariance could be zero.
   const double trace = c[0][0] + c[1][1] + c[2][2];
   for (int i = 0; i < 3; ++i) c[i] = c[i] * (1 / trace), c[i][i] += 1e-3;
-  // Inverse iteration with the adjugate, which equals the inverse up to a factor.
+  // Inverse iteration. It uses the adjugate, which equals the inverse matrix up to a factor.
   const Vec adjugate[3] = {cross(c[1], c[2]), cross(c[2], c[0]), cross(c[0], c[1])};
   const double scale = 1 / (adjugate[0][0] + adjugate[1][1] + adjugate[2][2]);
   Vec n = toward_eye;
@@ -86,9 +86,10 @@ bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surfa
   const double cube = std::clamp((pixels - 5) / 8, 0.0, 1.0);
   const Vec face = face_normal(hit, ray.direction);
   s.normal = cube < 1 ? normalized(mix(plane_normal(dag, hit, ray.direction), face, cube)) : face;
-  // The offset is larger than the steps between the cells of a slope.
+  // The offset from the surface is larger than the steps between neighboring cells of a slope.
   s.start = ray.at(s.t) + s.normal * (s.size * 2.2 * (1 - cube)) + face * (s.size * 0.01);
-  // In a narrow place this point may be occupied. Then the path of the ray is used, which is free.
+  // In a narrow place this point may be occupied. In this case, a point on the ray before the hit
+  // is used, which is certainly free.
   if (caster.cast({s.start, s.normal}, {s.size, 0}, 0, 0, hit))
     s.start = ray.at(s.t - 1.5 * s.size);
   return true;

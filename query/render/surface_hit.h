@@ -12,8 +12,8 @@ namespace voxdag::query {
 
 // Distance at which the view of any ray ends.
 inline constexpr double kFarthest = 1e30;
-// The cone of a ray through a pixel that is `pixel_spread` wide at distance 1: cells of up to three
-// quarters of a pixel are drawn as one cell.
+// The cone of a ray through a pixel that is `pixel_spread` wide at distance 1. Cells of up to three
+// quarters of a pixel are drawn as one cell: finer cells are not visited.
 inline Cone visible_cone(double pixel_spread) { return {0, 0.75 * pixel_spread}; }
 
 struct SurfaceHit {
@@ -22,12 +22,13 @@ struct SurfaceHit {
   uint32_t depth = 0;    // depth of this cell below the root
   int64_t cell[3] = {};  // position of this cell, in units of its edge
   Vec normal;            // unit vector on the side that the ray came from
-  Vec start;             // free space in front of the surface, where rays to the light start
+  Vec start;             // free point in front of the surface, where rays to the light start
 };
 
 // Finds the first surface on a ray through a pixel that is `pixel_spread` wide at distance 1.
-// Returns false if none exists. Voxels that cover many pixels are shown as cubes, smaller ones as
-// the surface that they sample. Throws Error{kCorrupt} for a damaged DAG.
+// Returns false if none exists. A voxel that covers many pixels is shown as a cube. Smaller voxels
+// are shown as the smooth surface from which they were sampled. Throws Error{kCorrupt} for a
+// damaged DAG.
 bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, SurfaceHit& surface);
 
 }  // namespace voxdag::query

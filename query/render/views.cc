@@ -12,7 +12,7 @@ namespace {
 constexpr double kFar = 1e30;
 constexpr double kOutsideFov = 32, kInsideFov = 62;
 constexpr double kMinEnclosureOfRooms = 0.1;
-constexpr size_t kFewCells = 256;  // fewer cells do not outline a scene
+constexpr size_t kFewCells = 256;  // fewer cells than this do not show the outline of a scene
 
 struct NamedDirection {
   const char* name;
@@ -24,22 +24,23 @@ const NamedDirection kDirections[] = {
     {"left", {{-1, 0, 0}}},     {"right", {{1, 0, 0}}}, {"top", {{0, 1, 0}}},
 };
 
-// Width of the rays that choose a view of a large grid. Finer cells would give the same view, but
-// are scattered over the file and may have to be read from disk.
+// Returns the width of the rays that choose a view of a large grid. Thinner rays would visit finer
+// cells, which give the same view, but are scattered over the file and may have to be read from
+// disk.
 double finest_width(const DagView& dag) {
   constexpr int64_t kCells = 4096;
   return dag.resolution() > kCells ? static_cast<double>(dag.resolution() / kCells) : 0;
 }
 
-// Limits of the work for views, in nodes and bricks read. A scene of dust, whose rays pass through
-// thousands of cells, or a damaged scene must not keep a service busy for minutes. Sponza at 4096^3
-// takes 0.4, 3.6 and 1.4 million steps.
+// Limits of the work for choosing a view, in nodes and bricks read. Without them, a scene of dust,
+// whose rays pass through thousands of cells, or a damaged scene could keep a service busy for
+// minutes. Sponza at 4096^3 takes 0.4, 3.6 and 1.4 million steps.
 constexpr uint64_t kMaxEnclosureSteps = uint64_t{1} << 22;
 constexpr uint64_t kMaxSearchSteps = uint64_t{1} << 25;  // for each of its two passes
 constexpr uint64_t kMaxBoxCells = uint64_t{1} << 25;
 
-// Rays that together take a limited number of steps. Discard results computed with a ray after the
-// last step.
+// Casts rays that together may take a limited number of steps. Results that were computed with a
+// ray after the last step must be discarded.
 class LimitedRays {
  public:
   LimitedRays(const DagView& dag, uint64_t max_steps, const CancelToken& cancel)
@@ -57,14 +58,15 @@ class LimitedRays {
   uint64_t steps_left_, count_ = 0;
 };
 
-// Returns the mean, over places on the surface, of the longest free distance from the place, as a
-// share of the scene's diagonal. A place from which a ray leaves the scene counts as 0. The result
-// is near 0 for an object or for caves, and larger for interiors.
+// Returns a measure of how enclosed the scene is. For each of some places on the surface, the
+// longest free distance from the place is found; a place from which a ray leaves the scene counts
+// as 0. The result is the mean of these distances, as a share of the scene's diagonal. It is near 0
+// for an object or for caves, and larger for interiors.
 double enclosure(const DagView& dag, const OccupiedCells& cells, const Box& box,
                  const CancelToken& cancel) {
   constexpr size_t kPlaces = 1000;
-  // Coprime to kPlaces, so that the first places are spread over the scene even if the steps are
-  // used up early.
+  // The stride is coprime to kPlaces. So the places visited first are spread over the scene, even
+  // if the steps are used up before all places are visited.
   constexpr size_t kStride = 381;
   LimitedRays rays(dag, kMaxEnclosureSteps, cancel);
   std::vector<Vec> directions;  // toward the 26 neighbors of a cell
@@ -90,8 +92,8 @@ double enclosure(const DagView& dag, const OccupiedCells& cells, const Box& box,
   return places == 0 ? 0 : sum / (static_cast<double>(places) * box.diagonal());
 }
 
-// Rates a view with a few rays. The score is higher for long views with much detail, and lower
-// close to a wall or if the camera looks out of the scene. A distance below `near` is too close.
+// Rates a view with a few rays. The score is higher for long views with much detail. It is lower if
+// the camera is close to a wall or looks out of the scene. Distances below `near` are too close.
 template <int kColumns, int kRows>
 double score(LimitedRays& rays, const Placement& placement, double width, double near) {
   constexpr double kRays = kColumns * kRows;
@@ -122,8 +124,8 @@ struct Trials {
   std::vector<Placement> placements;
   std::vector<double> scores;
 };
-// Returns some hundred random places in the lower half of the scene, with rough scores. Stops when
-// the steps are used up.
+// Returns some hundred random places in the lower half of the scene, with rough scores. Returns
+// fewer if the steps are used up.
 Trials rough_trials(const DagView& dag, const Box& box, double fov_degrees,
                     const CancelToken& cancel) {
   constexpr uint64_t kPlaces = 400;
@@ -150,11 +152,12 @@ Trials rough_trials(const DagView& dag, const Box& box, double fov_degrees,
   return trials;
 }
 
-// Returns the best of some random places. A quarter of the rays preselects the candidates. nullopt
-// if the steps were used up before any was found.
+// Returns the best of some random places; nullopt if the steps were used up before a place was
+// found. A quarter of the rays is used to preselect the candidates.
 std::optional<Placement> inside_view(const DagView& dag, const Box& box, double fov_degrees,
                                      const CancelToken& cancel) {
-  constexpr double kRoughShare = 0.6;  // of the best rough score; places below cannot be the best
+  // Places with less than this share of the best rough score cannot be the best.
+  constexpr double kRoughShare = 0.6;
   const auto [trials, rough] = rough_trials(dag, box, fov_degrees, cancel);
   if (trials.empty()) return std::nullopt;
   const size_t first =

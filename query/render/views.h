@@ -22,23 +22,24 @@ struct Box {
   double diagonal() const { return length(high - low); }
 };
 
-// Returns the box around the occupied cells of 1/2048 of the grid's edge. If this would take more
-// than some tens of millions of cells, returns a larger box. Throws as `cancel` does.
+// Returns the bounding box of the occupied cells of 1/2048 of the grid's edge. If this would
+// require visiting more than some tens of millions of cells, returns a larger box. Throws the error
+// of `cancel`.
 Box occupied_box(const DagView& dag, const CancelToken& cancel = {});
 
 // Occupied cells of one size.
 struct OccupiedCells {
   std::vector<Vec> centers;
   double edge;
-  // Returns points that must be in the picture to show the cells: the cells' centers, or their
-  // corners if there are few cells.
+  // Returns points that must be in the picture so that it shows all cells: the centers of the
+  // cells, or the corners of the cells if there are only few cells.
   std::vector<Vec> outline() const;
 };
-// Returns the occupied cells of 1/64 of the grid's edge. If they are few, the scene is small in its
-// grid, and finer cells are returned.
+// Returns the occupied cells of 1/64 of the grid's edge. Only few such cells mean that the scene is
+// small in its grid; then finer cells are returned.
 OccupiedCells occupied_cells(const DagView& dag);
 
-// "auto", "iso", "front", "back", "left", "right", "top", "inside".
+// Returns "auto", "iso", "front", "back", "left", "right", "top" and "inside".
 const std::vector<std::string>& view_names();
 
 // Returns the placement of a named view. "inside" is a position within the scene with a long view,
@@ -50,12 +51,12 @@ const std::vector<std::string>& view_names();
 // dust. Their number of steps is limited. At the limit, the result is the best view so far, or
 // "iso".
 //
-// Throws Error{kInvalidInput} for another name, and as `cancel` does.
+// Throws Error{kInvalidInput} for an unknown name, and the error of `cancel`.
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
                      std::optional<double> fov_degrees, const CancelToken& cancel = {});
 
-// Like named_view(), for several views of a DAG. Computes their common parts once. Refers to the
-// DAG and the token.
+// Like named_view(), for several views of the same DAG. Computes data that the views share only
+// once. Refers to the DAG and the token.
 class NamedViews {
  public:
   NamedViews(const DagView& dag, const CancelToken& cancel) : dag_(dag), cancel_(cancel) {}

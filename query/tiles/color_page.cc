@@ -12,7 +12,7 @@
 namespace voxdag::query {
 namespace {
 
-// Levels from a page's root to its cells, if the level has such small cells.
+// Number of levels from a page's root to its cells. Pages of levels near the DAG's root have fewer.
 constexpr uint32_t kPageLevels = 3;
 constexpr size_t kMaskWords = 16, kHeadWords = 1 + kMaskWords;
 constexpr uint64_t kBlockCells = 32;
@@ -33,7 +33,7 @@ void check_address(const voxdag_reader::File& file, const ColorPageAddress& page
                       std::to_string(page.level) + ": expected 0 to " + std::to_string(edge - 1));
 }
 
-// Returns a cell of the page from its Morton code within the page.
+// Returns the position of a cell of the page from its Morton code within the page.
 std::array<int64_t, 3> cell_of(const ColorPageAddress& page, uint32_t code) {
   std::array<int64_t, 3> cell;
   for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -53,7 +53,8 @@ uint32_t first_bit(const uint32_t* mask) {
 
 }  // namespace
 
-// A node is read when its children are requested; a brick is its own content.
+// Returns the children of a node or brick. A node is read from the file only now; the content of a
+// brick is its mask.
 DagView::Children ColorPages::children(uint32_t depth, uint64_t content) const {
   if (depth < file_->brick_level()) checked_file_.expect_intact(depth, content);
   return dag_->children(depth, content);
@@ -65,8 +66,8 @@ uint64_t ColorPages::content(uint32_t depth, const DagView::Children& children, 
   return dag_->content(depth, children, index);
 }
 
-// Sets the bits of the cells `below` levels under a cell at `depth`, in Morton order starting at
-// `code`.
+// Sets the bits of the set cells that are `below` levels under a cell at `depth`. The bits are in
+// Morton order, starting with bit `code`.
 void ColorPages::set_bits(uint32_t depth, uint64_t content, uint32_t below, uint32_t code,
                           uint32_t* mask) const {
   if (below == 0) {
@@ -95,8 +96,8 @@ void ColorPages::set_mask(const ColorPageAddress& page, uint32_t* mask) const {
   set_bits(root, content, below, 0, mask);
 }
 
-// Verifies the directory entries that a search for the region of a cell reads, and all bytes of the
-// region.
+// Verifies all directory entries that are read by a search for the region that contains `cell`, and
+// all bytes of this region.
 void ColorPages::check_region(const voxdag_reader::ColorTier& tier, uint32_t level,
                               const std::array<int64_t, 3>& cell) const {
   if (!blocks_) return;
@@ -134,7 +135,8 @@ std::vector<uint32_t> ColorPages::encode(const ColorPageAddress& address) {
   return words;
 }
 
-// The page's cells are consecutive in their region, unless the page is larger than the region.
+// The colors of a page's cells are consecutive in their region, unless the page is larger than a
+// region.
 void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_t>& words) {
   const uint32_t level = address.level;
   const uint64_t count = words[0];

@@ -1,9 +1,9 @@
-// Color pages: the colors of 8 x 8 x 8 cells of one level, for viewers that fetch visible data
-// (docs/format.md, "Color pages"). Unlike tiles they are addressed by their position, because equal
-// subtrees have different colors.
+// Color pages: the colors of 8 x 8 x 8 cells of one level, for viewers that fetch only visible data
+// (docs/format.md, "Color pages"). Tiles are addressed by their nodes, but pages by their position,
+// because equal subtrees have different colors.
 //
-// Addresses may come from unknown clients, and colors from damaged files. So the work for a page is
-// bounded.
+// An address may come from an unknown client, and the colors from a damaged file. So the work for a
+// page is bounded.
 #pragma once
 
 #include <array>
@@ -32,11 +32,11 @@ class ColorPages {
         dag_(&dag),
         checked_file_{file, dag, blocks},
         cursor_(checked_file_) {}
-  ColorPages(const ColorPages&) = delete;  // the cursor refers to a member
+  ColorPages(const ColorPages&) = delete;  // the cursor refers to a member of this object
 
-  // Returns the words of the page: one word if none of its cells is set. Throws Error{kNotFound} if
-  // the file has no colors of this level or the grid has no such cells, Error{kCorrupt}, and
-  // DamagedBlock if a needed block is damaged.
+  // Returns the words of the page; only one word if none of the page's cells is set. Throws
+  // Error{kNotFound} if the file has no colors of this level or the grid has no such cells,
+  // Error{kCorrupt}, and DamagedBlock if a block needed for the page is damaged.
   std::vector<uint32_t> encode(const ColorPageAddress& address);
 
  private:

@@ -1,5 +1,5 @@
-// Verifies the checksum blocks of nodes and bricks before they are read. Without a file, everything
-// counts as intact.
+// Verifies the checksum blocks of nodes and bricks before they are read. Without a file, all nodes
+// and bricks count as intact.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,9 @@ class NodeChecks {
     bytes_ = 4 * (is_brick ? 2 : dag.level(level + 1).wide ? 17 : 9);
   }
 
-  // Throws DamagedBlock if the node or brick at this word offset, which may have any value, is
-  // damaged. Checks as many words as the largest node has, because the first word, which determines
-  // the number, may be damaged.
+  // Throws DamagedBlock if the node or brick at this word offset is damaged. The offset may have
+  // any value. Checks the maximum number of words that a node can have, because the node's first
+  // word, which determines its number of words, may itself be damaged.
   void expect_intact(uint64_t offset) const {
     if (blocks_ && offset < words_) blocks_->expect_intact_at(place_ + 4 * offset, bytes_);
   }

@@ -1,5 +1,5 @@
-// Assigns numbers to the word offsets of a level: 0, 1, 2, ... in order of first use. Equal offsets
-// get the same number.
+// Assigns the numbers 0, 1, 2, ... to the word offsets of a level, in the order in which they are
+// added. Equal offsets get the same number.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@ namespace voxdag::query {
 
 class OffsetTable {
  public:
-  // Returns the number of the offset; a new number if the offset is new.
+  // Returns the number of the offset, which gets the next number if it is new.
   uint32_t add(uint64_t offset) {
     if (offsets_.size() * 2 >= slots_.size()) grow();
     uint32_t& slot = find(offset);
@@ -36,7 +36,8 @@ class OffsetTable {
     for (size_t i = 0; i < offsets_.size(); ++i) find(offsets_[i]) = static_cast<uint32_t>(i + 1);
   }
 
-  std::vector<uint32_t> slots_;  // a power of two; number + 1, or 0 for a free slot
+  // A hash table. A slot holds number + 1, or 0 if it is free. The size is a power of two.
+  std::vector<uint32_t> slots_;
   std::vector<uint64_t> offsets_;
 };
 

@@ -26,8 +26,8 @@ void check_address(const DagView& dag, const TileAddress& root, const CheckedBlo
                                           std::to_string(root.offset) + ": no node begins here");
 }
 
-// Appends the nodes of a level, with the numbers of their children in place of offsets, and assigns
-// numbers to the children. Returns the start word of each node.
+// Appends the nodes of a level. Each node contains the numbers of its children instead of their
+// offsets; new children get new numbers. Returns the index of the first word of each node.
 std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
                                 const std::vector<uint64_t>& offsets, OffsetTable& children,
                                 std::vector<uint32_t>& words) {
@@ -46,7 +46,8 @@ std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks,
   return starts;
 }
 
-// Replaces the children's numbers in words `begin` to `end` by their word offsets.
+// Replaces the children's numbers, in the words from `begin` to `end`, by the children's word
+// offsets.
 void point_to(const std::vector<uint32_t>& child_starts, size_t begin, size_t end,
               std::vector<uint32_t>& words) {
   while (begin < end) {
@@ -72,8 +73,8 @@ void add_bricks(const DagView& dag, const CheckedBlocks* blocks,
   }
 }
 
-// The nodes for a coarse brick are scattered over the file. So each loop prefetches the words that
-// the next loop reads.
+// The nodes from which coarse bricks are made are scattered over the file. So each of the loops
+// prefetches the words that the next loop reads.
 void add_cut_off(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
                  const std::vector<uint64_t>& offsets, std::vector<uint32_t>& words) {
   const NodeChecks checks(dag, level, blocks), child_checks(dag, level + 1, blocks);
@@ -99,7 +100,7 @@ void add_cut_off(const DagView& dag, const CheckedBlocks* blocks, uint32_t level
 }  // namespace
 
 uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level) {
-  const uint32_t below = grid_levels - kBrickLevels - level;  // levels below it, including bricks
+  const uint32_t below = grid_levels - kBrickLevels - level;  // levels below `level`, with bricks
   return level + (below - 1) % tile_levels + 1;
 }
 
@@ -115,7 +116,7 @@ std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels, cons
   std::vector<uint32_t> words(kHeaderWords);
   OffsetTable nodes;
   nodes.add(root.offset);
-  size_t parents = kHeaderWords;  // the word where the nodes of the level above begin
+  size_t parents = kHeaderWords;  // index of the first word of the nodes of the level above
   for (uint32_t level = root.level; level < end; ++level) {
     OffsetTable children;
     const size_t begin = words.size();

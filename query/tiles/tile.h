@@ -1,7 +1,8 @@
-// Tiles: a node of a finished DAG with a few levels below it, for viewers that fetch visible data
-// (docs/format.md, "Tiles"). A tile is addressed by its root, so that equal subtrees are one tile,
-// wherever they occur. If a tile ends above the bricks, it has for each child of its last level the
-// address of this child's tile and a coarse brick to draw until the tile arrives.
+// Tiles: a tile is a node of a finished DAG with a few levels below it, for viewers that fetch only
+// visible data (docs/format.md, "Tiles"). A tile is addressed by its root node, so equal subtrees
+// are one tile, wherever they occur. If a tile ends above the bricks, it contains two things for
+// each child of its last level: the address of the child's tile, and a coarse brick to draw until
+// that tile arrives.
 //
 // Stateless; thread-safe. Offsets may come from unknown clients and damaged files. So each offset
 // is checked, and the work for a tile is bounded by its number of levels.
@@ -22,18 +23,18 @@ inline constexpr uint32_t kTileMagic = 0x31544456;
 
 struct TileAddress {
   uint32_t level = 0;
-  uint64_t offset = 0;  // word offset of a node in this level
+  uint64_t offset = 0;  // word offset of the node in this level
 };
 
-// Returns the level at which a tile is cut off if its root is at `level`, which is above the
-// bricks. It is the next level below the root that is a multiple of `tile_levels` above the bricks.
+// Returns the level at which a tile ends if its root is at `level`, which must be above the bricks.
+// This is the first level below the root that is a multiple of `tile_levels` above the bricks.
 uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level);
 
 // Returns the words of the tile. `tile_levels` is 1 to kMaxTileLevels. Throws Error{kNotFound} for
-// an address that cannot have a node. Throws Error{kCorrupt} if the words there do not lead to
-// nodes or bricks, because the address is inside a node or the file is damaged. If the blocks of
-// the file are given, damage is reported as DamagedBlock, and is found even if the words look like
-// nodes.
+// an address that cannot have a node. Throws Error{kCorrupt} if the words at the address do not
+// lead to nodes or bricks, because the address is inside a node or the file is damaged. If `blocks`
+// is given, damage is reported as DamagedBlock instead, and is found even if the damaged words look
+// like nodes.
 std::vector<uint32_t> encode_tile(const DagView& dag, uint32_t tile_levels, const TileAddress& root,
                                   const CheckedBlocks* blocks = nullptr);
 

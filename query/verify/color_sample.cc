@@ -20,7 +20,7 @@ using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 
 struct SampledRegion {
-  // One per attribute of the file, in the order of attribute numbers.
+  // One region per attribute of the file, in the order of attribute numbers.
   std::array<ColorRegion, std::size(kAttributeTable)> stored;
   Cube cube;
   std::vector<FixedSurface> surfaces;  // surfaces that may touch the region
@@ -76,7 +76,7 @@ void find_surfaces(TriangleSource& scene, const Grid& snap, const ColorGrid& gri
     const CellBox box(surface.position, grid.levels, grid.region_level());
     for (SampledRegion& region : regions) {
       if (!may_touch(box, region.cube)) continue;
-      bytes += 2 * sizeof(FixedSurface);  // vectors may have twice the needed capacity
+      bytes += 2 * sizeof(FixedSurface);  // a vector may have twice the capacity that it needs
       if (bytes > charge.bytes() && !charge.try_resize(2 * bytes))
         throw Error(ErrorCode::kOutOfMemory,
                     "not enough memory for the triangles of the sampled color regions");
@@ -97,7 +97,8 @@ bool is_same(const EncodedRegion& baked, const ColorRegion& stored) {
          std::equal(bytes, bytes + baked.blocks.size(), stored.blocks);
 }
 
-// Returns the difference of the finest cells' colors. Both regions have the same number of cells.
+// Returns the difference between the colors of the finest cells in two regions, which must have the
+// same number of cells.
 ColorDiff difference(const EncodedRegion& baked, const ColorRegion& stored) {
   ColorRegion again;
   again.blocks = reinterpret_cast<const unsigned char*>(baked.blocks.data());
@@ -114,7 +115,7 @@ std::string place_of(const Cube& cube, const ColorGrid& grid) {
   return text;
 }
 
-// Compares a region's newly baked values of one attribute with the file's.
+// Compares the newly baked values of one attribute in a region with the values in the file.
 class RegionComparison {
  public:
   RegionComparison(const voxdag_reader::File& file, const ColorGrid& grid,

@@ -1,5 +1,6 @@
-// Compares a seeded sample of a file's colors, and its other attributes, with its scene: some
-// regions of 64^3 color cells are baked again from the triangles and the images.
+// Compares a seeded sample of a file's colors and other attributes with the scene from which the
+// file was built. For the sample, some regions of 64^3 color cells are baked again from the scene's
+// triangles and images.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +17,9 @@
 namespace voxdag::query {
 
 inline constexpr size_t kSampleRegions = 16;
-// Minimum PSNR, in dB, between a region's colors in the file and in the scene. In a built file they
-// are equal, and so are other attributes. Regions that `extract` had to encode again differ
-// slightly.
+// Minimum PSNR, in dB, between the colors of a region in the file and in the scene. In a file
+// written by a build, the colors and all other attributes are equal to the scene's. Regions that
+// `extract` had to encode again differ slightly.
 inline constexpr double kMinSamplePsnr = 30;
 
 struct ColorSampleReport {
@@ -27,10 +28,10 @@ struct ColorSampleReport {
   uint64_t cells = 0;    // cells in the compared regions
 };
 
-// Compares the attributes of `file`, which must have some. `grid` is the file's grid. Makes one
-// pass over the scene, which must be the scene of the build. Large images go to a scratch file at
-// `scratch_path`. Throws Error{kCorrupt} with the first wrong region, and the errors of
-// TextureSet::prepare().
+// Compares the attributes of `file`, which must have at least one, with `scene`, which must be the
+// scene of the build. `grid` is the file's grid. Makes one pass over the scene. Stores large images
+// in a scratch file at `scratch_path`. Throws Error{kCorrupt} with the first wrong region, and the
+// errors of TextureSet::prepare().
 ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const Grid& grid,
                                          FileSystem& files, TriangleSource& scene, uint64_t seed,
                                          const std::string& scratch_path, unsigned threads,

@@ -27,9 +27,10 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// Samples `size` items of a stream without replacement, with probability proportional to weight. It
-// keeps the items with the smallest keys. Keys are exponentially distributed with the weight as
-// rate (Efraimidis & Spirakis 2006).
+// Draws a sample of `size` items from a stream, without replacement. The probability of an item is
+// proportional to its weight. Each item gets a random key, exponentially distributed with the
+// item's weight as rate, and the items with the smallest keys are kept (Efraimidis & Spirakis
+// 2006).
 class Reservoir {
  public:
   explicit Reservoir(size_t size) : size_(size) {}
@@ -152,7 +153,7 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
   Random random(seed);
   std::vector<SampleBox> boxes;
   for (const FixedTriangle& triangle : draw_triangles(scene, grid, random, progress, cancel)) {
-    // A triangle may be mostly outside the grid, so several points are tried.
+    // A triangle may be mostly outside the grid, so up to this number of points is tried.
     constexpr int kTries = 16;
     std::optional<std::array<int64_t, 3>> voxel;
     for (int i = 0; i < kTries && !voxel; ++i) voxel = random_voxel(triangle, grid, random);

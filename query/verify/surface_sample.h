@@ -1,8 +1,9 @@
-// A seeded sample of the voxels near a scene's surface, computed from its triangles without the
-// code that builds DAGs. The sample consists of boxes of voxels around random points of random
-// triangles. Half of the triangles are drawn uniformly, half by area, so that neither a floor of
-// two triangles nor a million leaves is missed. Takes two passes over the scene. Memory depends
-// only on the sample.
+// A seeded sample of the voxels near a scene's surface. The voxels are computed from the scene's
+// triangles without the code that builds DAGs. The sample consists of boxes of voxels around random
+// points of random triangles. Half of the triangles are drawn uniformly, and half with a
+// probability proportional to their area, so that the sample misses neither a floor of two
+// triangles nor a million leaves. Takes two passes over the scene. Memory depends only on the size
+// of the sample.
 #pragma once
 
 #include <bitset>
@@ -17,7 +18,7 @@
 
 namespace voxdag::query {
 
-inline constexpr int64_t kBoxEdge = 16;  // in voxels; the complete grid if it is smaller
+inline constexpr int64_t kBoxEdge = 16;  // in voxels; a smaller grid is one box
 inline constexpr size_t kSampleBoxes = 256;
 
 struct SampleBox {
@@ -33,10 +34,10 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
 struct SampleReport {
   uint64_t boxes = 0;
   uint64_t voxels = 0;  // compared voxels
-  uint64_t set = 0;     // compared voxels that are set
+  uint64_t set = 0;     // compared voxels that are set in the sample
 };
 
-// Throws Error{kCorrupt} with the first voxel that differs between the file and the sample.
+// Compares the file with a sample. Throws Error{kCorrupt} with the first voxel that differs.
 SampleReport compare_with_sample(const voxdag_reader::File& file,
                                  const std::vector<SampleBox>& boxes);
 

@@ -11,12 +11,13 @@ namespace {
 using voxdag_reader::Rgb;
 using Lab = std::array<uint32_t, 3>;
 
-// kLabScale maps 1 to 4096. One step of a gray byte is then about 16, and sums of squares over 2^32
-// voxels fit in 64 bits. kLabShift is added because a and b can be negative.
+// A lab coordinate of 1 is stored as kLabScale. A step of a gray byte is then about 16, and sums of
+// squares over 2^32 voxels fit in 64 bits. kLabShift is added because the coordinates a and b can
+// be negative.
 constexpr double kLabScale = 4096, kLabShift = 1;
 
-// Newton's method, from above. The fixed number of steps is enough for the cube roots of all 16-bit
-// light values, which are at least 1 / 65.
+// Newton's method with a start value above the root. The fixed number of steps is enough for the
+// cube roots of all 16-bit light values, which are at least 1 / 65.
 double cube_root(double x) {
   double root = 1;
   for (int i = 0; i < 24; ++i) root = (2 * root + x / (root * root)) / 3;
@@ -79,7 +80,7 @@ void ColorPalette::make() {
     if (bins_[bin].count != 0) points_.push_back({oklab_of(mean_of(bins_[bin])), bin});
   std::vector<PaletteBox> boxes = {box_of(0, points_.size())};
   while (boxes.size() < kMaxColors) {
-    // The first of the boxes with the largest spread. If its spread is 0, there is nothing to cut.
+    // Cuts the first of the boxes with the largest spread. If the spread is 0, no box can be cut.
     const auto largest = std::ranges::max_element(boxes, {}, &PaletteBox::spread);
     if (largest->spread == 0) break;
     const PaletteBox box = *largest;
@@ -108,8 +109,9 @@ ColorPalette::PaletteBox ColorPalette::box_of(size_t begin, size_t end) const {
   return box;
 }
 
-// Moves the points below the mean of a box, which has a spread, before the others. Returns the
-// begin of the others. No sum depends on the order within the two parts.
+// Moves the points below the mean of a box to the front. The box must have a spread. Returns the
+// index of the first of the other points. No sum depends on the order of the points within the two
+// parts.
 size_t ColorPalette::cut(const PaletteBox& box) {
   const auto first = points_.begin() + static_cast<ptrdiff_t>(box.begin);
   const auto last = points_.begin() + static_cast<ptrdiff_t>(box.end);
@@ -135,8 +137,8 @@ Rgb ColorPalette::mean_of(const Bin& bin) {
   return {channel(0), channel(1), channel(2)};
 }
 
-// A bin's color can be closer to the mean of another box. So each bin gets the nearest of all
-// means, on ties the first.
+// Gives each bin the palette color that is nearest to the bin, which may be the mean of another box
+// than the bin's. On ties, the first palette color is used.
 void ColorPalette::assign_bins() {
   std::vector<Lab> labs;
   for (const Rgb color : colors_) labs.push_back(oklab_of(color));

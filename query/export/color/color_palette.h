@@ -3,13 +3,14 @@
 //
 // Up to 255 distinct colors are kept unchanged. Otherwise colors with the same six high bits per
 // channel are treated as one color, and these colors are divided into boxes in Oklab (Ottosson
-// 2020). The box with the largest sum of squared distances along an axis is cut in two first. The
-// cut is at the mean: at the median, as in Heckbert's method, the picture is 0.3 to 0.6 dB worse. A
-// color of the palette is the mean of a box. All arithmetic is in integers, or in IEEE operations
-// in a fixed order. So the palette depends only on how often each color occurs.
+// 2020). Boxes are cut in two until there are enough: the next box is always the one with the
+// largest sum of squared distances along an axis. The cut is at the mean, because a cut at the
+// median, as in Heckbert's method, makes the picture 0.3 to 0.6 dB worse. A color of the palette is
+// the mean of a box. All arithmetic is in integers, or in IEEE operations in a fixed order. So the
+// palette depends only on how often each color occurs.
 //
-// Memory does not grow with the number of colors, and is charged to the budget. One thread uses a
-// palette.
+// The used memory does not grow with the number of colors; it is charged to the budget. A palette
+// must be used by only one thread.
 #pragma once
 
 #include <array>
@@ -50,8 +51,8 @@ class ColorPalette {
   struct PaletteBox {
     size_t begin = 0, end = 0;    // range of its points
     size_t axis = 0;              // axis of the largest spread
-    uint64_t spread = 0;          // sum of squared distances along this axis
-    uint64_t sum = 0, count = 0;  // sum of coordinates along this axis, number of colors
+    uint64_t spread = 0;          // sum of squared distances from the mean along this axis
+    uint64_t sum = 0, count = 0;  // sum of the coordinates along this axis, number of colors
   };
 
   static voxdag_reader::Rgb mean_of(const Bin& bin);
@@ -62,7 +63,8 @@ class ColorPalette {
   void assign_bins();
 
   MemoryCharge charge_;
-  // The distinct colors as 24-bit numbers, increasing; used only while there are few.
+  // The distinct colors as 24-bit numbers in increasing order. Used only up to the limit of colors
+  // that are kept unchanged.
   std::vector<uint32_t> distinct_;
   bool is_exact_ = true;
   std::vector<Bin> bins_;

@@ -1,5 +1,5 @@
-// The linear light of stored colors, for formats that require it. The numbers are the same on every
-// machine.
+// Converts stored colors to linear light, for formats that require it. The results are the same on
+// every machine.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace voxdag::query {
 
-// Element i is the linear value of the sRGB byte i; 65535 is 1.
+// Returns a table: element i is the linear value of the sRGB byte i, where 65535 means 1.
 inline const std::array<uint16_t, 256>& linear_of_srgb() {
   static const std::array<uint16_t, 256> table = [] {
     std::array<uint16_t, 256> linear{};

@@ -1,9 +1,10 @@
-// Exports OpenVDB's .vdb and NanoVDB's .nvdb with these libraries: a grid of active voxels and, if
-// the file has colors, a grid of linear light with the name that Houdini and Blender use. The
-// libraries build the grids completely in memory, so their size is counted first.
+// Exports OpenVDB's .vdb and NanoVDB's .nvdb with these two libraries. The file has a grid of
+// active voxels and, if the input has colors, a grid of linear light with the name that Houdini and
+// Blender use. The libraries build the grids completely in memory, so the size of the grids is
+// calculated first.
 //
-// Half floats are converted without Imath's table, because the table's library would have to be
-// linked.
+// Half floats are converted without Imath's lookup table, because a use of the table would require
+// linking Imath.
 #define IMATH_HALF_NO_LOOKUP_TABLE
 #include <openvdb/openvdb.h>
 
@@ -27,14 +28,15 @@
 namespace voxdag::query {
 namespace {
 
-// Memory of a node with all of its pointers: a leaf of 8^3 voxels, and the nodes of 128^3 and
-// 4096^3 voxels.
+// Bytes of memory for a leaf of 8^3 voxels, and for the nodes of 128^3 and of 4096^3 voxels, each
+// including all its pointers.
 struct VdbNodeBytes {
   uint64_t leaf, lower, upper;
 };
 constexpr VdbNodeBytes kOpenVdbBytes = {192, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kNanoVdbBytes = {96, 34 << 10, 272 << 10};
-// A color is three floats. A node stores one color (padded) or a pointer for each child.
+// Sizes for a grid of colors. A color is three floats. A node stores for each child one color
+// (padded) or a pointer.
 constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
 // Minimum size of a leaf in a .vdb file, which stores the mask twice.
 constexpr uint64_t kVdbLeafBytes = 128;
@@ -45,7 +47,7 @@ VdbNodeBytes operator+(const VdbNodeBytes& a, const VdbNodeBytes& b) {
   return {a.leaf + b.leaf, a.lower + b.lower, a.upper + b.upper};
 }
 
-// Converts a library's exception to an Error; voxdag's errors and bad_alloc are rethrown.
+// Converts an exception of the libraries to an Error. Rethrows voxdag's own errors and bad_alloc.
 template <class Work>
 auto with_vdb_errors(const ExportJob& job, const Work& work) {
   try {
@@ -59,8 +61,8 @@ auto with_vdb_errors(const ExportJob& job, const Work& work) {
   }
 }
 
-// A stream buffer that writes to an ExportFile. Streams swallow exceptions, and the libraries'
-// errors do not have the reason. So check() rethrows the first exception.
+// A stream buffer that writes to an ExportFile. Streams swallow exceptions, and the libraries' own
+// errors do not contain the reason. So check() rethrows the first exception.
 class FileBuffer : public std::streambuf {
  public:
   FileBuffer(ExportFile& file, ExportStage& stage) : file_(file), stage_(stage) {}
@@ -119,8 +121,9 @@ class FileBuffer : public std::streambuf {
   std::exception_ptr failure_;
 };
 
-// Counts the nodes and memory of the trees of a selection, or stops above `limit` bytes. Cubes come
-// in Morton order, so that each is counted once. `steps` advances by bricks.
+// Counts the voxels of a selection and the memory of its trees. Stops above `limit` bytes. Bricks
+// are visited in Morton order, so all bricks of a node come one after the other and the node is
+// counted once. `steps` advances by bricks.
 struct VdbSize {
   uint64_t voxels = 0, bytes = 0;
 };
@@ -184,7 +187,7 @@ typename GridType::Ptr empty_vdb_grid(const ExportJob& job, const char* name) {
   return grid;
 }
 
-// Makes a grid of the selected voxels with the values value(cell).
+// Returns a grid in which each selected voxel has the value value(cell).
 template <class GridType, class Value>
 typename GridType::Ptr make_vdb_grid(const ExportJob& job, const char* name, uint64_t voxels,
                                      const Value& value) {
@@ -258,7 +261,8 @@ ExportReport write_vdb(const ExportJob& job) {
     }
     const uint64_t min_bytes = grid->tree().leafCount() * kVdbLeafBytes;
     return write_grid_file(job, voxels, min_bytes, [&](std::ostream& stream) {
-      // No codec is used, because some readers may lack it. Leaves consist of bits anyway.
+      // Writes without a codec, because some readers may lack it. Compression would gain little,
+      // because leaves consist of bits.
       openvdb::io::Stream out(stream);
       out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
       out.write(grids);

@@ -1,4 +1,4 @@
-// Compiled for AVX2: nothing in this file may run before the CPU was checked.
+// This file is compiled for AVX2. No function in it may be called before the CPU was checked.
 #include <immintrin.h>
 
 #include "query/rays/packet_walk.h"
