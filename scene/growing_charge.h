@@ -18,7 +18,7 @@ class GrowingCharge {
       : charge_(budget, 0, what), what_(std::move(what)) {}
 
   // Increases the charge to a total of `bytes`, unless it is already larger. Throws
-  // Error{kOutOfMemory} if they do not fit the budget.
+  // Error{kOutOfMemory} if this total does not fit the budget.
   void grow_to(uint64_t bytes) {
     if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
     throw Error(ErrorCode::kOutOfMemory, "out of memory: " + what_ + " needs over " +

@@ -1,5 +1,5 @@
 // The second pass over a generated scene: writes the blocks that GlbLayout counted, through one
-// buffer, under "<path>.partial" until finish().
+// buffer. The file has the name "<path>.partial" until finish() renames it.
 #pragma once
 
 #include <cstddef>

@@ -55,8 +55,9 @@ uint32_t as_index(T value) {
   return value < 0 ? kNoVertex : static_cast<uint32_t>(value);
 }
 
-// Parses the complete text as an integer, or as a number of a real type, rounded to nearest. "nan"
-// and "inf" are accepted; a number that is too large becomes infinity.
+// Parse the complete text as an integer, or as a number of a real type (rounded to nearest). Return
+// nullopt for any other text. parse_real() accepts "nan" and "inf", and returns infinity for a real
+// number that is too large.
 std::optional<int64_t> parse_integer(std::string_view text);
 std::optional<double> parse_real(std::string_view text, Type type);
 

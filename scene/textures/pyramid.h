@@ -24,7 +24,7 @@ class PyramidBuilder {
   using WritePages = std::function<void(uint64_t first, std::span<const uint64_t> texels)>;
 
   PyramidBuilder(std::span<const TextureLevel> levels, MemoryBudget& budget, WritePages write);
-  // Adds a row of the finest level. Rows are added from the top; all must be added.
+  // Adds a row of the finest level. Rows are added from the top; all rows must be added.
   void add_row(std::span<const uint64_t> row) { add_row(0, row); }
 
  private:

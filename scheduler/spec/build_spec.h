@@ -57,10 +57,10 @@ struct ClusterOptions {
   std::string program_path;    // path of voxdag, the same on all machines; "": this program
   std::string program_version;
   uint64_t max_retries = 3;  // max retries of one failed batch
-  // Time for the record of an ended task to become visible on the shared disk.
+  // Seconds until the record of an ended task must be visible on the shared disk.
   double grace_s = 15;
   double slurm_interval_s = 5;  // seconds between two queries to Slurm
-  // Time after Slurm's start in which it may not know the requested nodes yet.
+  // Seconds after Slurm's start in which Slurm may not know the requested nodes yet.
   double slurm_start_s = 15;
   // Options of the merge job (MergeJob). Without them this process merges.
   struct MergeJobOptions {

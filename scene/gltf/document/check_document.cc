@@ -81,8 +81,8 @@ void choose_scene(Document& d) {
   }
 }
 
-// Indices have 32 bits, so a primitive cannot use more vertices. The limit also bounds accessors
-// without bytes (all zeros), which could claim any count.
+// Indices have 32 bits, so a primitive cannot use more vertices than this. The limit also bounds
+// accessors without bytes (all zeros), which could claim any count.
 constexpr uint64_t kMaxElements = uint64_t{1} << 32;
 
 // `count` elements of `bytes` bytes each; the first is at `offset` of a view.

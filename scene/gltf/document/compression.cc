@@ -73,7 +73,8 @@ const Accessor& at(const Document& d, int accessor) {
   return d.accessors[static_cast<size_t>(accessor)];
 }
 
-// Replaces `accessor` by a copy whose elements begin at `offset` of a buffer. Returns their bytes.
+// Replaces `accessor` by a copy whose elements begin at `offset` of a buffer. Returns the size of
+// the elements in bytes.
 uint64_t move_accessor(Document& d, int& accessor, int buffer, uint64_t offset) {
   Accessor copy = at(d, accessor);
   if (copy.same_as < 0) copy.same_as = accessor;

@@ -158,8 +158,8 @@ struct Document {
   GrowingCharge charge;        // charge for the arrays
   GrowingCharge model_charge;  // charge for the model
 
-  // The asset, the extensions, materials, textures, samplers and images, as read by tinygltf. Its
-  // other arrays are empty. No image is loaded: a data: URI ends at its comma.
+  // The asset, the extensions, materials, textures, samplers and images, as read by tinygltf. The
+  // model's other arrays are empty. No image is loaded: a data: URI ends at its comma.
   std::shared_ptr<tinygltf::Model> model;
   std::vector<RawString> image_uris;  // one per image of the model; size 0 for an image without uri
 

@@ -16,7 +16,8 @@ class CornerReader {
  public:
   CornerReader(const Document& document, BufferReader& buffers, const Primitive& primitive);
 
-  // Reads the indices of triangles [first, first + count). The indices may be out of range.
+  // Reads the vertex indices of triangles [first, first + count). The vertex indices may be out of
+  // range.
   void read(uint64_t first, size_t count, uint32_t* corners);
 
  private:

@@ -109,7 +109,8 @@ class Slurm {
   std::string accepted_job(const CommandResult& submitted);
   // Returns a setting of slurm.conf, "" if unknown.
   std::string setting(const std::string& name);
-  // True if Slurm refused the request because of missing nodes, and may not know its nodes yet.
+  // True if Slurm refused the request because of missing nodes, and if it may have just started and
+  // not know its nodes yet.
   bool may_be_starting(const CommandResult& refused);
 
   CommandRunner& commands_;

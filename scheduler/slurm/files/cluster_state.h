@@ -65,7 +65,7 @@ std::string encode_state(const ClusterState& state);
 // Throws Error{kCorrupt} for a text not created by encode_state().
 ClusterState decode_state(const std::string& text);
 // Reads the state in a work folder; nullopt if the folder has no cluster build. Throws Error with
-// the file's name if it cannot be read or is damaged.
+// the name of cluster.json if this file cannot be read or is damaged.
 std::optional<ClusterState> read_cluster_state(FileSystem& files, const std::string& work_folder);
 
 }  // namespace voxdag

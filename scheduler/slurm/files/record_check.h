@@ -12,7 +12,8 @@
 namespace voxdag {
 
 // Reads the record of `entry` for a batch with these subvolumes. Checks the record and the roots of
-// its artifact. Throws Error{kCorrupt}, {kNotFound} or {kUnsupportedVersion} if it is invalid.
+// its artifact. Throws Error{kCorrupt}, {kNotFound} or {kUnsupportedVersion} if the record is
+// invalid.
 CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folder,
                                    const ClusterFolder::Entry& entry, const ClusterState& state,
                                    std::span<const ExpectedSubvolume> subvolumes);

@@ -28,9 +28,9 @@ namespace voxdag {
 
 class ColorStore {
  public:
-  // Reads the file if it exists, and warns about damaged parts. add() syncs it every
-  // `sync_interval_s`; if that is 0, every add() syncs it before returning. `files` must outlive
-  // the store.
+  // Reads the file if it exists, and warns about damaged parts. add() starts a sync of the file
+  // every `sync_interval_s` seconds. If `sync_interval_s` is 0, every add() syncs the file before
+  // returning. `files` must outlive the store.
   ColorStore(FileSystem& files, std::string path, double sync_interval_s, Progress& progress,
              const CancelToken& cancel);
   // Waits for a running sync.

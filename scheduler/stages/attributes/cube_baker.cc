@@ -77,8 +77,8 @@ void CubeBaker::bake(const Cube& cube, ChunkList& bin, const Sink& sink) {
   touching_ = {};
 }
 
-// Bakes a cube that has too many surfaces for the memory, by distributing them to its eight
-// children.
+// Bakes a cube whose surfaces do not fit in memory: distributes the surfaces to the cube's eight
+// children and bakes each child.
 void CubeBaker::divide(const Cube& cube, ChunkList& bin, const Sink& sink) {
   if (cube.level == grid_.region_level()) return bake_in_parts(cube, bin, sink);
   std::array<ChunkList, 8> children;

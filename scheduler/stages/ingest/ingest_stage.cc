@@ -22,7 +22,8 @@ constexpr double kMinSubvolumes = 64;
 constexpr double kMinBricksPerSubvolume = 131072;
 // Maximum wait until the file times of the scene can be trusted.
 constexpr int64_t kMaxWaitNs = 200'000'000;
-// With more bins their buffers would be too small. Large subvolumes are split later instead.
+// Maximum number of bins. With more bins, each bin's buffer would be too small. Large subvolumes
+// are split later instead.
 constexpr size_t kMaxBins = 8192;
 
 std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const RunOptions& options) {

@@ -74,8 +74,8 @@ class CubeTree {
 void partition(TriangleStore& store, BinId from, const CubeTree& tree,
                const std::vector<BinId>& leaf_bins, size_t buffer_bytes, const CancelToken& cancel);
 
-// Called after each piece with the number of the scene's triangles copied so far. These triangles
-// are in the bins after writer.flush().
+// Called after each piece. `copied` is the number of the scene's triangles that are copied so far.
+// These triangles are in the bins after writer.flush().
 using AfterPartitionPiece = std::function<void(uint64_t copied, BinWriter& writer)>;
 
 // Copies the scene's triangles, starting at number `first`, to the store's cube bins. Creates the
