@@ -46,7 +46,7 @@ class TriangleStream {
 // Everything that defines a subvolume task except its triangles.
 struct SubvolumeTask {
   uint32_t grid_levels = 2;  // L
-  Cube cube;                 // of level <= L-2
+  Cube cube;                 // its level is at most L-2
   uint32_t hash_bits = 64;   // 4 to 64
 
   SubDagShape shape() const { return {cube.level, grid_levels, hash_bits}; }

@@ -66,7 +66,7 @@ void WorldBounds::add(const WorldBounds& other) {
 
 WorldBounds bounds_of(std::span<const WorldTriangle> triangles) {
   if (triangles.empty()) return {};
-  WorldTriangle low = triangles[0], high = triangles[0];  // of the three vertices each
+  WorldTriangle low = triangles[0], high = triangles[0];  // bounds of each of the three vertices
   for (const WorldTriangle& triangle : triangles)
     for (int i = 0; i < 3; ++i)
       for (int a = 0; a < 3; ++a) {

@@ -56,7 +56,7 @@ struct Grid {
 
 enum class SnapResult {
   kInside,   // may touch the grid
-  kOutside,  // its box misses the grid: dropped and counted
+  kOutside,  // the bounding box of the triangle misses the grid: dropped and counted
   kTooFar,   // touches the grid, but a coordinate is beyond kCoordinateLimit: a limit error
 };
 

@@ -91,7 +91,7 @@ inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube
     if (last < middle) mask &= kLowHalf[a];
     inside &= first >= low[a] && last <= low[a] + parent_units;
   }
-  if ((mask & (mask - 1)) == 0) return mask;  // its box is inside one child
+  if ((mask & (mask - 1)) == 0) return mask;  // the triangle's box is inside one child
   // A triangle inside the cube whose box crosses exactly one of the middle planes also crosses this
   // plane.
   if (inside && popcount64(mask) == 2) return mask;

@@ -85,7 +85,7 @@ struct BuildProgress {
 // threads; calls never overlap. The functions must not throw. To end the build, a function calls
 // cancel->cancel().
 struct BuildHooks {
-  std::function<void(const BuildProgress&)> on_progress;  // at most ten times a second
+  std::function<void(const BuildProgress&)> on_progress;  // called at most ten times a second
   std::function<void(std::string_view message)> on_warning;
   const CancelToken* cancel = nullptr;  // build() throws Error{kCanceled} soon after cancel()
 };

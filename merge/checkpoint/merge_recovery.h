@@ -60,7 +60,7 @@ class MergeRecovery {
   const uint32_t grid_levels_;
   PendingArtifacts& pending_;
   StateSaver saver_;
-  std::vector<uint64_t> merged_ends_;  // where newly_merged() ended in each artifact
+  std::vector<uint64_t> merged_ends_;  // by artifact: end of the ranges of newly_merged()
 };
 
 }  // namespace voxdag

@@ -146,13 +146,13 @@ class GroupCursor {
   PositionMaps& maps_;
   const uint64_t hash_;
   std::span<uint32_t> buffer_;  // encoded rows
-  // An even number of positions; the first `pending_` are not stored yet.
+  // Buffer for an even number of positions. Its first `pending_` words are not stored in maps_ yet.
   std::span<uint32_t> positions_;
   uint64_t next_word_;  // first word of the file that is not read yet
   uint64_t rows_left_;
   size_t at_ = 0, filled_ = 0;  // positions in buffer_
-  uint64_t stored_ = 0;         // number of rows
-  size_t pending_ = 0;          // number of words
+  uint64_t stored_ = 0;         // rows whose positions were stored in maps_
+  size_t pending_ = 0;          // words in positions_ that are not stored yet
 };
 
 }  // namespace

@@ -29,7 +29,7 @@ namespace voxdag {
 struct RunSlice {
   size_t run = 0;
   FrameSpan frames;
-  uint64_t first_row = 0;  // in the run
+  uint64_t first_row = 0;  // index of the first row in the run
   RowCount size{};
   uint64_t row_base = 0, word_base = 0;
 };

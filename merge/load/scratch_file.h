@@ -70,7 +70,7 @@ class ScratchPath {
 struct ScratchFileState {
   uint32_t id = 0;
   uint64_t words = 0;
-  std::vector<uint64_t> checksums;  // of each checksum block
+  std::vector<uint64_t> checksums;  // one for each checksum block
 };
 
 // One file of 32-bit words without gaps, written and read by offset. Each word is written once, by

@@ -163,7 +163,7 @@ class PartitionMerge {
   const MergeContext& context_;
   const LevelTask& task_;
   HashPartition& partition_;
-  Turns turns_;        // of the buckets
+  Turns turns_;        // turns of the buckets
   uint64_t position_;  // position of the next bucket; changed only in turn
   std::vector<BucketSorter> sorters_;
   LevelExtent extent_;  // changed only in turn

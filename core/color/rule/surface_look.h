@@ -1,4 +1,5 @@
-// The look of a triangle at one of its points: texture, factor, vertex color and alpha.
+// The color of a triangle at one of its points, computed from texture, factor, vertex color and
+// alpha.
 #pragma once
 
 #include <cstdint>
@@ -148,7 +149,7 @@ class SurfaceLook {
     SurfacePoint point;
     TexelSquare texels;  // if there is an image
   };
-  // Also prefetches the texels.
+  // Returns the spot of a point, and prefetches its texels.
   VOXDAG_HD Spot spot_at(const SurfacePoint& point) const {
     Spot spot{point, {}};
     if (!view_) return spot;
@@ -158,7 +159,7 @@ class SurfaceLook {
     return spot;
   }
 
-  // Adds the look at a spot with `weight`, which is less than 2^24.
+  // Adds the color at a spot to `sum` with `weight`, which is less than 2^24.
   VOXDAG_HD void add(const Spot& spot, uint64_t weight, ColorSum& sum) {
     Texel texel = ~Texel{0};
     if (view_) texel = look_up(*view_, spot.texels);
@@ -170,7 +171,7 @@ class SurfaceLook {
   }
 
  private:
-  // The factor times the vertex color.
+  // Sets tint_ to the material's factor times the vertex color.
   VOXDAG_HD void set_tint(const SurfacePoint& point) {
     const int64_t first = kPointOne - point.second - point.third;
     for (size_t c = 0; c < 4; ++c) {
@@ -181,7 +182,8 @@ class SurfaceLook {
     }
   }
 
-  // Rounds down. Changes of 2^32 or more (256 images) need 128 bits.
+  // Returns texture coordinate `a` of a point, rounded down. Changes of 2^32 or more (256 images)
+  // need 128 bits.
   VOXDAG_HD int64_t coordinate(const SurfacePoint& point, int a) const {
     const int64_t second = change_[0][a], third = change_[1][a];
     int64_t change;
@@ -194,7 +196,7 @@ class SurfaceLook {
     return corners_[0].texture[static_cast<size_t>(a)] + change;
   }
 
-  // In 8 bits.
+  // Returns the alpha of a surface in 8 bits.
   VOXDAG_HD uint32_t alpha_of(uint32_t alpha) const {
     if (material_.alpha_mode == AlphaMode::kOpaque) return 255;
     if (material_.alpha_mode == AlphaMode::kMask) return alpha >= material_.alpha_cutoff ? 255 : 0;
@@ -207,7 +209,7 @@ class SurfaceLook {
   const Material& material_;
   std::optional<typename Textures::View> view_;  // if there is an image
   Wrap wrap_[2];
-  int64_t change_[2][2];  // of texture coordinates, from corner 0 to corners 1 and 2
+  int64_t change_[2][2];  // changes of texture coordinates from corner 0 to corners 1 and 2
   bool is_near_;          // all changes are below kNear
   bool one_tint_;         // the same tint for the complete triangle
   bool no_tint_;          // the tint does not change texels

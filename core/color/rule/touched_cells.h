@@ -97,7 +97,7 @@ class TouchedCells {
     lowest_ -= n * down;
   }
   // Sets first_ to the first cell where the plane's highest value is >= 0, and last_ to the last
-  // cell where its lowest value is <= 0. highest_ and lowest_ become these values.
+  // cell where the plane's lowest value is <= 0. Sets highest_ and lowest_ to these values.
   VOXDAG_HD void correct() {
     const Int n = t_.normal[2];
     for (; highest_ < 0; ++first_) highest_ += n;
@@ -168,7 +168,7 @@ class TouchedCells {
   const CellTriangle<Int>& t_;
   const CellRange& range_;
   Int margin_[3];    // an edge function's change over a cell
-  Int rise_, fall_;  // of the plane over a cell, along axes 0 and 1
+  Int rise_, fall_;  // the plane's rise and fall over a cell, along axes 0 and 1
   // The cells of the column that the plane touches, and the plane over them.
   int64_t first_ = 0, last_ = 0;
   Int highest_ = 0, lowest_ = 0;

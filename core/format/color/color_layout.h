@@ -24,13 +24,11 @@ inline constexpr size_t kRegionCountsAt = 16;  // u32, u16, u16, u16, u8, u8, u8
 inline constexpr size_t kRegionReservedAt = 29;
 inline constexpr size_t kRegionEntryBytes = 32;
 
-// Offsets in an entry of the tier table.
-inline constexpr size_t kTierOffsetAt =
-    0;  // offset of the tier's data from the section's first byte
-inline constexpr size_t kTierUnitsAt =
-    8;  // size of the tier's data in units; its directory follows
+// Offsets in an entry of the tier table. An entry describes a tier.
+inline constexpr size_t kTierOffsetAt = 0;  // the data's offset from the start of the section
+inline constexpr size_t kTierUnitsAt = 8;   // the data's size in units; the directory follows
 inline constexpr size_t kTierRegionsAt = 16;
-inline constexpr size_t kTierCellsAt = 24;  // cells of all levels of the tier
+inline constexpr size_t kTierCellsAt = 24;  // number of cells of all levels
 inline constexpr size_t kTierEntryBytes = 32;
 
 // Limits of the list of materials.

@@ -188,7 +188,7 @@ class Differ {
   const voxdag_reader::File &a_, &b_;
   const unsigned threads_;
   const CancelToken& cancel_;
-  std::vector<SharedPairTable> compared_;  // by level
+  std::vector<SharedPairTable> compared_;  // one table per level
 };
 
 bool same_words(const voxdag_reader::Level& a, const voxdag_reader::Level& b, unsigned threads,

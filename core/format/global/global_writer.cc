@@ -63,8 +63,8 @@ class BlockChecksums {
   std::vector<uint64_t> values() const;
 
  private:
-  std::vector<uint64_t> checksums_;  // of complete blocks
-  Checksum64 block_;                 // of the block after them
+  std::vector<uint64_t> checksums_;  // checksums of complete blocks
+  Checksum64 block_;                 // checksum of the block after them
   size_t filled_ = 0;                // bytes in that block so far
 };
 
@@ -108,13 +108,13 @@ struct GlobalFileWriter::State {
   std::unique_ptr<WritableFile> file;  // none before the first level or the header
   std::vector<GlobalLevel> levels;     // complete levels, from the bricks upwards
   std::vector<Section> sections;       // complete sections
-  BlockChecksums block_checksums;      // of the complete and open levels and sections
+  BlockChecksums block_checksums;      // checksums of the complete and open levels and sections
   uint64_t checksummed_words = 0;      // words of the open level
   bool level_open = false;
   uint64_t section_bytes = 0;  // bytes of the open section
   bool section_open = false;
   bool retained = false;      // the partial file outlives the writer
-  uint64_t end = kPageBytes;  // where the open level or section, the next one, or the table begins
+  uint64_t end = kPageBytes;  // start of the open (or the next) level or section, or of the table
 
   uint32_t brick_level() const { return grid.levels - kBrickLevels; }
   // The open level, or the next one to open.

@@ -48,7 +48,7 @@ struct GlobalLevel {
 struct GlobalAttribute {
   uint32_t kind = 0;
   uint32_t cell_levels = 0;
-  uint32_t block_bytes = 0;   // for 32 cells
+  uint32_t block_bytes = 0;   // bytes for the values of 32 cells
   uint64_t cells = 0;         // cells of all levels
   uint64_t finest_cells = 0;  // cells of the finest level
 };

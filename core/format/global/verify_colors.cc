@@ -88,7 +88,7 @@ class ColorVerifier {
       fail(tier, i, "the DAG has no cells in this region");
     std::array<uint32_t, kRegionLevels + 1> counts{};
     std::vector<uint32_t> prefix[2];
-    std::vector<ValuedCell> finest;  // for attributes other than color
+    std::vector<ValuedCell> finest;  // unused for colors
     const auto visit = [&](uint32_t level, uint64_t code) {
       const uint32_t coarser = tier.finest_level - level;
       if (coarser >= kPrefixLevels && coarser - kPrefixLevels < 2 && level > tier.region_level)

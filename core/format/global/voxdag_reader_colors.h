@@ -452,12 +452,12 @@ class BasicColorCursor {
   const ColorSection* section_;
   uint64_t path_[21] = {};  // places from the root to the cell looked up last
   uint64_t path_code_ = 0;  // code of that cell
-  uint32_t depth_ = 0;      // its level
+  uint32_t depth_ = 0;      // level of that cell
   const ColorTier* region_tier_ = nullptr;
   ColorRegion region_;
   uint32_t group_level_ = kNone;  // of the cells whose parents are below; a group is a cube
   uint64_t group_code_ = 0;
-  uint64_t starts_[64] = {};  // number of the region's cells before a parent's cells
+  uint64_t starts_[64] = {};  // by parent: number of the region's cells before the parent's
   uint32_t masks_[64] = {};
 };
 

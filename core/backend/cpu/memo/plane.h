@@ -21,7 +21,8 @@ struct Plane {
   // (n.q + c) / 256 is not an integer; the same for all cubes, because q is a multiple of 256.
   bool fractional;
 
-  // Sums of the positive and of the negative components.
+  // rising() returns the sum of the positive components of n, falling() the sum of the negative
+  // components.
   int64_t rising() const;
   int64_t falling() const;
 

@@ -25,7 +25,7 @@ namespace voxdag::parallel {
 
 struct HashOctreeNode {
   OctreeNodes nodes;
-  const uint64_t* child_hashes;  // of the octree's level below
+  const uint64_t* child_hashes;  // hashes of the octree's level below
   uint32_t hash_bits;
   uint64_t* hashes;
   VOXDAG_HD void operator()(uint32_t i) const {
@@ -38,7 +38,7 @@ struct HashOctreeNode {
 struct EmitCandidates {
   OctreeNodes nodes;
   const uint32_t* parents;  // octree nodes
-  const uint64_t* hashes;   // of the octree's level below
+  const uint64_t* hashes;   // hashes of the octree's level below
   uint32_t* candidates;
   uint64_t* candidate_hashes;
   VOXDAG_HD void operator()(uint32_t source, uint32_t rank, uint32_t output) const {
@@ -57,7 +57,7 @@ struct RemoveDuplicates {
   const uint64_t* candidate_hashes;
   uint32_t* survivors;
   uint64_t* hashes;
-  uint32_t* children;  // of the level above, one for each candidate
+  uint32_t* children;  // child lists of the level above; one entry per candidate
   VOXDAG_HD void operator()(uint32_t i) const {
     const uint32_t item = items[i], compact = marked[i + 1] - 1;
     children[item] = compact;
@@ -96,8 +96,8 @@ struct VerifyBrick {
 
 struct VerifyNode {
   OctreeNodes nodes;
-  const uint64_t* hashes;        // of the octree's level
-  const uint64_t* child_hashes;  // of the octree's level below
+  const uint64_t* hashes;        // hashes of the octree's level
+  const uint64_t* child_hashes;  // hashes of the octree's level below
   const uint64_t* survivor_hashes;
   const uint32_t* survivors;
   uint32_t survivor_count;

@@ -25,14 +25,14 @@ template <class Space>
 struct Reduced {
   uint32_t count = 0;
   SpaceArray<Space, uint32_t> survivors;  // octree nodes, in the total order
-  SpaceArray<Space, uint64_t> hashes;     // of the survivors
+  SpaceArray<Space, uint64_t> hashes;     // hashes of the survivors
   SpaceArray<Space, uint32_t> index_of;   // position of the survivor of each octree node
 };
 
 // The nodes of a level, as lists of their children in the level below, which is already reduced.
 struct LinkedNodes {
   OctreeNodes nodes;
-  const uint32_t* index_of;  // of the octree nodes below
+  const uint32_t* index_of;  // by octree node below: position of its survivor
 
   VOXDAG_HD uint32_t child(uint32_t node, uint32_t rank) const {
     return index_of[nodes.first_child[node] + rank];
@@ -107,7 +107,7 @@ struct HashSurvivorBrick {
 
 struct HashSurvivorNode {
   LinkedNodes links;
-  const uint64_t* child_hashes;  // of the survivors below
+  const uint64_t* child_hashes;  // hashes of the survivors below
   uint32_t hash_bits;
   const uint32_t* survivors;
   uint64_t* hashes;

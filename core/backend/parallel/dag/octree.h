@@ -45,7 +45,7 @@ struct Octree {
 // Child mask and code of the node whose children begin at first_child[i].
 struct MakeParent {
   const uint64_t* codes;
-  uint32_t child_count, parent_count;  // of the complete levels
+  uint32_t child_count, parent_count;  // numbers of nodes of the complete levels
   const uint32_t* first_child;
   uint8_t* masks;
   uint64_t* parent_codes;

@@ -71,9 +71,11 @@ struct Footprint {
   static VOXDAG_INLINE __m256i interleaved(__m256i x) {
     return _mm256_unpacklo_epi8(x, _mm256_srli_si256(x, 8));
   }
-  // From four rows of 64 voxels, a byte for each of the 16 bricks: its voxels in the first two
-  // rows, and in the upper half those in the other two. A byte of each of two rows has four voxels
-  // of one brick, then four of the next: of these four nibbles the middle ones are exchanged.
+  // Converts four rows of 64 voxels to bytes. The lower half of the result has a byte for each of
+  // the 16 bricks, with the voxels of the brick in the first two rows. The upper half has the same
+  // for the other two rows. A byte of a row has four voxels of one brick, then four voxels of the
+  // next brick. So a pair of bytes from two rows has four nibbles, and the middle two are
+  // exchanged.
   static VOXDAG_INLINE __m256i bytes_of_bricks(__m256i rows) {
     const __m256i pairs = interleaved(rows);
     const __m256i differ = _mm256_and_si256(_mm256_xor_si256(pairs, _mm256_srli_epi16(pairs, 4)),

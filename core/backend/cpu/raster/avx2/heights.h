@@ -71,7 +71,7 @@ class Heights {
     int brick;         // brick in which the lowest voxel column begins
     int within;        // units of 16-bit lanes above the floor of `brick`
   };
-  // Only bricks from `first` to `last` are considered.
+  // Returns the column of bricks (p, q), limited to the bricks from `first` to `last`.
   VOXDAG_INLINE Column column(int p, int q, int first, int last) const {
     const int64_t height = origin_ + step_p_ * p + step_q_ * q;
     const int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
@@ -84,7 +84,8 @@ class Heights {
             static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1)};
   }
 
-  // Lanes of `outer` that are all ones have no voxels.
+  // Returns the bounds of the heights in the 16 voxel columns. Columns whose lane of `outer` is all
+  // ones have no voxels.
   VOXDAG_INLINE HeightBounds bounds(const Column& c, __m256i outer) const {
     const __m256i base = _mm256_set1_epi16(static_cast<int16_t>(c.within));
     __m256i below = _mm256_add_epi16(base, below_lanes_);
