@@ -41,8 +41,8 @@ struct SubDagSummary {
 };
 
 // Receives a sub-DAG from the bricks upwards: bricks() once, then nodes() for every level from L-3
-// up to the cube's own level. The last array has exactly one node, the root. Nothing is called for
-// an empty subvolume. The views are only valid during the call.
+// up to the cube's own level. The last array has exactly one node, the root. For an empty
+// subvolume, no function is called. The views are only valid during the call.
 class SubDagSink {
  public:
   virtual ~SubDagSink() = default;

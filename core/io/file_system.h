@@ -3,9 +3,9 @@
 //
 // Errors: kNotFound, kNoSpace (ENOSPC, EDQUOT, EFBIG), kIo; the message names the call, the path,
 // the offset if there is one, and the system's reason. Implementations handle short reads and
-// writes, and EINTR. A FileSystem is thread-safe. A file is not, except that several threads may
-// call ReadableFile::read_at and WritableFile::write_at, and WritableFile::sync and release
-// concurrently with them.
+// writes, and EINTR. A FileSystem is thread-safe. A file is not thread-safe, with these exceptions:
+// several threads may call ReadableFile::read_at() or WritableFile::write_at() at the same time,
+// and other threads may call WritableFile::sync() and release() concurrently with these calls.
 #pragma once
 
 #include <cstddef>
@@ -97,8 +97,8 @@ class FileSystem {
   // Locks the file at `path`, creating it if necessary. Returns nullptr if another holder has the
   // lock.
   virtual std::unique_ptr<FileLock> try_lock(const std::string& path) = 0;
-  // True if a holder has the lock of the file at `path`, which must be readable. A concurrent
-  // try_lock() may fail.
+  // True if a holder has the lock of the file at `path`. The file must be readable. A try_lock()
+  // that runs concurrently with this call may fail.
   virtual bool is_locked(const std::string& path) = 0;
   // Returns the bytes that an unprivileged user may still write to the disk of `path`.
   virtual uint64_t free_space(const std::string& path) = 0;

@@ -14,7 +14,8 @@ struct Mesh {
   // Three vertex numbers for each triangle. Degenerate triangles set voxels like all other
   // triangles.
   std::span<const uint32_t> indices;
-  // Red, green, blue and alpha of each vertex, in sRGB; alpha is linear. Empty for white.
+  // Red, green, blue and alpha of each vertex, in sRGB; alpha is linear. If it is empty, all
+  // vertices are white.
   std::span<const uint8_t> colors = {};
 };
 

@@ -46,7 +46,8 @@ inline constexpr uint32_t kNoMaterial = UINT32_MAX;
 
 struct RayLimits {
   double max_distance = std::numeric_limits<double>::infinity();  // in voxels
-  // A ray hits cells of at most this edge, in voxels, as one cell. Values below 2 mean voxels.
+  // A ray stops at set cells with an edge of at most `stop_size` voxels, and hits such a cell as
+  // one cube. With values below 2, rays stop at voxels.
   double stop_size = 0;
 };
 

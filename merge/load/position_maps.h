@@ -22,7 +22,8 @@ namespace voxdag {
 
 class PositionMaps {
  public:
-  // One map for each entry of `rows`; in memory if all of them take at most `resident_bytes`.
+  // Creates one map for each run. `rows` has the number of rows of each run. The maps are in memory
+  // if all of them together take at most `resident_bytes`.
   PositionMaps(std::span<const uint64_t> rows, bool wide, uint64_t resident_bytes,
                ScratchFolder& scratch, MemoryBudget& budget);
   // Opens the maps that an earlier merge left in `file`, with one or two words per row.

@@ -4,7 +4,7 @@
 //   position maps    of the level below and of this level, up to resident_bytes each; larger maps
 //                    are spilled
 //   workers          frames, windows of spilled maps, memory for sorting a bucket
-//   hash partition   all the rest, at least partition_bytes
+//   hash partition   all remaining memory, at least partition_bytes
 //
 // The hash partition limits the fan-in: it must hold two frames of every run. Then the rows of any
 // single hash fit, unless there are very many of them.

@@ -57,7 +57,8 @@ class CudaDevice {
   Pinned<uint64_t> mailbox_;
   Staging staging_[2];
   int next_staging_ = 0;
-  // Last member, so that its destructor waits for pending work before the others are destroyed.
+  // Last member, so that its destructor waits for pending work before the other members are
+  // destroyed.
   Stream stream_;
 };
 

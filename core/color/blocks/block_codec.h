@@ -23,7 +23,8 @@ using ColorBlock = std::array<std::byte, kBlockBytes>;
 // Encodes 1 to 32 colors. Their alpha is not stored. The weights of missing cells are 0.
 using EncodeBlock = ColorBlock (*)(const Color* colors, size_t count);
 ColorBlock encode_block_portable(const Color* colors, size_t count);
-// The AVX2 version, with the same results; null if it was not built or this machine cannot run it.
+// Returns the AVX2 version, which has the same results. Returns null if this version was not built
+// or if this machine cannot run it.
 EncodeBlock encode_block_avx2();
 EncodeBlock fastest_block_encoder();
 

@@ -1,6 +1,6 @@
-// The values of a region for an attribute other than color, as stored in the file: in the same
-// order as colors (region.h), with a fixed number of bytes each, lowest byte first. Like colors,
-// they come in blocks of 32 cells. Bytes of missing cells are 0.
+// Encodes the values of a region for an attribute other than color, as the file stores them. Values
+// are in the same order as colors (region.h). Each has a fixed number of bytes, lowest byte first.
+// Like colors, they come in blocks of 32 cells. Bytes of missing cells are 0.
 #pragma once
 
 #include <cstdint>

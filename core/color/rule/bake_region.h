@@ -35,7 +35,7 @@
 
 namespace voxdag {
 
-// Bakes one region after another, on one thread, and reuses its memory.
+// Bakes one region after another, on one thread, and reuses its memory for the next region.
 template <class Textures>
 class RegionBaker {
  public:

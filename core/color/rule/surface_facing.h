@@ -15,9 +15,10 @@ inline constexpr double kColumnArea = 1 << 20;
 
 // A triangle's contribution to each cell that it touches.
 struct SurfaceFacing {
-  // For each column: a normal whose length is the column's area. Up to kColumnArea along each axis.
+  // The triangle's normal. Its length is the area of one covered column; each component is at most
+  // kColumnArea.
   int64_t area[3] = {};
-  bool is_backward = false;  // its dominant component is negative
+  bool is_backward = false;  // the normal's dominant component is negative
   uint32_t material = 0;
 };
 

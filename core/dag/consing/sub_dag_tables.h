@@ -12,15 +12,16 @@
 
 namespace voxdag {
 
-// A node of a known level, or none (an empty cube): its id in that level's table, and its full hash
-// so that hashing a parent needs no lookup of its children.
+// A node of a known level: its id in that level's table, and its full hash, so that hashing a
+// parent needs no lookup of its children. `exists` is false for an empty cube, which has no node.
 struct NodeRef {
   uint64_t hash = 0;
   uint32_t id = 0;
   bool exists = false;
 };
 
-// Octree nodes (bricks included) and set voxels of a cube, with multiplicity.
+// The numbers of octree nodes (including bricks) and set voxels of a cube. A shared node counts
+// once for each of its occurrences.
 struct OctreeCounts {
   uint64_t nodes = 0;
   uint64_t voxels = 0;

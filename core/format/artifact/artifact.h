@@ -4,8 +4,8 @@
 //   segment:   [header] [artifact] [artifact] ...
 //   artifact:  [frames of the bricks] [frames of level L-3] ... [frames of its top level] [index]
 //
-// A frame has kFrameRows consecutive rows of one level (the last frame of a level has the rest) as
-// columns, compressed where that pays, with a checksum of its bytes as stored. The index lists
+// A frame has kFrameRows consecutive rows of one level (the last frame of a level may have fewer)
+// as columns, compressed where that pays, with a checksum of its bytes as stored. The index lists
 // roots, levels and frames and has a separate checksum. An ArtifactRef points to the index, so that
 // a reader never scans a segment. An artifact of one subvolume has one root; a merge pass writes
 // artifacts with many.

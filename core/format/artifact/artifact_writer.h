@@ -15,7 +15,7 @@ namespace voxdag {
 
 class ArtifactWriter : public SubDagSink {
  public:
-  // A segment has at most one ArtifactWriter. A writer destroyed without finish() leaves
+  // A segment has at most one ArtifactWriter at a time. A writer destroyed without finish() leaves
   // unreferenced bytes in the segment.
   ArtifactWriter(SegmentWriter& segment, const DagShape& shape);
   ~ArtifactWriter() override;
@@ -25,7 +25,7 @@ class ArtifactWriter : public SubDagSink {
   void append_nodes(const NodeLevelView& rows);
   void end_level();
 
-  // SubDagSink: a complete level per call.
+  // The functions of SubDagSink. Each call adds a complete level.
   void bricks(const BrickLevelView& level) override;
   void nodes(const NodeLevelView& level) override;
 

@@ -40,8 +40,8 @@ class CheckedBlocks {
   void expect_intact(const void* begin, uint64_t bytes) const {
     expect_intact_at(place_of(begin), bytes);
   }
-  // expect_intact_at() does the same faster, for callers that store the place_of() an array: its
-  // offset in bytes from the end of the header page.
+  // place_of() returns the offset of a byte from the end of the header page. For callers that store
+  // this offset, expect_intact_at() is faster than expect_intact().
   uint64_t place_of(const void* begin) const {
     return static_cast<uint64_t>(static_cast<const unsigned char*>(begin) - first_);
   }

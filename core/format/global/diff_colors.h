@@ -1,6 +1,6 @@
-// Compares the colors of two global files of the same grid, cell by cell: the cells set in both,
-// on the finest level with colors in both. The result does not depend on
-// the number of threads.
+// Compares the colors of two global files of the same grid. Compares each cell that is set in both
+// files, on the finest level that has colors in both files. The result does not depend on the
+// number of threads.
 #pragma once
 
 #include <cstdint>

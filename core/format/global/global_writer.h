@@ -70,7 +70,7 @@ class GlobalFileWriter {
   // `narrow_words` words are wide: pointers into them have 64 bits. Throws Error.
   GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid, uint32_t hash_bits,
                    uint64_t narrow_words = global_layout::kNarrowLevelWords);
-  // Without publish(): removes the partial file, unless sync() made it resumable.
+  // If publish() was not called, removes the partial file, unless sync() made it resumable.
   ~GlobalFileWriter();
 
   const std::string& path() const;
@@ -86,7 +86,7 @@ class GlobalFileWriter {
   // concurrently with the writing of the next levels.
   void sync();
 
-  // Levels must come as L-2, L-3, ..., 0; none at all for a scene without voxels.
+  // Levels must come in the order L-2, L-3, ..., 0. A scene without voxels has no levels.
   void begin_level(uint32_t level);
   // Adds the next words of the current level to the checksums without writing them. Called for all
   // words in order, without overlapping calls.

@@ -1,6 +1,6 @@
 // The part of voxdag_reader.h that reads colors and the other attributes of cells (alpha, normals,
-// materials); copy both into your engine, and include that one. docs/format.md, "The color
-// section" and "The sections of alpha, normals and materials", describes the bytes.
+// materials); copy both headers into your engine, and include voxdag_reader.h. docs/format.md, "The
+// color section" and "The sections of alpha, normals and materials", describes the bytes.
 //
 // All set cells of the levels from 0 to the finest level of a section have a color, or another
 // value. The values are stored by regions of up to 64^3 cells of a tier's finest level: first for

@@ -1,6 +1,7 @@
 // Reduces the bricks of a tile to one node, level by level. Voxel blocks that occurred before are
-// found in the block memo. For the other nodes of a level, first all are hashed, then their slots
-// and records are prefetched, and then all are looked up, so that memory latencies overlap.
+// found in the block memo. The other nodes of a level are processed in three steps, so that memory
+// latencies overlap: all are hashed, then their slots and records are prefetched, and then all are
+// looked up.
 //
 // The non-empty cubes of a level are a bit set in Morton order. Each byte of this set is the child
 // mask of a node of the next coarser level, and the positions of the nonzero bytes are the bit set

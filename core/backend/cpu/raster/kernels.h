@@ -54,9 +54,9 @@ const Kernels* avx512_kernels();
 // Plain integer code, for narrow and wide triangles and for degenerate ones.
 template <class Coordinate>
 void draw_exactly(const TileTriangle<Coordinate>& triangle, TileBricks& tile);
-// Only for machines with AVX2, FMA and BMI2.
+// Requires a machine with AVX2, FMA and BMI2.
 void draw_avx2(const TileTriangle<int32_t>& triangle, TileBricks& tile);
-// Only for machines with AVX-512 F, BW, DQ, VL and VBMI as well.
+// Also requires AVX-512 F, BW, DQ, VL and VBMI.
 void draw_avx512(const TileTriangle<int32_t>& triangle, TileBricks& tile);
 
 // Wide triangles have a portable implementation only.

@@ -47,7 +47,8 @@ bool TileTriangle<Coordinate>::set_plane(const int64_t (&v)[3][3], int64_t (&hal
   dominant = size[1] > size[0] ? 1 : 0;
   if (size[2] > size[dominant]) dominant = 2;
   if (normal[dominant] < 0) {
-    // Negated together with the half-edges, so that the edges in set_edges() are the same.
+    // The normal is negated together with the half-edges, so that the edges in set_edges() are the
+    // same.
     for (int a = 0; a < 3; ++a) {
       normal[a] = -normal[a];
       for (int i = 0; i < 3; ++i) half[a][i] = -half[a][i];

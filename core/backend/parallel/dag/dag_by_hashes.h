@@ -5,11 +5,12 @@
 // the DAG, not of the octree.
 //
 // A verification sweep makes the result exact. On every level it compares every octree node,
-// removed or not, with the remaining node of the same hash: for bricks their masks, above the
-// bricks the child masks and the lists of child hashes. If all agree on all levels, nodes with
-// equal hashes have equal subtrees. This follows by induction from the bricks: the children of the
-// two nodes have equal hashes, so the children are equal. Then all hashes of a level are different,
-// and their order is the total order. After any mismatch, the DAG is made by pointers instead.
+// removed or not, with the remaining node of the same hash. It compares the masks of bricks, and
+// the child masks and lists of child hashes of the nodes above the bricks. If all agree on all
+// levels, nodes with equal hashes have equal subtrees. This follows by induction from the bricks:
+// the children of the two nodes have equal hashes, so the children are equal. Then all hashes of a
+// level are different, and their order is the total order. After any mismatch, the DAG is made by
+// pointers instead.
 #pragma once
 
 #include <cstdint>
@@ -117,7 +118,8 @@ struct VerifyNode {
   }
 };
 
-// Hashes of all octree nodes. Element 0 is for the bricks, element l + 1 for tree.levels[l].
+// Returns the hashes of all octree nodes. Element 0 is for the bricks, element l + 1 for
+// tree.levels[l].
 template <class Space>
 std::vector<SpaceArray<Space, uint64_t>> hash_octree(Space& space, const Octree<Space>& tree,
                                                      uint32_t hash_bits) {

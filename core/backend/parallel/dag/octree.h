@@ -42,7 +42,7 @@ struct Octree {
   }
 };
 
-// Child mask and code of the node whose children begin at first_child[i].
+// Computes the child mask and code of the node whose children begin at first_child[i].
 struct MakeParent {
   const uint64_t* codes;
   uint32_t child_count, parent_count;  // numbers of nodes of the complete levels
