@@ -65,7 +65,8 @@ struct BuildOptions {
   std::string cache_folder;  // folder for subvolumes shared between builds; "": no cache
   uint64_t cache_bytes = uint64_t{16} << 30;
 
-  // Resources. Resident memory, without `mesh`, exceeds memory_bytes by at most 64 MiB.
+  // Resources. Resident memory, without `mesh`, exceeds memory_bytes by at most 64 MiB if the
+  // allocator returns freed memory to the system (docs/library.md).
   uint64_t memory_bytes = 0;    // at least 64 MiB; 0: half of the RAM or cgroup limit
   unsigned threads = 0;         // 0: all CPUs that the process may use
   uint64_t subvolume_edge = 0;  // in voxels, a power of two; 0: chosen by the plan
