@@ -1,5 +1,6 @@
-// The parts of `build`, `plan` and `status` that concern clusters. Without cluster support
-// (VOXDAG_CLUSTER=OFF) --cluster is refused and the other options are absent.
+// Functions for clusters, used by `build`, `plan` and `status`. In a program without cluster
+// support (VOXDAG_CLUSTER=OFF), the option --cluster is refused, and the other cluster options do
+// not exist.
 #pragma once
 
 #include <string>
@@ -23,8 +24,8 @@ void apply_cluster(const BuildClusterOptions& cluster, RunOptions& run);
 // Adds the options of `plan`.
 void declare_cluster(Command& command, ClusterOptions& options);
 
-// The state of a work folder's tasks, for `status`: one JSON object, "" if there are no tasks. A
-// state that cannot be read is a warning on standard error.
+// Returns the state of a work folder's tasks as one JSON object, for `status`; "" if there are no
+// tasks. If the state cannot be read, prints a warning on standard error.
 std::string cluster_status_json(FileSystem& files, const std::string& work_folder);
 void print_cluster_status(FileSystem& files, const std::string& work_folder);
 

@@ -13,8 +13,8 @@ namespace {
 
 constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
 
-// Sets options that the command line does not give from a TOML or INI file. CLI11 supports such
-// files only for the whole program, not for one command.
+// Reads a TOML or INI file, and sets the options that the command line does not give. CLI11 itself
+// supports such files only for the complete program, not for a single command.
 void read_config_file(const std::string& path, CLI::App& command) {
   std::istringstream text(read_small_file(system_files(), path, kMaxConfigBytes));
   for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_config(text)) {
@@ -23,13 +23,13 @@ void read_config_file(const std::string& path, CLI::App& command) {
       throw Error(ErrorCode::kInvalidInput,
                   path + ": '" + item.fullname() + "' is not an option of " + command.get_name());
     if (option->count() > 0) continue;
-    // If the command line gives the option later, that value wins.
+    // If the command line gives the option later, the later value is used.
     option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)->add_result(item.inputs);
   }
 }
 
-// Returns "" for a valid number, otherwise a message. CLI11's own conversion turns -4 into 2^64 -
-// 4, and its errors have no expectation.
+// Returns "" for a valid number, otherwise an error message. CLI11's own conversion is not used: it
+// turns -4 into 2^64 - 4, and its errors do not state the expected value.
 template <class T>
 std::string integer_problem(const std::string& text) {
   if (parse_numbers<T, 1>(text, ',')) return "";

@@ -1,6 +1,7 @@
-// The commands and their options. Each command file defines one function `add_<name>_command(line)`
-// that adds the command to the command line. main.cc calls all of them and turns an Error into a
-// message and an exit status. Only command.cc includes CLI11, which takes seconds to compile.
+// The commands and their options. Each command has a file that defines a function
+// `add_<name>_command(line)`, which adds the command to the command line. main.cc calls all these
+// functions, and turns an Error into a message and an exit status. Only command.cc includes CLI11,
+// which takes seconds to compile.
 #pragma once
 
 #include <array>
@@ -32,20 +33,22 @@ std::array<Number, kCount> parse_list(const std::string& option, const std::stri
   return *numbers;
 }
 
-// A handle of a command's option. Each function returns the handle, so calls can be chained.
+// A handle of a command's option. Each member function returns the handle, so calls can be chained.
 class Option {
  public:
   explicit Option(CLI::Option* option) : option_(option) {}
   Option required();
   Option group(const char* heading);
-  // Reads the value from this variable if the command line does not set it.
+  // Reads the option's value from an environment variable if the command line does not give the
+  // option.
   Option environment(const char* variable);
   Option show_default();
   Option positive();
   Option range(int low, int high);
   Option range(double low, double high);
   Option one_of(const std::vector<std::string>& values);
-  // `problem` returns "" for a valid value, otherwise the expectation.
+  // Checks each value with `problem`, which returns "" for a valid value, otherwise the expected
+  // value.
   Option check(std::string (*problem)(const std::string& value));
   Option excludes(Option other);
   Option needs(Option other);
@@ -54,7 +57,7 @@ class Option {
   CLI::Option* option_;
 };
 
-// A command; a handle. Values are set when the command line is parsed.
+// A handle of a command. Variables get their option values when the command line is parsed.
 class Command {
  public:
   explicit Command(CLI::App* app) : app_(app) {}
@@ -62,8 +65,8 @@ class Command {
   // an optional double, or a vector of strings.
   template <class T>
   Option option(const char* names, T& value, const char* description);
-  // An option of any type: `set` parses the text and throws Error if it is invalid. `value_name`
-  // stands for the value in the help.
+  // Adds an option of any type. `set` parses the text, and throws Error if it is invalid.
+  // `value_name` is the placeholder for the value in the help.
   Option text_option(const char* names, const char* value_name,
                      std::function<void(const std::string& text)> set,
                      const std::string& description);
@@ -72,7 +75,8 @@ class Command {
                  const char* description = "report as one JSON object on standard output");
   // Adds --threads, 1 to 1024.
   void threads_option(unsigned& value);
-  // Adds --config, a TOML or INI file of options that the command line does not give.
+  // Adds the option --config, which names a TOML or INI file. The file sets options that the
+  // command line does not give.
   void config_option();
   bool given(const char* option) const;
   void hide();  // Hides the command from the help.
@@ -85,7 +89,7 @@ class Command {
 struct CommandContext {
   FileSystem& files;
   CancelToken& cancel;  // canceled by Ctrl-C and SIGTERM
-  // Exit status of a command that succeeded; diff sets 1 if the files differ.
+  // Exit status if the command succeeds. `diff` sets it to 1 if the files differ.
   int exit_status = 0;
 };
 
@@ -94,8 +98,8 @@ class CommandLine {
   explicit CommandLine(CommandContext& context);
   ~CommandLine();
   Command add(const char* name, const char* description);
-  // Parses the arguments and runs the command. Does not catch its exceptions. Returns the exit
-  // status.
+  // Parses the arguments and runs the command. Returns the exit status. Does not catch the
+  // command's exceptions.
   int run(int argc, char** argv);
   CommandContext& context() { return context_; }
 
@@ -104,8 +108,8 @@ class CommandLine {
   std::unique_ptr<CLI::App> app_;
 };
 
-// Adds a command whose options set the members of a `State`. declare(command, state) adds the
-// options, and run(state, context) runs after they are parsed. Both functions are found in the
+// Adds a command whose options set the members of a `State`. declare(command, state) must add the
+// options; run(state, context) is called after they are parsed. Both functions are looked up in the
 // namespace of `State`.
 template <class State>
 State& add_command(CommandLine& line, const char* name, const char* description) {
@@ -130,7 +134,7 @@ void add_render_command(CommandLine& line);
 void add_extract_command(CommandLine& line);
 void add_export_command(CommandLine& line);
 void add_view_command(CommandLine& line);
-// Adds `serve`, `token`, and the hidden command that `serve` runs for each job.
+// Adds `serve`, `token`, and the hidden command that `serve` runs in a child process for each job.
 void add_serve_commands(CommandLine& line);
 void add_health_command(CommandLine& line);
 void add_submit_command(CommandLine& line);

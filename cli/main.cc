@@ -12,7 +12,7 @@
 namespace voxdag::cli {
 namespace {
 
-// Exit status after an unexpected exception (docs/errors.md); EX_SOFTWARE of sysexits.h.
+// Exit status after an unexpected exception (docs/errors.md). It equals EX_SOFTWARE of sysexits.h.
 constexpr int kDefectStatus = 70;
 
 CancelToken g_cancel;
@@ -29,7 +29,8 @@ void catch_signals() {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  // The terminal was closed. nohup makes programs ignore this signal.
+  // SIGHUP means that the terminal was closed. It remains ignored if nohup has set it to be
+  // ignored.
   struct sigaction hangup {};
   sigaction(SIGHUP, nullptr, &hangup);
   if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
@@ -41,7 +42,8 @@ int report(ErrorCode code, const char* message) {
   return exit_status(code);
 }
 
-// Flushes standard output. The command has failed if the buffered text cannot be written.
+// Flushes standard output. Throws if the buffered text cannot be written, so that the command
+// fails.
 void check_output() {
   errno = 0;
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return;

@@ -74,7 +74,8 @@ class OptionDeclarer {
   std::map<std::string, Option> options_;
 };
 
-// Calls check(). Errors of fields have the names of options: "--color-resolution".
+// Calls check(). Error messages contain the name of the option, such as "--color-resolution",
+// instead of the name of the field.
 void with_option_names(const auto& check) {
   try {
     check();

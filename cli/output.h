@@ -10,18 +10,18 @@
 
 namespace voxdag::cli {
 
-// Prints the JSON on one line. Bytes that are not UTF-8, for example in a path, are printed as
-// U+FFFD.
+// Prints the JSON on one line. Bytes that are not valid UTF-8, for example in a path, are printed
+// as U+FFFD.
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
 
 // Returns resolution, cells and bytes of one section.
 nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section);
-// Adds the facts of all sections of the file as the members `colors` and `attributes`. The latter
-// also has the names of materials.
+// Adds the members `colors` and `attributes` with facts about the file's sections. `attributes`
+// also has the names of the materials.
 void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json);
 
-// True if voxdag wrote the file with a command of this kind.
+// True if the file was written by voxdag, with a command of the kind that is writing now.
 using IsOwnFile = std::function<bool(const ReadableFile& file)>;
 
 // A file to write, and the option --force.
@@ -29,9 +29,10 @@ struct OutputFile {
   std::string path;
   bool force = false;
   void declare_force(Command& command);
-  // Throws Error{kInvalidInput} if writing would destroy the `input` or, without --force, a file
-  // for which `is_own` returns false. Also checks path + ".partial", the temporary name of
-  // write_file_atomically(), and that the folder exists.
+  // Throws Error{kInvalidInput} if writing would destroy `input`, or would, without --force,
+  // destroy a file for which `is_own` returns false. Makes the same check for path + ".partial",
+  // the temporary name of write_file_atomically(). Also throws if the output's folder does not
+  // exist.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
   // Checks one name.
   void check(FileSystem& files, const std::string& name, const std::string& input,

@@ -33,7 +33,7 @@ struct RenderCommand {
   bool json = false;
 };
 
-// Returns the point that an option gives in world space, in voxel units.
+// Parses a point that an option gives in world space. Returns it in voxel units.
 query::Vec parse_point(const std::string& text, const std::string& option,
                        const voxdag_reader::File& file) {
   const auto world = parse_list<double, 3>(option, text, ',', "three numbers X,Y,Z");
@@ -98,10 +98,12 @@ void check_outputs(const RenderCommand& command, FileSystem& files) {
   depth.check(files, command.input, [](const ReadableFile&) { return false; });
 }
 
-// Refuses a size that is too large before any work is done.
+// Throws Error before any work is done if a picture of the requested size does not fit in the
+// memory.
 void check_memory(const RenderCommand& command) {
   const uint64_t limit = memory_limit(command.memory);
-  // The picture is written before the distances are computed, so they are never in memory together.
+  // The picture is written before the distances are computed. So both are never in memory together,
+  // and the larger one decides.
   const uint64_t of_pixel =
       command.output.path.empty() ? query::kDepthBytesPerPixel : query::kRenderBytesPerPixel;
   const uint64_t bytes = of_pixel * static_cast<uint64_t>(command.options.width) *

@@ -17,8 +17,8 @@ std::string lower_case(std::string_view name) {
   return lower;
 }
 
-// Bodies are requested without encoding unless the caller sets it, because newer versions of
-// httplib would request compression.
+// Adds a header that requests bodies without compression, unless the caller sets this header. Newer
+// versions of httplib would otherwise request compression.
 httplib::Headers to_httplib(const HeaderMap& headers) {
   httplib::Headers all(headers.begin(), headers.end());
   if (all.find("Accept-Encoding") == all.end()) all.emplace("Accept-Encoding", "identity");
@@ -105,7 +105,7 @@ ClientResponse HttpClient::send(const std::string& method, const std::string& pa
 
 ClientResponse HttpClient::upload(const std::string& path, uint64_t size, const Source& source,
                                   const HeaderMap& headers) {
-  // Exceptions of the source must not propagate through httplib.
+  // `source` may throw, but exceptions must not propagate through httplib. So they are stored here.
   std::exception_ptr failure;
   const auto provider = [&](size_t offset, size_t length, httplib::DataSink& sink) {
     try {
@@ -128,7 +128,7 @@ ClientResponse HttpClient::stream(const std::string& path, const HeaderMap& head
   std::string error_body;
   bool closed = false;
   std::exception_ptr failure;
-  // Exceptions of begin and sink must not propagate through httplib.
+  // `begin` and `sink` may throw, but exceptions must not propagate through httplib.
   const auto guarded = [&](const auto& step) {
     try {
       if (step()) return true;
@@ -165,7 +165,7 @@ void throw_if_problem(const ClientResponse& response) {
   if (response.status < 400) return;
   const auto json = nlohmann::json::parse(response.body, nullptr, false);
   std::string code, detail = "the server answered with status " + std::to_string(response.status);
-  // The answer may not be JSON of this service: it may come from another server or a proxy.
+  // The answer may not be this service's JSON, because it may come from another server or a proxy.
   const auto text = [&](const char* name, const std::string& otherwise) {
     const auto found = json.find(name);
     return found != json.end() && found->is_string() ? found->get<std::string>() : otherwise;

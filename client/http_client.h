@@ -1,5 +1,5 @@
-// Sends requests over HTTP or HTTPS to one server. Keeps the connection open between requests. Only
-// http_client.cc includes httplib. Used by one thread.
+// Sends requests over HTTP or HTTPS to one server, and keeps the connection open between requests.
+// httplib is included only in http_client.cc. Used by one thread.
 #pragma once
 
 #include <cstdint>
@@ -20,19 +20,20 @@ struct ClientResponse {
   int status = 0;
   HeaderMap headers;
   std::string body;  // empty if a sink received it
-  // Returns the first field with this name, ignoring case; "" if none exists.
+  // Returns the value of the first field with this name, ignoring case; "" if there is no such
+  // field.
   std::string header(std::string_view name) const;
 };
 
 struct ClientOptions {
-  std::string url;        // http://host:port or https://host[:port], no path
+  std::string url;        // http://host:port or https://host[:port], without a path
   std::string token;      // "": no token
-  std::string ca_file;    // certificates to trust; "": the system's certificates
-  double timeout_s = 30;  // for connecting, and for each read and write
+  std::string ca_file;    // file of certificates to trust; "": the system's certificates
+  double timeout_s = 30;  // limit for connecting, and for each read and write
 };
 
-// The constructor throws Error{kInvalidInput} for a malformed URL; requests throw Error{kIo} if the
-// server cannot be reached or the connection breaks. Answers with an error status do not throw.
+// The constructor throws Error{kInvalidInput} for a malformed URL. Requests throw Error{kIo} if the
+// server cannot be reached or the connection breaks. An answer with an error status is returned.
 class HttpClient {
  public:
   explicit HttpClient(const ClientOptions& options);
@@ -44,15 +45,16 @@ class HttpClient {
   ClientResponse send(const std::string& method, const std::string& path, const std::string& body,
                       const HeaderMap& headers = {});
 
-  // PUTs `size` bytes. source(offset, max_bytes) returns the next bytes, at least one.
+  // Sends `size` bytes with PUT. source(offset, max_bytes) must return the next bytes, at least
+  // one.
   using Source = std::function<std::string(uint64_t offset, uint64_t max_bytes)>;
   ClientResponse upload(const std::string& path, uint64_t size, const Source& source,
                         const HeaderMap& headers = {});
 
-  // GETs a body in pieces, for downloads and event streams. `begin` receives the status and
-  // headers, `sink` the body. If either returns false, the connection is closed, which is not an
-  // error. If the status is 400 or above, the body goes to the returned response instead of the
-  // sink.
+  // Fetches a body in pieces with GET, for downloads and event streams. `begin` is called with the
+  // status and headers, `sink` with each piece of the body. If one of them returns false, the
+  // connection is closed; this is not an error. If the status is 400 or above, the body is stored
+  // in the returned response instead of being passed to `sink`.
   using Begin = std::function<bool(const ClientResponse&)>;
   using Sink = std::function<bool(std::string_view piece)>;
   ClientResponse stream(const std::string& path, const HeaderMap& headers, const Begin& begin,
@@ -63,7 +65,8 @@ class HttpClient {
   std::unique_ptr<Impl> impl_;
 };
 
-// Returns the code with this name (docs/errors.md), else the code that fits the HTTP status best.
+// Returns the code with this name (docs/errors.md). If there is none, returns the code that fits
+// the HTTP status best.
 ErrorCode error_code_of(const std::string& name, int http_status);
 // Throws the Error that a problem+json answer describes (status 400 and above).
 void throw_if_problem(const ClientResponse& response);

@@ -47,14 +47,15 @@ class Download {
   }
 
  private:
-  // Returns the bytes present; 0 if the partial file is longer than the result.
+  // Returns the number of bytes in the partial file; 0 if this file is longer than the result.
   uint64_t bytes_present() const {
     if (!files_.exists(partial_)) return 0;
     const uint64_t bytes = files_.open_read(partial_)->size();
     return bytes <= size_ ? bytes : 0;
   }
 
-  // Sends one request. Returns the seconds to wait that a busy server requested.
+  // Requests the bytes from `offset` on. Returns the number of seconds to wait if a busy server
+  // requested a pause.
   double fetch_rest(uint64_t offset) {
     HeaderMap headers;
     if (offset > 0) {
@@ -89,8 +90,8 @@ class Download {
     return 0;
   }
 
-  // Distinguishes errors of the local file, which a retry does not fix, from errors of the
-  // connection. Both are kIo.
+  // Distinguishes errors of the local file from errors of the connection. Both are Error{kIo}, but
+  // a retry does not help against the former.
   template <class Step>
   void guard_file(const Step& step) {
     file_failed_ = true;

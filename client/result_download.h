@@ -17,9 +17,10 @@ struct DownloadResult {
 };
 
 // Downloads the .vdag file of a succeeded JOB to `output`. Until the file is complete and verified,
-// its name is `output`.<first digits of the SHA-256>.partial, and a later call resumes it. Retries
-// as RetryPolicy does; an attempt that makes progress restarts the policy. Throws Error{kNotFound}
-// for a job that has not succeeded, Error{kCorrupt} if the bytes do not match the SHA-256.
+// it has the name `output`.<first digits of the SHA-256>.partial, and a later call resumes the
+// download. Failed attempts are repeated as RetryPolicy allows; an attempt that makes progress
+// restarts the policy. Throws Error{kNotFound} for a job that has not succeeded, Error{kCorrupt} if
+// the bytes do not match the SHA-256.
 DownloadResult download_result(ServiceClient& service, FileSystem& files, const Json& job,
                                const std::string& output, Progress& progress);
 

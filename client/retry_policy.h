@@ -1,5 +1,5 @@
-// Delays before retries: half a second at first, then growing, five minutes in total. Used by one
-// thread.
+// Delays before retries. The first delay is half a second; later delays are longer, up to five
+// minutes in total. Used by one thread.
 #pragma once
 
 #include "client/http_client.h"
@@ -10,10 +10,10 @@ namespace voxdag::client {
 class RetryPolicy {
  public:
   explicit RetryPolicy(const CancelToken& cancel) : cancel_(cancel) {}
-  // Waits before the next attempt, at least `min_wait_s`. Returns false if the time for retries is
-  // used up. Throws Error{kCanceled}.
+  // Waits before the next attempt, for at least `min_wait_s`. Returns false if the total time for
+  // retries is used up. Throws Error{kCanceled}.
   bool wait(double min_wait_s = 0);
-  // Call it after an attempt that made progress: the delays start over.
+  // Restarts the delays. Call it after an attempt that made progress.
   void reset() { waited_s_ = 0, pause_s_ = kFirstPauseS; }
 
  private:
@@ -22,12 +22,12 @@ class RetryPolicy {
   double waited_s_ = 0, pause_s_ = kFirstPauseS;
 };
 
-// Returns the seconds to wait before the next request to a busy server (408, 429, 502 to 504); 0 if
-// the answer has no such field. Returns -1 for any other status, because a retry would not change
-// it.
+// Returns the number of seconds to wait before the next request to a busy server (status 408, 429,
+// 502 to 504); 0 if its answer does not have the header Retry-After. Returns -1 for any other
+// status, because a retry would give the same answer.
 double retry_after_s(const ClientResponse& response);
 
-// Throws Error{kCanceled} within about 50 ms of a cancellation.
+// Sleeps. Throws Error{kCanceled} within about 50 ms of a cancellation.
 void sleep_for(double seconds, const CancelToken& cancel);
 
 }  // namespace voxdag::client

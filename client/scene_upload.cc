@@ -18,8 +18,9 @@ constexpr uint64_t kPartBytes = 64 << 20;
 constexpr size_t kDigitsInName = 12;
 constexpr size_t kMaxStemChars = 100, kMaxEndingChars = 10;
 
-// "/a/My hall.glb" -> "My-hall-3f2a91c05b77.glb", a name that the API accepts if the service reads
-// files with this ending.
+// Returns the name of a local file on the server: "/a/My hall.glb" becomes
+// "My-hall-3f2a91c05b77.glb". The API accepts this name if the service reads files with this
+// ending.
 std::string name_on_server(const std::string& path, const std::string& sha256) {
   std::string stem = path.substr(path.rfind('/') + 1);
   const size_t dot = stem.rfind('.');
@@ -65,7 +66,7 @@ class Upload {
     return bytes;
   }
 
-  // True if the server has the complete file. Sets offset_ to the number of bytes that it has.
+  // True if the server has the complete file. Sets offset_ to the number of bytes on the server.
   bool is_complete() {
     offset_ = 0;
     try {
@@ -86,9 +87,9 @@ class Upload {
   }
 
   // Sends the missing bytes in parts, so that a crash of the server loses at most one part. The
-  // first part is small, because a server that rejects the scene can then answer; within a large
-  // part it would close the connection. If no bytes are missing, an empty part finishes the upload.
-  // Returns false if a retry is needed, with the reason in failure_.
+  // first part is small: if the server rejects the scene, it can answer after a small part, but
+  // would close the connection within a large part. If no bytes are missing, an empty part finishes
+  // the upload. Returns false if a retry is needed, and stores the reason in failure_.
   bool send_rest() {
     progress_.begin_stage("upload", size_, "bytes");
     progress_.resume_at(offset_);
@@ -139,7 +140,7 @@ class Upload {
   const uint64_t size_;
   std::string sha256_, name_;
   uint64_t offset_ = 0;       // bytes that the server has
-  bool file_failed_ = false;  // the last error came from the local file, not from the connection
+  bool file_failed_ = false;  // the last error was in the local file, not in the connection
   std::string failure_;       // error of the last attempt
   double wait_s_ = 0;         // requested by a busy server
 };

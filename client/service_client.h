@@ -1,6 +1,6 @@
-// The API of `voxdag serve` (docs/api.md): JSON requests that are retried while the server restarts
-// or is busy. Used by one thread. If an answer differs from docs/api.md, the functions throw
-// nlohmann's json::exception.
+// A client of the API of `voxdag serve` (docs/api.md). It sends JSON requests, and repeats them
+// while the server restarts or is busy. If an answer does not conform to docs/api.md, the functions
+// throw nlohmann's json::exception. Used by one thread.
 #pragma once
 
 #include <functional>
@@ -19,9 +19,9 @@ class ServiceClient {
   ServiceClient(const ClientOptions& options, const CancelToken& cancel)
       : url_(options.url), cancel_(cancel), http_(options) {}
 
-  // Sends a request that may safely be sent twice. Retries it while the server is busy (408, 429,
-  // 502 to 504). After the first answered request, also retries while the server cannot be reached.
-  // Throws the Error of any other status from 400.
+  // Sends a request that may safely be sent twice. Repeats it while the server is busy (status 408,
+  // 429, 502 to 504). If an earlier request was answered, also repeats it while the server cannot
+  // be reached. Throws an Error for any other status of 400 or above.
   using Request = std::function<ClientResponse(HttpClient& http)>;
   ClientResponse send_with_retries(const Request& request);
 
@@ -29,10 +29,10 @@ class ServiceClient {
   Json post(const std::string& path, const Json& body, const HeaderMap& headers = {});
   // Returns the JOB.
   Json job(const std::string& id);
-  // Posts an action ("cancel", "suspend", "resume", "retry"). Returns the resulting JOB.
+  // Posts an action ("cancel", "suspend", "resume", "retry"). Returns the JOB after the action.
   Json post_action(const std::string& id, const std::string& action);
-  // Calls on_job(JOB) twice per second until the job has ended, and returns the JOB. Throws
-  // Error{kCanceled} if the token is set; the job itself continues.
+  // Calls on_job(JOB) twice per second until the job has ended, and returns its last JOB. Throws
+  // Error{kCanceled} if the cancel token is canceled; the job itself continues.
   Json follow_job(const std::string& id, const std::function<void(const Json& job)>& on_job);
 
   HttpClient& http() { return http_; }

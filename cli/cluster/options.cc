@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kMergeJobFlag = "--cluster-merge-job";
 
-// Returns this process's command line without the program name.
+// Returns the arguments of this process, without the program name.
 std::vector<std::string> own_arguments() {
   std::ifstream line("/proc/self/cmdline");
   std::vector<std::string> words;
@@ -26,13 +26,14 @@ std::vector<std::string> own_arguments() {
   return words;
 }
 
-// The merge job gets the user's --memory and --threads. Without these options it gets the resources
-// of a task.
+// Returns the options of the merge job: the user's --memory and --threads. Without these options,
+// the merge job gets the resources of a task.
 ClusterOptions::MergeJobOptions merge_job(const BuildClusterOptions& cluster,
                                           const RunOptions& run) {
   ClusterOptions::MergeJobOptions job;
   job.arguments = own_arguments();
-  // The first word is the command. Words after "--" are scenes, so the flag cannot be appended.
+  // Inserts the flag after the first word, the command. It cannot be appended, because words after
+  // "--" are scenes.
   job.arguments.insert(job.arguments.begin() + 1, kMergeJobFlag);
   job.folder = std::filesystem::current_path().string();
   if (run.memory_bytes > 0)
@@ -45,13 +46,14 @@ ClusterOptions::MergeJobOptions merge_job(const BuildClusterOptions& cluster,
   return job;
 }
 
-// Applies this job's Slurm allocation to the options that the user left out.
+// Sets the options that the user left out from the Slurm allocation of this job.
 void take_allocation(RunOptions& run) {
   const Allocation given = slurm_allocation();
   if (run.memory_bytes == 0 && given.memory_bytes > 0)
     run.memory_bytes = batch_budget(given.memory_bytes);
   if (run.threads == 0) run.threads = given.cpus;
-  // An earlier attempt at this job may still be ending on another node.
+  // Waits this long for the lock, because an earlier attempt at this job may still be ending on
+  // another node.
   run.lock_wait_s = 300;
   run.restart = false;
 }

@@ -19,7 +19,7 @@ std::optional<ClusterState> read_state(FileSystem& files, const std::string& wor
   }
 }
 
-// Prints the unbuilt batches, grouped by the state of their tasks, and the last failure.
+// Prints the unbuilt batches, grouped by the state of their tasks, and the last failure of a task.
 void print(const ClusterState& cluster) {
   std::map<std::string, size_t> by_state, by_node;
   const OpenBatch* failed = nullptr;

@@ -19,7 +19,8 @@ struct ViewCommand {
   bool json = false;
 };
 
-// Starts the user's browser as a detached process, so that its end does not affect this process.
+// Starts the user's browser as a detached process, so that the end of the browser does not affect
+// this process.
 void open_in_browser(const std::string& url) {
   const pid_t child = fork();
   if (child == 0) {

@@ -1,4 +1,4 @@
-// Follows a job of a server and shows its progress on standard error.
+// Follows a job on a server, and shows the job's progress on standard error.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace voxdag::cli {
 
-// Returns the JOB after it has ended: succeeded, failed or canceled. Throws Error{kCanceled} on
-// Ctrl-C; the job itself continues.
+// Waits until the job has ended (succeeded, failed or canceled), and returns its JOB (docs/api.md).
+// Throws Error{kCanceled} on Ctrl-C; the job itself continues.
 Json follow_job(ServiceClient& service, const std::string& id);
 
 // Throws an Error for a job that failed or was canceled.

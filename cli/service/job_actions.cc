@@ -22,7 +22,7 @@ void declare(Command& command, JobActionCommand& state) {
   command.json_flag(state.json, "each job as one JSON object on standard output");
 }
 
-// Performs the action on each job; "resume" retries failed and canceled jobs.
+// Performs the action on each job. For a failed or canceled job, "resume" requests a retry.
 void run(const JobActionCommand& command, ServiceClient& service, CommandContext&) {
   for (const std::string& id : command.ids) {
     const std::string state = command.action == "resume" ? service.job(id).at("state") : "";

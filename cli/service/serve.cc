@@ -32,7 +32,7 @@ void log_line(const std::string& line) {
                line.c_str());
 }
 
-// Returns the settings of the file, overridden by the given options.
+// Returns the settings from the configuration file. Options on the command line override them.
 server::ServerConfig settings(const ServeCommand& command, const Command& line, FileSystem& files) {
   server::ServerConfig config;
   if (!command.config_file.empty()) server::read_config(files, command.config_file, config);
@@ -49,7 +49,8 @@ server::ServerConfig settings(const ServeCommand& command, const Command& line, 
 }
 
 void serve(const ServeCommand& command, const Command& line, CommandContext& context) {
-  // Only clients with a token may read scenes and results, not all users of the machine.
+  // Makes new files private to this user. Otherwise all users of the machine could read scenes and
+  // results, not only clients with a token.
   umask(0077);
   server::Service service(settings(command, line, context.files), context.files, log_line);
   log_line("listening on " + service.url());

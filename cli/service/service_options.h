@@ -1,4 +1,4 @@
-// The options that all client commands have: --server, --token-file and --ca-file.
+// The options of all client commands: --server, --token-file and --ca-file.
 #pragma once
 
 #include <functional>
@@ -15,8 +15,8 @@ using client::ServiceClient;
 class ServiceOptions {
  public:
   void declare(Command& command);
-  // Calls `action` with a client of the server. Throws Error{kInvalidInput} for a malformed URL or
-  // token file, and Error{kIo} for an answer that differs from docs/api.md.
+  // Calls `action` with a client for the server. Throws Error{kInvalidInput} for a malformed URL or
+  // token file, and Error{kIo} if an answer does not conform to docs/api.md.
   void with_service(CommandContext& context,
                     const std::function<void(ServiceClient&)>& action) const;
 
@@ -26,8 +26,8 @@ class ServiceOptions {
   std::string url_, token_file_, ca_file_;
 };
 
-// Adds a command whose State has a member `service` with these options. run(state, client, context)
-// is called with a client of the server.
+// Adds a command whose State has a member `service` with these options. When the command runs,
+// run(state, client, context) is called with a client for the server.
 template <class State>
 State& add_service_command(CommandLine& line, const char* name, const char* description) {
   Command command = line.add(name, description);

@@ -20,8 +20,8 @@ struct SubmitCommand {
   bool json = false;
 };
 
-// Uploads scenes that are local files and returns their names on the server. Other names are scenes
-// already on the server.
+// Uploads those scenes that are local files. Returns the names of all scenes on the server. A scene
+// that is not a local file must already be on the server.
 std::vector<std::string> upload(const std::vector<std::string>& scenes, FileSystem& files,
                                 ServiceClient& service) {
   const auto progress = make_progress_bar();
@@ -36,7 +36,8 @@ void run(const SubmitCommand& command, ServiceClient& service, CommandContext& c
   server::JobRequest request = command.request;
   request.scenes = upload(request.scenes, context.files, service);
   const Json body = options_json(request);
-  // A retry after a lost answer must not create a second job.
+  // Idempotency key: if the answer is lost and the request is sent again, the server creates no
+  // second job.
   const std::string key = random_id() + random_id();
   Json job = service.post("/api/v1/jobs", body, {{"Idempotency-Key", key}});
   if (!command.json) std::printf("%s\n", state_line(job).c_str());

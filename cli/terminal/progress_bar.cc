@@ -66,7 +66,7 @@ class ProgressBar : public Progress {
   void advance(uint64_t count) override {
     done_ += count;
     std::unique_lock lock(mutex_, std::try_to_lock);
-    if (!lock) return;  // another thread is showing it now
+    if (!lock) return;  // another thread is showing the progress now
     const double now = wall_seconds();
     if (now - last_shown_s_ < line_.interval_s()) return;
     last_shown_s_ = now;

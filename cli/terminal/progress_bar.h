@@ -1,5 +1,5 @@
-// Progress on standard error. On a terminal, it is a bar with rate and ETA; otherwise a plain line
-// every few seconds and at the end of each stage. The bar is thread-safe.
+// Shows progress on standard error: on a terminal as a bar with rate and ETA, otherwise as a plain
+// line every few seconds and at the end of each stage. The bar is thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -19,13 +19,13 @@ struct StageView {
   double eta_s = 0;  // 0 if unknown
 };
 
-// A stage's progress as one line on standard error: a bar that is redrawn on a terminal, a plain
-// line otherwise. Not thread-safe.
+// Shows the progress of a stage as one line on standard error: a bar that is redrawn if this is a
+// terminal, otherwise a plain line. Not thread-safe.
 class ProgressLine {
  public:
   // A quiet line shows only warnings and notes.
   explicit ProgressLine(bool quiet = false);
-  // Ends an open line, so that later output starts on a new line.
+  // Ends a line that is still being redrawn, so that later output starts on a new line.
   ~ProgressLine();
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
@@ -40,7 +40,7 @@ class ProgressLine {
  private:
   const bool quiet_;
   const bool terminal_;
-  bool open_ = false;  // the line on the terminal will be redrawn
+  bool open_ = false;  // the terminal shows a line that will be redrawn
 };
 
 // A quiet bar shows only warnings.

@@ -1,4 +1,4 @@
-// Python keyword arguments from a description (core/fields/field.h).
+// Writes Python keyword arguments from a description of options (core/fields/field.h).
 #pragma once
 
 #include <string>
@@ -28,7 +28,8 @@ std::string python_type(const Field& field) {
   }
 }
 
-// Collects one line of text per keyword. Required options are named parameters of the functions.
+// Collects one line of text per keyword. Skips required options, which are named parameters of the
+// Python functions.
 class KeywordWriter {
  public:
   template <class T>

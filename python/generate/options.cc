@@ -1,5 +1,5 @@
-// Writes voxdag/_options.py: the keyword arguments of build() and plan() as a TypedDict, from the
-// description of a build's options.
+// Writes voxdag/_options.py from the description of a build's options. The file defines the keyword
+// arguments of build() and plan() as a TypedDict.
 #include <cstdio>
 
 #include "python/generate/keyword_writer.h"

@@ -43,7 +43,7 @@ Mesh mesh_of(const MeshArrays& arrays) {
   return mesh;
 }
 
-// Removes the options from a dict of keyword arguments. An argument of None counts as absent.
+// Takes options out of a dict of keyword arguments. An argument that is None counts as absent.
 class KeywordReader {
  public:
   explicit KeywordReader(nb::dict given) : given_(std::move(given)) {}
@@ -106,7 +106,7 @@ BuildSpec spec_of(uint64_t resolution, nb::dict options) {
   return spec;
 }
 
-// Returns work(spec, context) for a scene of files or of one mesh.
+// Returns work(spec, context) for a scene, which is a list of files or one mesh.
 template <class Work>
 std::string run_with_scene(BuildSpec spec, std::vector<PathText> files,
                            const std::optional<MeshArrays>& arrays, nb::object progress,

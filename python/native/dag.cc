@@ -29,7 +29,7 @@ using Rows = nb::ndarray<Number, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu
 template <class Number>
 using Cells = nb::ndarray<Number, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
-// Returns the rows of an array (N, 3) without copying them.
+// Returns the rows of an array of shape (N, 3), without copying them.
 std::span<const Position> positions_of(const Rows<const int64_t>& rows) {
   return {reinterpret_cast<const Position*>(rows.data()), rows.shape(0)};
 }
@@ -55,7 +55,7 @@ void lookup(const query::DagFile& dag, const Rows<const int64_t>& points, uint32
   dag.lookup(positions_of(points), grid_levels, {set.data(), set.shape(0)}, threads_of(threads));
 }
 
-// Rays per batch. It bounds the memory of the library's hits.
+// Number of rays per batch. It limits the memory for the hits in the library's format.
 constexpr size_t kRays = size_t{1} << 16;
 
 void rays(const query::DagFile& dag, const Rows<const double>& origins,
@@ -121,7 +121,7 @@ std::pair<Position, Position> world_to_region(const query::DagFile& dag,
   return {region.low, region.high};
 }
 
-// Returns the number of rows that points() fills, found by a walk over only the region.
+// Returns the number of rows that points() fills. Finds it by a walk over the region only.
 uint64_t point_count(const query::DagFile& dag, const Position& low, const Position& high,
                      uint32_t grid_levels) {
   const nb::gil_scoped_release released;
@@ -149,7 +149,8 @@ void nearest(const query::DagFile& dag, const Rows<const int64_t>& points, doubl
   }
 }
 
-// Fills the rows of the cells that have the attribute. For `Number`, see attribute_types().
+// Fills the rows with the cells' values of an attribute. attribute_types() lists the type `Number`
+// of each attribute.
 template <class Number>
 void values(const query::DagFile& dag, const std::string& name, const Rows<const int64_t>& points,
             uint32_t grid_levels, const nb::ndarray<Number, nb::c_contig, nb::device::cpu>& found) {

@@ -48,8 +48,8 @@ class LatestProgress : public Progress {
 // Polling interval of the calling thread.
 inline constexpr std::chrono::milliseconds kLookInterval{50};
 
-// Forwards new messages to Python: warnings, and calls of `callback` (unless None) with stage,
-// done, total and unit. Raises the exceptions of Python code, and KeyboardInterrupt.
+// Forwards new messages to Python: warnings, and progress by calls of callback(stage, done, total,
+// unit) unless `callback` is None. Raises the exceptions of Python code, and KeyboardInterrupt.
 class Messenger {
  public:
   explicit Messenger(nb::object callback) : callback_(std::move(callback)) {}
@@ -60,8 +60,8 @@ class Messenger {
   LatestProgress::State last_;
 };
 
-// Returns work(progress, cancel) or throws its exception. An exception of Python code cancels the
-// work and is raised instead.
+// Returns work(progress, cancel) or throws its exception. If Python code raises an exception during
+// the work, cancels the work and raises the Python exception instead.
 template <class Work>
 auto run_long_work(nb::object callback, Work work) {
   LatestProgress progress;

@@ -1,4 +1,4 @@
-// The argument `memory` of calls that work within a budget.
+// The argument `memory` of the functions that work within a memory budget.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace voxdag::python {
 
-// Parses a limit; "" for half of the machine's memory. Throws Error{kInvalidInput}.
+// Parses a memory limit; "" means half of the machine's memory. Throws Error{kInvalidInput}.
 inline uint64_t memory_of(const std::string& text) {
   const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "memory");
   if (bytes < kMinMemory)

@@ -1,4 +1,5 @@
-// The native part of the module voxdag. python/voxdag is the part that users see.
+// The native part of the Python module voxdag. Users call the functions in python/voxdag, which
+// call this part.
 #include <nanobind/nanobind.h>
 
 #include "core/base/error.h"

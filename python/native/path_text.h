@@ -1,5 +1,5 @@
-// Paths and messages between Python, whose str may stand for any bytes, and C++, whose paths are
-// bytes.
+// Converts paths and messages between Python, where a str can represent arbitrary bytes, and C++,
+// where paths are bytes.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -9,8 +9,8 @@
 
 namespace voxdag::python {
 
-// A path. In Python it is a str in which bytes that are not UTF-8 are surrogates, as os.fsdecode()
-// makes them.
+// A path. In Python it is a str. Bytes of the path that are not UTF-8 are surrogates in this str,
+// as in the results of os.fsdecode().
 struct PathText {
   std::string bytes;
 };

@@ -36,8 +36,8 @@ query::Vec in_voxels(const Point& point, const voxdag_reader::File& file) {
   return voxels;
 }
 
-// Throws if the renderer and the array of pixels do not fit the limit. This is checked first,
-// because allocating too much memory can end the process.
+// Throws if the renderer's memory and the array of pixels together exceed the limit. This is
+// checked before any allocation, because allocating too much memory can end the process.
 void check_memory(int width, int height, const std::string& memory) {
   const uint64_t limit = memory_of(memory);
   const uint64_t bytes = (query::kRenderBytesPerPixel + 3) * static_cast<uint64_t>(width) *
@@ -49,7 +49,8 @@ void check_memory(int width, int height, const std::string& memory) {
                     size_text(limit) + ": choose a smaller size, or more with memory=");
 }
 
-// Fills the pixels. Without a camera, the named view determines it.
+// Fills `pixels` with the picture. If `camera` is nullopt, the view named `view` determines the
+// camera.
 void render(const PathText& path, const std::string& view, const std::optional<Point>& camera,
             const Point& target, std::optional<double> fov_degrees, int samples, bool gray,
             unsigned threads, nb::object progress, const Pixels& pixels) {

@@ -27,8 +27,9 @@ def torus(around=48, across=24, big=3.0, small=1.25):
 
 
 def interrupted(lines):
-    """Returns the output of a program of these lines after its first line of progress, at which
-    Ctrl-C must end it. The program has voxdag, and say() to show its progress."""
+    """Runs a Python program of these lines and sends Ctrl-C after the first line of its output.
+    Ctrl-C must end the program. Returns the rest of the output. The program can use voxdag, and
+    say() to show its progress."""
     program = textwrap.dedent(f"""
         import sys
         sys.path[:0] = {sys.path!r}

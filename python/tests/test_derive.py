@@ -97,7 +97,7 @@ def test_outputs(path, tmp_path, derive):
 
 
 def test_names_of_any_bytes(path, mesh, tmp_path):
-    """Paths need not be UTF-8, as they need not for Linux."""
+    """Paths need not be UTF-8, because Linux does not require it."""
     folder = os.fsencode(tmp_path)
     names = [os.path.join(folder, name) for name in (b"a\xff.vdag", b"b\xff.vdag", b"c\xff.npz")]
     voxdag.build(mesh, resolution=64, output=names[0], memory="64MiB")
@@ -116,7 +116,7 @@ def test_names_of_any_bytes(path, mesh, tmp_path):
 
 
 def test_ctrl_c(mesh, tmp_path):
-    """An export stops, and leaves nothing."""
+    """An interrupted export stops and leaves no files."""
     fine, output = tmp_path / "fine.vdag", tmp_path / "fine.npz"
     voxdag.build(mesh, resolution=1024, output=fine, memory="64MiB")
     interrupted(f"voxdag.export({str(fine)!r}, {str(output)!r}, to='npz', level=10, progress=say)")

@@ -15,7 +15,7 @@ from conftest import interrupted
 
 
 def shown(picture):
-    """The part of the picture that is not the background, which each row begins with."""
+    """Returns the share of pixels that are not background. Rows begin with background."""
     return (np.abs(picture.astype(int) - picture[:, :1].astype(int)).max(axis=2) > 24).mean()
 
 
@@ -144,7 +144,7 @@ def test_progress_stops_it(path):
 
 
 def test_the_example_of_the_docs(tmp_path):
-    """From a mesh to a picture, as docs/python.md says it, in six lines."""
+    """From a mesh to a picture, in six lines, as in docs/python.md."""
     text = (Path(__file__).parents[2] / "docs" / "python.md").read_text(encoding="utf-8")
     example = re.search(r"```python\n(.*?)```", text, re.DOTALL).group(1)
     assert len([line for line in example.splitlines() if line.strip()]) <= 6

@@ -22,7 +22,7 @@ def fine(tmp_path_factory):
 
 
 def test_corners_of_voxels(fine):
-    """A voxel contains its low corner, and a box of corners has no other layer."""
+    """A voxel contains its low corner, and a box between two corners has no additional layer."""
     voxels = np.random.default_rng(7).integers(0, 131072, (20000, 3))
     assert np.array_equal(fine.to_voxel(fine.to_world(voxels)), voxels)
     assert np.array_equal(fine.to_voxel(fine.to_world(voxels + 0.5)), voxels)

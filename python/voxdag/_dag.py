@@ -42,7 +42,7 @@ class Dag:
     Positions are voxels of the finest grid, (N, 3) integers. With a `level` l they are cells of the
     grid of 2^l per edge; a cell is set if any voxel in it is set. A region is half-open, in cells
     of the same grid, and may extend beyond it. With world=True, positions, regions and distances
-    are in the units of the scene. `threads` is 0 for all.
+    are in the units of the scene. `threads` is the number of threads, 0 for all.
     """
 
     def __init__(self, path: Path) -> None:
@@ -93,7 +93,7 @@ class Dag:
 
     @property
     def levels(self) -> list[dict[str, int]]:
-        """Nodes and bytes of each level of the DAG, the root's first; the last has the bricks."""
+        """Nodes and bytes of each level of the DAG, from the root's level to the bricks' level."""
         return [
             {"level": level, "nodes": nodes, "bytes": size}
             for level, (nodes, size) in enumerate(self._dag.levels())
@@ -226,7 +226,7 @@ class Dag:
 
     @property
     def material_names(self) -> list[str]:
-        """Material names; materials() returns indices. The last, "", means no material."""
+        """Material names, to which materials() returns indices. The last, "", means no material."""
         return [name.decode(errors="replace") for name in self._dag.material_names]
 
     def colors(
@@ -235,7 +235,8 @@ class Dag:
         """The color of each cell, (N, 3) uint8, sRGB; 0 where none is set.
 
         If a cell is finer than the color grid, it has the attributes of the coarser cell that
-        contains it. Raises Error if the file has no colors; the other attributes do the same."""
+        contains it. Raises Error if the file has no colors. alphas(), normals() and
+        materials() follow the same rules."""
         return self._values("color", points, level, world)
 
     def alphas(
@@ -270,7 +271,7 @@ class Dag:
         """Returns the set voxel nearest to each voxel, (N, 3) int64, and the distances between the
         centers.
 
-        Among equally near voxels it is the first in Morton order. If none is found, the voxel is -1
+        Among equally near voxels, returns the first in Morton order. If none is found, the voxel is -1
         and the distance is infinite."""
         positions = self._positions(points, None, False)
         voxels = np.empty_like(positions)
