@@ -33,7 +33,7 @@ class MemoryBudget {
 
   // Charges `bytes`. Returns false and charges nothing if they do not fit.
   bool try_charge(uint64_t bytes);
-  // Throws Error{kOutOfMemory} with `what` if it does not fit.
+  // Throws an Error{kOutOfMemory} that names `what` if the bytes do not fit.
   void charge(uint64_t bytes, std::string_view what);
   void release(uint64_t bytes);
 
@@ -48,7 +48,7 @@ class MemoryBudget {
 class MemoryCharge {
  public:
   MemoryCharge() = default;
-  // Throws Error{kOutOfMemory} with `what` if it does not fit.
+  // Throws an Error{kOutOfMemory} that names `what` if the bytes do not fit.
   MemoryCharge(MemoryBudget& budget, uint64_t bytes, std::string_view what)
       : budget_(&budget), bytes_(bytes) {
     budget.charge(bytes, what);

@@ -15,7 +15,8 @@
 
 namespace voxdag {
 
-// Throws Error{kOutOfMemory} with `what` if the system has no pages left.
+// Returns zero-filled pages. Throws an Error{kOutOfMemory} that names `what` if the system has no
+// pages left.
 void* allocate_pages(size_t bytes, std::string_view what);
 // Appends zero-filled pages. If necessary, moves all pages to other addresses, without copying
 // bytes.
@@ -28,7 +29,7 @@ class PageBuffer {
 
  public:
   PageBuffer() = default;
-  // Charges `budget`. Throws Error{kOutOfMemory} with `what` if it does not fit.
+  // Charges `budget`. Throws an Error{kOutOfMemory} that names `what` if the buffer does not fit.
   PageBuffer(MemoryBudget& budget, size_t size, std::string_view what)
       : charge_(budget, byte_count(size), what),
         data_(size ? static_cast<T*>(allocate_pages(byte_count(size), what)) : nullptr),
@@ -50,8 +51,8 @@ class PageBuffer {
     if (data_) free_pages(data_, size_ * sizeof(T));
   }
 
-  // Enlarges a buffer that is not empty. The new elements are zero. Throws Error{kOutOfMemory} with
-  // `what` if it does not fit; the buffer is then unchanged.
+  // Enlarges a buffer that is not empty. The new elements are zero. Throws an Error{kOutOfMemory}
+  // that names `what` if the new size does not fit; the buffer is then unchanged.
   void grow(size_t size, std::string_view what) {
     const uint64_t old_bytes = charge_.bytes();
     if (!charge_.try_resize(byte_count(size)))

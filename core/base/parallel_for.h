@@ -20,7 +20,7 @@ namespace voxdag {
 // Calls body(worker, item) for every item below `count`, on up to `workers` threads including the
 // caller. `worker` is the number of the thread, counted from 0. After an exception no further item
 // is started. Once all threads have stopped, the exception of the first failed item is rethrown. So
-// if the same items fail each time, the exception is the same for any number of threads.
+// if the same items fail in every run, the exception is the same for any number of threads.
 template <class Body>
 void parallel_for(unsigned workers, size_t count, Body&& body) {
   std::atomic<size_t> next{0};

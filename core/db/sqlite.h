@@ -33,7 +33,7 @@ class SqlStatement {
 
   // Advances to the next row. Returns true if there is a row to read.
   bool step();
-  // Runs a statement that returns no rows. Afterwards it can be bound again.
+  // Runs a statement that returns no rows. Afterwards the statement can be bound again.
   void run();
   void reset();
 

@@ -114,7 +114,7 @@ void put_row(SqlDatabase& database, const std::string& table, Record record) {
 }
 
 // Writes the record to all rows of `table` that satisfy `condition`. Unlike put_row(), it does not
-// remove rows that refer to them.
+// remove rows that refer to the changed rows.
 template <class Record>
 void update_row(SqlDatabase& database, const std::string& table, const std::string& condition,
                 Record record) {

@@ -13,8 +13,8 @@
 
 namespace voxdag {
 
-// The test with products of type `Int`: 64 bits if the cube's edge and the triangle's coordinates
-// relative to the cube are below kNarrowReach, 128 bits if they are below 2^41.
+// Runs the test with products of type `Int`: 64 bits if the cube's edge and the triangle's
+// coordinates relative to the cube are below kNarrowReach, 128 bits if they are below 2^41.
 template <class Int>
 VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int64_t (&low)[3],
                                                int64_t edge) {

@@ -7,7 +7,7 @@
 
 namespace voxdag {
 
-// Thread-safe. The work checks the token every few milliseconds.
+// Thread-safe. The running operation checks the token every few milliseconds.
 class CancelToken {
  public:
   // Async-signal-safe.

@@ -36,8 +36,8 @@ class StateSaver {
   // Discards the durable state and its files.
   void forget();
 
-  // True if the last save has finished and enough CPU time has passed since it began. Throws what
-  // that save threw.
+  // True if the last save has finished and enough CPU time has passed since it began. Rethrows the
+  // exception of that save.
   bool is_due();
   // Saves a state in the background. `named` are the scratch files that the state names; `sync`
   // makes them durable. Then removes the files of the previous state and releases `merged`.

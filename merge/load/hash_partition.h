@@ -25,7 +25,8 @@
 
 namespace voxdag {
 
-// The frames of one run that belong to a partition, and the begin of their rows in its columns.
+// The frames of one run that belong to a partition, and the start of their rows in the partition's
+// columns.
 struct RunSlice {
   size_t run = 0;
   FrameSpan frames;
@@ -34,7 +35,7 @@ struct RunSlice {
   uint64_t row_base = 0, word_base = 0;
 };
 
-// Numbers of rows and of their words in a slice before some row.
+// The offset of a row in a slice: the number of rows before it, and the number of their words.
 struct RowOffset {
   uint32_t row = 0;
   uint32_t word = 0;
@@ -100,8 +101,8 @@ class HashPartition {
   std::span<const RunSlice> slices() const { return slices_; }
   size_t bucket_count() const { return bucket_count_; }
   unsigned bucket_bits() const { return bucket_bits_; }
-  // Returns where a bucket begins in a slice. The begin of bucket_count() is the end of the last
-  // bucket.
+  // Returns the offset at which a bucket begins in a slice. For `bucket` = bucket_count(), this is
+  // the end of the last bucket.
   RowOffset bucket_begin(size_t bucket, size_t slice) const {
     return bucket_begins_[bucket * slices_.size() + slice];
   }

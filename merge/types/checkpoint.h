@@ -23,8 +23,8 @@ class Checkpoint {
 
   // Returns the last saved state; nullopt if none exists.
   virtual std::optional<std::vector<std::byte>> load() = 0;
-  // Replaces the state; it is durable on return. Afterwards the merge reads only the input levels
-  // above `level` (with smaller numbers).
+  // Replaces the state. The new state is durable on return. Afterwards the merge reads only the
+  // input levels above `level` (with smaller numbers).
   virtual void save(uint32_t level, std::span<const std::byte> state) = 0;
   // Discards the state.
   virtual void forget() = 0;

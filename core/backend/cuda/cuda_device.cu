@@ -110,7 +110,7 @@ uint64_t CudaDevice::available(const std::string& where) const {
              "cudaMemPoolGetAttribute", where);
   check_call(cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemCurrent, &used),
              "cudaMemPoolGetAttribute", where);
-  // Other workers allocate between the calls.
+  // Other workers may allocate between these calls, so `used` can exceed `reserved`.
   return free_bytes + (reserved > used ? reserved - used : 0);
 }
 

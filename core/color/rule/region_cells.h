@@ -2,8 +2,8 @@
 //
 // A cell is covered if a surface covers a column of it. In a covered cell, surfaces that cover no
 // column are ignored. Whether a cell is covered is known only at the end. So a cell has the sum of
-// non-covering surfaces until the first surface that covers a column restarts it from zero. The
-// sums do not depend on the order of the surfaces.
+// non-covering surfaces until the first surface that covers a column restarts the sum from zero.
+// The sums do not depend on the order of the surfaces.
 #pragma once
 
 #include <cstdint>

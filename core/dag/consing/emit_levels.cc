@@ -1,7 +1,7 @@
 // Converts tables to level arrays, from the bricks up. Each level takes three passes. First, child
 // ids in records are replaced by positions in the array below; this uses the order in which records
-// were added, because neighbors in it are neighbors in memory. Second, slots are sorted. Third,
-// records are copied in the sorted order and get their positions.
+// were added, because neighbors in this order are neighbors in memory. Second, slots are sorted.
+// Third, records are copied in the sorted order and get their positions.
 #include <algorithm>
 #include <cstring>
 

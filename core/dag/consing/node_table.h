@@ -30,8 +30,8 @@ inline constexpr FirstWords kFirstWords;
 
 class NodeTable {
  public:
-  // A reference to a record. Once its level is emitted, its position in the level array replaces
-  // the low half of its hash.
+  // A reference to a record. Once the record's level is emitted, the record's position in the level
+  // array replaces the low half of its hash.
   struct Record {
     static constexpr uint32_t kWords = 3;  // before the children
 

@@ -19,8 +19,8 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
 
 // Writes the artifact at `ref` of `from` as a cache entry at `path`, atomically: writes to
 // `partial`, a name that only the caller uses, and renames it. The file is not synced. If a power
-// failure damages an entry, its checksums fail and it is a cache miss. Returns the size of the file
-// in bytes.
+// failure damages an entry, its checksums fail, and a lookup of the entry is a cache miss. Returns
+// the size of the file in bytes.
 uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
                            const ReadableFile& from, const ArtifactRef& ref);
 

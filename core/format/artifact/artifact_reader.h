@@ -1,5 +1,5 @@
 // Reads one artifact. Immutable after construction: several threads may call read_frame(), each
-// with its own Frame. Memory: the index (56 bytes per frame), not charged.
+// with its own Frame. The index takes 56 bytes per frame, which are not charged to a budget.
 #pragma once
 
 #include <cstdint>

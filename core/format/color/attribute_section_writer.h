@@ -2,8 +2,9 @@
 // section" and "The sections of alpha, normals and materials", documents the byte layout.
 //
 // The regions of tier 0 are written when they are added. The cells of the coarser tiers and the
-// directories are in memory until finish(): 32 bytes per region, and tier 1, which is a
-// ten-thousandth of tier 0. All of this is charged to the budget. One thread uses a writer.
+// directories are in memory until finish(). They take 32 bytes per region, plus the size of tier 1,
+// which is a ten-thousandth of tier 0. This memory is charged to the budget. One thread uses a
+// writer.
 #pragma once
 
 #include <cstdint>

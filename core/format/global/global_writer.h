@@ -7,8 +7,9 @@
 // children in the next level: one word each, or two (low half first) if that level is wide. Nothing
 // in the file depends on the time, the place or the machine.
 //
-// Checksums are computed from the words that the merge passes in, never from a file. The sealed
-// file is read and compared with them: wrong bytes from a disk are Error{kCorrupt}.
+// Checksums are computed from the words that the merge passes in, never from a file. seal() reads
+// the file again and compares it with these checksums. If the disk returns wrong bytes, it throws
+// Error{kCorrupt}.
 //
 // One thread uses a writer, except for write_words() and sync().
 #pragma once

@@ -81,7 +81,7 @@ struct EmitParts {
   }
 };
 
-// The first pairs: every triangle with the complete subvolume.
+// Makes the first pairs: every triangle with the cube of the complete subvolume.
 struct StartPairs {
   uint32_t first_triangle;
   uint64_t* codes;

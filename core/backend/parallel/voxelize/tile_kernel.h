@@ -33,7 +33,8 @@ struct DrawTile {
     uint32_t counts[kThreads];               // non-empty bricks in each thread's run
     uint32_t groups[kThreads / kGroup];      // sums over groups of threads
   };
-  // One word of padding after each thread's run, so that neighboring threads use different banks.
+  // Returns the index of a brick in `masks`. There is one word of padding after each thread's run
+  // of bricks, so that neighboring threads use different banks of the shared memory.
   VOXDAG_HD static uint32_t slot(uint32_t brick) { return brick + brick / kRun; }
 
   CubePlace place;

@@ -24,8 +24,8 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr int kHeightBits = 12;  // below the voxel, in 16-bit lanes
-constexpr int kColumnBits = 40;  // below the voxel, per column of bricks in 64 bits
+constexpr int kHeightBits = 12;  // bits for the fraction of a voxel, in 16-bit lanes
+constexpr int kColumnBits = 40;  // bits for the fraction, in the 64-bit height of a column
 
 VOXDAG_INLINE __m256i load(const void* at) {
   return _mm256_load_si256(static_cast<const __m256i*>(at));
@@ -163,8 +163,9 @@ class Heights {
   }
 
   const TileTriangle<int32_t>& t;
-  // The height of a column of bricks is the height of its lowest voxel column, kLowered units of
-  // 16-bit lanes lower, kColumnBits below the voxel. Off by less than 2^-30 after 16 columns.
+  // The height of the column of bricks (p, q) is origin_ + step_p_ p + step_q_ q, with kColumnBits
+  // bits for the fraction of a voxel. It is the height of the lowest voxel column, minus kLowered
+  // units of 16-bit lanes. The error is less than 2^-30 after 16 columns.
   int64_t origin_, step_p_, step_q_;
   // An upper bound of the distance from the height of a column of bricks to its highest top.
   int64_t reach_;
