@@ -61,7 +61,8 @@ class MemoryCharge {
   ~MemoryCharge() {
     if (budget_) budget_->release(bytes_);
   }
-  // Grows or shrinks the charge to `bytes`. Returns false without a change if it does not fit.
+  // Grows or shrinks the charge to `bytes`. Returns false without a change if the new size does not
+  // fit.
   bool try_resize(uint64_t bytes);
   uint64_t bytes() const { return bytes_; }
 

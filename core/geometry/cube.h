@@ -39,7 +39,7 @@ struct Cube {
   VOXDAG_HD int64_t edge_voxels(uint32_t grid_levels) const {
     return int64_t{1} << (grid_levels - level);
   }
-  // Orders by level, then x, y and z. For containers only; it has no meaning in the octree.
+  // Orders by level, then x, y and z. For containers only: this order has no meaning in the octree.
   std::strong_ordering operator<=>(const Cube&) const = default;
 };
 

@@ -128,8 +128,8 @@ class DagFile {
 
   // Finds the first set cell on each ray. Directions may have any length except 0. All numbers must
   // be finite, and limits must not be negative. A cell includes its faces, so no ray passes between
-  // two cells that share a face. Rays close to their predecessors, such as rays of neighboring
-  // pixels, are faster.
+  // two cells that share a face. A ray is faster if it is close to the previous ray, such as the
+  // ray of a neighboring pixel.
   void rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
             const RayLimits& limits, std::span<RayHit> hits, unsigned threads = 1) const;
 

@@ -21,7 +21,7 @@ struct PassTask {
   std::span<const ArtifactReader> artifacts;
 };
 
-// The progress of a pass: the information about merged levels that the levels above need.
+// The progress of a pass: the data of the merged levels that the merge of the next levels reads.
 struct PassProgress {
   std::optional<uint32_t> level;     // the last merged level; none before the bricks
   std::optional<PositionMaps> maps;  // maps of this level

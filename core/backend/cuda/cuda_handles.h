@@ -24,7 +24,7 @@ inline void check_call(cudaError_t status, const char* call, const std::string& 
                                       ")");
 }
 
-// Waits for the stream's work, which may still read pinned memory after a build that failed.
+// Waits for the stream's work, which may still read pinned memory if a build failed.
 struct DestroyStream {
   void operator()(cudaStream_t stream) const {
     cudaStreamSynchronize(stream);

@@ -186,15 +186,17 @@ class File {
   void release_pages() const { bytes_->release_pages(); }
   // The low corner of the grid in world space.
   const double (&origin() const)[3] { return origin_; }
-  // The edge length of the grid in world space; a voxel's is edge() / resolution().
+  // Returns the edge length of the grid in world space. The edge length of a voxel is edge() /
+  // resolution().
   double edge() const { return edge_; }
   // The resolution is 2^grid_levels() voxels per edge of the grid.
   uint32_t grid_levels() const { return grid_levels_; }
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
   uint32_t brick_level() const { return grid_levels_ - 2; }
-  // Version of the format: 1, or 2 if the file has wide levels or attributes.
+  // Returns the version of the format: 1, or 2 if the file has wide levels or attributes.
   uint32_t version() const { return version_; }
-  // The number of bits of the node hash by which the nodes of a level are ordered, 4 to 64.
+  // Returns the number of bits of the node hash, 4 to 64. The nodes of a level are ordered by this
+  // hash.
   uint32_t hash_bits() const { return hash_bits_; }
   // Set voxels, nodes of the octree that the DAG represents, and nodes of the DAG; bricks count as
   // nodes.
@@ -257,7 +259,8 @@ class File {
   // True if the cells of the levels 0 to color_levels() have colors. An empty scene has no colors.
   bool has_colors() const { return colors().tier_count() > 0; }
   uint32_t color_levels() const { return colors().color_levels(); }
-  // The section of an attribute. It has no tiers if the file does not have this attribute.
+  // Returns the section of an attribute. The section has no tiers if the file does not have this
+  // attribute.
   const ColorSection& section(uint32_t kind) const { return sections_[kind - 1]; }
   const ColorSection& colors() const { return section(kColors); }
   const ColorSection& alphas() const { return section(kAlphas); }

@@ -202,8 +202,8 @@ class ColorSection {
     if (has_names) return read_names(section + end, tables - end, block_bytes / 32);
     return end == tables ? nullptr : "the color section is longer than its tiers";
   }
-  // A material is an index in this list. The last name, "", is for triangles without a
-  // material.
+  // Returns the names of the materials. A material is an index in this list. The last name is "",
+  // for triangles without a material.
   const std::vector<std::string>& names() const { return names_; }
 
   uint32_t color_levels() const { return color_levels_; }

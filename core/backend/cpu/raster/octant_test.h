@@ -137,7 +137,8 @@ struct OctantTest {
 
   Octants run(bool whole_cube_inside) {
     Octants out{box_test(), 0};
-    // A small triangle covers no child; if its box touches two, the triangle most likely does too.
+    // A small triangle covers no child; if its box touches two children, the triangle most likely
+    // touches both.
     if (!whole_cube_inside && kPopcount8[out.touched] <= (long_axes < 2 ? 2 : 1)) return out;
     set_normal();
     out.touched &= plane_test();

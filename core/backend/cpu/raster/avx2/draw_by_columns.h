@@ -91,7 +91,8 @@ VOXDAG_INLINE uint32_t in_layer(uint32_t columns) {
   return kP<D> < kQ<D> ? transposed(columns) : columns;
 }
 
-// Draws a triangle perpendicular to D: one layer of voxels, which only the edges bound.
+// Draws a triangle perpendicular to axis D. It touches one layer of voxels, limited only by the
+// edge tests.
 template <int D>
 VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
   const Footprint<D> footprint(t);
@@ -112,8 +113,8 @@ VOXDAG_INLINE void draw_along(const TileTriangle<int32_t>& t, TileBricks& tile) 
     ColumnWalk<D, Spread>(t, tile).run();
 }
 
-// Spread<D>: made from HeightBounds; mask(up) is the set of voxels of the brick that is `up` bricks
-// above the one where the column begins, up < 4.
+// Spread<D> is constructed from HeightBounds. Its mask(up) is the set of voxels of the brick that
+// is `up` bricks above the brick in which the column begins; up < 4.
 template <template <int> class Spread>
 VOXDAG_INLINE void draw_by_columns(const TileTriangle<int32_t>& t, TileBricks& tile) {
   if (t.normal[t.dominant] == 0) return draw_exactly(t, tile);

@@ -115,7 +115,8 @@ class Heights {
   static constexpr float kTopRaised = 2.54f;
   static constexpr int16_t kBelowDoubt = 2, kTopDoubt = 3;
 
-  // The height of each column above the lowest one; sp, sq are the slopes' magnitudes.
+  // Sets the lanes to the height of each voxel column above the lowest one. sp and sq are the
+  // magnitudes of the slopes.
   VOXDAG_INLINE void set_lanes(bool p_falls, float sp, bool q_falls, float sq, float width) {
     const __m256 p_low =
         p_falls ? _mm256_setr_ps(3, 2, 3, 2, 3, 2, 3, 2) : _mm256_setr_ps(0, 1, 0, 1, 0, 1, 0, 1);

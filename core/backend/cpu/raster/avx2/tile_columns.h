@@ -38,8 +38,8 @@ struct Layers {
 };
 constexpr Layers kLayers;
 
-// Columns of bricks, numbered p + 16 q: one list of all rows, since the length of a loop per row
-// would be mispredicted.
+// Columns of bricks, numbered p + 16 q. All rows are in one list, because the CPU would mispredict
+// the length of a separate loop for each row.
 struct ColumnList {
   int count = 0;
   uint8_t numbers[256 + 16];  // add() writes 16
