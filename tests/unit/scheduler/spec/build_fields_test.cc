@@ -5,6 +5,7 @@
 
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "scene/formats/formats.h"
 
@@ -25,7 +26,9 @@ struct OneOption {
 
   template <class T>
   void operator()(const Field& field, T& value) {
-    if (name == field.name) is_valid = parse_text(field, text, value);
+    // The command line does not parse flags and scenes in this way.
+    if constexpr (!IsVector<T>::value && !std::is_same_v<T, bool>)
+      if (name == field.name) is_valid = parse_text(field, text, value);
   }
   void object(const char*, const auto&) {}
 };
