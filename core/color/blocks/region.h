@@ -27,9 +27,9 @@ struct EncodedRegion {
   std::array<uint32_t, kRegionLevels + 1> counts{};  // cells by level, the finest first
   std::vector<std::byte> blocks;
   // Two tables of ranks: for the finest level and for the next coarser level. A table exists if the
-  // level that is kPrefixLevels above the table's level is below the region. It has an entry for
-  // each cell of that upper level, in Morton order: the number of cells of the table's level that
-  // come before this cell.
+  // level that is kPrefixLevels above the table's level is below the region. The table has an entry
+  // for each cell of that upper level, in Morton order: the number of cells of the table's level
+  // that come before this cell.
   std::vector<uint32_t> prefix;
   ColorSum total;
 };

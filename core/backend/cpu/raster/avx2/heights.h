@@ -11,7 +11,7 @@
 // it is up to 6 more, and the upper bound is up to 3 above y. y is rounded down and the upper bound
 // up, by little more than 2 units of a lane. If a lane is so close to a whole number that the exact
 // height may be on the other side of it, the code computes the height exactly by division. About 2
-// % of the columns of bricks have such a lane.
+// in 100 columns of bricks have such a lane.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
