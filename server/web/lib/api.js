@@ -31,8 +31,8 @@ export function authorization() {
   return token.get() ? {Authorization: `Bearer ${token.get()}`} : {};
 }
 
-// Returns the Response of a successful request, else throws Problem. A 401 also shows the login
-// page.
+// Resolves to the Response of a successful request, otherwise throws Problem. The status 401 also
+// shows the login page.
 export async function request(method, path, {headers = {}, body, signal} = {}) {
   let response;
   try {
@@ -69,7 +69,8 @@ export async function sendJson(method, path, body, {headers = {}, signal} = {}) 
   return response.status === 204 ? null : response.json();
 }
 
-// A value for Idempotency-Key. crypto.randomUUID() is not available on plain http.
+// Returns a value for Idempotency-Key. Does not use crypto.randomUUID(), because it is not
+// available on plain http.
 export function randomKey() {
   return Array
       .from(
@@ -77,8 +78,8 @@ export function randomKey() {
       .join("");
 }
 
-// Resolves after `ms`, or immediately when `signal` aborts. With `untilVisible`, does not resolve
-// before the page is visible.
+// Resolves after `ms`, or immediately when `signal` aborts. With `untilVisible`, also waits until
+// the page is visible.
 export function sleep(ms, signal, untilVisible = false) {
   return new Promise((resolve) => {
     const listening = new AbortController();
@@ -98,9 +99,9 @@ export function sleep(ms, signal, untilVisible = false) {
   });
 }
 
-// Calls `update` repeatedly until `signal` aborts. `update` returns the pause in ms until the next
-// call. While the page is hidden, the next call waits until it is visible. Calls onFailure(problem)
-// when `update` throws.
+// Calls `update` repeatedly until `signal` aborts. `update` must return the pause in ms until its
+// next call. While the page is hidden, the next call waits until the page is visible. If `update`
+// throws, calls onFailure(problem).
 export async function poll(update, onFailure, signal) {
   while (!signal.aborted) {
     let pauseMs = 5000;

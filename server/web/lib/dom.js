@@ -1,10 +1,10 @@
-// Creates elements in code. The content security policy forbids inline scripts and styles, and text
-// set this way is never parsed as markup.
+// Creates elements by code, because the content security policy forbids inline scripts and styles.
+// Text that is set by code is never parsed as markup.
 
 const kSvg = "http://www.w3.org/2000/svg";
 
-// h("a", {class: "x", href: "…", on: {click: f}}, "text", other). Children and attributes that are
-// null, undefined or false are omitted.
+// Returns a new element: h("a", {class: "x", href: "…", on: {click: f}}, "text", other). Children
+// and attributes with the value null, undefined or false are left out.
 export function h(tag, attributes = {}, ...children) {
   return fill(document.createElement(tag), attributes, children);
 }
@@ -27,7 +27,8 @@ function fill(element, attributes, children) {
   return element;
 }
 
-// Sets the text only if it changed, to preserve selections and not disturb screen readers.
+// Sets the text only if it has changed. So selections are preserved and screen readers are not
+// disturbed.
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
@@ -57,7 +58,7 @@ export function fact(name, ...value) {
   return h("div", {class: "fact"}, h("dt", {}, name), h("dd", {}, ...value));
 }
 
-// Opens a modal dialog. Resolves to true if the user confirms the action.
+// Opens a modal dialog. Resolves to true if the user confirms `action`.
 export function confirmAction(title, text, action) {
   const dialog =
       h("dialog", {class: "ask", "aria-labelledby": "ask-title"},

@@ -1,5 +1,6 @@
-// Server-sent events read with fetch(), because EventSource cannot send the Authorization header.
-// Reconnects with Last-Event-ID after growing pauses, until the event `end`.
+// Reads server-sent events with fetch(), because EventSource cannot send the Authorization header.
+// After a lost connection, reconnects with Last-Event-ID after growing pauses, until the event
+// `end` arrives.
 
 import {Problem, request, sleep} from "./api.js";
 
@@ -39,9 +40,9 @@ export class EventParser {
   }
 }
 
-// Calls onEvent(name, parsed data) for every event, and onStatus("live" | "waiting", problem) when
-// the connection opens and closes. Returns when the stream has ended or `signal` aborts; throws
-// Problem if a retry is useless (401, 403, 404).
+// Calls onEvent(name, parsed data) for every event. Calls onStatus("live" | "waiting", problem)
+// when the connection opens and when it closes. Resolves when the stream has ended or `signal`
+// aborts. Throws Problem if a retry is useless (401, 403, 404).
 export async function follow(path, {onEvent, onStatus, signal}) {
   let lastId = null;
   let retryMs = 3000;

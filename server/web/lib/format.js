@@ -23,7 +23,7 @@ function threeDigits(number) {
   return number.toFixed(number < 9.995 ? 2 : number < 99.95 ? 1 : 0);
 }
 
-// 12, "subvolumes" -> "12 subvolumes"; 1, "files" -> "1 file"
+// Returns a count with its unit: 12, "subvolumes" -> "12 subvolumes"; 1, "files" -> "1 file".
 export function unitText(text, unit) {
   return `${text} ${text === "1" ? unit.replace(/s$/, "") : unit}`;
 }
@@ -95,7 +95,7 @@ export function hasEnded(state) {
   return ["canceled", "failed", "succeeded"].includes(state);
 }
 
-// The completed fraction of the current stage, 0 to 1, or null while it is unknown.
+// Returns the completed fraction of the current stage, 0 to 1; null if it is unknown.
 export function doneFraction(progress) {
   return progress && progress.total > 0 ? Math.min(1, progress.done / progress.total) : null;
 }

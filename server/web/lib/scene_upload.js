@@ -1,10 +1,10 @@
-// Uploads a scene in parts, each with its digest. The service stores complete parts, so that a lost
-// connection, a pause or a closed page loses at most one part.
+// Uploads a scene in parts, each with its digest. The service stores each part when it is complete,
+// so a lost connection, a pause or a closed page loses at most one part.
 
 import {authorization, Problem, request, sleep} from "./api.js";
 
 const kPartBytes = 8 << 20;
-const kMaxFailures = 6;  // consecutive failures; each pause is longer than the previous one
+const kMaxFailures = 6;  // consecutive failures; the pauses between them grow
 
 const kSuffixes = "{{scene_suffixes}}";  // the service fills this in: "glb|gltf|ply"
 export const kSceneEndings = kSuffixes.split("|").map((suffix) => `.${suffix}`);
@@ -18,8 +18,8 @@ export function sceneName(fileName) {
       .replace(/-+\./g, ".");
 }
 
-// Resolves to the SCENE. Calls onProgress(bytes received) often. Throws Problem, or AbortError when
-// `signal` aborts; the same call resumes the upload later.
+// Resolves to the SCENE (docs/api.md). Calls onProgress(bytes received) often. Throws Problem, or
+// AbortError when `signal` aborts. Later, the same call resumes the upload.
 export async function upload(file, name, onProgress, signal) {
   const path = `/api/v1/scenes/${name}`;
   if (file.size === 0) throw new Problem(0, "invalid_input", `${file.name} is empty.`);
@@ -52,8 +52,8 @@ export async function upload(file, name, onProgress, signal) {
   }
 }
 
-// The offset to resume at: the number of this file's bytes that the service has, if this browser
-// sent them; else 0.
+// Resolves to the offset at which the upload resumes. If this browser sent the bytes that the
+// service has, this is their number; otherwise it is 0.
 async function resumeOffset(path, file, name, signal) {
   if (localStorage.getItem(keyOf(name)) !== fingerprintOf(file)) return 0;
   try {
@@ -68,12 +68,12 @@ async function resumeOffset(path, file, name, signal) {
   }
 }
 
-// Uses XMLHttpRequest, because fetch() does not report the progress of an upload.
+// Sends one part. Uses XMLHttpRequest, because fetch() does not report the progress of an upload.
 async function putPart(path, file, offset, onProgress, signal) {
   const end = Math.min(file.size, offset + kPartBytes);
   const part = await file.slice(offset, end).arrayBuffer();
   const range =
-      // An empty part completes an upload that has all its bytes.
+      // An empty part completes an upload of which the service has all bytes.
       end > offset ? `${offset}-${end - 1}` : "*";
   const headers = {
     ...authorization(),
@@ -98,7 +98,8 @@ async function putPart(path, file, offset, onProgress, signal) {
   });
 }
 
-// crypto.subtle is available on https and localhost only; the digest is optional.
+// Resolves to the headers with the digest of a part. They are empty where crypto.subtle is missing:
+// it exists only on https and localhost, and the digest is optional.
 async function digestHeader(part) {
   if (!crypto.subtle) return {};
   const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", part));

@@ -51,7 +51,7 @@ class JobPage {
         h("p", {class: "loading"}, "Loading…"));
   }
 
-  // Follows the job until it has ended, and again if it is retried.
+  // Follows the job until it has ended, and follows it again if it is retried.
   async run() {
     try {
       this.updateJob(await getJson(this.path, this.signal));
@@ -75,7 +75,8 @@ class JobPage {
     setText(this.link, "");
   }
 
-  // Waits before it fetches an ended job again, for its preview or in case it is retried.
+  // Waits before an ended job is fetched again: its preview may be ready then, or the job may be
+  // retried.
   async waitWhileEnded() {
     const waking = new AbortController();
     this.wake = () => waking.abort();
@@ -170,7 +171,8 @@ class JobPage {
         fact("Finished", ...when(job.finished_at)));
   }
 
-  // The buttons depend on the state. The keyboard focus remains among them.
+  // Shows the buttons for the job's state. If a button had the keyboard focus, a button has it
+  // afterwards.
   showActions() {
     const hadFocus = this.places.actions.contains(document.activeElement);
     clear(this.places.actions, actions(this.job, () => this.reload()));

@@ -1,5 +1,5 @@
-// The list of all jobs, newest first, filtered by state. It is refreshed every two seconds while
-// any job is active.
+// The list of all jobs, newest first, with a filter by state. The list is refreshed every two
+// seconds while any job is active.
 
 import {getJson, poll} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";
@@ -93,7 +93,7 @@ function showPaging(element, state, cursor, next_cursor) {
       next_cursor && h("a", {class: "button", href: to(next_cursor)}, "Older jobs"));
 }
 
-// Reuses the rows of jobs that remain, to preserve focus and selection.
+// Shows the jobs of `list`. Keeps the rows of jobs that remain, to preserve focus and selection.
 function showRows(list, rows, jobs) {
   const ids = new Set(jobs.map((job) => job.id));
   for (const [id, row] of rows) {

@@ -1,4 +1,4 @@
-// The form for a new job: scene, grid, options, and an estimate of the build.
+// The form for a new job: its scene, grid and options, and an estimate of the build's cost.
 
 import {getJson, randomKey, sendJson} from "../lib/api.js";
 import {clear, field, h} from "../lib/dom.js";
@@ -29,7 +29,7 @@ class NewJob {
       }
     });
     this.error = h("div", {role: "alert"});
-    // One key per state of the form, so that a double click creates only one job.
+    // The key is the same until the form changes, so that a double click creates only one job.
     this.key = randomKey();
     this.submit = h("button", {class: "primary"}, "Submit");
     this.element =
@@ -64,7 +64,7 @@ class NewJob {
     }
   }
 
-  // The request body, or null while no scene is chosen. Throws Problem for an invalid field.
+  // Returns the request body; null if no scene is chosen. Throws Problem for an invalid field.
   body() {
     const scene = this.scene.value();
     if (!scene) return null;
@@ -80,7 +80,7 @@ class NewJob {
       const body = this.body();
       if (body) question = {scene: body.scene, resolution: body.resolution, options: body.options};
     } catch {
-      // Reported when the job is submitted, not while the user types.
+      // The error is reported when the job is submitted, not while the user types.
     }
     this.estimate.update(question);
   }

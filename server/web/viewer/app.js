@@ -21,14 +21,15 @@ import {length, scale, subtract} from "./vector.js";
 const kDefaultFov = 35;
 const kPictureAspect = 16 / 9;  // aspect ratio of the views in the manifest
 const kSeenIntervalMs = 250;    // between two measurements of the visible distance
-const kFirstSeenMs = 2000;      // until the first pick, because a pick needs an additional program
+const kFirstSeenMs = 2000;  // delay of the first pick, because a pick needs an additional program
 const kStatisticsIntervalMs = 500;
 const kNoPicture = "There is no picture yet.";
 const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
-  // `renderer` may start later. `places` are the elements {panel, tools, status}. With `bookmarks`
-  // the fragment of the address follows the camera. Ends when `signal` aborts.
+  // `renderer` may start later. `places` are the elements {panel, tools, status}. With `bookmarks`,
+  // the fragment of the page's address is updated when the camera moves. The viewer ends when
+  // `signal` aborts.
   constructor({canvas, renderer, manifest, places, fileName, signal, bookmarks = true}) {
     Object.assign(this, {canvas, renderer, manifest, places, fileName, signal, bookmarks});
     this.space = new GridSpace(manifest);
@@ -70,7 +71,7 @@ export class Viewer {
     this.camera.set(this.firstCamera());
     this.followBookmark(location.hash);
     this.showMode();
-    // Starting does not wait for the distance of the visible surface. Until it is known, the
+    // The viewer starts before the distance of the visible surface is known. Until then, the
     // distance of the target is used.
     this.seen.distance = this.camera.distance;
     this.seen.time = performance.now() + kFirstSeenMs;
@@ -93,7 +94,8 @@ export class Viewer {
     return camera ? this.fit(this.space.placement(camera)) : this.camera.get();
   }
 
-  // A scene that fits in a wide picture is moved away until it also fits in a narrow one.
+  // The placement shows the scene in a wide picture. In a narrow picture, the camera is moved away
+  // until the scene also fits.
   fit(placement) {
     const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
     const outside = placement.eye.some((c) => c < 0 || c > this.manifest.resolution);
@@ -206,7 +208,8 @@ export class Viewer {
     this.bookmark();
   }
 
-  // Speeds follow the distance of the surface in the center. Without a surface they grow slowly.
+  // Measures the distance of the surface in the center of the picture, which determines the speed
+  // of motions. If there is no surface, the speed grows slowly.
   async lookAhead(now) {
     if (this.seen.key === this.cameraKey) return;
     this.seen.time = now;
@@ -217,7 +220,8 @@ export class Viewer {
     this.seen.distance = Math.max(1, hit ? hit.distance : free);
   }
 
-  // Sets some of the picture's options: {level, wire, clip, occlusion, shadows, color}.
+  // Sets those options of the picture that `changed` contains: {level, wire, clip, occlusion,
+  // shadows, color}.
   setOptions(changed) {
     Object.assign(this.options, changed);
     const {level, wire, clip, occlusion, shadows, color} = this.options;
@@ -240,7 +244,7 @@ export class Viewer {
   }
   flyToText(text) {
     const placement = parseCameraText(this.space, text, this.camera.fovDegrees);
-    new Camera(this.manifest.resolution).set(placement);  // throws if there is no such picture
+    new Camera(this.manifest.resolution).set(placement);  // throws if this shows no picture
     this.flyTo(placement);
   }
 
@@ -259,7 +263,7 @@ export class Viewer {
     announce("The camera orbits around this place.");
   }
 
-  // Updates the address bar without adding a history entry for each motion.
+  // Updates the page's address without adding a history entry for each motion.
   bookmark() {
     if (this.bookmarkTimer) return;
     this.bookmarkTimer = setTimeout(() => {
@@ -271,7 +275,7 @@ export class Viewer {
         history.replaceState(null, "", fragment);
         this.fragment = fragment;
       } catch {
-        // The browser refuses after too many changes. A later motion updates the address.
+        // The browser refuses a change after too many changes. The next motion updates the address.
       }
     }, kBookmarkDelayMs);
   }
@@ -289,8 +293,8 @@ export class Viewer {
     };
   }
 
-  // Takes camera and options from the fragment of an address, which may have changed. An invalid
-  // camera is ignored, and the page reports this until the camera moves.
+  // Sets camera and options from the fragment of the page's address, which may have changed. An
+  // invalid camera in the fragment is ignored; a message reports this until the camera moves.
   followBookmark(fragment) {
     if (fragment === this.fragment) return;
     const members = new URLSearchParams(this.bookmarks ? fragment.slice(1) : "");
@@ -327,8 +331,8 @@ export class Viewer {
     };
   }
 
-  // The drawing buffer is valid only until the browser has shown it. So this function draws
-  // immediately before it reads the buffer.
+  // Draws a picture and saves it immediately, because the drawing buffer is valid only until the
+  // browser has shown it.
   savePicture() {
     if (!this.renderer.hasDrawn) return announce(kNoPicture);
     this.renderer.frame();

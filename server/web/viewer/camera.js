@@ -1,4 +1,5 @@
-// A pinhole camera in voxels, in doubles. It gives the same picture as query/render/camera.h.
+// A pinhole camera in voxel units, computed in doubles. It gives the same picture as
+// query/render/camera.h.
 //
 // Invariants: the eye is not on the target. After a motion the view is at most kMaxPitch from the
 // horizontal, so the camera never turns over. Only set() can make it look straight up or down.
@@ -16,7 +17,7 @@ import {
 } from "./vector.js";
 
 const kMaxPitch = 89.9 * Math.PI / 180;
-const kMinDistance = 1 / 64;  // voxels from the eye to the target
+const kMinDistance = 1 / 64;  // minimum distance from the eye to the target, in voxels
 const kFarthest = 32;  // max distance of the eye from the grid's center, in edges of the grid
 
 export class Camera {
@@ -29,7 +30,7 @@ export class Camera {
     });
   }
 
-  // Throws an Error with a message for users if no picture can be taken from this position.
+  // Throws an Error if no picture can be taken from this position. The message is for users.
   set({eye, target, fovDegrees}) {
     if (![...eye, ...target].every(Number.isFinite))
       throw new Error("A camera has finite coordinates.");
@@ -56,14 +57,14 @@ export class Camera {
     return Math.tan(this.fovDegrees * Math.PI / 360) / (height / 2);
   }
 
-  // Returns the unit direction through a point of the picture, in pixels from its upper left
-  // corner.
+  // Returns the unit direction of the ray through a point of the picture. x and y are in pixels
+  // from the upper left corner.
   direction(x, y, width, height) {
     const pixel = this.pixelSpread(height);
     return pictureDirection(this.axes(), (x - width / 2) * pixel, (height / 2 - y) * pixel);
   }
 
-  // Rotates around the target. Positive angles (radians) move the eye to the right and up.
+  // Rotates the eye around the target. Positive angles (radians) move the eye to the right and up.
   orbit(yaw, pitch) {
     const at = spherical(subtract(this.eye, this.target));
     this.eye =
@@ -71,14 +72,14 @@ export class Camera {
             fromSpherical({...at, yaw: at.yaw + yaw, pitch: limitPitch(at.pitch + pitch)}));
   }
 
-  // Rotates around the eye. Positive angles look to the right and up.
+  // Rotates the view around the eye. Positive angles (radians) turn it to the right and up.
   turn(yaw, pitch) {
     const at = spherical(subtract(this.eye, this.target));
     this.target = subtract(
         this.eye, fromSpherical({...at, yaw: at.yaw - yaw, pitch: limitPitch(at.pitch - pitch)}));
   }
 
-  // Moves eye and target by voxels along the axes of the picture.
+  // Moves both eye and target. The distances, in voxels, are along the axes of the picture.
   move(toRight, toTop, forward) {
     const axes = this.axes();
     this.moveBy(
@@ -93,7 +94,7 @@ export class Camera {
     this.eye = eye;
   }
 
-  // Scales all distances from `point`, which keeps its place in the picture.
+  // Scales the distances of eye and target from `point`. The point keeps its place in the picture.
   zoomAbout(point, factor) {
     const least =
         kMinDistance / Math.min(this.distance, Math.max(distance(this.eye, point), kMinDistance));
@@ -113,14 +114,14 @@ export class Camera {
     if (depth > kMinDistance) this.target = add(this.eye, scale(forward, depth));
   }
 
-  // Returns the point on the ray through a pixel at the target's depth along the view.
+  // Returns the point on the ray through a pixel that has the same depth as the target.
   pointAtTarget(x, y, width, height) {
     const direction = this.direction(x, y, width, height);
     return add(this.eye, scale(direction, this.distance / dot(direction, this.axes().forward)));
   }
 }
 
-// Returns the camera at a fraction of the way between two cameras, by the shorter arc.
+// Returns the camera at the fraction `share` of the way between two cameras, along the shorter arc.
 export function between(from, to, share) {
   if (share >= 1) return to;
   const a = spherical(subtract(from.eye, from.target)), b = spherical(subtract(to.eye, to.target));

@@ -1,5 +1,5 @@
-// Converts the camera to text: to the options of `voxdag render`, in scene units, and to a URL
-// fragment.
+// Converts a camera to text and back: to the options of `voxdag render`, in scene units, and to the
+// members of a URL fragment.
 
 const kDigits = 4;  // decimal places of a voxel
 
@@ -20,7 +20,8 @@ export class GridSpace {
   toVoxels(point) {
     return point.map((c, axis) => (c - this.origin[axis]) * this.resolution / this.edge);
   }
-  // From {position, target, fov_degrees} of the manifest, in scene units.
+  // Returns a placement in voxels for {position, target, fov_degrees} of the manifest, in scene
+  // units.
   placement({position, target, fov_degrees}) {
     return {eye: this.toVoxels(position), target: this.toVoxels(target), fovDegrees: fov_degrees};
   }
@@ -32,7 +33,8 @@ export function cameraText(space, {eye, target, fovDegrees}) {
       `--fov ${numberText(fovDegrees)}`;
 }
 
-// Parses cameraText(), even from the middle of a command. Throws an Error with the missing option.
+// Parses text from cameraText(), even if it is in the middle of a command. Throws an Error that
+// names the missing option.
 export function parseCameraText(space, text, defaultFov) {
   const option = (name) => new RegExp(`(?:^|\\s)--${name}[\\s=]+["']?([^\\s"']+)`).exec(text)?.[1];
   return parseCamera(space, option("camera"), option("target"), option("fov"), defaultFov);
@@ -42,7 +44,7 @@ export function cameraFragment(space, {eye, target, fovDegrees}) {
   return {camera: space.text(eye), target: space.text(target), fov: numberText(fovDegrees)};
 }
 
-// Parses a camera from the members of a fragment; null if they have no camera.
+// Parses a camera from the members of a URL fragment; null if the members contain no camera.
 export function parseCameraFragment(space, members, defaultFov) {
   if (!members.has("camera")) return null;
   return parseCamera(

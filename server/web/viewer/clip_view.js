@@ -40,7 +40,8 @@ export class ClipView {
     });
   }
 
-  // Also moves the other end if necessary, because a box has at least one voxel.
+  // Moves one end of the box. Also moves the other end if necessary, because a box has at least one
+  // voxel.
   move(end, axis, value) {
     const {low, high} = this.box;
     if (end === "low") {

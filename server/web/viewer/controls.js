@@ -1,6 +1,6 @@
-// Mouse, touch and wheel input on the canvas. One pointer orbits (or turns, when flying). The right
-// button, the middle button, Shift or a second finger pan. The wheel and two fingers zoom. The
-// caller handles clicks.
+// Handles mouse, touch and wheel input on the canvas. One pointer orbits (or turns, when flying).
+// The right button, the middle button, Shift or a second finger pan. The wheel and two fingers
+// zoom. Clicks are passed to the caller.
 
 import {add, distance, dot, scale, subtract} from "./vector.js";
 
@@ -12,7 +12,7 @@ const kDoubleMovePx = 24;
 const kWheelZoom = 0.0016;  // per pixel of the wheel
 const kAnchorTimeMs = 400;  // wheel events within this time zoom to the same point
 const kLinePx = 20;
-const kRecentMs = 80;  // last part of a drag; its speed starts the inertia
+const kRecentMs = 80;  // inertia starts with the mean speed in this last part of a drag
 
 export class Controls {
   // handlers: pick(x, y) -> Promise of a position or null; onClick(x, y); onDoubleClick(x, y);
@@ -23,7 +23,7 @@ export class Controls {
     this.recent = [];
     this.press = null;  // set while a pointer is down
     this.lastClick = null;
-    this.anchor = null;  // point that the wheel zooms to
+    this.anchor = null;  // the point to which the wheel zooms
     const listen = (name, listener, options = {}) =>
         canvas.addEventListener(name, (event) => listener.call(this, event), {signal, ...options});
     listen("pointerdown", this.handleDown);
@@ -48,7 +48,7 @@ export class Controls {
     try {
       this.canvas.setPointerCapture(event.pointerId);
     } catch {
-      return;  // the pointer has already been lifted
+      return;  // the pointer was lifted before
     }
     const at = this.position(event);
     this.motion.stop();
@@ -70,7 +70,8 @@ export class Controls {
     }
   }
 
-  // The grabbed point follows the pointer. Until it is known, the target is used instead.
+  // Makes the grabbed point follow the pointer. Until the depth of this point is known, the
+  // target's depth is used.
   async findPanDepth(at) {
     const press = this.press;
     const point = await this.handlers.pick(...at);
@@ -162,7 +163,8 @@ export class Controls {
     else this.handlers.onClick(...at);
   }
 
-  // Zooms to the surface under the cursor. In the sky, zooms to a point at the target's distance.
+  // Zooms to the surface under the cursor. If the cursor is on the sky, zooms to the point at the
+  // target's distance.
   handleWheel(event) {
     event.preventDefault();
     const at = this.position(event);

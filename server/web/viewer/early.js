@@ -1,6 +1,6 @@
-// Creates the graphics context and its programs, which takes longest, while the other modules of
-// the page are still loading. The page of a job does not do this, because a job may have nothing to
-// draw yet.
+// Creates the graphics context and its programs while the other modules of the page are still
+// loading, because the compilation takes longest. The page of a job does not use this, because a
+// job may have nothing to draw yet.
 
 import {createContext} from "./gl/gl_objects.js";
 import {Passes} from "./gl/passes.js";
@@ -11,12 +11,13 @@ let begun = null;
 function begin(canvas) {
   const source = new TileSource({base: "/api/v1/view"}), manifest = source.manifest();
   const beginMs = performance.now(), gl = createContext(canvas);
-  manifest.catch(() => {});  // reported where the promise is awaited
+  manifest.catch(() => {});  // the error is reported where the promise is awaited
   if (!gl) return;
   const passes = gl.isContextLost() ? null : new Passes(gl),
         mine = {source, manifest, beginMs, gl, passes};
   begun = mine;
-  // A context that is lost already is restored later, but without its programs.
+  // If the context is already lost here, it is restored later, but without the programs compiled
+  // here.
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     mine.passes = null;
@@ -28,8 +29,8 @@ function begin(canvas) {
 
 if (!new URLSearchParams(location.search).has("job")) begin(document.getElementById("scene"));
 
-// Returns {source, manifest, beginMs, gl, passes} for the canvas of the page, or null if they were
-// taken before or the context is unavailable. `passes` is null if the context was lost.
+// Returns {source, manifest, beginMs, gl, passes} for the canvas of the page. Returns null if they
+// were already taken, or if no context is available. `passes` is null if the context was lost.
 export function takeBegun() {
   const taken = begun;
   begun = null;

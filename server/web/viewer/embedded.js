@@ -1,4 +1,5 @@
-// The viewer in place of the picture on a job's page: without the panel, and without a bookmark.
+// The viewer that replaces the picture on a job's page. It has no panel and does not change the
+// page's address.
 
 import {authorization} from "../lib/api.js";
 import {h} from "../lib/dom.js";
@@ -11,8 +12,8 @@ import {fillTools} from "./tools.js";
 
 const kBudgetBytes = 64 * 2 ** 20;
 
-// Fills `place`. Throws an Error, and leaves `place` unchanged, if that is not possible. Ends when
-// `signal` aborts.
+// Shows the viewer in `place` until `signal` aborts. If that is not possible, throws an Error and
+// leaves `place` unchanged.
 export async function embedViewer(place, job, signal) {
   const canvas = h("canvas", {
     class: "scene",
@@ -29,7 +30,8 @@ export async function embedViewer(place, job, signal) {
   let viewer = null;
   const renderer =
       new Renderer(canvas, source, {budgetBytes: kBudgetBytes, onChange: () => viewer?.schedule()});
-  // A browser has few contexts, and the page remains open, so the context is released early.
+  // Releases the context early, because a browser has only a few contexts and this page remains
+  // open.
   const release = () => {
     renderer.dispose();
     if (!renderer.context.gl.isContextLost())

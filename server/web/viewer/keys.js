@@ -1,4 +1,4 @@
-// The keys of the canvas and their help. Held keys move the camera, the others are actions.
+// The keys of the canvas and their help. Held keys move the camera; all other keys are actions.
 
 import {h} from "../lib/dom.js";
 
@@ -14,7 +14,8 @@ const kHeld = {
   KeyE: "rise",
   KeyQ: "sink",
 };
-// By character, because other keyboards have these keys elsewhere.
+// Keys identified by their character instead of their position, because they are elsewhere on other
+// keyboards.
 const kHeldCharacters = {
   "+": "zoomIn",
   "=": "zoomIn",
@@ -55,8 +56,8 @@ const kHelp = [
   ["H", "this help"],
 ];
 
-// Calls actions by name. `root` is the canvas, or the window, whose keys also act while nothing has
-// the focus.
+// Calls the actions by their names. `root` is the canvas, or the window. If it is the window, the
+// keys also work while nothing has the focus.
 export function listenToKeys(root, canvas, motion, actions, onChange, signal) {
   const held = new Map();  // by event.code: a character may change while its key is down
   root.addEventListener("keydown", (event) => {

@@ -1,5 +1,5 @@
-// The page of the viewer: viewer.html?job=ID shows a job of the service, viewer.html alone the file
-// of `voxdag view`. ?budget=MiB limits the memory of the tiles.
+// The page of the viewer. viewer.html?job=ID shows a job of the service; viewer.html without a job
+// shows the file of `voxdag view`. ?budget=MiB limits the memory of tiles and colors.
 
 import {authorization, getJson, Problem, sleep, token} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";
@@ -33,7 +33,7 @@ function budgetBytes() {
       2 ** 20;
 }
 
-// Shows a message instead of the picture until another message replaces it.
+// Shows a message instead of the picture, until the next message or a picture replaces it.
 function showMessage(...content) {
   place("scene").hidden = place("panel").hidden = place("tools").hidden = true;
   place("message").hidden = false;
@@ -49,7 +49,8 @@ function showTitle(title) {
   setText(place("title"), title);
 }
 
-// Waits until the job has a result, and returns the job. A failed or canceled job may be retried.
+// Resolves to the job when it has a result. Also waits for a failed or canceled job, because it may
+// be retried.
 async function finishedJob() {
   let known = null, waits = null, draws = true, pauseMs = kPauseMs;
   for (;;) {
@@ -85,7 +86,7 @@ async function finishedJob() {
   }
 }
 
-// Resolves to null if the service does not answer and `mayBe` allows that.
+// Resolves to the job; to null if the service does not answer and `mayBe` is set.
 async function jobNow(mayBe) {
   try {
     return await getJson(`/api/v1/jobs/${jobId}`, lifetime.signal);
@@ -112,7 +113,7 @@ class WaitingMessage {
           h("a", {class: "button", href: `/#/jobs/${jobId}`}, "The job's page"));
   }
 
-  // `job` is null while the service does not answer. `before` is the last known job, or null.
+  // `job` is null while the service does not answer. `before` is the previously known job, or null.
   show(job, before) {
     const said = `${job ? "This job is" : "This job was"} ${stateText((job ?? before).state)}.`;
     if (before && said !== this.heading.textContent)
@@ -126,7 +127,8 @@ class WaitingMessage {
   }
 }
 
-// The address is untrusted and the result is copied to a shell, so only numbers are used.
+// Returns the camera in the page's address. The address is untrusted and the result is copied to a
+// shell, so only numbers are used.
 function cameraOfAddress() {
   const members = new URLSearchParams(location.hash.slice(1));
   return ["camera", "target", "fov"]
@@ -168,7 +170,7 @@ async function start() {
   let renderer = null;
   hideMessage();
   try {
-    // The context and the programs take longer than the manifest.
+    // The manifest is requested first: the context and the programs take longer than the manifest.
     const arrives = (begun?.manifest ?? source.manifest()).then((manifest) => {
       if (!job) showTitle(manifest.name ?? "voxdag view");
       return manifest;
@@ -199,7 +201,7 @@ async function start() {
   window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
 }
 
-// The panel keeps its state when the next picture of the job follows.
+// Shows the tools. The panel keeps its state when the next picture of the job replaces this one.
 function showTools() {
   const before =
       place("tools").querySelector('[data-tool="togglePanel"]')?.getAttribute("aria-expanded");

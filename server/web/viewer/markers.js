@@ -1,4 +1,4 @@
-// Marks on the picture at the picked voxel and at the start of a measurement.
+// Marks on the picture, at the picked voxel and at the first point of a measurement.
 
 import {h} from "../lib/dom.js";
 
@@ -15,8 +15,8 @@ export class Markers {
     for (const mark of this.marks) mark.remove();
   }
 
-  // `positions`: the picked point and the start of the measurement, both in voxels. An entry that
-  // does not exist is null or undefined.
+  // `positions`: the picked point and the first point of the measurement, both in voxels. A point
+  // that does not exist is null or undefined.
   show(positions, camera, width, height) {
     const {forward, right, up} = camera.axes();
     const pixel = camera.pixelSpread(height);

@@ -1,15 +1,15 @@
-// Moves the camera over time: flights to another camera, inertia, held keys. With reduced motion a
-// flight arrives immediately and there is no inertia.
+// Moves the camera over time: flights to another camera, inertia, and held keys. If the user
+// prefers reduced motion, a flight ends immediately and there is no inertia.
 
 import {between} from "./camera.js";
 
 const kFlightS = 0.35;
-const kCoastS = 0.12;    // inertia falls to 1/e in this time
+const kCoastS = 0.12;    // time constant of inertia: the speed falls to 1/e in this time
 const kMinCoast = 0.02;  // radians per second
 const kMaxCoast = 3;
-const kTurnRate = 1.2;  // radians per second, by arrow keys
+const kTurnRate = 1.2;  // radians per second, while an arrow key is held
 const kZoomRate = 1.6;  // per second, by + and -
-const kFlyRate = 0.8;   // distances to the visible surface, per second
+const kFlyRate = 0.8;   // per second, in multiples of the distance to the visible surface
 const kFast = 4;
 const kFirstStepS = 1 / 20;  // minimum for a key press
 
@@ -36,7 +36,7 @@ export class Motion {
     }
   }
 
-  // Starts inertia after a drag: `apply(yaw, pitch)` is called with decreasing steps.
+  // Starts inertia after a drag. `apply(yaw, pitch)` is called with steps that become smaller.
   startCoasting(speed, apply) {
     const rate = Math.hypot(...speed);
     const limited = speed.map((s) => s * Math.min(1, kMaxCoast / rate));
@@ -61,7 +61,7 @@ export class Motion {
     this.keys.clear();
   }
 
-  // Advances to the time; returns whether the camera still moves.
+  // Advances the motion to the time `nowMs`. Returns true if the camera still moves.
   step(nowMs) {
     const elapsedS = this.lastMs === null ? 0 : Math.min(0.1, (nowMs - this.lastMs) / 1000);
     for (const key of this.keys) this.applyKey(key, elapsedS);

@@ -1,4 +1,4 @@
-// The panel: camera, pick, box, detail, light, statistics, keys.
+// The panel, with sections for camera, pick, box, detail, light, statistics and keys.
 
 import {clear, fact, field, h, setText} from "../lib/dom.js";
 import {countText, sizeText} from "../lib/format.js";
@@ -9,7 +9,7 @@ import {keysHelp} from "./keys.js";
 import {PickView} from "./pick_view.js";
 
 export class Panel {
-  // `viewer` is the Viewer (app.js) that the panel shows and changes.
+  // `viewer` is the Viewer (app.js) whose state the panel shows and changes.
   constructor(viewer) {
     this.viewer = viewer;
     const {manifest, space} = viewer;

@@ -33,7 +33,8 @@ export class PickView {
     this.show();
   }
 
-  // Returns the box {low, high} of the two picks in voxels, or null.
+  // Returns the box {low, high} that contains the two picked voxels; null if there are not two
+  // picks.
   box() {
     if (!this.start || !this.pick) return null;
     const edge = (pick) => this.cellEdge(pick);

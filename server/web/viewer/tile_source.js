@@ -1,10 +1,10 @@
-// Fetches the manifest, tiles and color pages of one file. They never change for a digest, so the
-// browser's cache serves single tiles again, and the first batches when a page is reloaded. Other
-// batches depend on the view and are seldom requested twice.
+// Fetches the manifest, tiles and color pages of one file. For a given digest they never change. So
+// the browser's cache answers repeated requests for single tiles, and for the first batches when a
+// page is reloaded. Other batches depend on the view and are seldom requested twice.
 
-const kTimeoutMs = 30000;   // between two bytes; a complete answer may take longer
-const kMaxBytes = 2 ** 26;  // per answer; the largest possible batch has 44 MB
-const kLookAgainMs = 5000;  // between two checks that the file still exists
+const kTimeoutMs = 30000;   // maximum time between two bytes; a complete answer may take longer
+const kMaxBytes = 2 ** 26;  // maximum size of an answer; the largest possible batch has 44 MB
+const kLookAgainMs = 5000;  // minimum time between two checks that the file still exists
 const kMaxTileLevels = 5, kMaxBatch = 4096;
 
 const kReplaced = {
@@ -16,8 +16,8 @@ const kRemoved = {
   message: "The file was removed: its missing parts cannot be loaded."
 };
 
-// `status` is the HTTP status, 0 without an answer, 200 if the answer makes no sense. `code` is the
-// code of the service.
+// `status` is the HTTP status: 0 if there was no answer, 200 for an answer that makes no sense.
+// `code` is the error code from the service.
 export class TileError extends Error {
   constructor(status, detail, {code = "", retryAfterMs = 0, timedOut = false} = {}) {
     super(detail);
@@ -41,19 +41,21 @@ export class TileError extends Error {
   get isMissing() {
     return this.status === 404 || this.status === 409;
   }
-  // True if the requested items may be the cause, although the answer does not say so.
+  // True if the requested items may be the cause of the error, although the answer does not state
+  // this.
   get isSuspicious() {
     return this.status === 200 || (this.status === 500 && this.isTransient);
   }
 }
 
 export class TileSource {
-  // `base`: path before "/tiles", without a slash at its end. `headers`: of every request.
+  // `base`: the path before "/tiles", without a slash at its end. `headers`: header fields that
+  // every request has.
   constructor({base, headers = {}}) {
     this.base = base;
     this.headers = headers;
     this.info = null;
-    this.ended = null;  // {code, message} once the file was removed or replaced
+    this.ended = null;  // {code, message} after the file was removed or replaced
     this.timeoutMs = kTimeoutMs;
     this.looking = null;
     this.lookedMs = -Infinity;
@@ -68,8 +70,8 @@ export class TileSource {
     return info;
   }
 
-  // Resolves to the words of the tiles of [{level, offset}], in the same order. Throws TileError
-  // unless all arrive. `options`: {signal, cache}.
+  // Resolves to the words of the tiles of `nodes`, [{level, offset}...], in the same order. Throws
+  // TileError unless all tiles arrive. `options`: {signal, cache}.
   async fetchTiles(nodes, options) {
     const digest = encodeURIComponent(this.info.digest);
     if (nodes.length === 1) {
@@ -94,7 +96,7 @@ export class TileSource {
     return this.info.batch_max;
   }
 
-  // Called after a tile was not found. Sets `ended` if the file was removed or replaced.
+  // Call it after a tile was not found. Sets `ended` if the file was removed or replaced.
   async lookAgain(signal) {
     if (this.ended || performance.now() < this.lookedMs + kLookAgainMs) return;
     this.looking ??= this.look(signal).finally(() => this.looking = null);
@@ -161,7 +163,7 @@ export class TileSource {
   }
 }
 
-// Resolves to all bytes of an answer. Calls `heard` for each piece.
+// Resolves to all bytes of an answer. Calls `heard` after each piece that arrives.
 async function bodyOf(response, heard) {
   const reader = response.body?.getReader(), parts = [];
   let length = 0;
@@ -189,7 +191,7 @@ function problemOf({status, headers}, bytes) {
   try {
     problem = JSON.parse(new TextDecoder().decode(bytes));
   } catch {
-    // The answer is not from the service; only its status is known.
+    // The answer was not sent by the service, so only the HTTP status is used.
   }
   const retryAfterMs = 1000 * Math.max(0, Number(headers.get("Retry-After")) || 0);
   return new TileError(
@@ -197,7 +199,7 @@ function problemOf({status, headers}, bytes) {
       {code: String(problem?.code ?? ""), retryAfterMs});
 }
 
-// Checks the values that GPU memory sizes and loop bounds depend on.
+// Checks those values of the manifest on which GPU memory sizes and loop bounds depend.
 function checkManifest(info) {
   const expect = (isTrue, name) => {
     if (!isTrue)

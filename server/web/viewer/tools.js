@@ -1,4 +1,4 @@
-// The buttons over the picture, by the names of the viewer's actions.
+// The buttons over the picture. They have the names of the viewer's actions.
 
 import {h} from "../lib/dom.js";
 

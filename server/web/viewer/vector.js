@@ -11,7 +11,8 @@ export const cross =
     (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 export const mix = (a, b, share) => add(scale(a, 1 - share), scale(b, share));
 
-// The unit vectors of a picture taken in a direction; looking straight up or down, up is -z or z.
+// Returns the unit vectors of a picture that is taken in a direction. If the direction is straight
+// down or up, the picture's up vector is -z or z.
 export function pictureAxes(direction, above = [0, 1, 0]) {
   const forward = normalize(direction),
         vertical = Math.abs(dot(forward, normalize(above))) > 1 - 1e-9;
@@ -19,8 +20,8 @@ export function pictureAxes(direction, above = [0, 1, 0]) {
   return {forward, right, up: cross(right, forward)};
 }
 
-// The unit direction through a point of the picture, in units to the right of its center and above
-// it.
+// Returns the unit direction of the ray through a point of the picture. x and y are the distances
+// to the right of the center and above it, for a picture at distance 1.
 export function pictureDirection({forward, right, up}, x, y) {
   return normalize(add(forward, add(scale(right, x), scale(up, y))));
 }

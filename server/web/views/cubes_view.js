@@ -1,5 +1,5 @@
-// The occupied subvolumes as cubes in an isometric view. Pending cubes are translucent; built ones
-// are solid, and highlighted for a moment when they are finished.
+// The occupied subvolumes as cubes in an isometric view. Pending cubes are translucent. Built cubes
+// are solid, and are highlighted for a moment when they are finished.
 
 import {getJson} from "../lib/api.js";
 import {h, setText} from "../lib/dom.js";
@@ -10,7 +10,7 @@ const kMargin = 10;
 const kCos = Math.cos(Math.PI / 6), kSin = 0.5;
 const kGlowMs = 900;
 const kMinOutlinePx = 5;      // smaller cubes are drawn without outlines
-const kMaxGlowing = 6000;     // no highlights above this count: each frame draws all cubes
+const kMaxGlowing = 6000;     // with more cubes nothing glows, because each frame draws all cubes
 const kMinIntervalMs = 1000;  // between two requests
 
 export class CubesView {
@@ -38,7 +38,7 @@ export class CubesView {
     new ResizeObserver(() => this.draw()).observe(this.canvas);
   }
 
-  // Fetches the cubes if the job has built more of them, at a limited rate.
+  // Fetches the cubes, at a limited rate, if the job has built more of them.
   async update(job) {
     const {built, total} = job.progress?.subvolumes ?? {total: 0};
     const key = `${job.attempts} ${built} ${total} ${hasEnded(job.state)}`;
@@ -63,7 +63,7 @@ export class CubesView {
     } catch (problem) {
       if (this.signal.aborted) return;
       if (problem.status === 404)
-        this.key = key;  // not planned yet, or the job failed before planning
+        this.key = key;  // 404: not planned yet, or the job failed before planning
     } finally {
       this.fetching = false;
       sayIfEmpty();
@@ -94,8 +94,8 @@ export class CubesView {
     this.canvas.hidden = this.turner.hidden = empty;
   }
 
-  // An ended job gets cubes only if it is retried. `known`: the service has reported that it has
-  // none.
+  // Explains why there are no cubes. An ended job gets cubes only if it is retried. `known`: the
+  // service has reported that the job has no cubes.
   sayWhyEmpty(ended, known) {
     if (this.resolution !== undefined) return;
     const end = known ? "There are no subvolumes." : "";
@@ -114,9 +114,9 @@ export class CubesView {
     return [[x, y, z], [z, y, far(x)], [far(x), y, far(z)], [far(z), y, x]][this.turn];
   }
 
-  // Sorts the cubes from back to front. Octree cubes do not overlap, so the Morton order of their
-  // low corners is correct for any mixture of sizes: a cube never precedes a cube that is lower on
-  // all axes.
+  // Sorts the cubes from back to front. Octree cubes do not overlap, so for any mixture of sizes
+  // the Morton order of their low corners is correct: a cube that is lower than another cube on all
+  // axes always comes first.
   order() {
     const minEdge = Math.min(...this.cubes.map((cube) => cube.edge));
     for (const cube of this.cubes) {
@@ -124,7 +124,7 @@ export class CubesView {
       cube.rank = morton(...cube.at.map((c) => Math.floor(c / minEdge)));
     }
     this.cubes.sort((a, b) => a.rank - b.rank);
-    // Faces that touch another cube of the same size are hidden.
+    // A face that touches another cube of the same size is hidden.
     const here = new Set(this.cubes.map((cube) => `${cube.at} ${cube.edge}`));
     for (const {at: [x, y, z], edge, faces} of this.cubes) {
       faces.top = !here.has(`${[x, y + edge, z]} ${edge}`);
@@ -197,7 +197,7 @@ export class CubesView {
     }
   }
 
-  // Calls paint(face) for each visible face, with its path set.
+  // Calls paint(face) for each visible face, after setting the face's path.
   eachFace(pen, size, {at: [x, y, z], edge}, paint) {
     const p = (dx, dy, dz) => this.point(size, x + dx * edge, y + dy * edge, z + dz * edge);
     const paths = {
@@ -242,7 +242,7 @@ export class CubesView {
   }
 }
 
-// Coordinates have up to 17 bits: a double represents the 51 bits of the code exactly.
+// A coordinate has up to 17 bits, so a double represents the 51 bits of the code exactly.
 function morton(x, y, z) {
   let code = 0;
   for (let bit = 2 ** 16; bit >= 1; bit /= 2) {

@@ -1,4 +1,4 @@
-// An estimate of the build, requested from the service while the user fills in the form.
+// The estimate of the build, which is requested from the service while the user fills in the form.
 
 import {sendJson, sleep} from "../lib/api.js";
 import {clear, h, setText} from "../lib/dom.js";
@@ -7,7 +7,7 @@ import {countText, durationText, rangeText, shortCount, sizeText} from "../lib/f
 import {problemBox} from "./parts.js";
 
 const kDebounceMs = 700;  // after the last change
-const kMaxAttempts = 5;   // while the service is busy with other plans
+const kMaxAttempts = 5;   // attempts while the service is busy with other plans
 
 const kFigures = [
   ["voxels", "Voxels", shortCount],

@@ -9,7 +9,7 @@ import {copyButton, problemBox} from "./parts.js";
 
 const kMaxInMemoryBytes = 2 ** 30;
 
-// Elements for the actions; `reload` is called after each action.
+// Returns the elements for the actions on a job. `reload` is called after each action.
 export function actions(job, reload) {
   const error = h("div", {role: "alert"});
   const button = (text, action, kind = "") => actionButton(text, action, kind, error);
@@ -37,7 +37,8 @@ export function actions(job, reload) {
   return [h("div", {class: "buttons"}, buttons), error];
 }
 
-// A button that is busy during its action, and shows a Problem in the element `error`.
+// Returns a button that is busy while its action runs. If the action throws Problem, the element
+// `error` shows it.
 function actionButton(text, action, kind, error) {
   const element =
       h("button", {type: "button", class: kind, "data-action": text.toLowerCase()}, text);
@@ -78,9 +79,9 @@ function fileName(job) {
       titleText(job).replace(kSceneEnding, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
 }
 
-// Without a token the browser downloads the link itself, which is resumable. A link cannot carry a
-// token: then the bytes are streamed to a file where the browser supports that, else held in
-// memory.
+// Downloads the result. Without a token, the browser downloads the link itself and can resume the
+// download. A link cannot carry a token. So with a token, the bytes are streamed to a file if the
+// browser supports this; otherwise they are held in memory.
 async function download(job) {
   const name = fileName(job);
   if (!token.get()) return clickLink(job.links.dag, name);
@@ -109,7 +110,7 @@ function clickLink(href, name) {
   link.remove();
 }
 
-// The same download as a shell command, which resumes after a lost connection.
+// Returns a shell command for the same download, which resumes after a lost connection.
 export function downloadCommand(job) {
   const text = `voxdag download ${job.id} -o ${fileName(job)} --server ${location.origin}` +
       (token.get() ? " --token-file FILE" : "");

@@ -1,4 +1,4 @@
-// The resolution and the options of a job, the same as on the command line.
+// The resolution and the options of a job. They are the same as on the command line.
 
 import {Problem} from "../lib/api.js";
 import {field, h} from "../lib/dom.js";
@@ -13,8 +13,8 @@ const kAttributes = {
   material: "Materials"
 };
 
-// The form fields of all options; `on` are their listeners. The keys of `options` are the names in
-// a request. An option is sent if its field is not empty.
+// The form fields of all options; `on` has their event listeners. The keys of `options` are the
+// names of the options in a request. An option is sent if its field is not empty.
 class Fields {
   constructor(on) {
     this.on = on;
@@ -110,7 +110,7 @@ export class JobOptions {
     return [this.fields.color, ...this.fields.attributes].some((input) => input.checked);
   }
 
-  // {resolution, priority?, options?}. Throws Problem for an invalid field.
+  // Returns {resolution, priority?, options?}. Throws Problem for an invalid field.
   values() {
     const {resolution, priority} = this.fields, options = this.optionValues();
     return {

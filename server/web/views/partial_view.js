@@ -1,8 +1,8 @@
-// The subvolumes that a running job has built, each by the coarse brick of its voxels.
+// The subvolumes that a running job has built. Each is drawn from the coarse brick of its voxels.
 
 import {CubesView} from "./cubes_view.js";
 
-const kMaxDetailed = 1500;  // more subvolumes are drawn as plain cubes
+const kMaxDetailed = 1500;  // with more subvolumes, they are drawn as plain cubes
 
 export class PartialView extends CubesView {
   setEmpty(empty) {
@@ -15,7 +15,8 @@ export class PartialView extends CubesView {
     this.element.hidden = ended;
   }
 
-  // `cubes` of the service are [x, y, z, edge, low, high]: the halves of a brick.
+  // `cubes` comes from the service. Each entry is [x, y, z, edge, low, high]; low and high are the
+  // halves of a brick.
   show({resolution, built, total, cubes}) {
     const parts = cubes.length <= kMaxDetailed ? cubes.flatMap(cellsOf) :
                                                  cubes.map(([x, y, z, edge]) => [x, y, z, edge, 1]);
@@ -23,7 +24,8 @@ export class PartialView extends CubesView {
   }
 }
 
-// The occupied 64ths of a cube; the bits are in the order of a brick (docs/format.md).
+// Returns the occupied ones of the 64 cells of a cube. The bits are in the order of a brick
+// (docs/format.md).
 function cellsOf([x, y, z, edge, ...halves]) {
   const cells = [];
   for (let bit = 0; bit < 64; ++bit) {

@@ -15,7 +15,8 @@ export function problemBox(problem, title = null) {
       h("p", {class: "code"}, problem.code, problem.status ? ` · HTTP ${problem.status}` : null));
 }
 
-// An accessible progress bar. update(fraction) takes 0 to 1, or null if it is unknown.
+// Returns an accessible progress bar. Its update(fraction) takes 0 to 1; null if the fraction is
+// unknown.
 export function meter(label) {
   const full = h("div", {class: "meter-full"});
   const element =
@@ -36,7 +37,7 @@ export function meter(label) {
   return {element, update};
 }
 
-// Shows the current stage of a job, or a full bar once it succeeded.
+// Shows the progress of a job's current stage. The bar is full after the job has succeeded.
 export function updateJobMeter(bar, job) {
   const fraction = job.state === "succeeded" ? 1 : doneFraction(job.progress);
   const idle = ["queued", "suspended", "canceled", "failed"].includes(job.state);

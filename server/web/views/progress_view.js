@@ -1,4 +1,4 @@
-// The current stage of a job, and the numbers of the attempt.
+// The current stage of a job, and the numbers of its current attempt.
 
 import {h, setText} from "../lib/dom.js";
 import {

@@ -1,21 +1,22 @@
-// Plots the rate of each stage over time, from the updates this page has received.
+// Plots the rate of each stage over time, from the updates that this page has received.
 
 import {clear, h, setText, svg} from "../lib/dom.js";
 import {durationText, shortCount} from "../lib/format.js";
 
 const kWidth = 520, kHeight = 170;
 const kLeft = 52, kRight = 8, kTop = 10, kBottom = 24;
-const kWindowS = 2;       // minimum duration that a rate is averaged over
-const kMaxSamples = 600;  // above it every other sample is dropped
+const kWindowS = 2;       // minimum duration over which a rate is averaged
+const kMaxSamples = 600;  // if there are more samples, every other sample is dropped
 
-// Job id -> series by stage: shown again when the user returns to a job.
+// Job id -> series by stage. They are kept, so that they are shown again when the user returns to a
+// job.
 const seriesByJob = new Map();
 
 export class RatePlot {
   constructor(id) {
     if (!seriesByJob.has(id)) seriesByJob.set(id, new Map());
     this.series = seriesByJob.get(id);
-    this.chosen = null;  // a stage, or null for the current one
+    this.chosen = null;  // the stage chosen by the user; null for the current stage
     this.tabs = h("div", {class: "tabs", role: "group", "aria-label": "Stage"});
     this.note = h("p", {class: "faint"});
     this.picture = svg("svg", {viewBox: `0 0 ${kWidth} ${kHeight}`, class: "plot", role: "img"});

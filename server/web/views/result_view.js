@@ -50,7 +50,7 @@ function cubeText({origin, edge}) {
   return `from ${origin.map(short).join(", ")}, edge ${short(edge)}`;
 }
 
-// The picture, and below it the ways to explore the result.
+// Returns the picture, with the ways to explore the result below it.
 function picture(job, signal) {
   const place = preview(job, signal);
   const error = h("p", {class: "bad", role: "alert"});
@@ -102,7 +102,7 @@ function preview(job, signal) {
   return place;
 }
 
-// Level 0 is the root, the last level has the bricks of 4³ voxels.
+// Returns a table of the levels. Level 0 is the root; the last level has the bricks of 4³ voxels.
 function levelsTable(job) {
   const levels = job.result.levels;
   const maxNodes = Math.max(1, ...levels.map((level) => level.nodes));

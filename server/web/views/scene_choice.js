@@ -1,4 +1,5 @@
-// Chooses a scene: an uploaded one, a new upload, or the path of a file on the server.
+// Lets the user choose a scene: an uploaded scene, a new upload, or the path of a file on the
+// server.
 
 import {getJson} from "../lib/api.js";
 import {announce, clear, field, h, setText} from "../lib/dom.js";
@@ -44,12 +45,12 @@ export class SceneChoice {
                       "In one of the scene folders configured for the service.")));
   }
 
-  // The path if one is entered, else the chosen scene, else "".
+  // Returns the entered path, or the chosen scene if no path is entered, or "" if none is chosen.
   value() {
       return this.path.value.trim() || this.several || this.select.value;
   }
 
-  // Fills the list and selects `chosen`, the scenes of a job.
+  // Fills the list, and selects the scenes in `chosen`, which are the scenes of an earlier job.
   async load(chosen = null) {
       const scenes = [];
       for (let cursor = null, more = true; more; more = cursor !== null) {

@@ -1,4 +1,4 @@
-// The stages of an attempt as bars in proportion to their duration.
+// Shows the stages of an attempt as bars whose lengths are proportional to their durations.
 
 import {clear, h, setText} from "../lib/dom.js";
 import {durationText, shortCount, unitText} from "../lib/format.js";

@@ -1,6 +1,7 @@
-// The color pages on the GPU: a pool of blocks, like the pool of the tiles, stores their words, and
-// a hash table maps the position of a page to its blocks. If the pool is full, pages that the view
-// does not use are evicted. The coarsest pages remain, so that every cell has some color.
+// Stores color pages on the GPU: their words in a pool of blocks, like the pool of the tiles, and a
+// hash table that maps the position of a page to its blocks. If the pool is full, pages that the
+// view does not use are evicted. The coarsest pages are never evicted, so every cell has some
+// color.
 
 import {kRoundsToKnow} from "../tiles/loader.js";
 import {TilePool} from "../tiles/tile_pool.js";
@@ -8,18 +9,18 @@ import {TilePool} from "../tiles/tile_pool.js";
 import {decodePage, kBlockWords, kMoreAt} from "./page_format.js";
 
 const kRecentMs = 1500;
-const kFreeShare = 1 / 64;                   // share of the pool that one eviction frees
-const kTableShare = 1 / 5;                   // share of the budget
-const kEntryBytes = 16, kTableWidth = 1024;  // the shaders contain the width
-// The pool has at most 2^20 blocks, and half of the entries remain free.
+const kFreeShare = 1 / 64;  // share of the pool that is freed when pages are evicted
+const kTableShare = 1 / 5;  // share of the budget
+const kEntryBytes = 16, kTableWidth = 1024;  // the shaders contain the same table width
+// Entries of the hash table. The pool has at most 2^20 blocks, so half of the entries remain free.
 const kMaxEntries = 2 ** 21;
-const kCoarseLevel = 5;  // pages of this level and coarser ones (at most 76) are never evicted
+const kCoarseLevel = 5;  // pages of this and all coarser levels (at most 76) are never evicted
 
 // The number of the pages along an axis.
 function pagesOf(level) {
   return 2 ** Math.max(0, level - 3);
 }
-const kPagesBefore = [0];  // number of pages on all coarser levels
+const kPagesBefore = [0];  // by level: number of pages on all coarser levels
 for (let level = 0; level < 20; ++level)
   kPagesBefore.push(kPagesBefore[level] + pagesOf(level) ** 3);
 // A unique number of a page, below 2^52.
@@ -54,7 +55,7 @@ export class ColorStore {
     this.rounds = 0;
   }
 
-  // Stores a fetched page. Returns false if there is no space. Throws if the page is damaged.
+  // Stores a fetched page. Returns false if the pool has no space. Throws if the page is damaged.
   add({key, level, position}, pageWords, nowMs) {
     if (this.pages.has(key)) return true;
     const words = decodePage(pageWords), count = words.length / kBlockWords;
@@ -67,7 +68,7 @@ export class ColorStore {
     blocks.forEach(
         (block, i) => this.pool.write(
             block * kBlockWords / 4, words.subarray(i * kBlockWords, (i + 1) * kBlockWords)));
-    // A page without cells is stored, but has no entry for the shaders.
+    // A page without cells is kept here, but gets no entry in the shaders' hash table.
     if (count > 0) this.insert(page.place, blocks[0] + 1);
     this.pages.set(key, page);
     this.usedBlocks += count;
@@ -104,16 +105,17 @@ export class ColorStore {
     return fits(count, 1);
   }
 
-  // A probe starts at the hash of a page and ends at the next free entry; some entries are always
-  // free. An entry is x and the level, y, z, and the number of the page's first block plus 1. 0
-  // marks a free entry.
+  // A search (probe) starts at the hash of the page and ends at the next free entry; some entries
+  // are always free. An entry has four words: x and the level; y; z; and the number of the page's
+  // first block plus 1. The last word is 0 in a free entry.
   insert(place, number) {
     let at = this.homeOf(place);
     while (this.words[4 * at + 3] !== 0) at = this.next(at);
     this.write(at, [...place, number]);
   }
 
-  // Moves later entries back, so that no probe ends too early at the freed entry.
+  // Frees the entry of a page. Moves later entries back, so that no probe ends too early at the
+  // freed entry.
   remove(place) {
     const {words} = this;
     let free = this.homeOf(place);
@@ -121,7 +123,7 @@ export class ColorStore {
     for (let at = this.next(free); words[4 * at + 3] !== 0; at = this.next(at)) {
       const home = this.homeOf(words.subarray(4 * at, 4 * at + 3));
       const mask = this.entries - 1;
-      // This entry's probe starts after the free entry, so it is not moved.
+      // The probe for this entry starts behind the free entry, so this entry is not moved.
       if ((at - home & mask) < (at - free & mask)) continue;
       this.write(free, words.slice(4 * at, 4 * at + 4));
       free = at;

@@ -1,14 +1,15 @@
-// The colors of a file: the uniforms for drawing them, and the pages that the feedback requests.
+// The colors of a file: the uniforms for drawing them, and requests for the pages that the feedback
+// misses.
 
 import {ColorLoader} from "./color_loader.js";
 import {ColorStore, pageKey} from "./color_store.js";
 
 const kMebibyte = 1 << 20;
-const kBudgetShare = 1 / 4;   // share of the budget of tiles and colors
-const kMinBytes = 96 * 1024;  // minimum for a pool and a hash table
-const kBytesPerVoxel = 1024;  // worst case: one page for each voxel, and as many on coarser levels
+const kBudgetShare = 1 / 4;   // share of colors in the budget of tiles and colors
+const kMinBytes = 96 * 1024;  // minimum for a pool and a hash table together
+const kBytesPerVoxel = 1024;  // worst case: one page per voxel, and as many on coarser levels
 const kBaseBelow = 2;  // levels from a wanted page to the coarser page that is requested first
-const kWanted = 2;     // min value of the feedback's last word for a missing page: 1 + its pixels
+const kWanted = 2;     // min value of the last word of a missing page: 1 + its pixels
 
 // Returns the part of the budget for the colors of a file.
 export function colorBudget(info, budgetBytes) {
@@ -40,7 +41,8 @@ export class Colors {
     };
   }
 
-  // Requests and marks the pages that kColorFeedback wrote for a picture of an epoch.
+  // Requests the missing pages and marks the used pages. `words` is the color feedback of a picture
+  // of `epoch`.
   takeReading(words, epoch, nowMs) {
     const wanted = new Map();
     for (let at = 0; at < words.length; at += 4) {
@@ -64,16 +66,16 @@ export class Colors {
     this.loader.demand(wanted, nowMs);
   }
 
-  // Pages for more pixels come first. So coarse pages precede fine ones, and if memory is short,
-  // every part of the picture still has colors.
+  // Pages that more pixels need come first. So coarse pages are requested before fine ones. If
+  // memory is short, every part of the picture still has colors.
   want(wanted, level, position, pixels) {
     const key = pageKey(level, ...position), request = wanted.get(key);
     if (request) request.priority += pixels;
     else wanted.set(key, {key, level, position, priority: pixels});
   }
 
-  // Marks the coarser page that is drawn in place of a missing one. Returns its level, or -1 if no
-  // coarser page is loaded.
+  // Marks the coarser page that is drawn instead of a missing page. Returns the coarser page's
+  // level; -1 if no coarser page is loaded.
   markCoarser(level, position, epoch, nowMs) {
     for (let coarser = level - 1; coarser >= 0; --coarser) {
       position = position.map((at) => at >>> 1);

@@ -6,7 +6,7 @@ const kMaskAt = 1, kMaskWords = 16;
 const kSingle = 1 << 24;       // flag of a page's first word: single colors follow, not blocks
 const kUsedBits = 0x011f03ff;  // all valid bits of the first word
 const kFirstColors = 8;        // color texels in the first block
-// Word of the first block at which the addresses of the other blocks begin.
+// Index in the first block's words at which the addresses of the other blocks begin.
 export const kMoreAt = 20;
 
 function countBits(word) {
@@ -15,10 +15,10 @@ function countBits(word) {
   return bits;
 }
 
-// Returns the words of complete blocks; none for a page without cells. The first block has the
-// page's first word, the numbers of cells before the second, third and fourth 128 of them (10 bits
-// each), two words of 0, the mask, the addresses of up to 12 more blocks (filled in later), and 8
-// texels of colors. The other blocks have 16 texels of colors.
+// Returns the words of complete blocks; no words for a page without cells. The first block has the
+// page's first word, three numbers of 10 bits each (the number of cells before the second, the
+// third and the fourth group of 128 cells), two words of 0, the mask, the addresses of up to 12
+// more blocks (filled in later), and 8 texels of colors. Each other block has 16 texels of colors.
 export function decodePage(page) {
   const count = page[0] & 1023, skip = page[0] >>> 16 & 31, single = (page[0] & kSingle) !== 0;
   if (page.length === 1 && page[0] === 0) return new Uint32Array(0);

@@ -1,5 +1,5 @@
-// GLSL: colors of cells from the pages on the GPU (layout: colors/page_format.js), and the feedback
-// about missing and used pages.
+// GLSL source: reads the colors of cells from the pages on the GPU (layout: colors/page_format.js),
+// and writes the feedback about missing and used pages.
 
 import {kCameraSource, kPrecision} from "./ray_shader.js";
 
@@ -115,9 +115,9 @@ uint color_of_cell(ivec3 cell, int scale, bool is_final) {
 }
 `;
 
-// One texel per block of u_block x u_block pixels: x and level, y, z of a page, and a number. The
-// number is 0 without a page, 1 if the page is used, and otherwise 1 plus the number of pixels that
-// lack it.
+// Writes one texel per block of u_block x u_block pixels. The texel describes a page: x and the
+// level; y; z; and a number. The number is 0 if the block has no page, 1 if the page is used, and
+// otherwise 1 plus the number of pixels that lack the page.
 export const kColorFeedback = `#version 300 es
 ${kPrecision}${kCameraSource}${kColorState}
 uniform usampler2D u_hits, u_colors;

@@ -1,4 +1,5 @@
-// Decodes a reading of the feedback: missing tiles, used tiles, and statistics of the picture.
+// Decodes a reading of the feedback: the missing tiles, the used tiles, and statistics of the
+// picture.
 
 const kMaxSamples = 4096;  // for the statistics
 const kHalf = new DataView(new ArrayBuffer(4));
@@ -18,8 +19,9 @@ function shareOf(sorted, share) {
       sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
 }
 
-// {wanted: Map of leaf address -> priority, slots: Set, coarsePixels: of the largest missing cell,
-//  medianT, nearestT, exposure (null: nothing is seen), stepsMean, steps99}
+// Returns
+// {wanted: Map of leaf address -> priority, slots: Set, coarsePixels: width of the largest missing
+//  cell, medianT, nearestT, exposure (null if no surface is seen), stepsMean, steps99}.
 export function readFeedback(words) {
   const wanted = new Map(), slots = new Set(), texels = words.length / 4;
   const stride = Math.ceil(texels / kMaxSamples) | 1, count = Math.ceil(texels / stride);
@@ -58,8 +60,8 @@ export function readFeedback(words) {
   };
 }
 
-// Returns {depth, level, steps} of each pixel, rows from the top. `words` are the results of
-// pack_hit(), rows from the bottom. The depth of the sky is infinite.
+// Returns {depth, level, steps} of each pixel, in rows from the top. `words` are the results of
+// pack_hit(), in rows from the bottom. The depth of the sky is infinite.
 export function readHits(words, width, height, levels) {
   const depth = new Float32Array(width * height).fill(Infinity),
         level = new Uint8Array(width * height);

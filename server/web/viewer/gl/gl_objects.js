@@ -1,10 +1,10 @@
-// Small helpers over WebGL2: programs whose uniforms are set by name, and render targets.
+// Helpers for WebGL2: programs with uniforms that are set by name, and render targets.
 
 import {kQuad} from "./picture_shaders.js";
 
 export class WebGLUnavailable extends Error {}
 
-// Returns the context of a canvas, or null if the browser provides none.
+// Returns the WebGL2 context of a canvas; null if the browser provides none.
 export function createContext(canvas) {
   return canvas.getContext("webgl2", {
     alpha: false,
@@ -33,8 +33,8 @@ export class Program {
     this.uniforms = null;
   }
 
-  // True if the compiler has finished, or if the browser cannot report it. `parallel` is the
-  // extension KHR_parallel_shader_compile, or null.
+  // True if the compilation has finished, and also if the browser cannot report this. `parallel` is
+  // the extension KHR_parallel_shader_compile; null if it is missing.
   done(parallel) {
     return !parallel || this.gl.getProgramParameter(this.program, parallel.COMPLETION_STATUS_KHR);
   }
@@ -61,8 +61,8 @@ export class Program {
     }
   }
 
-  // Draws one pixel to a target of these formats, because most drivers finish compilation only
-  // then. The textures `words` and `floats` are placeholders.
+  // Draws one pixel to a target of these formats, because most drivers finish a compilation only at
+  // the first draw. The textures `words` and `floats` are placeholders.
   warmUp(formats, words, floats) {
     const {gl} = this, target = new Target(gl, 1, 1, formats);
     gl.useProgram(this.program);
@@ -81,8 +81,8 @@ export class Program {
     this.gl.deleteProgram(this.program);
   }
 
-  // Sets the uniforms of the program and draws the viewport, or some rows of it. `target`: null for
-  // the canvas.
+  // Sets the uniforms of the program, and draws the complete viewport or some of its rows. If
+  // `target` is null, draws to the canvas.
   draw(target, values, width, height, {row = 0, rows = height} = {}) {
     const {gl} = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
@@ -137,7 +137,7 @@ const kTexelBytes = {
   R8: 1
 };
 
-// A framebuffer with textures of these formats, such as "RGBA32UI".
+// A framebuffer with one texture for each of these formats, such as "RGBA32UI".
 export class Target {
   constructor(gl, width, height, formats) {
     this.gl = gl;
@@ -167,8 +167,8 @@ export class Target {
   }
 }
 
-// Resolves to true when the GPU has finished all commands; to false if `isOver()` becomes true
-// before that.
+// Resolves to true when the GPU has finished all commands. Resolves to false if `isOver()` becomes
+// true first.
 export async function gpuDone(gl, isOver) {
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();
@@ -182,7 +182,7 @@ export function pause() {
   return new Promise((resolve) => setTimeout(resolve, 4));
 }
 
-// Reads the pixels in the lower left corner of an integer target without waiting for the GPU.
+// Reads the pixels in the lower left corner of an integer target. Does not wait for the GPU.
 export class AsyncReading {
   constructor(gl, target, width, height) {
     this.gl = gl;

@@ -1,4 +1,4 @@
-// Programs and targets of a picture, and the order in which its passes run.
+// The programs and targets for a picture, and the order in which the passes run.
 
 import {kColorFeedback} from "./color_shader.js";
 import {AsyncReading, gpuDone, pause, Program, Target} from "./gl_objects.js";
@@ -25,7 +25,8 @@ const kSkyFormats = ["RGBA8"], kFeedbackFormats = ["RGBA32UI"];
 const kColorTexels =
     1 << 17;  // approximate texels of the color feedback; every visible page needs one
 
-// Returns the block of pixels for a feedback texel, and the pixel in it that is sampled.
+// Returns the uniforms for a feedback: the edge of the block of pixels per texel, and the pixel of
+// the block that is sampled.
 function blocksOf(edge, seed) {
   return {u_block: edge, u_sample: [seed % edge, Math.floor(seed / edge) % edge]};
 }
@@ -42,7 +43,7 @@ export class Passes {
     this.combine = new Program(gl, "combine", kCombine);
     this.present = new Program(gl, "present", kPresent);
     this.feedback = new Program(gl, "feedback", kFeedback);
-    this.trace = null;  // trace and colorFeedback depend on the file
+    this.trace = null;  // trace and colorFeedback depend on the file, so compile() creates them
     this.colorFeedback = null;
     this.pick = null;
     this.sun = null;
@@ -50,8 +51,9 @@ export class Passes {
     this.disposed = false;
     this.targets = null;
     this.vertexArray = gl.createVertexArray();
-    // Compiles the programs that do not depend on the file. If the browser cannot report the end of
-    // a compilation, all programs are linked before the first result is queried.
+    // Starts the compilation of the programs that do not depend on the file. If the browser cannot
+    // report the end of a compilation, this is left to compile(), so that all programs are linked
+    // before the first result is queried.
     this.begun = this.parallel ? this.begin() : null;
     this.begun?.catch(() => {});  // compile() reports it
     this.compiled = null;         // promise of compile()
@@ -72,8 +74,8 @@ export class Passes {
   }
 
   // Resolves when all programs for a file are compiled. The page remains responsive if the browser
-  // compiles in the background. Throws WebGLUnavailable if a program fails. Does nothing if the
-  // context is lost.
+  // compiles in the background. Throws WebGLUnavailable if a program has an error. Does nothing if
+  // the context is lost.
   compile(colored) {
     return this.compiled ??= this.compileAll(colored);
   }
@@ -105,8 +107,8 @@ export class Passes {
     return this.floats ? "RGBA16F" : "RGBA8";
   }
 
-  // Compiles the programs that the first picture does not need. Resolves to true if they can be
-  // used.
+  // Compiles the programs that the first picture does not need (pick and sun). Resolves to true if
+  // they can be used.
   compileLater() {
     if (!this.later) {
       this.pick = new Program(this.gl, "pick", kPick);
@@ -124,17 +126,18 @@ export class Passes {
     return true;
   }
 
-  // Provides targets for a picture of this size: the `full` size {width, height}, or a smaller one
-  // while the camera moves. From the second size on the targets have the full size, so nothing is
-  // allocated when the camera starts or stops. `colored`: the file has colors.
+  // Provides targets for a picture of width x height pixels. This is the size `full` {width,
+  // height} of the canvas, or a smaller size while the camera moves. If a larger size is needed
+  // later, the targets get the full size, so that nothing is allocated when the camera starts or
+  // stops. `colored` is true if the file has colors.
   resize(width, height, full, colored) {
     const {targets} = this,
           isForCanvas = targets?.full.width === full.width && targets.full.height === full.height;
     if (!isForCanvas) this.allocate(width, height, full, colored);
     else if (width > targets.hits.width || height > targets.hits.height)
       this.allocate(full.width, full.height, full, colored);
-    // A small picture reports as many missing tiles as a large one: its feedback texels cover fewer
-    // pixels.
+    // A smaller picture should report as many missing tiles as a full one. So each of its feedback
+    // texels covers fewer pixels.
     const share = Math.max(width / full.width, height / full.height);
     Object.assign(this.targets, {
       width,
@@ -187,9 +190,10 @@ export class Passes {
         (target) => target !== null);
   }
 
-  // Draws one sample per pixel, accumulated as number `values.u_frame` (from 0). Yields between
-  // parts of at most `partPixels()` pixels. Returns the reading of the feedback. Its `colors` is
-  // the reading of the color feedback, ready at the same time, or null if no colors are shown.
+  // Draws one sample per pixel and accumulates it with the earlier samples; `values.u_frame` is its
+  // number (from 0). Yields between parts of at most `partPixels()` pixels. Returns the reading of
+  // the feedback. The member `colors` of the reading is the reading of the color feedback, which is
+  // ready at the same time; it is null if no colors are shown.
   * draw(values, partPixels) {
     const {targets} = this, {width, height, hits, light, sky, colors} = targets;
     const all = this.passValues(values);
@@ -240,7 +244,7 @@ export class Passes {
     return Object.assign(this.read(this.feedback, feedback, feedbackBlock, values), {colors});
   }
 
-  // Draws a feedback with one texel per block of pixels, and starts to read it.
+  // Draws a feedback with one texel per block of pixels, and starts to read its texels.
   read(program, target, block, values) {
     const size = [this.targets.width, this.targets.height].map((edge) => Math.ceil(edge / block));
     program.draw(target, {...values, ...blocksOf(block, values.u_seed)}, ...size);
@@ -260,7 +264,8 @@ export class Passes {
         width, height);
   }
 
-  // Returns the hits of a picture of any size, as words of pack_hit(), rows from the bottom.
+  // Returns the hits of a picture, which may have any size. They are words of pack_hit(), in rows
+  // from the bottom.
   capture(values, width, height) {
     const {gl} = this, target = new Target(gl, width, height, ["RGBA32UI"]);
     this.trace.draw(target, {...values, u_color_levels: -1}, width, height);
@@ -270,8 +275,9 @@ export class Passes {
     return words;
   }
 
-  // Resolves to the hit of one ray: 4 words of pack_hit(), low corner of the cell, slot of its
-  // tile; or to null if the context is lost. Does not block on the GPU. Call compileLater() first.
+  // Resolves to the hit of one ray: 4 words of pack_hit(), the low corner of the cell, and the slot
+  // of the cell's tile. Resolves to null if the context is lost. Does not block on the GPU. Call
+  // compileLater() first.
   async pickOne(values) {
     const {gl} = this, target = new Target(gl, 2, 1, ["RGBA32UI"]);
     this.pick.draw(target, values, 2, 1);
@@ -284,9 +290,9 @@ export class Passes {
     return reading.take();
   }
 
-  // Returns {place, wanted}. `place` is one of the 48 positions of the sun: the one whose lit share
-  // of the last picture is nearest to `share`. `wanted` maps the leaf addresses of tiles that would
-  // improve the choice to 1. Call compileLater() first.
+  // Returns {place, wanted}. `place` is the best of the 48 positions of the sun: the share of the
+  // last picture's surface that it lights is nearest to `share`. `wanted` maps the leaf address of
+  // each tile that would improve the choice to 1. Call compileLater() first.
   chooseSun(values, share) {
     const {gl, targets} = this, wanted = new Map();
     const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]),

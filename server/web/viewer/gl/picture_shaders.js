@@ -1,6 +1,6 @@
-// GLSL of the passes of a picture: trace (G-buffer), light (normals and sun), occlusion (sky),
-// combine (filter, accumulate), present (tones), feedback (missing and used tiles). Lighting as in
-// query/render.
+// GLSL source of the passes of a picture: trace (G-buffer), light (normals and sun), occlusion
+// (sky), combine (filter and accumulate), present (tones), and feedback (missing and used tiles).
+// The lighting is the same as in query/render.
 
 import {kColorSource, kColorState} from "./color_shader.js";
 import {kCameraSource, kPrecision, kRaySource} from "./ray_shader.js";
@@ -96,7 +96,7 @@ vec3 unpack_normal(uint packed_normal) {
 }
 `;
 
-// Shared by the passes of light: rays that begin at the surface of a pixel.
+// Source that the passes of light share, for rays that begin at the surface of a pixel.
 const kSurface = `
 uniform usampler2D u_hits;
 uniform ivec2 u_size;        // of the picture, a corner of the targets
@@ -171,7 +171,7 @@ bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out
 }
 `;
 
-// Computes the normal of each pixel, and if it sees the sun.
+// Computes the normal of the surface at each pixel, and whether the surface sees the sun.
 export const kLight = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform vec3 u_sun;          // unit vector toward the sun
 uniform bool u_shadows;
@@ -305,8 +305,9 @@ void main() {
   o_sky = vec4(sky / 1.1, 1.0);
 }`;
 
-// For each of 48 places of the sun (columns) and each of 40 x 24 probed pixels (rows): 0 without a
-// surface, 1 in shadow, 2 lit; and the cut-off node whose missing tile makes the result uncertain.
+// Writes one texel for each of 48 places of the sun (columns) and each of 40 x 24 probed pixels
+// (rows). Its first word is 0 if the pixel has no surface, 1 if the surface is in shadow, and 2 if
+// it is lit. Its second word is the cut-off node whose missing tile makes the result uncertain.
 export const kSunPlaces = 48, kSunRows = 960;
 export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
@@ -341,8 +342,8 @@ vec3 reflected(vec3 albedo, vec3 normal, vec3 sky, float sun) {
 }
 `;
 
-// The sky's light is averaged over 4 x 4 samples on the same plane. On the floor it is averaged
-// over samples of the floor.
+// Source that averages the light of the sky over 4 x 4 samples on the same plane. On the floor, the
+// samples of the floor are averaged.
 const kSkyFilter = `
 uniform usampler2D u_hits, u_normals;
 uniform sampler2D u_light, u_sky;
@@ -378,8 +379,8 @@ vec3 sky_around(ivec2 pixel, uvec4 g, vec3 normal) {
 }
 `;
 
-// The result is multiplied by its coverage, which haze reduces. A shadow on the floor is black that
-// partly covers the background.
+// Combines light and color. The result is multiplied by its coverage of the background, which haze
+// reduces. A shadow on the floor is black with a coverage below 1.
 export const kCombine = `${kVersion}${kCameraSource}${kSky}${kColorState}${kSkyFilter}
 uniform usampler2D u_colors;
 uniform bool u_colored;      // u_colors has colors
@@ -450,9 +451,10 @@ void main() {
   o_color = vec4(srgb(mix(background, lit, color.a)) + (float(order) / 16.0 - 0.47) / 255.0, 1.0);
 }`;
 
-// One texel per block of u_block x u_block pixels: the cut-off node of the largest cell whose tile
-// is missing; the width of that cell in pixels and the brightness of a sample; a used tile and the
-// steps of the sample; the sample's t. The sampled pixel of the block changes with each frame.
+// Writes one texel per block of u_block x u_block pixels. Its words are: the cut-off node of the
+// largest cell whose tile is missing; this cell's width in pixels, and the brightness of a sample;
+// a used tile, and the number of steps of the sample; and the t of the sample. The pixel of the
+// block that is sampled changes with each frame.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;

@@ -1,9 +1,9 @@
 // The uniforms of all rays of a picture.
 
-const kConeShare = 0.75;  // of a pixel: cells of this width are hit as one cell
+const kConeShare = 0.75;  // share of a pixel: cells up to this width are hit as one cell
 
-// Returns the uniforms of a Renderer with loaded tiles, for a picture of width x height pixels with
-// the level of detail of lodHeight rows.
+// Returns the uniforms for a picture of width x height pixels, drawn by `renderer` with its loaded
+// tiles. The level of detail is that of a picture with lodHeight rows.
 export function pictureValues(renderer, width, height, lodHeight) {
   const {info, options, view, light, stream: {store, colors, rootPointer}} = renderer,
                                                              levels = info.levels,

@@ -1,11 +1,11 @@
-// GLSL: the words of the pool, and the descent of one ray through the DAG, as in
+// GLSL source: reads the words of the pool, and descends through the DAG along one ray, like
 // query/rays/ray_walk.h.
 //
 // The ray is mirrored so that its direction is positive on every axis. Voxel coordinates are
-// integers. A ray begins at an integer voxel plus a fraction, and the parameter of a plane is
-// computed from the difference of two integers by one formula, time_of: exact to the last step for
-// any grid up to 2^20, wherever the camera is. Cells on both sides of a plane agree to the last
-// bit, so there are no cracks.
+// integers, and a ray begins at an integer voxel plus a fraction. The ray's parameter at a plane is
+// always computed by the same formula, time_of, from the difference of two integers. So it is exact
+// to the last step for any grid up to 2^20, wherever the camera is. The cells on both sides of a
+// plane agree to the last bit, so there are no cracks.
 
 export const kPrecision = `
 precision highp float;
@@ -227,7 +227,7 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
 }
 `;
 
-// The ray of a pixel, as query/render/camera.h; and the layout of a G-buffer's pixel.
+// Source that computes the ray of a pixel, as in query/render/camera.h, and reads the G-buffer.
 export const kCameraSource = `
 uniform ivec3 u_eye_cell;
 uniform vec3 u_eye_part, u_forward, u_right, u_up;

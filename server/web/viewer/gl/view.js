@@ -1,9 +1,9 @@
-// The camera of the shaders, as in query/render/camera.h. The eye is an integer voxel plus a
-// fraction, so that float32 suffices for all relative positions.
+// The camera in the form that the shaders need, as in query/render/camera.h. The eye is an integer
+// voxel plus a fraction, so float32 is sufficient for all positions relative to the eye.
 
 import {length, pictureAxes, pictureDirection, subtract} from "../vector.js";
 
-const kFar = 2 ** 30;  // voxels; a farther eye is moved to this distance
+const kFar = 2 ** 30;  // in voxels; an eye farther away is moved to this distance
 
 export class View {
   // In voxels; the vertical field of view in degrees.
@@ -20,7 +20,7 @@ export class View {
     this.tangent = Math.tan(fovDegrees * Math.PI / 360);
   }
 
-  // Width of a pixel at distance 1 of a picture of this height.
+  // Returns the width of a pixel at distance 1, for a picture of this height.
   pixel(height) {
     return 2 * this.tangent / height;
   }
@@ -38,7 +38,8 @@ export class View {
     };
   }
 
-  // Unit vector through a point in pixels from the upper left corner.
+  // Returns the unit vector through a point of the picture, given in pixels from the upper left
+  // corner.
   direction(x, y, width, height) {
     const pixel = this.pixel(height);
     return pictureDirection(this, (x - width / 2) * pixel, (height / 2 - y) * pixel);

@@ -1,7 +1,7 @@
-// Draws the samples of a picture and counts them. A sample is drawn in parts: a GPU that gets too
-// much work in one piece stops the whole system, and some drivers end a context that is busy for
-// seconds. At most one sample is being drawn; at most one drawn sample waits for the reading of its
-// feedback.
+// Draws the samples of a picture and counts them. A sample is drawn in parts, because a GPU that
+// gets too much work in one piece stops the complete system, and some drivers end a context that is
+// busy for seconds. At most one sample is being drawn. At most one drawn sample waits until its
+// feedback can be read.
 
 import {mark} from "./statistics.js";
 
@@ -12,14 +12,14 @@ export class FrameAccumulator {
     this.pace = pace;
     this.show = show;
     this.seed = 0;
-    this.samples = 0;       // per pixel, of the current picture
+    this.samples = 0;       // number of samples per pixel in the current picture
     this.hasDrawn = false;  // true once anything was drawn in the current context
     this.drawing = null;    // the sample being drawn
     this.reading = null;    // the drawn sample whose feedback has not been read
   }
 
-  // Starts a new picture. A full-size sample of a still picture is abandoned, because a smaller one
-  // finds the missing tiles sooner.
+  // Starts a new picture. If a full-size sample of a still picture is being drawn, it is abandoned,
+  // because a smaller sample finds the missing tiles sooner.
   restart() {
     this.samples = 0;
     if (this.reading) this.reading.isOutdated = true;
@@ -36,20 +36,21 @@ export class FrameAccumulator {
     this.drawing = this.reading = null;
   }
 
-  // Starts a sample of {width, height, isFull, isMoving, epoch, poolTextures}.
+  // Starts to draw a sample. `sample` is {width, height, isFull, isMoving, epoch, poolTextures}.
   begin(values, sample, nowMs) {
     const parts = this.context.passes.draw(values, () => this.pace.partPixels);
     this.drawing = {...sample, parts, fence: null, partMs: nowMs, busyMs: 0, isOutdated: false};
     this.drawPart(nowMs);
   }
 
-  // Draws the next part if the GPU has finished the last one. Returns true if the sample is
-  // complete.
+  // Draws the next part of the sample if the GPU has finished the previous part. Returns true if
+  // the sample is complete.
   continue(nowMs, poolTextures) {
     const {drawing, context: {gl}} = this;
     if (gl.getSyncParameter(drawing.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
     gl.deleteSync(drawing.fence);
-    // A pool has grown: the remaining parts would read its old texture.
+    // A pool has grown, so its texture was replaced. The remaining parts would read the old
+    // texture.
     if (drawing.poolTextures.some((texture, i) => texture !== poolTextures[i])) {
       this.drawing = null;
       return true;
@@ -80,7 +81,7 @@ export class FrameAccumulator {
     this.hasDrawn = true;
   }
 
-  // Returns the sample whose feedback can be read now, or null.
+  // Returns the drawn sample if its feedback can be read now; otherwise null.
   takeReading() {
     if (!this.reading?.pass.ready) return null;
     const {reading} = this;

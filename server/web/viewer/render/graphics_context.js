@@ -1,14 +1,15 @@
 // The WebGL context of a canvas and its shader programs. A browser can take the context away at any
-// time and restore it later. A restored context is empty: programs, tiles and targets are made
-// again.
+// time and restore it later. A restored context is empty, so programs, tiles and targets are
+// created again.
 
 import {createContext, WebGLUnavailable} from "../gl/gl_objects.js";
 import {Passes} from "../gl/passes.js";
 
-const kDefaultMaxSize = 4096;  // of a texture, until a context reports its own limit
+const kDefaultMaxSize = 4096;  // edge of a texture, until a context has reported its own limit
 
 export class GraphicsContext {
-  // `early`: the context that early.js created for this canvas, or null. Throws WebGLUnavailable.
+  // `early`: the context that early.js has created for this canvas, or null if there is none.
+  // Throws WebGLUnavailable.
   constructor(canvas, early, {onLost, onRestored}) {
     this.canvas = canvas;
     this.gl = early?.gl ?? createContext(canvas);
@@ -42,16 +43,17 @@ export class GraphicsContext {
   createPasses(passes = null, beginMs = performance.now()) {
     this.maxSize = this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE) || kDefaultMaxSize;
     this.compileBeginMs = passes ? beginMs : performance.now();
-    if (this.passes) this.passes.disposed = true;  // its objects were lost with the old context
+    if (this.passes) this.passes.disposed = true;  // their objects were lost with the old context
     this.passes = passes ?? new Passes(this.gl);
   }
 
-  // True while these passes can draw: the context was neither lost nor replaced since.
+  // True if `passes` can draw: their context was neither lost nor replaced.
   owns(passes) {
     return !this.isDisposed && !this.isLost && passes === this.passes && !this.gl.isContextLost();
   }
 
-  // Resolves to true when the programs for the file can be used, to false if the context was lost.
+  // Resolves to true when the programs for the file can be used. Resolves to false if the context
+  // was lost.
   async compile(isColored) {
     const {passes} = this;
     await passes.compile(isColored);

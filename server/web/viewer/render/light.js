@@ -1,5 +1,6 @@
-// The light of a picture: position of the sun, exposure, reach of occluders, and position of the
-// floor, in voxels. Exposure and reach follow the visible surfaces.
+// The light of a picture: the position of the sun, the exposure, the distance within which surfaces
+// hide the sky, and the position of the floor. Distances are in voxels. Exposure and distance
+// follow the visible surfaces.
 
 import {length, scale, subtract} from "../vector.js";
 
@@ -17,13 +18,14 @@ export class Light {
     this.setSun(0);
   }
 
-  // True if a camera at `eye` sees the floor below the scene, and its shadow.
+  // True if a camera at `eye` sees the floor below the scene, with the scene's shadow.
   seesFloor(eye) {
     return eye[1] > this.low[1] && eye.some((x, i) => x < this.low[i] || x > this.high[i]);
   }
 
-  // Returns the uniforms of the floor for a camera at `eye`: its distance below, or 0; the distance
-  // over which its shadow fades; and the center of the shadow.
+  // Returns the uniforms of the floor for a camera at `eye`: the distance of the floor below the
+  // eye (0 if it is not seen), the distance over which the shadow fades, and the center of the
+  // shadow.
   floor(eye) {
     const center = this.low.map((x, i) => (x + this.high[i]) / 2);
     return {
@@ -35,12 +37,12 @@ export class Light {
     return length(subtract(this.high, this.low));
   }
 
-  // The next reading sets exposure and reach directly instead of approaching them.
+  // After this call, the next reading sets exposure and reach directly instead of approaching them.
   forgetReadings() {
     this.readings = 0;
   }
 
-  // Places the sun over the left shoulder of the first camera, which looks `forward`.
+  // Places the sun behind the left shoulder of the first camera, which looks along `forward`.
   placeSun(eye, forward) {
     const back = scale(forward, -1);
     this.outside = this.seesFloor(eye);
@@ -56,8 +58,8 @@ export class Light {
         [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
   }
 
-  // Adapts exposure and reach to a reading: slowly while the camera moves, quickly when it is
-  // still.
+  // Moves exposure and reach toward the values of a reading: slowly while the camera moves, quickly
+  // when it is still.
   adjust(read, eye, moving) {
     const share = moving ? 0.15 : 0.5;
     const toward = (from, to, known) => known ? from * (to / from) ** share : to;
@@ -65,7 +67,8 @@ export class Light {
         this.skyReach, Math.max(1, (this.seesFloor(eye) ? 0.35 : 1) * read.medianT),
         this.readings > 0);
     this.hazeStart = toward(this.hazeStart, Math.max(1, read.nearestT), this.readings > 0);
-    // The first reading measures its exposure before the reach is known.
+    // The second reading also sets the exposure directly: the first one measured it before the
+    // reach was known.
     this.exposure = toward(this.exposure, read.exposure, this.readings > 1);
     this.readings++;
   }

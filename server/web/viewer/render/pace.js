@@ -1,11 +1,11 @@
-// Measures the speed of the GPU, and chooses the pixels per part and the resolution while the
-// camera moves.
+// Measures the speed of the GPU. From this it chooses the number of pixels per part of a sample,
+// and the resolution while the camera moves.
 
-const kTargetMs = 40;  // of a frame while the camera moves
+const kTargetMs = 40;  // time of a frame while the camera moves
 const kPartMs = 120;   // per part of a sample
 const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // of the internal resolution
-const kFewTiles = 64,
-      kCoarsePixels = 16;  // missing tiles, and width of the widest missing cell
+// Limits for lacksFew: missing tiles, and width in pixels of the widest missing cell.
+const kFewTiles = 64, kCoarsePixels = 16;
 const kMinPart = 1 << 12,
       kFirstPart = 1 << 17;  // pixels per part, until the speed is known
 
@@ -22,9 +22,9 @@ export class Pace {
   get scale() {
     return kScales[this.scaleIndex];
   }
-  // The scale while tiles arrive. Small pictures quickly find most of the tiles that a view needs.
-  // Their few rays find the last tiles only by chance, so if few are missing, a full-size picture
-  // searches.
+  // The scale while tiles arrive. A small picture quickly finds most of the tiles that a view
+  // needs, but its few rays find the last tiles only by chance. So if only few tiles are missing, a
+  // full-size picture searches for them.
   get seekingScale() {
     return this.lacksFew ? 1 : this.scale;
   }
@@ -42,12 +42,14 @@ export class Pace {
     if (interval > 4) this.intervalMs = Math.min(interval, 1.05 * this.intervalMs, kTargetMs);
   }
 
-  // The GPU may have finished at any time since the previous frame.
+  // Estimates the time on the GPU from an observed time: the GPU may have finished at any time
+  // since the previous frame.
   gpuMs(seenMs) {
     return Math.max(1, seenMs - this.intervalMs / 2);
   }
 
-  // Takes the observed time of one of several parts. Returns the estimated time on the GPU.
+  // Takes the observed time of a part that is not the last one. Returns the estimated time on the
+  // GPU.
   partDone(seenMs) {
     const partMs = this.gpuMs(seenMs);
     this.partPixels =
@@ -55,8 +57,8 @@ export class Pace {
     return partMs;
   }
 
-  // Takes the observed time of the last or only part of a picture; the other parts took `busyMs`.
-  // If the frame `counts`, chooses the internal resolution by its time.
+  // Takes the observed time of the last or only part of a picture. `busyMs` is the time of the
+  // other parts. If the frame `counts`, chooses the internal resolution from the total time.
   frameDone(seenMs, busyMs, pixels, counts) {
     const frameMs = busyMs + this.gpuMs(seenMs);
     if (busyMs === 0)

@@ -2,7 +2,7 @@
 
 import {add, scale} from "../vector.js";
 
-// Resolves to the voxel that `renderer` shows at a point in CSS pixels, or to null for the sky.
+// Resolves to the voxel that `renderer` shows at a point, given in CSS pixels; to null for the sky.
 export async function pickVoxel(renderer, cssX, cssY) {
   const {passes} = renderer.context;
   if (!renderer.canPick || !await passes.compileLater()) return null;
@@ -14,7 +14,8 @@ export async function pickVoxel(renderer, cssX, cssY) {
   values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
   const words = await passes.pickOne(values);
   if (!words || !renderer.isReady || (words[1] >>> 23 & 1) === 0) return null;
-  // The hit refers to tiles by slot, and one of them may have been evicted since.
+  // The hit refers to tiles by their slots. If a tile was evicted after the pick began, a slot may
+  // now refer to another tile, so the pick is repeated.
   if (store.evicted !== evicted) return pickVoxel(renderer, cssX, cssY);
   return hitOf(words, view.eye, view.direction(x, y, width, height), store, renderer.info);
 }

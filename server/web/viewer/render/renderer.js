@@ -1,9 +1,11 @@
-// Draws a file of any size within a budget of GPU memory: casts rays through the loaded tiles, and
+// Draws a file of any size within a budget of GPU memory. Casts rays through the loaded tiles, and
 // requests the tiles that the rays miss (docs/view.md).
 //
-// Each part has one life cycle and its own class. The GraphicsContext lives until the renderer is
-// disposed, a TileStream as long as the context keeps its memory, the samples of a FrameAccumulator
-// until the picture starts again, and ViewProgress and SunSearch describe the current view.
+// Each part of the renderer has its own class and lifetime:
+//   - GraphicsContext: until the renderer is disposed
+//   - TileStream: until the context loses its memory
+//   - the samples of a FrameAccumulator: until the picture starts again
+//   - ViewProgress and SunSearch: while the view remains the same
 
 import {readFeedback, readHits} from "../gl/feedback.js";
 import {WebGLUnavailable} from "../gl/gl_objects.js";
@@ -23,15 +25,15 @@ import {ViewProgress} from "./view_progress.js";
 export {WebGLUnavailable};
 
 const kBudgetBytes = 256 << 20, kPhoneBudgetBytes = 64 << 20;
-// Pixels of the canvas. The render targets are not part of the budget.
+// Maximum number of canvas pixels. The budget does not include the render targets for these pixels.
 const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;
-const kMovingMs = 180;           // after the last change of the view
-const kSamples = 16;             // per pixel of a still picture
-const kFirstPicturePixels = 16;  // the first picture has no missing cells as wide as this
+const kMovingMs = 180;           // duration of "moving" after the last change of the view
+const kSamples = 16;             // number of samples per pixel of a still picture
+const kFirstPicturePixels = 16;  // in the first picture all missing cells are narrower
 
 export class Renderer {
-  // `begun`: the context that early.js created for this canvas, or null. onChange() is called when
-  // frame() has more to draw. Throws WebGLUnavailable.
+  // `begun`: the context that early.js has created for this canvas, or null. onChange() is called
+  // when there is something new for frame() to draw. Throws WebGLUnavailable.
   constructor(canvas, source, {budgetBytes, onChange, begun = null} = {}) {
     this.canvas = canvas;
     this.source = source;
@@ -67,8 +69,8 @@ export class Renderer {
     this.frames = new FrameAccumulator(this.context, this.pace, () => this.show());
   }
 
-  // Resolves when the first picture can be drawn. The manifest of the source must be loaded. If the
-  // view is set before, the tiles of the view are requested immediately.
+  // Resolves when the first picture can be drawn. The manifest of the source must be loaded before
+  // the call. If the view is set before the call, the tiles of the view are requested immediately.
   async start() {
     this.info = this.source.info;
     this.light = new Light(this.info);
@@ -81,8 +83,8 @@ export class Renderer {
     });
   }
 
-  // Shows another root of the same DAG, which has grown; loaded tiles remain. Resolves to true if
-  // the root is shown.
+  // Shows another root of the same DAG, after the DAG has grown. Loaded tiles remain. Resolves to
+  // true if the new root is shown.
   async showRoot(info) {
     const {stream} = this;
     if (!this.isReady || !this.info.root || info.levels <= 2) return false;
@@ -125,8 +127,8 @@ export class Renderer {
     this.beginEpoch();
   }
 
-  // Draws a frame if there is something new to draw and the GPU has finished the last one. Returns
-  // whether the camera moves, and whether the picture is complete.
+  // Draws a frame if there is something new to draw and the GPU has finished the previous frame.
+  // Returns {moving, complete}: whether the camera moves, and whether the picture is complete.
   frame() {
     const now = performance.now(), moving = now - this.viewMs < kMovingMs;
     if (!this.isReady || !this.view) return {moving, complete: true};
@@ -141,7 +143,8 @@ export class Renderer {
     return {moving, complete: false};
   }
 
-  // Continues the current sample and takes its reading. Returns true if both are done.
+  // Continues the sample that is being drawn, and takes the reading of its feedback. Returns true
+  // if both are done.
   takesNewFrame(now) {
     const {frames, stream} = this;
     if (!frames.hasDrawn && stream.awaitsFirstTiles) return false;
@@ -152,7 +155,7 @@ export class Renderer {
     return sample !== null;
   }
 
-  // True if further samples would not change the picture, until a tile arrives.
+  // True if further samples would not change the picture before a tile arrives.
   isPictureFinal(now) {
     if (this.frames.samples < kSamples) return false;
     const {progress} = this;
@@ -160,8 +163,9 @@ export class Renderer {
         (progress.isFullSize && this.stream.isPaused(now));
   }
 
-  // Resolves when all tiles for the pixels of the canvas have arrived and the sun is placed. Inside
-  // a scene that needs the tiles for the sun, so it does not resolve while the service is away.
+  // Resolves when all tiles for the canvas pixels have arrived and the sun is placed. Inside a
+  // scene, placing the sun needs further tiles, so this does not resolve while the service does not
+  // answer.
   complete() {
     if (this.isReady && this.isComplete && this.progress.isFullSize && this.isSunPlaced &&
         !this.frames.reading)
@@ -172,12 +176,13 @@ export class Renderer {
     });
   }
 
-  // Resolves to the voxel at a point of the canvas, to null for the sky.
+  // Resolves to the voxel at a point of the canvas; to null for the sky.
   pick(cssX, cssY) {
     return pickVoxel(this, cssX, cssY);
   }
 
-  // The hits of a picture of any size with the loaded tiles, rows from the top.
+  // Resolves to the hits of a picture of any size, drawn with the loaded tiles. Rows are from the
+  // top.
   async capture({width, height}) {
     const words = this.canPick ?
         this.context.passes.capture(this.uniforms(width, height), width, height) :
@@ -189,7 +194,7 @@ export class Renderer {
     return this.measured.report(this);
   }
 
-  // null, or {code, message}: why a part of the picture does not arrive.
+  // The reason why a part of the picture does not arrive, {code, message}; null if there is none.
   get problem() {
     return this.stream?.problem ?? null;
   }
@@ -217,12 +222,13 @@ export class Renderer {
     this.started?.resolve();
   }
 
-  // Loads the file into the current context, for the first time or after a loss.
+  // Loads the file into the current context, for the first time or after the previous context was
+  // lost.
   async load() {
     const {context, info} = this, {passes} = context;
     try {
       const root = this.loadRoot();
-      root.catch(() => {});  // reported below, unless the programs fail
+      root.catch(() => {});  // the error is reported below, unless the programs fail first
       if (!await context.compile(Boolean(info.colors))) return;
       mark("compiled");
       await root;
@@ -274,8 +280,8 @@ export class Renderer {
     this.onChange();
   }
 
-  // The internal resolution: lower while the camera moves and while tiles arrive, if frames take
-  // long.
+  // Returns the internal resolution. If frames take long, it is lower while the camera moves and
+  // while tiles arrive.
   internalSize(moving) {
     const scale = this.resolutionScale(moving);
     const scaled = (pixels) => Math.max(1, Math.round(pixels * scale));
@@ -293,7 +299,8 @@ export class Renderer {
     const {width, height, isFull} = this.internalSize(isMoving);
     if (!passes.hasTargets(width, height, size)) frames.samples = 0;
     passes.resize(width, height, size, stream.colors !== null);
-    // Cells are as fine as the still picture needs, unless the camera moves.
+    // A smaller picture of a still view uses cells as fine as the full-size picture, so that it
+    // requests the same tiles.
     const values = this.uniforms(width, height, isMoving ? height : size.height);
     frames.seed++;
     Object.assign(values, {
@@ -320,7 +327,7 @@ export class Renderer {
     read.coarsePixels *= this.size.height / height;  // pixels of the canvas
     this.measured.noteFrame(read, width * height);
     pace.frameDone(now - sample.partMs, sample.busyMs, width * height, isMoving || !isFull);
-    // The light is constant while samples of a still picture are accumulated.
+    // The light does not change while samples of a still picture are accumulated.
     if (read.exposure !== null && this.frames.samples <= kSamples / 4)
       this.light.adjust(read, this.view.eye, isMoving);
     progress.coarsePixels = read.coarsePixels;
@@ -333,8 +340,8 @@ export class Renderer {
     this.judgeProgress(sample, now);
   }
 
-  // An outdated sample cannot show that the view is complete: tiles that arrived since it began may
-  // refer to more that are missing.
+  // An outdated sample cannot show that the view is complete: tiles arrived after it began, and may
+  // refer to further tiles that are missing.
   judgeProgress({isMoving, isFull, isOutdated}, now) {
     const {progress} = this, {isQuiet} = this.stream;
     progress.takeReading(!isMoving && isQuiet && !isOutdated, isFull);

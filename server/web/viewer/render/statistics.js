@@ -1,6 +1,6 @@
 // Measurements of a renderer, for the panel and for benchmarks.
 
-export const kBlockBytes = 256;  // of the pools: the minimum for a tile or the colors of a page
+export const kBlockBytes = 256;  // block size of the pools: the least for a tile or a color page
 
 export class Statistics {
   constructor(beginMs) {
@@ -65,7 +65,7 @@ function streamReport(stream) {
   };
 }
 
-// Records a named time, which the browser's developer tools show.
+// Records the current time under a name; the browser's developer tools show it.
 export function mark(name) {
   performance.mark(`voxdag: ${name}`);
 }

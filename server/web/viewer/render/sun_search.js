@@ -1,9 +1,10 @@
 // Moves the sun so that it lights a good share of a view inside a scene. Runs once, after the first
-// complete view. The shadow test of a candidate place may miss tiles: they are requested, and the
-// search is repeated until nothing is missing or it makes no progress.
+// complete view. A shadow test for a candidate position may need tiles that are missing. These
+// tiles are requested, and the search is repeated until no tile is missing or the search makes no
+// progress.
 
 const kLitShare = 0.35;    // of the visible surface
-const kMaxIdleTrials = 8;  // trials that find no fewer missing tiles than the best before
+const kMaxIdleTrials = 8;  // consecutive trials that do not reduce the number of missing tiles
 
 export class SunSearch {
   constructor(context, light) {
@@ -11,14 +12,14 @@ export class SunSearch {
     this.light = light;
     this.idleTrials = 0;
     this.fewestMissing = Infinity;
-    this.usablePasses = null;  // whose programs for the search are compiled
+    this.usablePasses = null;  // the passes for which the programs of the search are compiled
   }
 
   get isOver() {
     return this.light.outside || this.idleTrials >= kMaxIdleTrials;
   }
 
-  // One trial with the picture that was drawn last. Returns true if it moved the sun.
+  // Runs one trial with the picture that was drawn last. Returns true if it moved the sun.
   run(values, loader, nowMs) {
     const {passes} = this.context;
     if (this.usablePasses !== passes) {

@@ -1,6 +1,6 @@
-// The tiles and color pages of one file in one graphics context: loads the root and the tiles of
-// the first view, then the tiles that each reading of the feedback misses. A new context has a new
-// stream.
+// The tiles and color pages of one file in one graphics context. Loads the root, then the tiles of
+// the first view, and then the tiles that each reading of the feedback misses. A new context gets a
+// new stream.
 
 import {colorBudget, Colors} from "../colors/colors.js";
 import {FirstView} from "../tiles/first_view.js";
@@ -11,11 +11,12 @@ import {TileStore} from "../tiles/tile_store.js";
 import {kBlockBytes, mark} from "./statistics.js";
 
 const kMinPoolBytes = 4 << 20;  // of a small file
-const kMaxFirstWaitMs = 400;    // the first frame waits this long for the tiles of the first view
+const kMaxFirstWaitMs = 400;  // maximum time that the first frame waits for the first view's tiles
 
 export class TileStream {
-  // `options`: the renderer's; `color` decides whether color pages are loaded. onArrival(failed): a
-  // tile or page arrived, or, if `failed`, a request failed or the retry state changed.
+  // `options` are the renderer's options; `color` decides whether color pages are loaded.
+  // onArrival(failed) is called when a tile or page has arrived, or with `failed` set when a
+  // request has failed or the retry state has changed.
   constructor(gl, source, info, options, budgetBytes, onArrival) {
     this.info = info;
     this.options = options;
@@ -30,7 +31,8 @@ export class TileStream {
     this.loader = new TileLoader(source, this.store, onArrival);
   }
 
-  // Resolves to the words of the root tile; to undefined if the file has none or the stream ended.
+  // Resolves to the words of the root tile; to undefined if the file has no tiles or the stream has
+  // ended.
   async loadRoot() {
     const {root, levels, root_brick: brick} = this.info;
     if (root && levels > 2) {
@@ -55,7 +57,8 @@ export class TileStream {
     this.colors?.beginEpoch();
   }
 
-  // Finds the tiles of the first view without the feedback of a frame, from the words of the root.
+  // Finds the tiles of the first view, beginning with the words of the root. Does not need the
+  // feedback of a frame.
   seekFirstView(rootWords, view, size) {
     const {levels} = this.info, finestLevel = Math.min(levels, this.options.maxLevel ?? levels);
     this.loader.firstView = new FirstView(this.info, view, size, 2 ** (levels - finestLevel));
@@ -63,7 +66,7 @@ export class TileStream {
     this.continueFirstView();
   }
 
-  // Requests more tiles of the first view, if it is still being loaded.
+  // Requests more tiles of the first view, unless it is complete.
   continueFirstView() {
     const {firstView} = this.loader;
     if (!firstView) return;
@@ -77,15 +80,15 @@ export class TileStream {
     this.loader.firstView = null;
   }
 
-  // True while the first frame waits: with its tiles it is complete soon, without them it only
-  // costs time.
+  // True while the first frame should wait for the tiles of the first view. With them, it is soon
+  // complete. Without them, it would only cost time.
   get awaitsFirstTiles() {
     return performance.now() < this.waitUntilMs &&
         (this.loader.firstView !== null || this.rootPointer === undefined);
   }
 
-  // Requests the tiles and pages that a frame of `epoch` misses, and marks the used ones.
-  // `pageFeedback` is the reading of the colors' feedback, or null.
+  // Requests the tiles and pages that a frame of `epoch` misses, and marks those that it uses.
+  // `pageFeedback` is the reading of the color feedback; null if no colors are shown.
   takeReading(read, pageFeedback, epoch, nowMs) {
     const {loader, store, colors} = this;
     for (const slot of read.slots) store.mark(slot, epoch, nowMs);
@@ -100,7 +103,7 @@ export class TileStream {
     return [this.loader, ...(this.colors && this.options.color ? [this.colors.loader] : [])];
   }
 
-  // Tiles and pages that the last reading missed and that may still arrive.
+  // Number of tiles and pages that the last reading missed and that may still arrive.
   get missingCount() {
     return this.loaders.reduce((sum, each) => sum + each.unmet, 0);
   }
@@ -124,12 +127,12 @@ export class TileStream {
         this.loaders.every((each) => each.pauses(nowMs) || each.isIdle);
   }
 
-  // The textures of the pools. A pool that grows has a new one.
+  // The textures of the pools. When a pool grows, its texture is replaced.
   get poolTextures() {
     return [this.store.pool.texels, this.colors?.store.pool.texels];
   }
 
-  // null, or {code, message}: why a part of the picture does not arrive.
+  // The reason why a part of the picture does not arrive, {code, message}; null if there is none.
   get problem() {
     return this.loader.problem || (this.options.color && this.colors?.loader.problem) || null;
   }
@@ -138,7 +141,8 @@ export class TileStream {
     this.loader.fail(error);
   }
 
-  // Ends all requests. The memory on the GPU remains, or was lost with the context.
+  // Ends all requests. Does not free the memory on the GPU, which remains in use or was lost with
+  // the context.
   stop() {
     this.loader.dispose();
     this.colors?.loader.dispose();
@@ -151,8 +155,8 @@ export class TileStream {
   }
 }
 
-// A small file needs less than the budget: at worst each voxel has its own path of tiles. A growing
-// DAG has no voxel count yet.
+// Returns the size of the pool. A small file needs less than the budget: in the worst case each
+// voxel has its own path of tiles. The number of voxels is unknown for a DAG that is still growing.
 function poolBudget({voxels, levels, tile_levels: tileLevels}, budgetBytes) {
   const pathBlocks = Math.ceil(levels / tileLevels);
   return Math.min(

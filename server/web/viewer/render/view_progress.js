@@ -1,14 +1,14 @@
-// How complete the picture of the current view is, by the readings of its frames.
+// Tracks how complete the picture of the current view is, from the feedback readings of its frames.
 
-const kQuietReadings = 2;             // without a missing tile, until the view is complete
+const kQuietReadings = 2;             // readings without a missing tile that complete the view
 export const kMaxLateCellPixels = 3;  // missing cells up to this width do not restart a picture
 
 export class ViewProgress {
   constructor() {
     this.quietReadings = 0;
     this.coarsePixels = 0;    // width of the widest cell whose tile is missing
-    this.isFullSize = false;  // the last frame read had all pixels of the canvas
-    this.waiting = [];        // resolve functions of complete()
+    this.isFullSize = false;  // true if the last frame that was read had all pixels of the canvas
+    this.waiting = [];        // the resolve functions of the promises from complete()
   }
 
   restart() {
@@ -19,14 +19,14 @@ export class ViewProgress {
     return this.quietReadings >= kQuietReadings;
   }
 
-  // True if a tile that arrives changes the picture enough to start it again. Otherwise the
-  // remaining samples show it.
+  // True if an arriving tile changes the picture so much that the picture must start again.
+  // Otherwise the tile is only visible in the remaining samples.
   get needsRestartOnArrival() {
     return !this.isComplete || this.coarsePixels > kMaxLateCellPixels;
   }
 
   // Takes the reading of a frame of the current view. `isQuiet`: the frame was up to date, the
-  // camera is still, and no tile is in flight.
+  // camera is still, and no request for a tile is in progress.
   takeReading(isQuiet, isFullSize) {
     if (isQuiet) this.quietReadings++;
     else if (this.needsRestartOnArrival) this.quietReadings = 0;

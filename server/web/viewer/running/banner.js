@@ -31,7 +31,8 @@ export class Banner {
     this.element = h("div", {class: "banner"}, this.text, toggle, legend);
   }
 
-  // `job` is null while the service does not answer. The counts are the last known ones.
+  // `job` is null while the service does not answer. `built` and `total` are the last known
+  // numbers.
   show(job, {built = 0, total = 0}) {
     setText(this.text, job ? describe(job, built, total) : kNoAnswer);
     this.kinds.waiting.hidden = this.kinds.built.hidden = !this.wires.drawsAll;

@@ -1,4 +1,4 @@
-// The viewer of a running job: its partial result, drawn from the coarse bricks of the built
+// The viewer of a running job. It draws the partial result from the coarse bricks of the built
 // subvolumes, and the wireframe of all subvolumes. The partial result grows while it is viewed;
 // fetched tiles remain valid.
 
@@ -14,16 +14,18 @@ import {Banner} from "./banner.js";
 import {SubvolumeWires} from "./subvolume_wires.js";
 
 const kPauseMs = 1500, kMaxPauseMs = 15000;
-const kGone = [404, 409, 410];  // the partial result has a new digest, or the job a new state
-// The pause between two requests for the list of subvolumes is this multiple of the last request's
-// duration, and at least this time per subvolume. The list contains a change slightly later than
-// the progress report, so it is fetched twice; started subvolumes are only in the list.
+// Statuses that mean: the partial result has a new digest, or the job has a new state.
+const kGone = [404, 409, 410];
+// After a request for the list of subvolumes, the pause before the next request is this multiple of
+// the request's duration, and at least this time per subvolume. A change appears in the list
+// slightly later than in the progress report, so the list is fetched twice per change. Started
+// subvolumes appear only in the list.
 const kListShare = 10, kListPausePerCubeMs = 0.1;
 const kListLooks = 2, kMaxListPauseMs = 15000;
 
 // Shows the job until it has a result. Resolves to false if there was nothing to show, because the
 // subvolumes are not planned yet. Throws WebGLUnavailable, or Problem if the job was deleted. The
-// address keeps the camera for the next viewer. `showTools` fills the tools of the page.
+// next viewer takes its camera from the page's address. `showTools` fills the page's tools.
 export async function watchJob({job, place, budgetBytes, showPicture, showTools, signal}) {
   const path = `/api/v1/jobs/${job.id}`;
   const source = new TileSource({base: `${path}/partial`, headers: authorization()});
@@ -74,8 +76,8 @@ export async function watchJob({job, place, budgetBytes, showPicture, showTools,
   }
 }
 
-// Resolves to null before the plan, after the files of the job were deleted, and while the service
-// does not answer.
+// Resolves to the manifest; to null if the job is not planned yet, if its files were deleted, and
+// while the service does not answer.
 async function manifestOf(source) {
   try {
     return await source.manifest();
@@ -95,13 +97,13 @@ async function jobOf(path, signal) {
   }
 }
 
-// The list of subvolumes, fetched again whenever it may have changed.
+// The list of subvolumes. It is fetched again whenever it may have changed.
 class SubvolumeList {
   constructor(path) {
     this.path = path;
     this.list = null;
     this.key = null;
-    this.looks = 0;  // requests until the list is up to date
+    this.looks = 0;  // number of requests after which the list is up to date
     this.nextMs = -Infinity;
     this.latestMs = -Infinity;
   }
@@ -126,9 +128,9 @@ class SubvolumeList {
   }
 }
 
-// Updates the picture until the job has a result, is retried, or its partial result is a different
-// DAG, as after a restart of the service. Resolves to true if the caller has to pause before it
-// follows the job again, because the cause may recur.
+// Updates the picture until the job has a result, is retried, or has a different DAG as its partial
+// result, for example after a restart of the service. Resolves to true if the caller must pause
+// before it follows the job again, because the reason for ending may recur.
 async function follow({path, source, renderer, banner, wires, signal}) {
   const {digest} = renderer.info, wasEmpty = !renderer.info.root;
   const subvolumes = new SubvolumeList(path);
@@ -150,7 +152,8 @@ async function follow({path, source, renderer, banner, wires, signal}) {
     if (manifest?.root && manifest.root.offset === renderer.info.root.offset) {
       Object.assign(renderer.info, {built: manifest.built, total: manifest.total});
     } else if (manifest?.root && !isArriving) {
-      // Loading the tile may take long; banner and wireframe are updated nevertheless.
+      // Does not wait for the new root's tile, which may take long, so that banner and wireframe
+      // are still updated.
       isArriving = true;
       renderer.showRoot(manifest)
           .catch(
@@ -161,7 +164,8 @@ async function follow({path, source, renderer, banner, wires, signal}) {
     if (job && await subvolumes.update(job, signal))
       wires.show(subvolumes.list, state === "running");
     banner.show(job, subvolumes.list ?? source.info);
-    // An ended job may be retried, and a service may come back.
+    // Continues with longer pauses if the job has ended or the service does not answer: the job may
+    // be retried, and the service may come back.
     pauseMs = manifest ? kPauseMs : Math.min(kMaxPauseMs, 1.5 * pauseMs);
     await sleep(pauseMs, signal, true);
   }

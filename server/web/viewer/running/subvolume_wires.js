@@ -1,12 +1,12 @@
-// The wireframe of a job's subvolumes over the picture. Built, active and waiting subvolumes differ
-// by line style, not by color alone. Hidden lines are visible, because the depth on the GPU is not
-// used.
+// The wireframe of a job's subvolumes, drawn over the picture. Built, active and waiting subvolumes
+// differ by line style, not by color alone. Lines behind surfaces are also visible, because the
+// depth on the GPU is not used.
 
 import {dot, subtract} from "../vector.js";
 
-const kMaxEdges = 24000;  // beyond this count only the edges of active subvolumes are drawn
-const kOpaque = 10;       // square root of the number of cubes of one kind that are drawn opaque
-const kNear = 1e-3;       // share of the grid's edge; nearer lines are clipped
+const kMaxEdges = 24000;  // if there are more, only the edges of active subvolumes are drawn
+const kOpaque = 10;       // square root of the largest number of cubes of one kind drawn opaque
+const kNear = 1e-3;       // share of the grid's edge; lines nearer to the eye are clipped
 
 // Later styles are drawn over earlier ones.
 export const kStyles = {
@@ -26,12 +26,12 @@ export class SubvolumeWires {
     this.edges = Object.fromEntries(kOrder.map((state) => [state, new Float64Array(0)]));
     this.counts = Object.fromEntries(kOrder.map((state) => [state, 0]));
     this.visible = true;
-    this.drawsAll = true;  // false: only active subvolumes
-    this.drawn = null;     // camera and size of the drawn picture
+    this.drawsAll = true;  // false if only active subvolumes are drawn
+    this.drawn = null;     // camera and size for which the wireframe was drawn
   }
 
-  // Shows {resolution, cubes: [[x, y, z, edge, built]...], working: [[x, y, z, edge]...]} in
-  // voxels. `working` counts only while the job `runs`.
+  // Shows {resolution, cubes: [[x, y, z, edge, built]...], working: [[x, y, z, edge]...]}, all in
+  // voxels. `working` is used only if the job `runs`.
   show({resolution, cubes, working = []}, runs) {
     this.resolution = resolution;
     const atWork = new Set(runs ? working.map((cube) => cube.join()) : []);
@@ -66,8 +66,8 @@ export class SubvolumeWires {
     const {canvas} = this, width = canvas.clientWidth, height = canvas.clientHeight,
           ratio = window.devicePixelRatio || 1;
     if (!width || !height) return;
-    // Thousands of lines take longer than a part of a sample, so they are drawn only when they
-    // change.
+    // Thousands of lines take longer to draw than a part of a sample, so they are drawn only if the
+    // camera or the size has changed.
     const {forward, up} = camera.axes(), drawn = [
       ...camera.eye, ...forward, ...up, camera.fovDegrees, width, height, ratio
     ].join();
@@ -126,7 +126,7 @@ export class SubvolumeWires {
   }
 }
 
-// Adds the twelve edges of a cube. An edge shared by cubes of the same size is drawn once.
+// Adds the twelve edges of a cube. If cubes of the same size share an edge, it is drawn only once.
 function addEdges(x, y, z, edge, rank, found) {
   for (let axis = 0; axis < 3; ++axis)
     for (let corner = 0; corner < 4; ++corner) {

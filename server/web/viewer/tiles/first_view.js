@@ -1,24 +1,25 @@
 // Finds the tiles of the first view while the shaders compile, by descending through the loaded
-// tiles. Readings of the feedback would find them level by level. Hidden surfaces are not detected
-// here, so some unneeded tiles are fetched. Therefore the search stops at rather wide cells, after
-// a maximum number of tiles, and if no tile arrives.
+// tiles. The feedback would find them only level by level. This search does not know which surfaces
+// are hidden, so it fetches some tiles that are not needed. Therefore it does not refine cells that
+// are already rather narrow, and ends after a maximum number of tiles, or if no tile arrives for
+// some time.
 
-const kPixels = 15;  // pixels of the canvas; wider cells are refined
+const kPixels = 15;  // in pixels of the canvas; wider cells are refined
 const kMaxTiles = 1500;
 const kStallMs = 1500;
 const kHeadWords = 4, kCutWords = 4;  // in a tile (docs/format.md)
 
 export class FirstView {
-  // Searches for the `view` (gl/view.js) in a picture of this size. Cells of `finest` voxels are
-  // not refined.
+  // Searches for the tiles that `view` (gl/view.js) needs in a picture of this size. Cells with an
+  // edge of `finest` voxels are not refined.
   constructor({levels}, view, {width, height}, finest) {
     Object.assign(this, {levels, view, finest});
     this.pixel = view.pixel(height);
     // Slopes of the sides of the picture.
     this.slopes = [view.tangent * width / height, view.tangent];
     this.known = new Map();   // key -> words of a tile
-    this.places = new Map();  // key -> low corners of the places that need the tile
-    this.wanted = new Map();  // texel of a cut-off node -> pixels of its widest coarse cell
+    this.places = new Map();  // tile key -> low corners of the places that need the tile
+    this.wanted = new Map();  // texel of a cut-off node -> width in pixels of its widest cell
     this.takenMs = 0;         // time of the last tile
   }
 
@@ -78,13 +79,15 @@ export class FirstView {
     if (words && tile) this.walk(store, tile, words, corner);  // it may have been evicted
   }
 
-  // True if a cube is in the picture and its cells are too wide.
+  // True if a cube is in the picture and the cells in it are too wide. `cell` is their edge in
+  // voxels.
   needs(x, y, z, edge, cell) {
     return this.pixelsOf(x, y, z, edge, cell) > kPixels &&
         this.isSeen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);
   }
 
-  // Returns the width in pixels of a cell at the nearest point of a cube.
+  // Returns the width in pixels of a cell of edge `cell`, at the point of a cube nearest to the
+  // eye.
   pixelsOf(x, y, z, edge, cell) {
     const [ex, ey, ez] = this.view.eye;
     const far = Math.hypot(

@@ -3,11 +3,11 @@
 
 import {TileError} from "../tile_source.js";
 
-// An item without a mark after this many readings is known to be unused.
+// After this many readings, an item that no reading has marked is known to be unused.
 export const kRoundsToKnow = 4;
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
-const kMaxTries = 3;         // per item, if its answers are unusable
-const kRefusedMs = 300000;   // until a refused item is requested again
+const kMaxTries = 3;         // tries per item if the answers are unusable
+const kRefusedMs = 300000;   // time until a refused item is requested again
 const kMaxFailures = 65536;  // remembered items
 const kMaxWarnings = 20;
 const kFullPauseMs = 250;
@@ -21,26 +21,27 @@ const kRefused = {
   message: "Part of the file is drawn coarse: the service fails to send it."
 };
 
-// Random, so that clients of a restarted service do not return simultaneously.
+// Returns a pause before a retry. It is random, so that the clients of a restarted service do not
+// all return at the same time.
 export function pauseAfter(failures) {
   return Math.min(kMaxPauseMs, kFirstPauseMs * 2 ** (failures - 1)) * (0.5 + 0.5 * Math.random());
 }
 
-// A request is {key, priority, ...}. Derived classes have
+// Base class of TileLoader and ColorLoader. A request is {key, priority, ...}. Derived classes have
 //     async fetchAll(batch, options) resolves to the answers, in the order of the requests
-//     keep(request, answer, nowMs) false if there is no room; throws if the answer is damaged
-//     nameOf(request)              for messages
-// and `store.rounds`, the readings since the view changed.
+//     keep(request, answer, nowMs)   false if there is no space; throws if the answer is damaged
+//     nameOf(request)                the item's name for messages
+// and `store.rounds`, the number of readings since the view changed.
 export class Loader {
-  // onArrival(failed): an item arrived, or, if `failed`, a request failed or the retry state
-  // changed.
+  // onArrival(failed) is called when an item has arrived, or with `failed` set when a request has
+  // failed or the retry state has changed.
   constructor(source, store, onArrival, {maxRequests, maxBatch}) {
     this.source = source;
     this.store = store;
     this.onArrival = onArrival;
     this.maxRequests = maxRequests;  // concurrent requests
     this.maxBatch = maxBatch;
-    this.allowed = maxRequests;  // fewer while the service is busy
+    this.allowed = maxRequests;  // concurrent requests allowed now; fewer while the service is busy
     this.batchSize = maxBatch;   // smaller after timeouts
     this.queue = [];
     this.loading = new Map();   // key -> request
@@ -52,14 +53,14 @@ export class Loader {
     this.requestedTotal = 0;
     this.outage = {count: 0, retryMs: 0};
     this.busy = {count: 0, retryMs: 0};
-    this.fullUntilMs = 0;  // there is no space until then; Infinity: until the next epoch
+    this.fullUntilMs = 0;  // the store has no space until then; Infinity: until the next epoch
     this.trouble = null;   // {code, message} of the current outage
     this.failure = null;   // {code, message} of the error that ended loading
     this.refusal = null;   // {code, message} if some items were refused
     this.warnings = 0;
     this.timer = 0;
     this.wakes = new Set();  // times of scheduled wake-ups
-    this.unmet = 0;          // items missing in the last reading that may still arrive
+    this.unmet = 0;          // number of items missing in the last reading that may still arrive
     this.ending = new AbortController();
   }
 
@@ -87,7 +88,7 @@ export class Loader {
     if (this.fullUntilMs === Infinity) this.fullUntilMs = 0;
   }
 
-  // True if an item was refused and is not requested for minutes.
+  // True if an item was refused a short time ago. Such an item is not requested for some minutes.
   isRefused(key, nowMs) {
     const failure = this.failures.get(key);
     return failure !== undefined && failure.count >= kMaxTries && nowMs < failure.retryMs;
@@ -97,12 +98,13 @@ export class Loader {
     return !(nowMs < this.failures.get(key)?.retryMs) && nowMs >= this.fullUntilMs;
   }
 
-  // Replaces the queue by the `requests` of one reading. `unmet`: its items that may still arrive.
+  // Replaces the queue by the `requests` of one reading. `unmet`: number of the reading's items
+  // that may still arrive.
   replaceQueue(requests, unmet, nowMs) {
     this.unmet = unmet;
     if (unmet === 0) this.endOutage();
-    // Suspicious items come last, the most suspicious ones at the very end, so that they do not
-    // delay others.
+    // Suspicious items are requested last, and the most suspicious ones at the very end, so that
+    // they do not delay other items.
     const trust = ({key}) =>
         this.failures.get(key)?.last ? this.failures.get(key).batch : this.maxBatch;
     this.queue = requests.sort((a, b) => trust(a) - trust(b) || a.priority - b.priority);
@@ -144,7 +146,8 @@ export class Loader {
     for (const request of batch) this.loading.set(request.key, request);
     let answer = null, error = null;
     try {
-      // An unusable answer must not come from the browser's cache again.
+      // Bypasses the browser's cache for an item that has failed, because the cache may contain the
+      // unusable answer.
       const again = batch.some(({key}) => this.failures.has(key));
       answer = await this.fetchAll(batch, {signal, cache: again ? "reload" : undefined});
     } catch (caught) {
@@ -180,7 +183,8 @@ export class Loader {
           this.failures.delete(request.key);
         } else {
           hasRoom = false;
-          // Once the store knows the unused items, all remaining items are needed.
+          // After kRoundsToKnow readings, the store knows the unused items and can evict them.
+          // If there is still no space, the view needs all remaining items.
           this.fullUntilMs = this.store.rounds >= kRoundsToKnow ? Infinity : nowMs + kFullPauseMs;
           this.queue = [];
           this.wakeAt(nowMs + kFullPauseMs, nowMs);
@@ -205,7 +209,7 @@ export class Loader {
     else this.split(batch, error, nowMs);
   }
 
-  // One item of the batch is at fault. Halving the batch finds it.
+  // One item of the batch has caused the error. Splits the batch in two to find this item.
   split(batch, error, nowMs) {
     if (batch.length === 1) return this.noteFailure(batch[0], error, nowMs);
     const half = Math.ceil(batch.length / 2);
@@ -221,7 +225,8 @@ export class Loader {
     this.queue.push(...batch.reverse());
   }
 
-  // The oldest failures are forgotten; their items are then requested like any other.
+  // Stores a failure. If there are too many, forgets the oldest ones; their items are then
+  // requested like any other.
   remember(key, failure) {
     this.failures.delete(key);
     this.failures.set(key, failure);
@@ -247,7 +252,8 @@ export class Loader {
           count < kMaxTries ? " and is requested again" : ""}: ${error.message}`);
   }
 
-  // The service does not answer, or its answers make no sense. Concurrent failures count once.
+  // Pauses, because the service does not answer or its answers make no sense. Failures of
+  // concurrent requests count as one.
   pause(trouble, nowMs) {
     this.failedTotal++;
     this.trouble = trouble;
@@ -257,7 +263,7 @@ export class Loader {
     this.wakeAt(this.outage.retryMs, nowMs);
   }
 
-  // The service is busy. This is not an outage, and the user need not know.
+  // Pauses, because the service is busy. This is not an outage, so it is not shown to the user.
   rest(retryAfterMs, nowMs) {
     this.endOutage();
     if (nowMs < this.busy.retryMs) return;
@@ -267,15 +273,15 @@ export class Loader {
     this.wakeAt(this.busy.retryMs, nowMs);
   }
 
-  // Stops loading after a fatal error. A known change of the file explains it better than the
-  // error.
+  // Stops loading after a fatal error. If the file is known to have changed, reports this change,
+  // which explains the failure better than the error.
   fail(error) {
     this.failure = this.source.ended ??
         {code: error.isDenied ? "unauthorized" : "failed", message: error.message};
     this.queue = [];
   }
 
-  // True if wanted items may still arrive although no request is in flight.
+  // True if no request is in progress but wanted items may still arrive after a retry.
   get awaitsRetry() {
     const nowMs = performance.now();
     if (this.hasEnded || this.unmet === 0) return false;
@@ -285,7 +291,7 @@ export class Loader {
             (f) => f.count > 0 && f.count < kMaxTries && nowMs < f.retryMs);
   }
 
-  // True if the next request is sent only after a scheduled wake-up.
+  // True if no request is in progress and the next one is sent only after a scheduled wake-up.
   pauses(nowMs) {
     return this.requests === 0 && nowMs < this.retryMs;
   }

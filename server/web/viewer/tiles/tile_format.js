@@ -1,5 +1,6 @@
-// Decodes a tile (docs/format.md) and lays out its words for the pool. Tiles come from the network:
-// every index is checked, so a damaged tile is an error, never a wrong address on the GPU.
+// Decodes a tile (docs/format.md) and lays out its words for the pool. Tiles come from the network.
+// Every index is checked, so a damaged tile is an error and never leads to a wrong address on the
+// GPU.
 
 export const kTexelWords = 4;
 export const kBlockTexels = 16;  // in the pool; no node or leaf crosses the end of a block
@@ -30,7 +31,7 @@ export function decodeTile(tile, level, shape) {
   checkHead(tile, level, shape);
   const {levels, bricks} = shape, nodeWords = tile[2], leafCount = tile[3];
   const nodes = tile.subarray(kHeadWords, kHeadWords + nodeWords);
-  const place = new Uint32Array(nodeWords);  // pointer to the node that begins here
+  const place = new Uint32Array(nodeWords);  // at each word that begins a node: pointer to the node
   const depth = new Uint8Array(nodeWords);
   const leafBegin = placeNodes(nodes, levels, place, depth);
   const texels = leafBegin + (bricks ? Math.ceil(leafCount / 2) : leafCount);
@@ -63,8 +64,8 @@ export function decodeTile(tile, level, shape) {
   };
 }
 
-// Returns the number of levels in a tile of `level`, and whether its leaves are bricks, for a file
-// with this manifest.
+// Returns the shape of a tile at `level`, for a file with this manifest: the number of the tile's
+// levels, and whether its leaves are bricks.
 export function tileShape({levels, tile_levels}, level) {
   const below = levels - 2 - level, own = (below - 1) % tile_levels + 1;
   return {levels: own, bricks: own === below};
@@ -84,7 +85,8 @@ function checkHead(tile, level, {levels, bricks}) {
     throw new Error(`A tile has ${tile[3]} leaves; expected ${8 ** levels} at most.`);
 }
 
-// Packs the nodes in order; no node crosses the end of a block. Returns the texel after the last.
+// Places the nodes in order, so that no node crosses the end of a block. Returns the texel after
+// the last node.
 function placeNodes(nodes, levels, place, depth) {
   let address = 0;
   for (let at = 0; at < nodes.length;) {
@@ -97,7 +99,7 @@ function placeNodes(nodes, levels, place, depth) {
     address += texels;
     at += 1 + count;
   }
-  // Children follow their parents, so one sweep finds every node's level.
+  // Children follow their parents, so one pass over the words finds the level of every node.
   for (let at = 0; at < nodes.length;) {
     const count = kPopcount[nodes[at]];
     if (at > 0 && depth[at] === 0)

@@ -7,8 +7,8 @@ import {Loader, pauseAfter} from "./loader.js";
 const kMaxRequests = 4, kMaxBatch = 48;
 const kMaxRootTries = 3;  // with unusable answers
 
-// Requests are {key, level, offset, priority, leaves}; `leaves` are the texels of the cut-off nodes
-// to link.
+// A request is {key, level, offset, priority, leaves}; `leaves` are the texels of the cut-off nodes
+// that must be linked to the tile.
 export class TileLoader extends Loader {
   constructor(source, store, onArrival) {
     super(
@@ -17,8 +17,8 @@ export class TileLoader extends Loader {
     this.firstView = null;  // the FirstView that receives the next tiles
   }
 
-  // Requests the tiles of one reading; `wanted` maps leaf address -> priority. Returns the number
-  // of nodes that were linked to loaded tiles.
+  // Requests the tiles of one reading. `wanted` maps leaf address -> priority. Returns the number
+  // of cut-off nodes that were linked to already loaded tiles.
   demand(wanted, nowMs) {
     const byKey = new Map();
     let linked = 0, unmet = 0;
@@ -53,8 +53,8 @@ export class TileLoader extends Loader {
     return linked;
   }
 
-  // Loads the root, a tile that no other tile refers to. Resolves to its words, or to undefined
-  // after dispose().
+  // Loads the root, to which no other tile refers. Resolves to its words; to undefined after
+  // dispose().
   async loadRoot(level, offset) {
     const {signal} = this.ending;
     for (let tries = 1;; ++tries) {
@@ -83,7 +83,7 @@ export class TileLoader extends Loader {
     }
   }
 
-  // Links loaded tiles below a new root immediately, without waiting for a reading.
+  // Links the already loaded tiles below a new root immediately, without waiting for a reading.
   linkRoot() {
     const {store} = this, {root} = store;
     for (let i = 0; i < (root.addresses?.length ?? 0); ++i) {

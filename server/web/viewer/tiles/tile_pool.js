@@ -1,8 +1,9 @@
-// The GPU's memory for tiles: a texture of four-word texels, divided into blocks, and a table with
-// the pointer to the tile of each slot. A tile uses any free blocks, so memory does not fragment.
-// Few views need much memory: a large pool starts small and grows to its final size in one step.
-// Both textures, and the third one while the pool grows, together never exceed the budget. If the
-// GPU has no memory for the larger texture, the pool keeps its size.
+// The GPU's memory for tiles. It consists of a texture of four-word texels, divided into blocks,
+// and a table that contains, for each slot, the pointer to the slot's tile. A tile uses any free
+// blocks, so memory does not fragment. Only few views need much memory, so a large pool starts
+// small and grows to its final size in one step. During this step the old texture also exists; all
+// textures together never exceed the budget. If the GPU has no memory for the larger texture, the
+// pool keeps its size.
 
 import {kBlockTexels, kTexelWords} from "./tile_format.js";
 
@@ -11,13 +12,13 @@ const kMaxRows = 4096;                        // addresses have 24 bits
 const kBlocksPerRow = kRowTexels / kBlockTexels;
 const kTexelBytes = kTexelWords * 4;
 const kFirstRows = 256;  // initial size of a growing pool: 16 MiB
-const kErrorFlags = 8;   // upper bound of the number of WebGL's error flags
+const kErrorFlags = 8;   // upper bound of the number of error flags in WebGL
 
 export class TilePool {
   constructor(gl, budgetBytes) {
     this.gl = gl;
-    // A tile has at least one block, so there are at most as many slots as blocks. Each slot has an
-    // entry in the table.
+    // A tile has at least one block, so there are at most as many slots as blocks. The table has
+    // one entry for each slot.
     const rowBytes = kRowTexels * kTexelBytes + kBlocksPerRow * 4;
     const rows = Math.floor((budgetBytes - kTableWidth * 4) / rowBytes);
     if (rows < 1) throw new Error(`A budget of ${budgetBytes} bytes is too small for the viewer.`);
@@ -31,7 +32,7 @@ export class TilePool {
     this.texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.rows);
     this.table = this.createTexture(gl.R32UI, kTableWidth, this.tableRows);
     this.free = [];      // blocks that were used and released
-    this.nextBlock = 0;  // this block and all later ones were never used
+    this.nextBlock = 0;  // number of the first block that was never used
     this.freeSlots = [];
     this.nextSlot = 1;  // slot 0 means none
   }
@@ -43,7 +44,8 @@ export class TilePool {
     return this.free.length + this.blockCount - this.nextBlock;
   }
 
-  // Returns block numbers, or null if too few blocks are free or the pool cannot grow.
+  // Returns the numbers of `count` free blocks; null if too few blocks are free or the pool cannot
+  // grow.
   allocate(count) {
     if (this.freeBlocks < count) return null;
     const end = this.nextBlock + Math.max(0, count - this.free.length);
@@ -54,8 +56,8 @@ export class TilePool {
     return blocks.sort();
   }
 
-  // Replaces the texture by a larger one. Returns false, and keeps the size, if the GPU has no
-  // memory.
+  // Replaces the texture by a larger one. If the GPU has no memory for it, keeps the old texture
+  // and returns false.
   grow() {
     const {gl} = this, before = this.texels;
     for (let flags = 0; flags < kErrorFlags && gl.getError() !== gl.NO_ERROR; ++flags)
@@ -94,7 +96,7 @@ export class TilePool {
     this.freeSlots.push(slot);
   }
 
-  // Writes a decoded tile to its blocks. Returns the pointer to its root.
+  // Writes a decoded tile to its blocks. Returns the pointer to the root of the tile.
   upload(blocks, {words, pointers, root}) {
     const absolute = (pointer) => {
       const texel = pointer >>> 8;
@@ -125,7 +127,7 @@ export class TilePool {
         words.length / kTexelWords, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
   }
 
-  // Sets the pointer to the root of the slot's tile, 0 if the tile is not loaded.
+  // Sets the pointer to the root of the slot's tile. 0 means that the tile is not loaded.
   setSlot(slot, pointer) {
     const {gl} = this;
     gl.bindTexture(gl.TEXTURE_2D, this.table);

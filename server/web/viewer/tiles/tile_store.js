@@ -1,19 +1,20 @@
-// The loaded tiles by node, and their eviction when the pool is full.
+// The loaded tiles, by their root nodes, and the eviction of tiles when the pool is full.
 //
-// Tiles refer to each other by slots: a cut-off node in the pool contains the slot of its tile, and
-// the table of the pool contains the tile's pointer, or 0. So equal subtrees share one tile, and an
-// eviction costs one write. A slot exists while its tile is loaded or a loaded tile refers to it.
+// Tiles refer to each other by slots. A cut-off node in the pool contains the slot of its tile. The
+// pool's table contains the pointer to the slot's tile, or 0 if the tile is not loaded. So equal
+// subtrees share one tile, and an eviction costs one write. A slot exists while its tile is loaded
+// or a loaded tile refers to it.
 //
-// A tile is evicted only if the current view ("epoch") does not use it, and, while the camera
-// moves, if it was not used recently. Tiles loaded for a view remain until the next view. Therefore
-// the number of tiles fetched for one view is bounded, however small the pool is.
+// A tile is evicted only if the current view ("epoch") does not use it and, while the camera moves,
+// only if it was not used recently. Tiles loaded for a view remain until the next view. So the
+// number of tiles fetched for one view is bounded, however small the pool is.
 
 import {kRoundsToKnow} from "./loader.js";
 import {decodeTile, kBlockTexels, kTexelWords, tileShape} from "./tile_format.js";
 
 const kRecentMs = 1500;
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
-const kFreeShare = 1 / 64;  // share of the pool that one eviction frees
+const kFreeShare = 1 / 64;  // share of the pool that is freed when tiles are evicted
 
 // A unique number of a node; offsets are below 2^40.
 export function keyOf(level, offset) {
@@ -29,11 +30,11 @@ export class TileStore {
     this.slots = new Map();  // key -> slot
     this.owner = [];         // block -> tile
     this.ordinal = [];       // block -> its number within the tile
-    this.bySlot = [];        // slot -> {key, tile or null, references}
+    this.bySlot = [];        // slot -> {key, tile (null if it is not loaded), references}
     this.root = null;
     this.tileBytes = 0;
     this.epoch = 0;
-    this.rounds = 0;  // readings of the feedback in this epoch
+    this.rounds = 0;  // number of feedback readings in this epoch
     this.evicted = 0;
   }
 
@@ -46,7 +47,8 @@ export class TileStore {
     return this.tiles.get(keyOf(level, offset));
   }
 
-  // Returns the cut-off node in a texel of the pool, {tile, index, level, offset, key}, or null.
+  // Returns the cut-off node {tile, index, level, offset, key, texel} at a texel of the pool; null
+  // if there is none.
   cutOffNode(texel) {
     const block = Math.floor(texel / kBlockTexels), tile = this.owner[block];
     if (!tile || !tile.addresses) return null;
@@ -63,7 +65,7 @@ export class TileStore {
         tile.blocks[Math.floor(at / kBlockTexels)] * kBlockTexels + at % kBlockTexels);
   }
 
-  // Makes the cut-off node refer to its tile, which must be loaded.
+  // Makes a cut-off node refer to its tile, which must be loaded.
   link(node) {
     const slot = this.slots.get(node.key);
     if (node.tile.links.has(node.index) || slot === undefined) return false;
@@ -75,8 +77,8 @@ export class TileStore {
     return true;
   }
 
-  // Stores a fetched tile. Returns false if the view needs everything in the full pool. Throws if
-  // the tile is damaged.
+  // Stores a fetched tile. Returns false if the pool is full and the view needs all its tiles.
+  // Throws if the fetched tile is damaged.
   add(level, offset, words, nowMs) {
     const key = keyOf(level, offset);
     if (this.tiles.has(key)) return true;
@@ -119,7 +121,8 @@ export class TileStore {
     this.root = this.get(level, offset);
   }
 
-  // Stores the only brick of a grid of 4^3 voxels, two words. Returns its pointer.
+  // Stores the only brick of a grid of 4^3 voxels, which is two words. Returns the pointer to the
+  // brick.
   addBrick(brick) {
     const words = new Uint32Array(kBlockTexels * kTexelWords);
     words.set(brick);
@@ -128,7 +131,7 @@ export class TileStore {
     return this.pool.upload(blocks, {words, pointers: [], root: 0});
   }
 
-  // Marks the tile in a slot as used by a picture of epoch `epoch`.
+  // Marks the tile in a slot as used by a picture that was drawn for `epoch`.
   mark(slot, epoch, nowMs) {
     const tile = this.bySlot[slot]?.tile;
     if (!tile) return;
@@ -136,8 +139,9 @@ export class TileStore {
     if (epoch > tile.epoch) tile.epoch = epoch;
   }
 
-  // Evicts tiles until `count` blocks, and a slot if needed, are free. An evicted tile keeps its
-  // slot while others refer to it, so evictions continue until a slot is free.
+  // Evicts tiles until `count` blocks are free and, if `needsSlot`, also a slot. An evicted tile
+  // keeps its slot while other tiles refer to it, so evictions continue until a slot is free.
+  // Returns false if not enough can be evicted.
   evictFor(count, needsSlot, nowMs) {
     const fits = (blocks) =>
         this.pool.freeBlocks >= blocks && (!needsSlot || this.pool.hasFreeSlot);
