@@ -58,10 +58,10 @@ class Dispatcher {
   // disk. An interrupted removal is finished later; until then the job cannot be retried.
   void remove(const std::string& id);
 
-  // Null unless the job's process is running.
+  // Returns null unless the job's process is running.
   std::shared_ptr<LiveJob> live(const std::string& id) const;
   size_t running() const;
-  // Totals of all running jobs.
+  // Returns the cluster task totals over all running jobs.
   ClusterTasks cluster_tasks() const;
   JobFolder folder(const std::string& id) const;
 

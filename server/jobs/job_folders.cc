@@ -60,7 +60,7 @@ void JobFolders::clean_up() {
       // The cluster tasks of the job may still run: the service may have been killed before it
       // stopped them.
       else if (job->state == JobState::kSuspended || job->state == JobState::kFailed)
-        // No job of the service uses a merge job.
+        // Also stops the merge job, because no job of the service uses one.
         stop_cluster_tasks(files_, of(entry.name).work(), true);
       else if (has_ended(job->state) && job->state != JobState::kFailed)
         remove_work(entry.name);

@@ -1,4 +1,4 @@
-// The new state of a job after its process has ended.
+// Determines the new state of a job after its process has ended.
 #pragma once
 
 #include "server/config/config.h"

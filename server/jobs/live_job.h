@@ -23,13 +23,13 @@ class LiveJob {
   // Returns the JSON object PROGRESS of docs/api.md; "" before the first stage. The text is created
   // only once per version of the progress.
   std::string progress_json() const;
-  // Number of messages so far.
+  // Returns the number of messages received so far.
   uint64_t version() const { return locked(version_); }
   // Returns the cluster tasks of the last attempt; nullopt for a build without a cluster.
   std::optional<ClusterTasks> cluster_tasks() const { return locked(cluster_tasks_); }
   std::vector<std::string> warnings() const { return locked(warnings_); }
   std::optional<Failure> failure() const { return locked(failure_); }
-  // JSON, or "".
+  // Returns the result as JSON; "" before the job's process has reported one.
   std::string result() const { return locked(result_); }
 
   // Requests a stop. Only the first call counts.

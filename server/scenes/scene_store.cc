@@ -226,7 +226,7 @@ void SceneStore::remove_stale_uploads(double before_s) {
       log_("scene " + name +
            ": removed its unfinished upload, which has received nothing for too long");
     } catch (const RequestError&) {
-      // The scene is being uploaded.
+      // The scene is being uploaded, so its upload is not stale.
     }
   }
 }

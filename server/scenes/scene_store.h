@@ -62,7 +62,7 @@ class SceneStore {
   bool remove(const std::string& name);
   // Finishes removals that a crash or a full disk interrupted.
   void finish_removals();
-  // Unix time of the newest record; 0 without records.
+  // Returns the Unix time of the newest record; 0 without records.
   double last_change_s();
   // Removes unfinished uploads that have received no bytes since `before_s` (Unix time).
   void remove_stale_uploads(double before_s);
@@ -73,7 +73,7 @@ class SceneStore {
  private:
   friend class SceneUpload;
 
-  // Exclusive permission to write to a name.
+  // The exclusive permission to write to a scene name, during the lifetime of this object.
   class NameLock {
    public:
     // Throws RequestError{kConflict} if another request has the permission.

@@ -30,7 +30,7 @@ Problem problem(ErrorCode code, std::string detail);
 Problem bad_request(std::string detail);
 Problem not_found(std::string detail);
 Problem conflict(std::string detail);
-// 503 with Retry-After.
+// Returns the problem 503 with a Retry-After header.
 Problem busy(std::string detail, int retry_after_s = 2);
 
 std::string problem_json(const Problem& problem);

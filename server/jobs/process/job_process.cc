@@ -148,7 +148,7 @@ int run_job(FileSystem& files, const std::string& path, const CancelToken& cance
   } catch (const std::system_error&) {
     return fail(ErrorCode::kOutOfMemory, "the system has no threads or memory left");
   } catch (const std::exception&) {
-    // Messages of libraries may contain paths.
+    // The exception's text is not sent, because messages of libraries may contain paths.
     pipe.fail("internal", "a fault of the job's process");
     return kInternalExitStatus;
   }

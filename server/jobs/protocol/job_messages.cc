@@ -27,7 +27,7 @@ void from_json(const nlohmann::json&, StageEnded&) {}
 
 namespace {
 
-// Names in the order of the variant.
+// Names of the messages, in the order of the variant's alternatives.
 constexpr std::string_view kNames[] = {
     "stage_begun", "stage_resumed", "stage_advanced", "stage_ended", "subvolumes",
     "usage",       "cluster_tasks", "warning",        "failure",     "result"};
@@ -68,7 +68,7 @@ std::optional<Message> decode(std::string_view text) {
     if (!has_whole_numbers(line, 1)) return {};
     return message_of(line, std::make_index_sequence<kKinds>());
   } catch (const nlohmann::json::exception&) {
-    // A malformed line has no value.
+    // A malformed line is no message, so the result has no value.
   }
   return {};
 }

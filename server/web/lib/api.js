@@ -14,7 +14,7 @@ export class Problem extends Error {
   get isTransient() {
     return this.code === "unreachable" || [408, 429, 502, 503, 504].includes(this.status);
   }
-  // The pause in seconds that the service requests.
+  // The pause in seconds that the service has requested.
   get retryAfterS() {
     return Number(this.headers?.get("Retry-After")) || 0;
   }

@@ -43,7 +43,7 @@ export function announce(text) {
   document.getElementById("announcer").textContent = text;
 }
 
-// A labeled control; `hint` is its accessible description.
+// Returns a labeled control; `hint` is the control's accessible description.
 export function field(label, control, hint = null) {
   const id = control.id || `f-${++field.count}`;
   control.id = id;
@@ -53,7 +53,7 @@ export function field(label, control, hint = null) {
 }
 field.count = 0;
 
-// An entry of a definition list.
+// Returns an entry of a definition list.
 export function fact(name, ...value) {
   return h("div", {class: "fact"}, h("dt", {}, name), h("dd", {}, ...value));
 }

@@ -193,7 +193,7 @@ class JobPage {
   }
 }
 
-// The last error, unless the job has succeeded since.
+// Returns a box with the last error, unless the job has succeeded since.
 function errorBox(job) {
   if (!job.error || job.state === "succeeded") return null;
   const problem = {code: job.error.code, detail: job.error.message};

@@ -47,7 +47,7 @@ export class Camera {
     return distance(this.eye, this.target);
   }
 
-  // Looking straight down, up is -z.
+  // If the camera looks straight down, the up axis is -z.
   axes() {
     return pictureAxes(subtract(this.target, this.eye));
   }

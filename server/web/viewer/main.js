@@ -120,7 +120,7 @@ class WaitingMessage {
       announce(job ? said : "The service does not answer.");
     setText(this.heading, said);
     setText(this.text, waitingText(job));
-    // The focus is kept.
+    // Replaces the elements only if necessary, so that the focus is kept.
     if (place("message").hidden || !this.heading.isConnected)
       showMessage(this.heading, this.text, this.cubes.element, this.buttons);
     if (job) this.cubes.update(job);
@@ -137,7 +137,7 @@ function cameraOfAddress() {
       .join("");
 }
 
-// Without WebGL2 there is still a picture.
+// Without WebGL2, shows the picture of the job, if there is one.
 async function showWithoutWebgl(reason, job) {
   const content = [
     h("h1", {}, "This browser cannot draw the scene."),
@@ -227,7 +227,7 @@ function showFailure(error) {
   }
   const code = error.code || (error.status ? `http_${error.status}` : "unreachable");
   const isMissing = code === "not_found" && askedJob === null;
-  // The id of a deleted job is never used again.
+  // A job that is not found never comes back, because ids are never used again.
   const isFinal = code === "not_found" && error instanceof Problem;
   showMessage(
       isMissing &&

@@ -84,7 +84,7 @@ export class TileSource {
     return splitBatch(bytes, nodes.length);
   }
 
-  // The same for color pages [{level, position: [x, y, z]}].
+  // Like fetchTiles(), for color pages [{level, position: [x, y, z]}].
   async fetchColors(pages, options) {
     const list = pages.map(({level, position}) => [level, ...position].join(".")).join(",");
     const bytes = await this.request(
@@ -144,7 +144,7 @@ export class TileSource {
           await fetch(this.base + path, {cache, headers: this.headers, signal: ending.signal});
       heard();
       const bytes = await bodyOf(response, heard);
-      // The length of the body as sent, possibly compressed.
+      // Content-Length is the length of the body as sent, which may be compressed.
       this.fetchedBytes += Number(response.headers.get("Content-Length")) || bytes.byteLength;
       if (response.ok) return bytes;
       throw problemOf(response, bytes);

@@ -108,7 +108,7 @@ export class CubesView {
     this.draw();
   }
 
-  // The low corner of a cube after the rotation; y is up.
+  // Returns the low corner of a cube after the rotation of the view; y is up.
   turned({x, y, z, edge}) {
     const far = (c) => this.resolution - edge - c;
     return [[x, y, z], [z, y, far(x)], [far(x), y, far(z)], [far(z), y, x]][this.turn];
@@ -181,7 +181,7 @@ export class CubesView {
     ];
   }
 
-  // The floor and the far edges of the grid.
+  // Draws the floor and the far edges of the grid.
   frame(pen, colors, size) {
     const r = this.resolution;
     const lines = [

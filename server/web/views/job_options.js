@@ -138,7 +138,7 @@ export class JobOptions {
     return values;
   }
 
-  // Copies the options of a job.
+  // Fills the form with the options of a job.
   set({resolution, priority, options = {}}) {
     const {fields} = this, attributes = [options.attributes ?? []].flat();
     fields.resolution.value = String(resolution);
@@ -165,7 +165,7 @@ function checkRow(input, label) {
            }, label));
 }
 
-// The value of an option in a request.
+// Returns the value of an option, in the form that a request needs.
 function valueOf(name, input) {
   if (["memory", "backend", "method"].includes(name)) return input.value.trim();
   return numberOf(input, `The ${name.replace("_", " ")}`);

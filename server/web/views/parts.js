@@ -7,7 +7,7 @@ export function stateBadge(state) {
   return h("span", {class: `state ${state}`}, stateText(state));
 }
 
-// A Problem, or a job's error, with its code.
+// Returns a box with a Problem or a job's error, and with its code.
 export function problemBox(problem, title = null) {
   return h(
       "div", {class: "problem"}, title && h("strong", {}, title),
@@ -45,7 +45,7 @@ export function updateJobMeter(bar, job) {
   bar.element.dataset.state = job.state;
 }
 
-// A button that copies `text` to the clipboard.
+// Returns a button that copies `text` to the clipboard.
 export function copyButton(text, what) {
   const button =
       h("button", {type: "button", class: "quiet small", "aria-label": `Copy ${what}`}, "Copy");

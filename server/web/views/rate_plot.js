@@ -96,7 +96,7 @@ function longest(series, names) {
   return names.reduce((best, name) => (best && size(best) >= size(name) ? best : name), null);
 }
 
-// Axes with few, round ticks; a line over a filled area.
+// Returns the axes with a few round ticks, and a line over a filled area.
 function plot(samples) {
   const begin = samples[0][0], end = Math.max(samples.at(-1)[0], begin + 1);
   const ticks = roundTicks(Math.max(...samples.map(([, rate]) => rate), 1e-9));
@@ -121,7 +121,7 @@ function plot(samples) {
   ];
 }
 
-// 0 and two to five round steps that reach `max`.
+// Returns 0 and two to five round steps, of which the last reaches `max`.
 function roundTicks(max) {
   const power = 10 ** Math.floor(Math.log10(max));
   const step = [0.25, 0.5, 1, 2, 5].map((factor) => factor * power).find((size) => max / size <= 4);

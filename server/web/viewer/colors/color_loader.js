@@ -1,4 +1,4 @@
-// Fetches the color pages that a picture lacks.
+// Fetches the color pages that a picture needs but that are not loaded.
 
 import {Loader} from "../tiles/loader.js";
 

@@ -16,14 +16,14 @@ const kEntryBytes = 16, kTableWidth = 1024;  // the shaders contain the same tab
 const kMaxEntries = 2 ** 21;
 const kCoarseLevel = 5;  // pages of this and all coarser levels (at most 76) are never evicted
 
-// The number of the pages along an axis.
+// Returns the number of pages along an axis of the grid.
 function pagesOf(level) {
   return 2 ** Math.max(0, level - 3);
 }
 const kPagesBefore = [0];  // by level: number of pages on all coarser levels
 for (let level = 0; level < 20; ++level)
   kPagesBefore.push(kPagesBefore[level] + pagesOf(level) ** 3);
-// A unique number of a page, below 2^52.
+// Returns a unique number for a page, below 2^52.
 export function pageKey(level, x, y, z) {
   const n = pagesOf(level);
   return kPagesBefore[level] + (x * n + y) * n + z;

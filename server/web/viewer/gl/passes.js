@@ -217,7 +217,7 @@ export class Passes {
     return this.drawFeedback(all);
   }
 
-  // The uniforms of all passes of a sample.
+  // Returns the uniforms of all passes of a sample.
   passValues(values) {
     const {width, height, hits, light, sky, colors, current} = this.targets;
     return {

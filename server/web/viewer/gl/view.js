@@ -6,7 +6,7 @@ import {length, pictureAxes, pictureDirection, subtract} from "../vector.js";
 const kFar = 2 ** 30;  // in voxels; an eye farther away is moved to this distance
 
 export class View {
-  // In voxels; the vertical field of view in degrees.
+  // Positions are in voxels; the vertical field of view is in degrees.
   constructor({eye, target, up = [0, 1, 0], fovDegrees}) {
     const forward = subtract(target, eye);
     if (![...eye, ...target, ...up, fovDegrees].every(Number.isFinite))

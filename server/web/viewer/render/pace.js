@@ -35,7 +35,7 @@ export class Pace {
     this.lacksFew ||= tiles < kFewTiles && coarsePixels < kCoarsePixels;
   }
 
-  // The browser requests a frame.
+  // Call it when the browser requests a frame.
   tick(nowMs) {
     const interval = nowMs - this.callMs;
     this.callMs = nowMs;

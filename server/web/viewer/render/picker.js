@@ -1,4 +1,4 @@
-// The voxel at a point of the canvas.
+// Finds the voxel at a point of the canvas.
 
 import {add, scale} from "../vector.js";
 

@@ -261,7 +261,7 @@ export class Renderer {
     this.frames.reset();
   }
 
-  // A tile or page arrived, or a request failed.
+  // Called when a tile or page has arrived, or when a request has failed.
   handleArrival(hasFailed = false) {
     this.stream.continueFirstView();
     if (!hasFailed && this.progress.needsRestartOnArrival) this.restart();

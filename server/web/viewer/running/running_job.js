@@ -87,7 +87,7 @@ async function manifestOf(source) {
   }
 }
 
-// Resolves to null while the service does not answer.
+// Resolves to the job; to null while the service does not answer.
 async function jobOf(path, signal) {
   try {
     return await getJson(path, signal);

@@ -87,7 +87,7 @@ export class SubvolumeWires {
       pen.strokeStyle = color;
       pen.lineWidth = line;
       pen.setLineDash(dash);
-      // Thousands of lines would hide the voxels.
+      // Many lines are drawn translucent: thousands of opaque lines would hide the voxels.
       pen.globalAlpha = Math.min(1, Math.max(0.25, kOpaque / Math.sqrt(this.counts[state])));
       pen.beginPath();
       const points = this.edges[state];

@@ -64,7 +64,7 @@ export class Loader {
     this.ending = new AbortController();
   }
 
-  // null, or {code, message} for the user.
+  // The problem to show to the user, {code, message}; null if there is none.
   get problem() {
     return this.failure ?? this.source.ended ?? this.trouble ?? this.refusal;
   }

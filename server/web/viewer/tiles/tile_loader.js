@@ -1,4 +1,4 @@
-// Fetches the tiles that a picture lacks.
+// Fetches the tiles that a picture needs but that are not loaded.
 
 import {TileError} from "../tile_source.js";
 

@@ -16,7 +16,7 @@ const kRecentMs = 1500;
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
 const kFreeShare = 1 / 64;  // share of the pool that is freed when tiles are evicted
 
-// A unique number of a node; offsets are below 2^40.
+// Returns a unique number for a node. Offsets are below 2^40.
 export function keyOf(level, offset) {
   return offset * 32 + level;
 }
