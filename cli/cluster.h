@@ -18,7 +18,7 @@ struct BuildClusterOptions {
 
 // Adds the options of `build`.
 void declare_cluster(Command& command, BuildClusterOptions& state);
-// Applies them.
+// Applies the cluster options.
 void apply_cluster(const BuildClusterOptions& cluster, RunOptions& run);
 
 // Adds the options of `plan`.

@@ -11,7 +11,7 @@ namespace voxdag::cli {
 
 class OptionDeclarer {
  public:
-  // Fields of a later scope are left out.
+  // Leaves out fields that belong to a later scope than `scope`.
   OptionDeclarer(Command& command, Scope scope) : command_(command), scope_(scope) {}
 
   template <class T>

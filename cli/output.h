@@ -34,7 +34,7 @@ struct OutputFile {
   // the temporary name of write_file_atomically(). Also throws if the output's folder does not
   // exist.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
-  // Checks one name.
+  // Makes these checks for one name, such as path + ".partial".
   void check(FileSystem& files, const std::string& name, const std::string& input,
              const IsOwnFile& is_own) const;
 };

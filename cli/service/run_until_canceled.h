@@ -1,4 +1,4 @@
-// Servers that a command runs until a signal ends them.
+// Runs a server of a command until a signal ends it.
 #pragma once
 
 #include <chrono>

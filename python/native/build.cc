@@ -20,7 +20,7 @@
 namespace voxdag::python {
 namespace {
 
-// Vertices are floats or doubles.
+// The vertices of a mesh, as floats or doubles.
 using Vertices = nb::ndarray<nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Triangles = nb::ndarray<const uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using MeshArrays = std::pair<Vertices, Triangles>;

@@ -15,7 +15,7 @@ struct PathText {
   std::string bytes;
 };
 
-// Bytes that are not UTF-8 are U+FFFD.
+// Returns a message as str. Bytes that are not UTF-8 become U+FFFD.
 inline nanobind::object message_text(const std::string& message) {
   return nanobind::steal(
       PyUnicode_DecodeUTF8(message.data(), static_cast<Py_ssize_t>(message.size()), "replace"));

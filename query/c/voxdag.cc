@@ -111,7 +111,7 @@ voxdag::query::RayLimits ray_limits_of(const voxdag_ray_limits* limits) {
   return {limits->max_distance, limits->stop_size};
 }
 
-// Items per allocation.
+// Number of items per allocation.
 constexpr size_t kBatch = 4096;
 
 template <class Work>

@@ -24,7 +24,7 @@ ExportFile::~ExportFile() {
   try {
     files_.remove(partial_name(path_));
   } catch (const Error&) {
-    // The error that ended the export is reported instead.
+    // An error here is ignored: the error that ended the export is reported.
   }
 }
 

@@ -34,7 +34,7 @@ struct ExportJob {
   double cell_edge() const {
     return file.edge() / static_cast<double>(int64_t{1} << selection.grid_levels);
   }
-  // World coordinate of a position along an axis, in cells.
+  // Returns the world coordinate of a position along an axis; `cells` is the position in cells.
   double world(size_t axis, double cells) const {
     return file.origin()[axis] + cells * cell_edge();
   }

@@ -210,7 +210,7 @@ class VoxWriter {
     voxels_.reserve(dag.node_count(depth_));
     uint64_t total = 0;
     for_each_model_node(dag, [&](uint64_t offset) {
-      // If the total is already too large, counting can stop.
+      // Stops counting when the voxels alone, of 4 bytes each, are already too large.
       if (4 * total > kMaxVoxBytes) return;
       models_[offset] = static_cast<uint32_t>(voxels_.size());
       uint64_t voxels = 0;

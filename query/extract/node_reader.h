@@ -21,7 +21,7 @@ namespace voxdag::query {
 // Thread-safe.
 class CheckedReader {
  public:
-  // `header` is the same file; only its header is read.
+  // `header`: the same file, already opened. Only its header is read through `header`.
   CheckedReader(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget);
 
   const voxdag_reader::File& header() const { return header_; }

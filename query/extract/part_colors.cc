@@ -301,7 +301,7 @@ class PartColors {
     const auto color = [&](uint32_t up, const ColoredCell& cell) {
       const uint32_t cell_level = level + depth - up;
       const uint64_t cell_code = code << 3 * (depth - up) | cell.code;
-      // The sums of the finest cells are their colors.
+      // The sum of a finest cell is already the cell's color.
       if ((tier == 0 && up == 0) || !is_whole(cell_level, cell_code)) return color_of(cell.sum);
       const voxdag_reader::Rgb rgb = color_of_cell(colors, cell_level, cell_code);
       return Color{{rgb.r, rgb.g, rgb.b}, 255};

@@ -98,7 +98,7 @@ class Descents {
   // True if the cell at the end of a descent is set.
   bool ends_set(const Descent& d) const {
     if (grid_levels_ + 2 <= dag_.grid_levels()) return true;
-    // Levels below the brick: 1 or 2.
+    // The number of levels below the brick, 1 or 2.
     const uint32_t voxel_levels = grid_levels_ + 2 - dag_.grid_levels();
     const uint64_t mask = dag_.grid_levels() == 2 ? d.content : dag_.brick(d.content);
     const uint64_t octant = mask >> (8 * d.child_index(voxel_levels - 1)) & 255;

@@ -145,7 +145,7 @@ class PacketWalk {
     if (mask - 1 >= 255) job_.dag->corrupt(depth, offset);
     return {mask, words + 1, level.wide_children};
   }
-  // Checks a node near the end of its level.
+  // Checks that a node near the end of its level is complete.
   __attribute__((noinline)) void check_node(uint32_t depth, uint64_t offset) const {
     const PacketJob::Level& level = job_.levels[depth];
     if (offset >= level.count || uint64_t{kPopcount8[level.words[offset] & 255]}
@@ -161,7 +161,7 @@ class PacketWalk {
     if (mask == 0) job_.dag->corrupt(brick_depth_, offset);
     return mask;
   }
-  // Does nothing if there is no such word.
+  // Does nothing if the level has no such word.
   VOXDAG_INLINE void prefetch(uint32_t depth, uint64_t offset) const {
     __builtin_prefetch(reinterpret_cast<const void*>(
         reinterpret_cast<uintptr_t>(job_.levels[depth].words) + 4 * offset));
@@ -232,7 +232,7 @@ class PacketWalk {
     const int32_t half = edge / 2;
     uint32_t candidates = mirrored_[n.mask] & cross_any(low, half);
     const bool only = (candidates & (candidates - 1)) == 0;
-    // For these children rays need no separate test.
+    // The children that all rays cross. They need no separate test per ray.
     const uint32_t by_all = only ? candidates : cross_all(low, half);
     Child children[8];
     int count = 0;
@@ -381,7 +381,7 @@ class PacketWalk {
     return report(corner(low, first_of(in), half), half, ray, depth);
   }
 
-  // Ends the ray here; it is cast separately.
+  // Removes the ray from the walk; the ray is cast separately later. Returns true.
   bool give_up(int ray) {
     job_.single |= uint64_t{1} << ray;
     return true;

@@ -60,7 +60,7 @@ Placement named_view(const std::string& name, const DagView& dag, double aspect,
 class NamedViews {
  public:
   NamedViews(const DagView& dag, const CancelToken& cancel) : dag_(dag), cancel_(cancel) {}
-  // occupied_box()
+  // Returns occupied_box() of the DAG.
   const Box& box();
   Placement find(const std::string& name, double aspect, std::optional<double> fov_degrees);
 

@@ -124,7 +124,7 @@ class HttpServer::Engine {
   std::optional<TlsContext> tls_;
   ConnectionTable table_;
   std::atomic<bool> draining_{false};
-  // The last member, because its threads use the others.
+  // Must be the last member, because its threads use the other members.
   std::unique_ptr<ThreadPool> threads_ = std::make_unique<ThreadPool>();
 };
 

@@ -97,9 +97,9 @@ class JobQueue {
   // came with another request.
   std::optional<Job> find_by_key(const IdempotencyKey& key);
 
-  // Number of changes of all jobs, including announcements.
+  // Returns the number of changes of all jobs, including calls of announce().
   uint64_t version() const;
-  // Number of changes without announcements.
+  // Returns the number of changes of all jobs, without calls of announce().
   uint64_t changes() const;
   // Waits until version() differs from `seen`, or for `max_s` seconds.
   void wait_for_change(uint64_t seen, double max_s) const;

@@ -20,7 +20,7 @@ class FileTileSource : public TileSource {
   // process. `manifests`, if not null, caches manifests.
   FileTileSource(const std::string& path, const FileIdentity& identity,
                  std::shared_ptr<ManifestCache> manifests = nullptr);
-  // The same for a file that is already mapped.
+  // Like the constructor above, for a file that is already mapped.
   FileTileSource(const std::string& path, const FileIdentity& identity,
                  std::shared_ptr<const voxdag_reader::Bytes> bytes,
                  std::shared_ptr<ManifestCache> manifests = nullptr);

@@ -10,7 +10,7 @@
 
 namespace voxdag::server {
 
-// "2026-11-21T07:00:00.123Z"; "" for 0.
+// Returns a time such as "2026-11-21T07:00:00.123Z"; "" for the time 0.
 std::string time_text(double unix_s);
 
 // `live` may be null. `position` is the position in the queue, counted from 1; 0 if the job is not

@@ -7,7 +7,7 @@ namespace voxdag::server {
 
 using Json = nlohmann::ordered_json;
 
-// An object of schemas: "Job", "Scene", ...
+// Returns an object with all schemas by name: "Job", "Scene", ...
 const Json& schemas();
 
 }  // namespace voxdag::server

@@ -65,7 +65,7 @@ Response accepted(Context& context, const Job& job, bool replayed) {
   return response;
 }
 
-// The folder of a plan. The destructor removes it.
+// The folder of a dry run (plan). The destructor removes it.
 class TemporaryTask {
  public:
   TemporaryTask(FileSystem& files, const std::string& path) : folder{path}, files_(files) {
@@ -242,7 +242,7 @@ Response retry_job(Context& context, Call& call) {
   if (job.state == JobState::kFailed || job.state == JobState::kCanceled)
     context.tasks.make(parse_job_request(job.request), JobTask::Kind::kBuild);
   const Job queued = context.dispatcher.retry(job.id);
-  // The job may now build a different scene.
+  // Forgets the partial view, because the retried job may build a different scene.
   if (has_ended(job.state)) context.partial.close(job.id);
   return json_response(202, to_json(context, queued));
 }

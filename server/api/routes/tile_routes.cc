@@ -55,7 +55,7 @@ std::vector<uint32_t> make_tile(const TileSource& dag, const query::TileAddress&
     throw;
   } catch (const Error& error) {
     if (!error.is_corruption()) throw;
-    // The file is intact, so no node is at this offset.
+    // The file is intact. So the error means that no node is at this offset.
     throw not_found(error.message());
   }
 }

@@ -39,7 +39,7 @@ struct Answer {
   std::vector<Parameter> headers = {};
 };
 
-// A request whose caller has the required role.
+// A request that the router passes to a handler. Its caller has the required role.
 struct Call {
   Request& request;
   Caller caller;

@@ -17,7 +17,7 @@ class Router {
   using Handler = std::function<Response(Context&, Call&)>;
   using PlainHandler = std::function<Response(Call&)>;
 
-  // For routes that need no Context.
+  // A router for routes that need no Context.
   Router() = default;
   explicit Router(Context& context) : context_(&context) {}
 

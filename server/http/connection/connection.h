@@ -33,7 +33,7 @@ class Connection {
   bool handshake();
   // Waits for the first byte of a request. Returns false if none arrives.
   bool wait_for_request();
-  // Ends the header phase.
+  // Ends the header phase; the exchange phase begins.
   void begin_exchange();
 
   enum class ErrorState { kNone, kBroken, kTooSlow };

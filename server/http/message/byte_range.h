@@ -7,7 +7,7 @@
 
 namespace voxdag::server {
 
-// Bytes [begin, end), not empty.
+// The bytes [begin, end) of the contents. The range is not empty.
 struct ByteRange {
   uint64_t begin = 0;
   uint64_t end = 0;

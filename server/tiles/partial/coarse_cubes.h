@@ -33,7 +33,7 @@ class CoarseCubes {
   uint64_t total() const { return total_; }
   // Number of built subvolumes, including empty and omitted ones.
   uint64_t built() const { return built_; }
-  // Known subvolumes with voxels.
+  // Returns the known subvolumes that have voxels.
   const std::map<SubvolumeId, CoarseCube>& cubes() const { return cubes_; }
 
  private:

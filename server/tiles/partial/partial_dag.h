@@ -56,7 +56,7 @@ class PartialDag {
   uint64_t word_count_ = 0;
 };
 
-// A copy of the DAG, for any thread; it does not change.
+// An immutable copy of the DAG, for any thread.
 class PartialDagCopy {
  public:
   explicit PartialDagCopy(const PartialDag& dag, uint32_t grid_levels);

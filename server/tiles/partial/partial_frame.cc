@@ -62,7 +62,7 @@ nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, ui
     const GridPlace place{plan.at("origin"), plan.at("edge")};
     nlohmann::ordered_json frame = {{"origin", place.origin}, {"edge", place.edge}};
     PartialDag nodes(levels);
-    // A DAG built by one call has one node on the root level.
+    // A DAG that was built by one call has only one node on the root's level.
     if (nodes.add(planned_parts(plan, resolution))) {
       const PartialDagCopy planned(nodes, levels);
       const CancelToken never;

@@ -12,7 +12,7 @@
 
 namespace voxdag::server {
 
-// The built subvolumes, each with its coarse brick.
+// Returns the built subvolumes as JSON, each with its coarse brick.
 std::string describe_cubes(const CoarseCubes& cubes, uint64_t resolution);
 
 // Returns the manifest members that the plan determines: the position of the grid, the bounding box

@@ -162,7 +162,7 @@ void PartialView::update_json(uint64_t resolution) {
 
 void PartialView::find_frame(const JobFolder& folder, uint64_t resolution) {
   if (!frame_.is_null()) return;
-  // Tries only once per version of the folder.
+  // Tries to read the frame only once after each reading of the folder.
   if (std::exchange(frame_version_, version_) == version_)
     throw Error(ErrorCode::kNotFound, "the subvolumes are not planned yet");
   frame_ = read_frame(files_, folder, resolution);

@@ -26,7 +26,7 @@ namespace voxdag::server {
 // Limits how often, and for how much CPU time, a job's folder is read. Used by one thread.
 class ReadLimiter {
  public:
-  // Charges the CPU time of its scope.
+  // Charges the CPU time that passes during the lifetime of this object.
   class Charge {
    public:
     explicit Charge(ReadLimiter& limiter);
@@ -129,7 +129,7 @@ class PartialView {
   bool has_failed_ = false;       // true if the last read failed
   nlohmann::ordered_json frame_;  // the manifest's constant members; null before the plan exists
   GrowingDag nodes_;
-  // Versions of the last updates.
+  // Values of version_ at the last update of the list, of the tiles and of the frame.
   uint64_t json_version_ = 0, tiles_version_ = 0, frame_version_ = 0;
 };
 
