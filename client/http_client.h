@@ -65,7 +65,7 @@ class HttpClient {
   std::unique_ptr<Impl> impl_;
 };
 
-// Returns the code with this name (docs/errors.md). If there is none, returns the code that fits
+// Returns the code with this name (docs/errors.md). Without one, returns the code that fits
 // the HTTP status best.
 ErrorCode error_code_of(const std::string& name, int http_status);
 // Throws the Error that a problem+json answer describes (status 400 and above).

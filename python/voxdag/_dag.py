@@ -271,8 +271,8 @@ class Dag:
         """Returns the set voxel nearest to each voxel, (N, 3) int64, and the distances between the
         centers.
 
-        Among equally near voxels, returns the first in Morton order. If none is found, the voxel is -1
-        and the distance is infinite."""
+        Among equally near voxels, returns the first in Morton order. If none is found, the voxel
+        is -1 and the distance is infinite."""
         positions = self._positions(points, None, False)
         voxels = np.empty_like(positions)
         distances = np.empty(len(positions))

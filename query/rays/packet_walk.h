@@ -339,7 +339,7 @@ class PacketWalk {
     prefetch(depth + 1, descent.offset);
   }
 
-  // Moves a descent from a cell without a hit to its next cell. Returns false if there is none.
+  // Moves a descent from a cell without a hit to its next cell. Returns false without one.
   VOXDAG_INLINE bool enter_next(RayDescent& descent) {
     if (descent.open == 0) {
       if (descent.first_waiting < 0) return false;

@@ -194,7 +194,7 @@ export class Renderer {
     return this.measured.report(this);
   }
 
-  // The reason why a part of the picture does not arrive, {code, message}; null if there is none.
+  // The reason why a part of the picture does not arrive, {code, message}; null without one.
   get problem() {
     return this.stream?.problem ?? null;
   }

@@ -132,7 +132,7 @@ export class TileStream {
     return [this.store.pool.texels, this.colors?.store.pool.texels];
   }
 
-  // The reason why a part of the picture does not arrive, {code, message}; null if there is none.
+  // The reason why a part of the picture does not arrive, {code, message}; null without one.
   get problem() {
     return this.loader.problem || (this.options.color && this.colors?.loader.problem) || null;
   }

@@ -64,7 +64,7 @@ export class Loader {
     this.ending = new AbortController();
   }
 
-  // The problem to show to the user, {code, message}; null if there is none.
+  // The problem to show to the user, {code, message}; null without one.
   get problem() {
     return this.failure ?? this.source.ended ?? this.trouble ?? this.refusal;
   }

@@ -48,7 +48,7 @@ export class TileStore {
   }
 
   // Returns the cut-off node {tile, index, level, offset, key, texel} at a texel of the pool; null
-  // if there is none.
+  // without one.
   cutOffNode(texel) {
     const block = Math.floor(texel / kBlockTexels), tile = this.owner[block];
     if (!tile || !tile.addresses) return null;
