@@ -54,8 +54,9 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
   return true;
 }
 
-// Reach for which 64 bits suffice: edges of the triangle are then below 2^20, its normal below
-// 2^41, the plane's sums below 2^63.
+// Limit of the cube's edge and of the triangle's coordinates relative to the cube. Below this limit
+// 64-bit products suffice: the triangle's edges are below 2^20, its normal is below 2^41, and the
+// sums of the plane test are below 2^63.
 inline constexpr int64_t kNarrowReach = int64_t{1} << 19;
 
 // True if the triangle touches the cube. `low`: the cube's low corner, `edge`: the cube's edge,

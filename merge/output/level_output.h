@@ -41,8 +41,9 @@ class LevelOutput {
   virtual void begin_level(uint32_t level) = 0;
   // Receives all rows of the level in order. Calls do not overlap.
   virtual void add(const MergedRows& rows) = 0;
-  // Receives the same rows again, the first one at `position`, in any order and concurrently from
-  // several threads, for work that does not depend on the order.
+  // Receives the same rows again, for work that does not depend on their order. `position` is the
+  // position of the first row of `rows`. Calls come in any order, and concurrently from several
+  // threads.
   virtual void write(uint64_t position, const MergedRows& rows) = 0;
   virtual void end_level(const LevelExtent& level) = 0;
 };

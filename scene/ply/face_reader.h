@@ -27,7 +27,8 @@ class FaceReader {
 
   const PlyFile& ply_;
   const std::unique_ptr<Rows> rows_;
-  // The face last read by rows_, its first triangle, and the offset after it.
+  // The face that rows_ read last, its first triangle, and the offset of the next face. Valid only
+  // if is_loaded_ is true.
   bool is_loaded_ = false;
   uint64_t face_ = 0, first_triangle_ = 0, next_offset_ = 0;
 };

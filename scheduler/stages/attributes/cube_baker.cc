@@ -88,8 +88,8 @@ void CubeBaker::divide(const Cube& cube, ChunkList& bin, const Sink& sink) {
     const int64_t units = cube.edge_voxels(grid_.levels) * kUnitsPerVoxel;
     for_each_surface(store_, bin, [&](const FixedSurface& surface) {
       record.clear();
-      // `has_image` has no effect, because a surface stored without texture coordinates has none
-      // here.
+      // Passes true for has_image. A surface that was stored without texture coordinates was read
+      // back without them, so nothing is lost.
       append_surface(surface, true, record);
       for (uint32_t mask = touched_children(surface.position, cube, units); mask; mask &= mask - 1)
         writer.append(static_cast<size_t>(lowest_bit(mask)), record, 1);

@@ -80,8 +80,8 @@ export class TileStream {
     this.loader.firstView = null;
   }
 
-  // True while the first frame should wait for the tiles of the first view. With them, it is soon
-  // complete. Without them, it would only cost time.
+  // True while the first frame should wait for the tiles of the first view. A frame drawn with
+  // these tiles is soon complete. A frame drawn without them would only cost time.
   get awaitsFirstTiles() {
     return performance.now() < this.waitUntilMs &&
         (this.loader.firstView !== null || this.rootPointer === undefined);
