@@ -1,4 +1,7 @@
-// Serves the embedded files.
+// Serves the embedded files and the OpenAPI document.
+#include <memory>
+#include <mutex>
+
 #include "core/format/checksum.h"
 #include "server/api/openapi/document.h"
 #include "server/api/routes/routes.h"
@@ -25,6 +28,12 @@ Response get_asset(Call& call, const Asset& asset) {
   return response;
 }
 
+// The document, which the first request creates: by then all routes are known.
+struct Document {
+  std::once_flag is_created;
+  Asset asset;
+};
+
 }  // namespace
 
 void add_asset_routes(Router& router, const std::string& start_page) {
@@ -47,10 +56,13 @@ void add_document_route(Router& router) {
               .tag = "service",
               .accepts_any_query = true,
               .answers = {{200, "OpenAPI 3.1", {json_content()}}, {304, "the client has it"}}},
-             [&router](Call& call) {
-               const std::string text = openapi_document(router);
-               const std::string etag = '"' + sha256_hex(text) + '"';
-               return get_asset(call, {"openapi.json", text, "application/json", etag});
+             [&router, document = std::make_shared<Document>()](Call& call) {
+               std::call_once(document->is_created, [&] {
+                 const std::string text = openapi_document(router);
+                 document->asset = {"openapi.json", text, "application/json",
+                                    '"' + sha256_hex(text) + '"'};
+               });
+               return get_asset(call, document->asset);
              });
 }
 
