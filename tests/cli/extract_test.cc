@@ -125,7 +125,8 @@ TEST_F(Extract, RefusalsOfExports) {
   refused("x.ply exists", {"-o", "x.ply"});
   std::filesystem::create_directory(folder_.file("folder"));
   refused("folder is not a regular file", {"-o", "folder", "--force"});
-  expect_error(3, "no folder none", {"export", "s.vdag", "--to", "ply", "-o", "none/x.ply"});
+  expect_error(3, "the folder none does not exist",
+               {"export", "s.vdag", "--to", "ply", "-o", "none/x.ply"});
   EXPECT_EQ(contents("x.ply"), "mine");
   EXPECT_FALSE(exists("x.ply.partial") || exists("x.ply.lock") || exists(".ply.partial"));
 }

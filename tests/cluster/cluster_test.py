@@ -327,7 +327,7 @@ class ClusterTest(unittest.TestCase):
         (folder / "batch-2.record-foreign.json").write_text("{}\n17\n")
         _, messages = self.finish(build, 16384)
         self.assertIn("batch-3.record-torn.json is rejected: it fails its checksum", messages)
-        self.assertIn("batch-2.record-foreign.json does not count", messages)
+        self.assertIn("batch-2.record-foreign.json is rejected: it fails its checksum", messages)
 
     def test_a_requeued_task(self):
         build = self.start(16384, 4)
