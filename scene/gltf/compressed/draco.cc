@@ -42,10 +42,11 @@ constexpr uint64_t kMaxStripTrianglesPerFace = 8;
 
 constexpr size_t kWriteElements = 16384;
 
-void charge_up_to(MemoryCharge& charge, uint64_t bytes) {
-  if (bytes > charge.bytes() && !charge.try_resize(bytes))
+void charge_more(MemoryCharge& charge, uint64_t bytes) {
+  const uint64_t total = charge.bytes() + bytes;
+  if (!charge.try_resize(total))
     throw Error(ErrorCode::kOutOfMemory, "decoding its Draco data takes " +
-                                             std::to_string(bytes >> 20) + " MiB, more than " +
+                                             std::to_string(total >> 20) + " MiB, more than " +
                                              "the memory budget leaves");
 }
 
@@ -93,7 +94,7 @@ class BoundedDecoder : public Decoder {
   // Draco makes the objects of all attributes before it calls DecodeAllAttributes().
   void charge_attributes() {
     const uint64_t attributes = count_attributes(attributes_, *this);
-    charge_up_to(charge_, charge_.bytes() + attributes * kBytesPerAttribute);
+    charge_more(charge_, attributes * kBytesPerAttribute);
   }
 
   void check_attributes() {
@@ -107,7 +108,7 @@ class BoundedDecoder : public Decoder {
       bytes_per_vertex += 2 * static_cast<uint64_t>(a.byte_stride()) + kMapBytesPerValue +
                           sizeof(int32_t) * static_cast<uint64_t>(a.num_components());
     }
-    charge_up_to(charge_, charge_.bytes() + vertices_ * bytes_per_vertex);
+    charge_more(charge_, vertices_ * bytes_per_vertex);
     // Called after the charge, because the charge limits the number of values to walk over.
     check_attribute_tables(attributes_, *this, admit_table_);
   }
@@ -118,7 +119,7 @@ class BoundedDecoder : public Decoder {
   uint64_t table_bytes_ = 0;  // charge for the largest table
   const AdmitTable admit_table_ = [this](uint64_t bytes) {
     if (bytes <= table_bytes_) return;
-    charge_up_to(charge_, charge_.bytes() + bytes - table_bytes_);
+    charge_more(charge_, bytes - table_bytes_);
     table_bytes_ = bytes;
   };
   draco::DecoderBuffer attributes_;  // start of the attribute section
@@ -274,8 +275,8 @@ void decode_draco(const DracoPart& part, std::span<std::byte> compressed, Memory
                   const std::function<void(std::span<const std::byte>)>& write) {
   const DracoHeader header = read_draco_header(compressed);
   check_faces(part, header.faces);
-  charge_up_to(charge,
-               header.faces * (kBytesPerFace + kBytesPerFaceOfTable * header.attribute_tables));
+  charge_more(charge,
+              header.faces * (kBytesPerFace + kBytesPerFaceOfTable * header.attribute_tables));
   try {
     draco::Mesh mesh;
     const std::span<const std::byte> data = compressed.subspan(header.begin);
