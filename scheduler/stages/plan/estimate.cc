@@ -288,30 +288,27 @@ bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildSc
 
 std::string estimate_json(const Estimate& e) {
   using nlohmann::ordered_json;
-  const auto range = [](const EstimateRange& r) {
-    return ordered_json{{"low", r.low}, {"likely", r.likely}, {"high", r.high}};
-  };
   ordered_json json = {
       {"triangles", e.triangles},
       {"subvolumes", e.subvolumes},
       {"pilot_resolution", e.pilot_resolution},
-      {"voxels", range(e.voxels)},
-      {"svo_nodes", range(e.svo_nodes)},
-      {"dag_nodes", range(e.dag_nodes)},
-      {"file_bytes", range(e.file_bytes)},
-      {"disk_bytes", range(e.disk_bytes)},
-      {"memory_bytes", range(e.memory_bytes)},
-      {"cpu_s", range(e.cpu_s)},
-      {"wall_s", range(e.wall_s)},
+      {"voxels", range_json(e.voxels)},
+      {"svo_nodes", range_json(e.svo_nodes)},
+      {"dag_nodes", range_json(e.dag_nodes)},
+      {"file_bytes", range_json(e.file_bytes)},
+      {"disk_bytes", range_json(e.disk_bytes)},
+      {"memory_bytes", range_json(e.memory_bytes)},
+      {"cpu_s", range_json(e.cpu_s)},
+      {"wall_s", range_json(e.wall_s)},
       {"free_disk_bytes", e.free_disk},
       {"memory_budget_bytes", e.free_memory},
   };
   if (const auto& c = e.colors)
-    json["colors"] = {{"cells", range(c->cells)},
-                      {"file_bytes", range(c->file_bytes)},
-                      {"artifact_bytes", range(c->artifact_bytes)},
-                      {"spill_bytes", range(c->spill_bytes)},
-                      {"cpu_s", range(c->cpu_s)}};
+    json["colors"] = {{"cells", range_json(c->cells)},
+                      {"file_bytes", range_json(c->file_bytes)},
+                      {"artifact_bytes", range_json(c->artifact_bytes)},
+                      {"spill_bytes", range_json(c->spill_bytes)},
+                      {"cpu_s", range_json(c->cpu_s)}};
   return json.dump(2);
 }
 

@@ -1,5 +1,7 @@
-// Arithmetic of estimates.
+// Arithmetic and JSON of estimates.
 #pragma once
+
+#include <nlohmann/json.hpp>
 
 #include "voxdag/build.h"
 
@@ -14,6 +16,10 @@ inline EstimateRange operator+(const EstimateRange& a, const EstimateRange& b) {
 }
 inline EstimateRange operator*(double factor, const EstimateRange& a) {
   return {factor * a.low, factor * a.likely, factor * a.high};
+}
+
+inline nlohmann::ordered_json range_json(const EstimateRange& r) {
+  return {{"low", r.low}, {"likely", r.likely}, {"high", r.high}};
 }
 
 }  // namespace voxdag
