@@ -48,15 +48,14 @@ void print(const BuildReport& r) {
 void run(const BuildCommand& command, CommandContext& context) {
   BuildSpec spec = command.spec;
   apply_cluster(command.cluster, spec.run);
-  with_option_names([&] { check_options(spec); });
   const auto progress = make_progress_bar();
-  const BuildReport report = [&] {
+  const BuildReport report = with_option_names([&] {
     try {
       return run_build(spec, {context.files, *progress, context.cancel});
     } catch (const DoesNotFit& error) {
       throw Error(error.code(), error.message() + " (--force builds anyway)");
     }
-  }();
+  });
   if (command.json)
     std::printf("%s\n", report_json(report).c_str());
   else

@@ -74,11 +74,11 @@ class OptionDeclarer {
   std::map<std::string, Option> options_;
 };
 
-// Calls check(). Error messages contain the name of the option, such as "--color-resolution",
+// Returns work(). Error messages contain the name of the option, such as "--color-resolution",
 // instead of the name of the field.
-void with_option_names(const auto& check) {
+auto with_option_names(const auto& work) {
   try {
-    check();
+    return work();
   } catch (const FieldError& error) {
     throw Error(ErrorCode::kInvalidInput,
                 option_name(error.field.c_str()) + ": expected " + error.expectation);

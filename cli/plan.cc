@@ -54,9 +54,10 @@ void print(const ClusterPlan& plan) {
 }
 
 void run(const PlanCommand& command, CommandContext& context) {
-  with_option_names([&] { check_options(command.spec); });
   const auto progress = make_progress_bar();
-  const Estimate estimate = plan_build(command.spec, {context.files, *progress, context.cancel});
+  const Estimate estimate = with_option_names([&] {
+    return plan_build(command.spec, {context.files, *progress, context.cancel});
+  });
   if (command.cluster.engine == ClusterEngine::kNone) {
     if (command.json)
       std::printf("%s\n", estimate_json(estimate).c_str());
