@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/text.h"
+#include "core/fields/field.h"
 #include "server/http/message/problem.h"
 
 namespace voxdag::server {
@@ -24,11 +25,10 @@ bool matches(const std::vector<std::string>& pattern, const std::vector<std::str
 }
 
 Problem unknown_parameter(const Route& route, const std::string& name) {
-  std::string expected;
-  for (const Parameter& parameter : route.query)
-    expected += (expected.empty() ? "" : ", ") + parameter.name;
+  std::vector<std::string> names;
+  for (const Parameter& parameter : route.query) names.push_back(parameter.name);
   return bad_request("unknown query parameter '" + name.substr(0, 64) + "': expected " +
-                     (expected.empty() ? "none" : expected));
+                     (names.empty() ? "none" : joined(names)));
 }
 
 void check_query(const Request& request, const Route& route) {
