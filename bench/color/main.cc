@@ -1,4 +1,4 @@
-// Measures what a color costs: the rule and the encoding, on one core, for a generated scene.
+// Measures the cost of a color: the rule and the encoding, on one core, for a generated scene.
 //
 //     bench_color [K]
 //

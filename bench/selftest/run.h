@@ -25,7 +25,7 @@ bool compare_with_cpu(const std::vector<Subject>& subjects, bool quick);
 struct BenchOptions {
   uint32_t grid_levels = 12;
   int64_t subvolume_edge = 0;  // 0 for an eighth of the grid's
-  unsigned workers = 2;        // of a subject, each with a backend of its own
+  unsigned workers = 2;        // workers of a subject, each with its own backend
   unsigned cpu_workers = 1;
   uint64_t worker_bytes = uint64_t{8} << 30;
 };

@@ -73,7 +73,7 @@ class ExportStage {
   uint64_t pending_ = 0, calls_ = 0;
 };
 
-// Checks for cancellation from time to time in a long loop that is not an ExportStage of its own.
+// Checks for cancellation from time to time in a long loop without an ExportStage.
 class CancelCheck {
  public:
   explicit CancelCheck(const ExportJob& job) : job_(job) {}
