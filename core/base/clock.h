@@ -22,21 +22,23 @@ inline double wall_seconds() { return clock_seconds(CLOCK_MONOTONIC); }
 inline double unix_seconds() { return clock_seconds(CLOCK_REALTIME); }
 // Returns the user and system time of all threads of this process, in seconds.
 inline double process_cpu_seconds() { return clock_seconds(CLOCK_PROCESS_CPUTIME_ID); }
+// Returns the user and system time of the calling thread, in seconds.
 inline double thread_cpu_seconds() { return clock_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
-// CPU time of each thread, which shows whether a stage keeps all threads busy. The times of all
-// threads that parallel_for() started with the same worker number are added together. So are the
-// times of all background threads. A thread adds its time when it ends.
+// CPU time of each thread, which shows whether a stage keeps all threads busy. A thread adds its
+// time when it ends. All threads that parallel_for() started with the same worker number share one
+// entry, and all background threads share another.
 class ThreadTimes {
  public:
-  static constexpr size_t kThreads = 257;
-  static constexpr size_t kBackground = kThreads - 1;
+  static constexpr size_t kThreads = 257;  // entries: workers 0 to 255, and background threads
+  static constexpr size_t kBackground = kThreads - 1;  // entry of the background threads
   using Seconds = std::array<double, kThreads>;
 
-  // Adds the time of the ending thread to a worker's time. All workers from 255 share one entry.
+  // Adds the calling thread's time to a worker's entry. Call it once, when the thread ends. Workers
+  // above 255 share the entry of worker 255.
   static void add(size_t worker) { times_ns_[std::min(worker, kBackground - 1)] += now_ns(); }
   static void add_background() { times_ns_[kBackground] += now_ns(); }
-  // Returns the times so far. The calling thread's time counts as worker 0's.
+  // Returns the seconds of each entry so far. The calling thread's time counts as worker 0's.
   static Seconds now() {
     Seconds seconds;
     for (size_t i = 0; i < kThreads; ++i) seconds[i] = 1e-9 * static_cast<double>(times_ns_[i]);

@@ -10,7 +10,8 @@ struct Row {
   int http_status;
 };
 
-// docs/errors.md shows this table to users. 130 is the shell's status after Ctrl-C.
+// docs/errors.md shows this table to users. Exit status 130 is the one that a shell reports after
+// Ctrl-C.
 constexpr Row kTable[] = {
     {ErrorCode::kInvalidInput, "invalid_input", 2, 400},
     {ErrorCode::kNotFound, "not_found", 3, 404},

@@ -1,10 +1,10 @@
-// Accounts for large buffers, so that a build never exceeds --memory. Each buffer is charged here
-// before it is allocated. If the charge fails, the buffer's owner spills, splits or refuses the
-// work.
+// Accounts for large buffers, so that a build never exceeds its memory limit (--memory). Each
+// buffer is charged here before it is allocated. If the charge fails, the buffer's owner spills
+// data to disk, splits the work or refuses it.
 //
 // Invariants:
 //   1. used() <= limit() at any time.
-//   2. A budget may be a share of a parent: every charge is charged to the parent too.
+//   2. A budget may be a share of a parent: every charge is also charged to the parent.
 //
 // Thread-safe.
 #pragma once
@@ -15,7 +15,8 @@
 
 namespace voxdag {
 
-// Thrown if a budget, or a device's memory, cannot hold a piece of work that the caller can split.
+// Thrown if a budget, or the memory of a GPU, cannot hold a piece of work. The caller can catch it
+// and split the work.
 struct OutOfBudget {};
 
 class MemoryBudget {
@@ -27,13 +28,15 @@ class MemoryBudget {
 
   uint64_t limit() const { return limit_; }
   uint64_t used() const { return used_.load(std::memory_order_relaxed); }
+  // Returns the largest number of bytes charged at any time so far.
   uint64_t peak() const { return peak_.load(std::memory_order_relaxed); }
-  // Bytes that can be charged now. The parents' limits are considered.
+  // Returns the bytes that can be charged now without exceeding this limit or a parent's limit.
   uint64_t available() const;
 
   // Charges `bytes`. Returns false and charges nothing if they do not fit.
   bool try_charge(uint64_t bytes);
-  // Throws an Error{kOutOfMemory} that names `what` if the bytes do not fit.
+  // Charges `bytes`. Throws an Error{kOutOfMemory} that names `what`, the buffer, if they do not
+  // fit.
   void charge(uint64_t bytes, std::string_view what);
   void release(uint64_t bytes);
 
@@ -44,11 +47,11 @@ class MemoryBudget {
   std::atomic<uint64_t> peak_{0};
 };
 
-// A charge that is released when it goes out of scope.
+// Charges bytes to a budget, and releases them when it is destroyed.
 class MemoryCharge {
  public:
   MemoryCharge() = default;
-  // Throws an Error{kOutOfMemory} that names `what` if the bytes do not fit.
+  // Throws like MemoryBudget::charge() if the bytes do not fit.
   MemoryCharge(MemoryBudget& budget, uint64_t bytes, std::string_view what)
       : budget_(&budget), bytes_(bytes) {
     budget.charge(bytes, what);

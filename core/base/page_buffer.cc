@@ -17,7 +17,7 @@ void* check_pages(void* pages, size_t bytes, std::string_view what) {
     throw Error(ErrorCode::kOutOfMemory, "out of memory: the system refused " +
                                              std::to_string(bytes) + " bytes for " +
                                              std::string(what));
-  // With huge pages, random access to large tables needs far fewer address translations. No huge
+  // Random access to a large table needs far fewer address translations with huge pages. No huge
   // page extends beyond the mapping, so resident memory does not exceed the charge.
   if (bytes >= (size_t{2} << 20)) madvise(pages, bytes, MADV_HUGEPAGE);
   return pages;
@@ -33,7 +33,8 @@ void* allocate_pages(size_t bytes, std::string_view what) {
 
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what) {
 #if defined(__SANITIZE_THREAD__)
-  // ThreadSanitizer does not see mremap(): it attributes the memory to its previous thread.
+  // ThreadSanitizer does not see mremap(), and attributes memory at the new address to the thread
+  // that used this address before. So copy the bytes instead.
   void* const grown = allocate_pages(new_bytes, what);
   std::memcpy(grown, pages, std::min(bytes, new_bytes));
   free_pages(pages, bytes);

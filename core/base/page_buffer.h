@@ -1,6 +1,6 @@
-// A large array of zero-filled pages allocated directly from the system, in huge pages where they
-// help. Freed pages return to the system immediately, which the general allocator does not
-// guarantee. So tables and level arrays use this buffer. Not thread-safe.
+// A large array of zero-filled pages allocated directly from the system; arrays of 2 MiB or more
+// use huge pages. Tables and level arrays use this buffer because freed pages return to the system
+// immediately, which the general allocator does not guarantee. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,11 +15,12 @@
 
 namespace voxdag {
 
-// Returns zero-filled pages. Throws an Error{kOutOfMemory} that names `what` if the system has no
-// pages left.
+// Returns zero-filled pages for `bytes` bytes. Throws an Error{kOutOfMemory} that names `what`, the
+// purpose of the pages, if the system refuses them.
 void* allocate_pages(size_t bytes, std::string_view what);
-// Appends zero-filled pages. If necessary, moves all pages to other addresses, without copying
-// bytes.
+// Grows an allocation from `bytes` to `new_bytes` bytes and returns its address, which may have
+// changed. The new pages are zero-filled. Pages may move to other addresses, but their bytes are
+// not copied. Throws like allocate_pages().
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what);
 void free_pages(void* pages, size_t bytes);
 
@@ -29,7 +30,8 @@ class PageBuffer {
 
  public:
   PageBuffer() = default;
-  // Charges `budget`. Throws an Error{kOutOfMemory} that names `what` if the buffer does not fit.
+  // Allocates `size` zero elements and charges them to `budget`. Throws an Error{kOutOfMemory} that
+  // names `what`, the purpose of the buffer, if they do not fit.
   PageBuffer(MemoryBudget& budget, size_t size, std::string_view what)
       : charge_(budget, byte_count(size), what),
         data_(size ? static_cast<T*>(allocate_pages(byte_count(size), what)) : nullptr),
@@ -51,8 +53,9 @@ class PageBuffer {
     if (data_) free_pages(data_, size_ * sizeof(T));
   }
 
-  // Enlarges a buffer that is not empty. The new elements are zero. Throws an Error{kOutOfMemory}
-  // that names `what` if the new size does not fit; the buffer is then unchanged.
+  // Enlarges a buffer that is not empty to `size` elements. The new elements are zero. Throws an
+  // Error{kOutOfMemory} that names `what` if the new size does not fit; the buffer is then
+  // unchanged.
   void grow(size_t size, std::string_view what) {
     const uint64_t old_bytes = charge_.bytes();
     if (!charge_.try_resize(byte_count(size)))
@@ -75,7 +78,8 @@ class PageBuffer {
   T* end() { return data_ + size_; }
 
  private:
-  // Returns UINT64_MAX, which never fits, if the product overflows.
+  // Returns the bytes of `size` elements, or UINT64_MAX, which never fits a budget, if the product
+  // overflows.
   static uint64_t byte_count(size_t size) {
     return size <= SIZE_MAX / sizeof(T) ? size * sizeof(T) : UINT64_MAX;
   }

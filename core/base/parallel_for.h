@@ -1,4 +1,4 @@
-// Loops over items on several threads. When a thread has finished an item, it takes the next one.
+// Loops over items on several threads. A thread that has finished an item takes the next one.
 // Results can be committed in the order of the items.
 #pragma once
 
@@ -17,10 +17,11 @@
 
 namespace voxdag {
 
-// Calls body(worker, item) for every item below `count`, on up to `workers` threads including the
-// caller. `worker` is the number of the thread, counted from 0. After an exception no further item
-// is started. Once all threads have stopped, the exception of the first failed item is rethrown. So
-// if the same items fail in every run, the exception is the same for any number of threads.
+// Calls body(worker, item) for the items 0 to count - 1, on up to `workers` threads including the
+// caller. `worker` is the number of the thread; the caller is 0. After an exception no further item
+// is started. Once all threads have stopped, the exception of the failed item with the lowest
+// number is rethrown. So if the same items fail in every run, the exception is the same for any
+// number of threads.
 template <class Body>
 void parallel_for(unsigned workers, size_t count, Body&& body) {
   std::atomic<size_t> next{0};
@@ -48,23 +49,25 @@ void parallel_for(unsigned workers, size_t count, Body&& body) {
     for (unsigned worker = 1; worker < workers && worker < count; ++worker)
       threads.emplace_back(work_and_end, worker);
   } catch (const std::exception&) {
-    // The system has no more threads, so the started threads and this one do all the work.
+    // The system has no more threads. The threads started so far and the caller do all the work.
   }
   work(0);
   for (std::thread& thread : threads) thread.join();
   if (failure) std::rethrow_exception(failure);
 }
 
-// Gives each item a turn, in the order of the items' numbers. Thread-safe.
+// Orders the commits of items that several threads process: each item gets a turn, in the order of
+// the items' numbers. Thread-safe.
 class Turns {
  public:
-  // Waits for the turn of an item, which lasts until end(). Returns false if the item gets no turn
-  // because an earlier item failed.
+  // Waits for the turn of an item. The turn lasts until end(). Returns false if the item gets no
+  // turn because an earlier item failed.
   bool wait_for(size_t item) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return item == turn_ || item > failed_; });
     return item == turn_;
   }
+  // Ends the current turn. The next item then gets its turn.
   void end() {
     const std::lock_guard lock(mutex_);
     ++turn_;
@@ -89,9 +92,9 @@ class Turns {
   size_t failed_ = SIZE_MAX;
 };
 
-// Calls prepare(worker, item) for every item below `count`, on several threads like parallel_for().
-// Calls commit(worker, item) sequentially in the order of the items. If an item throws, exactly the
-// items before the first such item are committed.
+// Calls prepare(worker, item) for the items 0 to count - 1, on several threads like parallel_for().
+// Calls commit(worker, item) for one item at a time, in the order of the items. If items throw,
+// exactly the items before the first of them are committed.
 template <class Prepare, class Commit>
 void parallel_for_in_order(unsigned workers, size_t count, Prepare&& prepare, Commit&& commit) {
   Turns turns;

@@ -1,13 +1,14 @@
-// Counts the bits set in a byte, with a table: baseline x86-64 has no instruction for it, so
-// std::popcount would be a function call.
+// Counts the bits set in a byte, with a table. x86-64 without extensions has no instruction for
+// this, so std::popcount would be a function call.
 #pragma once
 
 #include <cstdint>
 
 namespace voxdag {
 
-// A plain array, so that sources compiled for other instruction sets do not share an inline
-// function by using it.
+// The table is a plain array because indexing a std::array calls an inline function. Sources
+// compiled for different instruction sets would share one copy of that function, and the CPU might
+// not be able to run this copy.
 struct Popcount8Table {
   uint8_t of[256] = {};
   constexpr Popcount8Table() {

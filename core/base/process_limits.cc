@@ -20,7 +20,8 @@ uint64_t number_in(const std::string& path) {
   return file >> bytes ? bytes : UINT64_MAX;  // "max" does not parse, which means no limit
 }
 
-// Returns the lowest limit of the groups from `path` up to the root of the hierarchy.
+// Returns the lowest limit of the cgroup `path` and its ancestors, up to the mount point `root`.
+// limit_of(folder) reads the limit from a cgroup's folder.
 template <class LimitOf>
 uint64_t min_up_from(const std::string& root, std::string path, const LimitOf& limit_of) {
   uint64_t lowest = UINT64_MAX;
@@ -32,9 +33,10 @@ uint64_t min_up_from(const std::string& root, std::string path, const LimitOf& l
   }
 }
 
-// Returns the lowest limit of all groups in `membership` and of their ancestors; limit_of2() and
-// limit_of1() read the limit from a group's folder in version 2 and 1. A line of `membership` is
-// "<id>:<controllers>:<path>"; version 2 has no controllers there.
+// Returns the lowest limit of all cgroups in `membership` (the text of /proc/self/cgroup) and of
+// their ancestors. limit_of2() and limit_of1() read the limit from a cgroup's folder, for version 2
+// and version 1 of cgroups. A line of `membership` is "<id>:<controllers>:<path>". In version 2,
+// <controllers> is empty.
 template <class LimitOf2, class LimitOf1>
 uint64_t min_of_groups(const std::string& membership, const std::string& mount,
                        const std::string& controller, const LimitOf2& limit_of2,
@@ -48,11 +50,12 @@ uint64_t min_of_groups(const std::string& membership, const std::string& mount,
     const std::string controllers = line.substr(first + 1, second - first - 1);
     const std::string path = line.substr(second + 1);
     if (controllers.empty()) {
+      // Systems with both versions mount version 2 at "unified".
       for (const char* root : {"", "/unified"})
         lowest = std::min(lowest, min_up_from(mount + root, path, limit_of2));
     } else if (("," + controllers + ",").find("," + controller + ",") != std::string::npos) {
-      // A controller is mounted under its name, or under the names of all controllers mounted with
-      // it.
+      // Version 1 mounts a controller under its own name, or under the names of all controllers
+      // that are mounted together with it.
       for (const std::string& name : {controller, controllers})
         lowest = std::min(lowest, min_up_from(mount + "/" + name, path, limit_of1));
     }
@@ -60,7 +63,8 @@ uint64_t min_of_groups(const std::string& membership, const std::string& mount,
   return lowest;
 }
 
-// Returns the CPUs of a quota in microseconds per period, rounded up.
+// Returns the number of CPUs, rounded up, that a cgroup may use: it gets `quota` microseconds of
+// CPU time in every `period` microseconds. Returns UINT64_MAX if there is no quota.
 uint64_t cpus(uint64_t quota, uint64_t period) {
   if (quota >= INT64_MAX || period == 0 || period >= INT64_MAX) return UINT64_MAX;
   return std::max<uint64_t>(1, (quota + period - 1) / period);
@@ -73,7 +77,8 @@ std::string own_membership() {
 
 constexpr const char* kCgroupMount = "/sys/fs/cgroup";
 
-// Returns a size in the kernel's status of this process; 0 if it is absent.
+// Returns the size, in bytes, in the line of /proc/self/status that begins with `name`; 0 if it is
+// absent.
 uint64_t status_bytes(const std::string& name) {
   std::ifstream status("/proc/self/status");
   std::string line;

@@ -1,6 +1,6 @@
 // Returns the memory and CPUs that a build may use on this machine, and the memory that this
-// process uses. Also changes allocator settings, because with the defaults the process would use
-// more memory than it has charged. Thread-safe.
+// process uses. Also changes allocator settings: with the default settings the process would use
+// more memory than is charged to its budget. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -8,20 +8,20 @@
 
 namespace voxdag {
 
-// The smallest --memory, in bytes.
+// The smallest accepted value of --memory, in bytes.
 inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;
 
-// Returns half of the memory that RAM and cgroups allow, at least kMinMemory, in bytes.
+// Returns half of the memory that RAM and cgroup limits allow, but at least kMinMemory, in bytes.
 uint64_t default_memory();
-// Returns the lowest memory limit of some cgroups (version 2 or 1), mounted under `mount`, and of
-// their ancestors. `membership` lists the cgroups; it is the text of /proc/self/cgroup. Returns
-// UINT64_MAX if there is no limit.
+// Returns the lowest memory limit, in bytes, of the cgroups in `membership` and of their ancestors.
+// `membership` is the text of /proc/self/cgroup. The cgroups are version 1 or 2 and are mounted at
+// `mount`. Returns UINT64_MAX if there is no limit.
 uint64_t cgroup_memory(const std::string& membership, const std::string& mount);
 // Returns the number of CPUs that this process may use: the CPUs of its affinity mask, or fewer if
 // a cgroup has a quota.
 unsigned default_threads();
-// Returns the lowest CPU quota of the same cgroups, in CPUs, rounded up. Returns UINT64_MAX if
-// there is no quota.
+// Returns the lowest CPU quota of the cgroups in `membership` and of their ancestors, in CPUs,
+// rounded up; the parameters are as for cgroup_memory(). Returns UINT64_MAX if there is no quota.
 uint64_t cgroup_cpus(const std::string& membership, const std::string& mount);
 // Largest resident set of this process so far (VmHWM), in bytes.
 uint64_t peak_resident_bytes();
@@ -31,11 +31,12 @@ uint64_t resident_bytes();
 uint64_t max_open_files();
 
 // Makes the C library return freed memory to the system immediately, so that resident memory
-// follows the charges of a MemoryBudget. Called by main() only: the setting is process-wide, so a
-// library must leave it to its host program. No effect without glibc.
+// follows the charges of a MemoryBudget. Only main() calls this: the setting applies to the whole
+// process, so a library must leave it to its host program. No effect without glibc.
 void return_freed_memory_to_system();
-// Returns pages of small freed blocks to the system. The C library retains these pages despite the
-// settings above. Call it after many small blocks were freed. No effect without glibc.
+// Returns the pages of small freed blocks to the system. The C library retains these pages even
+// after return_freed_memory_to_system(). Call it after many small blocks were freed. No effect
+// without glibc.
 void trim_heap();
 
 }  // namespace voxdag

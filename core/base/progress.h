@@ -1,6 +1,6 @@
-// The interface through which work reports its progress. Stages run one after another; within a
-// stage any thread may call advance(). Implementations (a terminal's bar, plain lines, the service)
-// are thread-safe.
+// The interface through which a build or another command reports its progress. Stages run one after
+// another. Within a stage any thread may call advance(). Implementations (a progress bar, plain
+// lines, the service) are thread-safe.
 #pragma once
 
 #include <array>
@@ -20,11 +20,12 @@ struct SubvolumeStatus {
   bool built = false;
   // Contents of a built subvolume.
   uint64_t voxels = 0;
-  uint64_t nodes = 0;
-  uint64_t bytes = 0;
+  uint64_t nodes = 0;  // unique nodes
+  uint64_t bytes = 0;  // size of its artifact
 };
 
-// The batches of a build on a cluster, and the tasks for them.
+// The batches of a build on a cluster, and the tasks that build them. A node here is a machine of
+// the cluster.
 struct ClusterTasks {
   uint64_t batches = 0;                           // total
   uint64_t built = 0;                             // built batches
@@ -37,10 +38,11 @@ struct ClusterTasks {
 class Progress {
  public:
   virtual ~Progress() = default;
-  // A stage starts; `total` counts `unit`s ("triangles", "subvolumes", "nodes"), 0 if unknown.
+  // A stage starts. It has `total` units of work, 0 if unknown; `unit` is their name ("triangles",
+  // "subvolumes", "nodes").
   virtual void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) = 0;
-  // The stage continues where an earlier run ended: `done` units count toward the total but not
-  // toward the rate. Called after begin_stage(), if at all.
+  // The stage continues where an earlier run ended. The `done` units count toward the total, but
+  // not toward the displayed rate. Called after begin_stage(), if at all.
   virtual void resume_at(uint64_t done) = 0;
   // Reports that `count` more units are done.
   virtual void advance(uint64_t count) = 0;
@@ -50,12 +52,14 @@ class Progress {
   // Reports a warning that a user should read: one sentence.
   virtual void warn(std::string_view message) = 0;
 
-  // The position of the grid in the scene. Called before set_subvolumes().
+  // The grid's low corner and edge length, in the units of the scene. Called before
+  // set_subvolumes().
   virtual void set_grid(const std::array<double, 3>& /*origin*/, double /*edge*/) {}
-  // All subvolumes of the build, including the ones built by an earlier run. Replaces earlier
-  // reports.
+  // All subvolumes of the build, including subvolumes built by an earlier run. `resolution` is the
+  // grid's, in voxels per edge. Replaces all earlier reports of subvolumes.
   virtual void set_subvolumes(uint64_t /*resolution*/, std::span<const SubvolumeStatus> /*all*/) {}
-  // A worker has begun a planned subvolume. The subvolume is done when it is built or split.
+  // A worker has begun to build a planned subvolume. The subvolume is finished when
+  // subvolume_built() or subvolume_split() is called.
   virtual void subvolume_begun(int64_t /*id*/) {}
   virtual void subvolume_built(const SubvolumeStatus& /*built*/) {}
   // `parts` replace the subvolume `id`.

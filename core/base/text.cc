@@ -10,7 +10,8 @@ namespace {
 
 constexpr const char* kUnits[] = {"B", "KiB", "MiB", "GiB", "TiB", "PiB"};
 
-// Returns the shift for a unit ("", "B", "K", "KiB", "kB", ...), or -1.
+// Returns the power of two that a unit ("", "B", "K", "KiB", "kB", ...) stands for, as its
+// exponent: 10 for "KiB". Returns -1 for other texts.
 int unit_shift(std::string unit) {
   if (unit.ends_with("B") || unit.ends_with("b")) unit.pop_back();
   if (unit.ends_with("i")) unit.pop_back();

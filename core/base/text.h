@@ -1,5 +1,5 @@
-// Converts text for people and protocols: sizes, counts, durations, lists of numbers, hexadecimal
-// and percent-encoded bytes. Pure functions.
+// Converts between values and text: sizes, counts, durations, lists of numbers, hexadecimal and
+// percent-encoded bytes. Pure functions.
 #pragma once
 
 #include <array>
@@ -15,8 +15,9 @@
 
 namespace voxdag {
 
-// Parses a size: "512MiB", "8GiB", "64M" (binary), "1000000". Returns bytes. Throws
-// Error{kInvalidInput} with `option` unless the text is a number with an optional unit.
+// Parses a size in bytes: "512MiB", "8GiB", "64M" (also binary), "1000000". Throws
+// Error{kInvalidInput} unless the text is a number with an optional unit; the message begins with
+// `option`.
 uint64_t parse_size(const std::string& text, const std::string& option);
 // Returns a size as text: "1.25 GiB".
 std::string size_text(uint64_t bytes);
@@ -25,7 +26,7 @@ std::string count_text(uint64_t count);
 // Returns a duration as text: "1 m 04 s" or "12.3 s".
 std::string duration_text(double seconds);
 
-// Returns the shortest text that reads back as the same number, in any locale.
+// Returns the shortest text that parses to the same number. It does not depend on the locale.
 std::string number_text(double number);
 
 // Formats a Unix time in UTC, with a format of strftime().
@@ -33,11 +34,12 @@ std::string utc_text(time_t time, const char* format);
 
 // Returns bytes as text, with two lower-case hexadecimal digits per byte.
 std::string hex_text(std::span<const unsigned char> bytes);
-// Decodes a percent-encoded text (RFC 3986); nullopt if an escape is broken.
+// Decodes a percent-encoded text (RFC 3986). Returns nullopt if a '%' is not followed by two
+// hexadecimal digits.
 std::optional<std::string> percent_decoded(std::string_view text);
 
-// Parses `text` as exactly kCount numbers with `separator` between them; nullopt for any other
-// text.
+// Parses `text` as exactly kCount numbers with `separator` between them. Returns nullopt for any
+// other text.
 template <class Number, size_t kCount>
 std::optional<std::array<Number, kCount>> parse_numbers(std::string_view text, char separator) {
   std::array<Number, kCount> numbers{};
