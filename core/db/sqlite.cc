@@ -41,7 +41,8 @@ bool has_no_inodes(const std::string& path) {
   const int reason = database ? sqlite3_system_errno(database) : 0;
   if (code == ErrorCode::kIo && (reason == ENOSPC || reason == EDQUOT || reason == EFBIG))
     code = ErrorCode::kNoSpace;
-  // SQLite tries again without creating the file. Then it reports that the file does not exist.
+  // If SQLite cannot create a file because no inodes are left, it tries to open the file without
+  // creating it. It then reports only that the file does not exist.
   if ((result & 0xff) == SQLITE_CANTOPEN && has_no_inodes(path)) {
     code = ErrorCode::kNoSpace;
     message += ": the file system has no inodes left";
@@ -83,7 +84,8 @@ SqlStatement& SqlStatement::bind(int parameter, std::string_view text) {
 }
 
 SqlStatement& SqlStatement::bind(int parameter, std::span<const std::byte> bytes) {
-  // An empty span is an empty blob, not NULL.
+  // SQLite would store a null pointer as NULL. So an empty span, whose data() may be null, is bound
+  // as an empty blob.
   const void* data = bytes.empty() ? static_cast<const void*>("") : bytes.data();
   const int result =
       sqlite3_bind_blob64(statement_.get(), parameter + 1, data, bytes.size(), SQLITE_STATIC);
@@ -156,8 +158,8 @@ int64_t SqlDatabase::integer(const std::string& sql) {
 }
 
 SqlTransaction::SqlTransaction(SqlDatabase& database, Durable durable) : database_(database) {
-  // In WAL mode FULL syncs the log at each commit. NORMAL leaves the sync to the next commit with
-  // FULL.
+  // In WAL mode FULL syncs the log at each commit. NORMAL does not; the next commit with FULL syncs
+  // its changes.
   database_.execute(durable == Durable::kNow ? "PRAGMA synchronous = FULL"
                                              : "PRAGMA synchronous = NORMAL");
   database_.execute("BEGIN IMMEDIATE");

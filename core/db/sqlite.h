@@ -1,4 +1,4 @@
-// A small wrapper of SQLite: a connection that closes itself, statements that bind and step, and
+// A small wrapper of SQLite: a connection that closes itself, statements with bound parameters, and
 // errors as voxdag::Error. table_rows.h reads and writes complete rows. Not thread-safe: a
 // connection and its statements must not be used concurrently. Only sqlite.cc includes sqlite3.h.
 #pragma once
@@ -24,14 +24,16 @@ class SqlStatement {
 
   SqlStatement& bind(int parameter, int64_t value);
   SqlStatement& bind(int parameter, double value);
+  // Copies the text.
   SqlStatement& bind(int parameter, std::string_view text);
+  // Does not copy the bytes. They must remain valid until the statement has run.
   SqlStatement& bind(int parameter, std::span<const std::byte> bytes);
   // Stores a 64-bit word as the signed integer with the same bits.
   SqlStatement& bind_word(int parameter, uint64_t word) {
     return bind(parameter, static_cast<int64_t>(word));
   }
 
-  // Advances to the next row. Returns true if there is a row to read.
+  // Advances to the next row. Returns false if there are no more rows.
   bool step();
   // Runs a statement that returns no rows. Afterwards the statement can be bound again.
   void run();
@@ -55,13 +57,14 @@ class SqlStatement {
 class SqlDatabase {
  public:
   enum class Mode { kReadWrite, kReadOnly };
-  // Opens (and for kReadWrite creates) a database. Its statements wait up to `busy_ms` for other
-  // processes.
+  // Opens a database; kReadWrite creates it if it does not exist. A statement waits up to `busy_ms`
+  // milliseconds if another process has locked the database.
   SqlDatabase(const std::string& path, Mode mode, int busy_ms = 5000);
 
   void execute(const std::string& sql);
   SqlStatement prepare(std::string_view sql) { return SqlStatement(handle_.get(), sql); }
-  // Returns the single integer that a query returns.
+  // Returns the first column of the first row of a query. Throws Error{kCorrupt} if the query has
+  // no row.
   int64_t integer(const std::string& sql);
 
  private:
@@ -71,13 +74,14 @@ class SqlDatabase {
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
-// True if a database has no tables and no application id.
+// True if a database has no tables, no application id and no schema version.
 bool is_new(SqlDatabase& database);
 
-// Commits with kLater may be lost in a power cut until the next commit with kNow.
+// A commit with kNow survives a power cut. A commit with kLater may be lost in a power cut until
+// the next commit with kNow.
 enum class Durable { kNow, kLater };
 
-// The destructor rolls back unless commit() was called.
+// A write transaction. The destructor rolls it back unless commit() was called.
 class SqlTransaction {
  public:
   explicit SqlTransaction(SqlDatabase& database, Durable durable = Durable::kNow);
@@ -89,8 +93,9 @@ class SqlTransaction {
   bool open_ = true;
 };
 
-// Runs `sql`, which creates or changes tables, and marks the database with its kind (PRAGMA
-// application_id) and the version of its schema (PRAGMA user_version). Does all of this or nothing.
+// Runs `sql`, which creates or changes tables. Also stores the kind of the database (PRAGMA
+// application_id) and the version of its schema (PRAGMA user_version). All changes are one
+// transaction.
 void change_schema(SqlDatabase& database, const std::string& sql, int64_t application_id,
                    int64_t version);
 

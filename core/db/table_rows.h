@@ -1,15 +1,15 @@
-// Writes and reads rows of a table. A row is made from the description of a record
-// (core/fields/field.h), whose members are integers, enums, double, text, bytes or optional
-// integers:
+// Writes and reads rows of a table. A row has a column for each member that the record's fields()
+// function visits (core/fields/field.h). The members are integers, enums, double, text, bytes or
+// optional integers:
 //
 //   template <class Row>
 //   void fields(Row& row, Record& record) {
-//     row.fixed("id", 1);  // the same in every row; not read
+//     row.fixed("id", 1);  // a column that is 1 in every row; ignored on reading
 //     row("name", record.name);
 //   }
 //
-// put_row() and select_rows() make their SQL from this description, so that no code needs the
-// number of a column.
+// put_row() and select_rows() make their SQL from this function, so no code contains the number of
+// a column.
 #pragma once
 
 #include <optional>
@@ -22,7 +22,7 @@
 
 namespace voxdag {
 
-// The names of the columns, separated by commas.
+// A visitor that lists the names of the columns, separated by commas.
 class ColumnNames {
  public:
   void fixed(const char* name, int64_t) { add(name); }
@@ -40,7 +40,7 @@ class ColumnNames {
   int count_ = 0;
 };
 
-// Binds the columns to the parameters of a statement, in order.
+// A visitor that binds the values of a record to the parameters of a statement, in order.
 class RowWriter {
  public:
   explicit RowWriter(SqlStatement& statement) : statement_(statement) {}
@@ -63,7 +63,8 @@ class RowWriter {
   int next_ = 0;
 };
 
-// Reads the columns of a statement's row, in order.
+// A visitor that sets the members of a record from the columns of a statement's current row, in
+// order.
 class RowReader {
  public:
   explicit RowReader(const SqlStatement& row) : row_(row) {}
@@ -93,7 +94,8 @@ ColumnNames column_names() {
   return names;
 }
 
-// Writes a record with the statement `before` (COLUMNS) `between` (VALUES) `after`.
+// Runs the statement "`before` (COLUMNS) `between` (VALUES) `after`", with the names of the
+// record's columns and its values.
 template <class Record>
 void write_row(SqlDatabase& database, const std::string& before, const char* between,
                const std::string& after, Record record) {
@@ -113,15 +115,17 @@ void put_row(SqlDatabase& database, const std::string& table, Record record) {
   write_row(database, "INSERT OR REPLACE INTO " + table, "VALUES", "", std::move(record));
 }
 
-// Writes the record to all rows of `table` that satisfy `condition`. Unlike put_row(), it does not
-// remove rows that refer to the changed rows.
+// Writes the record to all rows of `table` that satisfy `condition`. It changes the rows in place.
+// put_row() instead deletes and inserts a row, which also deletes the rows that refer to it with ON
+// DELETE CASCADE.
 template <class Record>
 void update_row(SqlDatabase& database, const std::string& table, const std::string& condition,
                 Record record) {
   write_row(database, "UPDATE " + table + " SET", "=", "WHERE " + condition, std::move(record));
 }
 
-// Returns the rows of `table`; `rest` may filter and order them.
+// Returns a statement that selects the rows of `table`. `rest` is the end of the SQL; it may filter
+// and order the rows.
 template <class Record>
 SqlStatement select_rows(SqlDatabase& database, const std::string& table,
                          const std::string& rest = "") {
@@ -129,7 +133,7 @@ SqlStatement select_rows(SqlDatabase& database, const std::string& table,
                           rest);
 }
 
-// Returns the current row of a statement of select_rows().
+// Returns the current row of a statement from select_rows() as a record.
 template <class Record>
 Record read_row(const SqlStatement& statement) {
   Record record;
