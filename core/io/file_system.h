@@ -1,11 +1,13 @@
-// All file access of voxdag uses this interface, so that tests can replace the disk with a disk
-// that is full, loses unsynced data, or flips bits. Paths are plain byte strings.
+// All file access of voxdag uses this interface, so that tests can replace the disk by one that is
+// full, loses unsynced data, or flips bits. Paths are plain byte strings.
 //
-// Errors: kNotFound, kNoSpace (ENOSPC, EDQUOT, EFBIG), kIo; the message names the call, the path,
-// the offset if there is one, and the system's reason. Implementations handle short reads and
-// writes, and EINTR. A FileSystem is thread-safe. A file is not thread-safe, with these exceptions:
-// several threads may call ReadableFile::read_at() or WritableFile::write_at() at the same time,
-// and other threads may call WritableFile::sync() and release() concurrently with these calls.
+// Error codes are kNotFound, kNoSpace (for ENOSPC, EDQUOT and EFBIG) and kIo. The message names the
+// call, the path, the offset if there is one, and the system's reason. Implementations handle short
+// reads and writes, and EINTR.
+//
+// A FileSystem is thread-safe. A file is not thread-safe, with these exceptions: several threads
+// may call ReadableFile::read_at() or WritableFile::write_at() at the same time, and other threads
+// may call WritableFile::sync() and release() concurrently with these calls.
 #pragma once
 
 #include <cstddef>
@@ -17,13 +19,14 @@
 
 namespace voxdag {
 
-// Changes when the file changes. Equal identities mean equal bytes, unless the file was changed so
-// recently that the file system's clock has not advanced since then.
+// Identifies a file and its contents. Equal identities mean the same file with equal bytes, unless
+// the file was changed so recently that the file system's clock has not advanced since then.
 struct FileIdentity {
   uint64_t inode = 0;
   uint64_t bytes = 0;
   int64_t modified_ns = 0;  // Unix time of the last change of the contents
-  // Unix time of the last change of contents, names or times; no program can set it back.
+  // Unix time of the last change of contents, names or times (ctime). No program can set this time
+  // back.
   int64_t changed_ns = 0;
   bool operator==(const FileIdentity&) const = default;
 };
@@ -33,9 +36,9 @@ class ReadableFile {
   virtual ~ReadableFile() = default;
   virtual const std::string& path() const = 0;
   virtual uint64_t size() const = 0;
-  // Identity when the file was opened; all zeros if unknown.
+  // Returns the identity that the file had when it was opened; all zeros if unknown.
   virtual FileIdentity identity() const { return {}; }
-  // Fills `out` from `offset`. Throws Error{kCorrupt} if the file ends earlier.
+  // Fills `out` with the bytes at `offset`. Throws Error{kCorrupt} if the file ends earlier.
   virtual void read_at(uint64_t offset, std::span<std::byte> out) const = 0;
 };
 
@@ -50,8 +53,8 @@ class WritableFile {
   virtual void release(uint64_t /*offset*/, uint64_t /*bytes*/) {}
   // Returns after all written data is on the disk.
   virtual void sync() = 0;
-  // Does not flush. Throws the errors that close() reports. The destructor calls it and ignores
-  // errors.
+  // Closes the file without syncing it. Throws an Error if the system's close() fails. The
+  // destructor also closes the file, but ignores errors.
   virtual void close() = 0;
 };
 
@@ -75,44 +78,46 @@ class FileSystem {
  public:
   virtual ~FileSystem() = default;
   virtual std::unique_ptr<ReadableFile> open_read(const std::string& path) = 0;
-  // Creates an empty file under `path`, or empties an existing file. Like open_write() and
-  // try_lock(), throws Error{kInvalidInput} for a symbolic link and for a file with other hard
-  // links.
+  // Creates an empty file at `path`, or empties an existing file. Throws Error{kInvalidInput} for a
+  // symbolic link and for a file with other hard links; so do open_write() and try_lock().
   virtual std::unique_ptr<WritableFile> create(const std::string& path) = 0;
-  // Opens the file under `path` with its contents, or creates an empty one.
+  // Opens the file at `path` and keeps its contents. Creates an empty file if none exists.
   virtual std::unique_ptr<WritableFile> open_write(const std::string& path) = 0;
   virtual bool exists(const std::string& path) = 0;
   virtual void rename(const std::string& from, const std::string& to) = 0;
   virtual void remove(const std::string& path) = 0;
-  // Creates the directory and its missing parents. Throws Error{kInvalidInput} if one of these
-  // names is a file.
+  // Creates the directory and its missing parents. Throws Error{kInvalidInput} if the directory or
+  // a parent exists but is a file.
   virtual void make_directories(const std::string& path) = 0;
   // Removes an empty directory.
   virtual void remove_directory(const std::string& path) = 0;
   virtual std::vector<DirectoryEntry> list(const std::string& path) = 0;
   // Sets the file's time of modification to now.
   virtual void touch(const std::string& path) = 0;
-  // Makes renames and new names in the directory survive a power cut.
+  // Syncs a directory, so that renames and new names in it survive a power cut.
   virtual void sync_directory(const std::string& path) = 0;
   // Locks the file at `path`, creating it if necessary. Returns nullptr if another holder has the
   // lock.
   virtual std::unique_ptr<FileLock> try_lock(const std::string& path) = 0;
-  // True if a holder has the lock of the file at `path`. The file must be readable. A try_lock()
-  // that runs concurrently with this call may fail.
+  // True if a process holds the lock of the file at `path`, which must be readable. The check takes
+  // the lock for a moment, so a try_lock() that runs concurrently may fail.
   virtual bool is_locked(const std::string& path) = 0;
-  // Returns the bytes that an unprivileged user may still write to the disk of `path`.
+  // Returns the number of bytes that an unprivileged user may still write to the file system of
+  // `path`.
   virtual uint64_t free_space(const std::string& path) = 0;
-  // Returns the number of the disk of `path`. Paths on one disk share its free space.
+  // Returns the device number of the file system of `path`. Paths with equal numbers share one
+  // free_space().
   virtual uint64_t device(const std::string& path) = 0;
 };
 
 // The file system of this machine.
 FileSystem& system_files();
 
-// Folder for temporary files of this process: $TMPDIR, /tmp or the current folder.
+// Returns the folder for temporary files: $TMPDIR or /tmp, the first that is writable, or else the
+// current folder.
 std::string temporary_parent();
-// Creates a folder that only this user may enter and returns its path. Its name is `prefix` plus
-// six unpredictable characters.
+// Creates a folder that only this user may enter, and returns its path: `prefix`, which may contain
+// slashes, plus six unpredictable characters.
 std::string make_temporary_folder(const std::string& prefix);
 
 // Removes the contents of a folder, if it exists.
@@ -120,12 +125,12 @@ void remove_entries(FileSystem& files, const std::string& path);
 // Removes a folder with its contents, if it exists.
 void remove_tree(FileSystem& files, const std::string& path);
 
-// Returns the directory part of a path, "." if it has none.
+// Returns the parent directory of a path; "." if the path has no directory part.
 std::string parent_directory(const std::string& path);
 // Reads a small file completely. Throws Error{kLimit} if it is larger than `limit_bytes`.
 std::string read_small_file(FileSystem& files, const std::string& path, uint64_t limit_bytes);
-// Replaces the file at `path` by `contents` atomically: writes path + ".partial", syncs it, renames
-// it and syncs the directory.
+// Replaces the file at `path` by `contents` atomically: writes the contents to `path` + ".partial",
+// syncs and renames this file, and syncs the directory.
 void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents);
 
 }  // namespace voxdag

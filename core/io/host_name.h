@@ -1,4 +1,5 @@
-// The name of this machine, for messages: the writer of a lock or of a record on a shared disk.
+// The name of this machine. Messages use it to tell which machine wrote a lock or a record on a
+// shared disk.
 #pragma once
 
 #include <string>

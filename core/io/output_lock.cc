@@ -15,10 +15,10 @@ OutputLock::OutputLock(FileSystem& files, const std::string& output, std::unique
 
 OutputLock::~OutputLock() {
   try {
-    // A file with this name that is not empty was not created by voxdag.
+    // A file with this name that is not empty was not created by voxdag, and is kept.
     if (files_.open_read(path_)->size() == 0) files_.remove(path_);
   } catch (const Error&) {
-    // An empty file remains. The next process that writes the output locks it.
+    // The empty lock file remains. The next process that writes this output locks it.
   }
 }
 

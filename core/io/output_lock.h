@@ -1,9 +1,10 @@
-// Keeps two processes from writing the same output, because they would share its temporary files.
+// A lock that prevents two processes from writing the same output. They would use the same
+// temporary files.
 //
-// Only the holder removes the lock's file; a process that waits for the lock then creates a new
-// one. The partial output file cannot serve as the lock file: after its rename, its name would be
-// free while the lock is still held. A killed process leaves the empty lock file behind, and the
-// next process locks this file.
+// Only the holder of the lock removes the lock file. A process that tries to lock the file at that
+// moment notices the removal and creates a new file. A killed process leaves the empty lock file
+// behind, and the next process locks this file. The partial output file cannot serve as the lock
+// file: after its rename, its name would be free while the lock is still held.
 #pragma once
 
 #include <memory>
@@ -15,14 +16,16 @@ namespace voxdag {
 
 class OutputLock {
  public:
-  // Path of the lock file. The file is empty and exists while a process writes the output.
+  // Returns the path of the lock file. The lock file is empty and exists while a process writes the
+  // output.
   static std::string path_of(const std::string& output) { return output + ".lock"; }
   // Throws Error{kIo} if another process holds the lock.
   OutputLock(FileSystem& files, const std::string& output)
       : OutputLock(files, output, files.try_lock(path_of(output))) {}
-  // Takes `lock`, the lock of path_of(output). Throws as above if `lock` is null.
+  // Takes over `lock`, which try_lock(path_of(output)) returned. Throws Error{kIo} if it is null,
+  // which means that another process holds the lock.
   OutputLock(FileSystem& files, const std::string& output, std::unique_ptr<FileLock> lock);
-  // Removes the file.
+  // Removes the lock file.
   ~OutputLock();
   OutputLock(const OutputLock&) = delete;
   OutputLock& operator=(const OutputLock&) = delete;

@@ -12,22 +12,24 @@
 
 namespace voxdag {
 
-// Opens a file. If the file does not exist, returns null instead of throwing: another process may
-// just have removed the file.
+// Opens a file. Returns null if the file does not exist, even if another process removes it during
+// the call.
 std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string& path);
 
-// Throws Error{kInvalidInput} if one of `paths`, which need not exist, is the same file as one of
-// `inputs`.
+// Throws Error{kInvalidInput} if one of `paths` is the same file as one of `inputs`. The files at
+// `paths` need not exist.
 void refuse_inputs(FileSystem& files, std::span<const std::string> paths,
                    std::span<const std::string> inputs);
 
-// Throws Error{kInvalidInput} if `path` is not a regular file. Also throws if the file is neither
-// empty nor created by the program, which `is_own` checks. `otherwise` ends the message.
+// Throws Error{kInvalidInput} if `path` exists but is not a regular file, or if the file has
+// contents that the program did not write, so that is_own(file) is false. `otherwise` is appended
+// to the message; it names an option that helps, such as " (--force replaces it)".
 void refuse_foreign_file(FileSystem& files, const std::string& path,
                          const std::function<bool(const ReadableFile& file)>& is_own,
                          const std::string& otherwise = "");
 
-// True if the file begins with `bytes`, or is shorter than `bytes` and a prefix of them.
+// True if the file begins with `bytes`. Also true if the file is shorter than `bytes` and equals
+// the beginning of `bytes`.
 bool begins_with(const ReadableFile& file, std::string_view bytes);
 
 }  // namespace voxdag

@@ -1,4 +1,4 @@
-// Unpredictable, unique names.
+// Makes unpredictable names. Two calls practically never return the same name.
 #pragma once
 
 #include <string>

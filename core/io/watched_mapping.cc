@@ -10,10 +10,11 @@
 namespace voxdag {
 namespace {
 
-// A watched mapping. The signal handler reads slots, and must not take a lock.
+// A watched mapping. The signal handler reads the slots. It must not take a lock, so all members
+// are atomic.
 struct Slot {
   std::atomic<bool> taken{false};
-  std::atomic<uintptr_t> begin{0}, end{0};  // while they change, no address is inside
+  std::atomic<uintptr_t> begin{0}, end{0};  // `end` is 0 while `begin` changes
   std::atomic<bool> damaged{false};
 };
 Slot g_slots[WatchedMapping::kMaxWatched];
@@ -23,7 +24,8 @@ static_assert(std::atomic<uintptr_t>::is_always_lock_free &&
 uintptr_t g_page_bytes = 4096;
 struct sigaction g_before;
 
-// Maps a page of zeros at the address of the fault and repeats the read.
+// Handles SIGBUS. For an address in a watched mapping, maps a page of zeros at the address; when
+// the handler returns, the read is repeated and succeeds.
 void on_bus_error(int number, siginfo_t* info, void* context) {
   const auto address = reinterpret_cast<uintptr_t>(info->si_addr);
   if (info->si_code == BUS_ADRERR) {
@@ -40,11 +42,13 @@ void on_bus_error(int number, siginfo_t* info, void* context) {
       return;
     }
   }
-  // The fault belongs to another handler.
+  // The fault is outside all watched mappings, so the previous handler of SIGBUS handles it.
   if (g_before.sa_flags & SA_SIGINFO) return g_before.sa_sigaction(number, info, context);
   if (g_before.sa_handler != SIG_DFL && g_before.sa_handler != SIG_IGN)
     return g_before.sa_handler(number);
-  signal(SIGBUS, SIG_DFL);  // the access is repeated and then ends the process
+  // There is no previous handler. When this handler returns, the access is repeated, and the
+  // default action ends the process. A signal without a repeated access must be raised again.
+  signal(SIGBUS, SIG_DFL);
   const bool was_sent = info->si_code <= 0 || info->si_code == BUS_MCEERR_AO;
   if (was_sent) raise(number);
 }

@@ -1,7 +1,7 @@
-// If a mapped file is truncated, or its disk fails, reading it ends the process with SIGBUS. A
-// process that must survive watches its mappings: missing pages read as zeros, and the mapping
-// reports them. (The rest of a truncated file's last page reads as zeros without a fault.)
-// Thread-safe.
+// Protects a process from unreadable pages of a mapped file. If the file is truncated or its disk
+// fails, reading the mapping would end the process with SIGBUS. In a watched mapping these pages
+// read as zeros instead, and is_damaged() becomes true. (After a truncation, the end of the file's
+// last page reads as zeros without a fault, so is_damaged() remains false.) Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,19 @@ namespace voxdag {
 
 class WatchedMapping {
  public:
-  // Maximum number of watched mappings; further mappings are not protected.
+  // Maximum number of mappings watched at a time; further mappings are not protected.
   static constexpr int kMaxWatched = 256;
 
-  // The first mapping of the process installs a handler for SIGBUS permanently. Faults outside
-  // watched mappings still end the process.
+  // Watches `bytes` bytes from `begin`. The first WatchedMapping installs a handler for SIGBUS,
+  // which remains until the process exits. Faults outside watched mappings still end the process,
+  // unless it had a handler before.
   WatchedMapping(const void* begin, uint64_t bytes);
-  // To be called before the mapping ends.
+  // Destroy this object before the memory is unmapped.
   ~WatchedMapping();
   WatchedMapping(const WatchedMapping&) = delete;
 
-  // True if pages of the mapping were read as zeros. If so, discard all results computed from the
-  // mapping since it was created.
+  // True if pages of the mapping were read as zeros. If so, discard all results that were computed
+  // from the mapping since this object was created.
   bool is_damaged() const;
 
  private:
