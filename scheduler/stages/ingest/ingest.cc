@@ -130,8 +130,9 @@ void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, Top
               ErrorCode::kLimit,
               "triangle " +
                   std::to_string(counts.triangles + counts.dropped_outside + *piece.too_far()) +
-                  " of the scene reaches into the grid from more than 2^32 voxels away: "
-                  "expected coordinates within 2^40 / 256 voxels (--bounds)");
+                  " of the scene reaches into the grid and has a vertex 2^32 or more voxels away "
+                  "from the grid's low corner: expected less than 2^32 voxels on each axis "
+                  "(--bounds)");
         add(piece.counts(), counts);
         top.add(piece.tally());
         add_records(store, kSceneBin, piece.records());
