@@ -58,6 +58,9 @@ void append_surface(const FixedSurface& surface, bool has_image, std::vector<std
 std::optional<FixedSurface> SurfaceRecords::next() {
   if (in_.ok() && in_.left() == 0) return std::nullopt;
   const uint8_t flags = in_.get<uint8_t>();
+  if (flags >= 2 * kFlipped)
+    throw DamagedTriangles("a stored surface has the flags " + std::to_string(flags) +
+                           ": expected at most " + std::to_string(2 * kFlipped - 1));
   FixedSurface surface;
   surface.is_flipped = (flags & kFlipped) != 0;
   surface.material = in_.get<uint32_t>();
@@ -69,9 +72,9 @@ std::optional<FixedSurface> SurfaceRecords::next() {
   if (flags & kColored)
     for (SurfaceCorner& corner : surface.corners)
       for (uint16_t& value : corner.color) value = in_.get<uint16_t>();
-  if (!in_.ok() || flags >= 2 * kFlipped)
-    throw DamagedTriangles("stored surfaces have a record that ends too early or has flags " +
-                           std::to_string(flags) + ": expected what was written there");
+  if (!in_.ok())
+    throw DamagedTriangles(
+        "the stored surfaces end within a record: expected a complete last record");
   return surface;
 }
 
