@@ -114,7 +114,7 @@ std::unique_ptr<TriangleStream> open_chunks(const ChunkList& list, const Triangl
   return std::make_unique<ChunkStream>(list, file, record_bytes, first);
 }
 
-// Adjacent chunks are released together, because a disk frees only complete blocks.
+// Releases adjacent chunks together, because a disk frees only complete blocks.
 void release_chunks(const ChunkList& list, TriangleFile* file) {
   Extent piece;
   const auto release = [&] {

@@ -1,6 +1,6 @@
 // Stored triangles: records of fixed size in chunks, each chunk in memory or in a TriangleFile.
-// Both triangle stores use these chunks. Nothing here locks: one thread writes a list of chunks,
-// and any number of threads may read it when it is complete.
+// Both triangle stores use these chunks. No function locks: one thread writes a list of chunks, and
+// any number of threads may read the list when it is complete.
 //
 // A record has nine coordinates of 32 bits (36 bytes). If the build's options define the grid,
 // triangles may extend far beyond it. Their coordinates then have 64 bits ("wide", 72 bytes).
@@ -29,7 +29,8 @@ struct Chunk {
   uint64_t first = 0;  // number of records in the list before this chunk
 };
 
-// Bytes per chunk in a growing list of chunks.
+// Memory per entry of a growing list of chunks. A growing vector may have room for twice its
+// entries.
 inline constexpr uint64_t kChunkListBytes = 2 * sizeof(Chunk);
 
 struct ChunkList {
@@ -41,13 +42,13 @@ struct ChunkList {
     records += chunk.records;
     chunks.push_back(std::move(chunk));
   }
-  // Sorts the chunks by their offsets. All must be in a file.
+  // Sorts the chunks by their offsets in the file. No chunk may be in memory.
   void sort_by_offset();
 };
 
-// Streams the triangles of a complete list, starting at number `first`. Chunks that are not in
-// memory are read from `file`, which throws DamagedTriangles. List and file must outlive the
-// stream.
+// Streams the triangles of a complete list, starting at index `first`. Chunks that are not in
+// memory are read from `file`; this can throw DamagedTriangles. The list and the file must outlive
+// the stream.
 std::unique_ptr<TriangleStream> open_chunks(const ChunkList& list, const TriangleFile* file,
                                             size_t record_bytes, uint64_t first);
 

@@ -1,10 +1,10 @@
 // Triangles that outlive the process. The bins of the scene and of the plan's cubes are in a file,
 // so that a later run resumes with them. Parts of split subvolumes are not durable: a later run
-// copies them again from their source bin, which is released after its last part.
+// copies them again from their source bin. So the source bin is released only after its last part.
 //
-// The file's table of contents is a chain of links. Each link lists the chunks since the previous
-// link, and the extent of that link. checkpoint() appends a link. A caller that syncs the file and
-// records the returned state can open the store at that point again.
+// The file's table of contents is a chain of links. Each link lists the chunks written since the
+// previous link, and the extent of the previous link. checkpoint() appends a link. A caller that
+// syncs the file and records the returned state can open the store at that point again.
 //
 // Thread-safe as documented at TriangleStore. The thread that fills the durable bins must be the
 // one that calls checkpoint().
@@ -32,8 +32,9 @@ struct DurableStoreState {
 
 class DurableStore : public TriangleStore {
  public:
-  // Opens the store at `path` with its contents at a checkpoint. Throws DamagedTriangles if they
-  // are damaged. Parts go to memory and `spill_path`, as in a MemoryStore that charges to `share`.
+  // Opens the store at `path` with its contents at the checkpoint that returned `state`. Throws
+  // DamagedTriangles if they are damaged. Parts are kept in a MemoryStore that charges to `share`
+  // and spills to `spill_path`. `wide` as in chunk.h.
   DurableStore(FileSystem& files, std::string path, const DurableStoreState& state,
                std::string spill_path, bool wide, MemoryBudget& share);
 
@@ -67,7 +68,7 @@ class DurableStore : public TriangleStore {
     ChunkList list;
     uint64_t references = 1;
   };
-  // A part's bin id is this plus its number in parts_.
+  // A part's bin id is kFirstPart plus the part's bin id in parts_.
   static constexpr BinId kFirstPart = BinId{1} << 31;
 
   static bool is_part(BinId bin) { return bin >= kFirstPart; }

@@ -17,8 +17,8 @@ namespace voxdag {
 
 class MemoryStore : public TriangleStore {
  public:
-  // Charges chunks to `share`. Chunks that exceed it are written to a file at `spill_path`, created
-  // with the first such chunk. `wide` as in chunk.h.
+  // Charges chunks to `share`. Chunks that do not fit in `share` are written to a file at
+  // `spill_path`, which the first such chunk creates. `wide` as in chunk.h.
   MemoryStore(FileSystem& files, std::string spill_path, bool wide, MemoryBudget& share);
 
   size_t record_bytes() const override { return record_bytes_; }

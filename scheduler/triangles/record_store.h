@@ -1,8 +1,8 @@
 // Stores records of triangles or surfaces in chunks: in memory up to a share of the memory budget,
 // and further chunks in a spill file. Not durable.
 //
-// Threads may use a store concurrently if they use different lists. A complete list may be read by
-// several threads.
+// Several threads may use a store concurrently if each adds to, moves or clears a different list.
+// Any number of threads may read a complete list.
 #pragma once
 
 #include <cstddef>
@@ -23,8 +23,8 @@ namespace voxdag {
 
 class RecordStore {
  public:
-  // Charges chunks to `share` as `what`. Chunks that exceed it are written to a file at
-  // `spill_path`, created with the first such chunk.
+  // Charges chunks to `share`; messages call the charge `what`. Chunks that do not fit in `share`
+  // are written to a file at `spill_path`, which the first such chunk creates.
   RecordStore(FileSystem& files, std::string spill_path, MemoryBudget& share,
               const std::string& what);
   // Removes the file.
@@ -33,11 +33,12 @@ class RecordStore {
 
   // Adds a chunk of `count` records to the list.
   void add(ChunkList& list, std::span<const std::byte> records, uint32_t count);
-  // Returns the chunk's records; those in the file are read into `buffer`. Throws DamagedTriangles.
+  // Returns the chunk's records, which remain in memory or are read from the file into `buffer`.
+  // Throws DamagedTriangles if the file is damaged.
   std::span<const std::byte> read(const Chunk& chunk, std::vector<std::byte>& buffer) const;
   // Moves the lists' records from memory to the file.
   void move_to_file(std::span<ChunkList> lists);
-  // Frees the list's records and empties it.
+  // Frees the list's records and empties the list.
   void clear(ChunkList& list);
 
   // The spill file; null before the first chunk is written to it.
@@ -70,7 +71,7 @@ class ChunkWriter {
   size_t missing_bytes(size_t target) const {
     return chunk_bytes_ - buffers_[target].records.size();
   }
-  // Passes the incomplete chunks.
+  // Passes the incomplete chunks to `add_chunk`.
   void flush();
 
  private:

@@ -1,6 +1,7 @@
-// Snapped triangles with their look, stored in a spill file until they are baked: records of 41 to
-// 149 bytes, one after another. Data without influence on the color is left out: texture
-// coordinates of materials without an image, and COLOR_0 if all corners are white.
+// Records of surfaces: snapped triangles with material, texture coordinates and colors. A spill
+// file stores them until the color stage bakes them. A record has 41 to 149 bytes; records are
+// stored one after another. A record omits data without influence on the color: texture coordinates
+// of materials without an image, and COLOR_0 if all corners are white.
 //
 //     u8   flags: 1 wide positions, 2 textured, 4 wide texture coordinates, 8 colored, 16 flipped
 //     u32  material
@@ -26,8 +27,8 @@ inline constexpr size_t kMaxSurfaceRecordBytes = 1 + 4 + 9 * 8 + 6 * 8 + 12 * 2;
 // Appends the record of a surface. `has_image` is true if its material has a readable image.
 void append_surface(const FixedSurface& surface, bool has_image, std::vector<std::byte>& out);
 
-// Reads records from the front of `bytes`, in the form that append_surface() writes. The bytes must
-// have passed their checksum; remaining defects are reported as damage of the file.
+// Reads the records in `bytes`, in the form that append_surface() writes. The caller has verified
+// the checksum of the bytes. Invalid records are reported as damage of the file.
 class SurfaceRecords {
  public:
   explicit SurfaceRecords(std::span<const std::byte> bytes) : in_(bytes) {}

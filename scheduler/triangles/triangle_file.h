@@ -15,7 +15,7 @@
 
 namespace voxdag {
 
-// A piece of the file. Zero bytes mean no piece.
+// A piece of the file. An extent with `bytes` == 0 means "no piece".
 struct Extent {
   uint64_t offset = 0;
   uint64_t bytes = 0;
@@ -36,7 +36,8 @@ class TriangleFile {
   TriangleFile(FileSystem& files, std::string path, uint64_t end = 0);
 
   Extent append(std::span<const std::byte> bytes);
-  // Reads a piece. Throws DamagedTriangles if its checksum differs.
+  // Reads a piece; `out` must have its size. Throws DamagedTriangles if the file is too short or
+  // the checksum differs.
   void read(const Extent& extent, std::span<std::byte> out) const;
   // Frees the disk space of a piece that is no longer needed.
   void release(const Extent& extent);

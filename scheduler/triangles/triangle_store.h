@@ -5,8 +5,9 @@
 // Life of a bin:
 //   1. It is created with one reference, and filled by one BinWriter.
 //   2. Any number of streams read it.
-//   3. drop(): this run does not read it again. A store that no other run can read frees it.
-//   4. release(): its artifact is durable. The last release() frees the bin.
+//   3. drop(): this run does not read the bin again. A MemoryStore frees the bin; a DurableStore
+//      keeps it for later runs unless it is a part.
+//   4. release(): the artifact built from the bin is durable. The last release() frees the bin.
 //
 // Thread-safe, except that add_cube_bins() needs exclusive access and that a bin must not be filled
 // and read concurrently.
@@ -46,13 +47,13 @@ class TriangleStore {
   // Creates the bins of the plan's cubes, once per store. A resumed store may already have them.
   virtual void add_cube_bins(std::span<const Cube> cubes) = 0;
   virtual const std::vector<CubeBin>& cube_bins() const = 0;
-  // Creates a bin for triangles that are copied from `whole`. Retains `whole` until the part is
-  // released.
+  // Creates a bin for a part of a split subvolume. The caller copies triangles from the bin `whole`
+  // to it. The store retains `whole` until the part is released.
   virtual BinId add_part(BinId whole) = 0;
 
   virtual void add_chunk(BinId bin, std::span<const std::byte> records) = 0;
   virtual uint64_t count(BinId bin) const = 0;
-  // Reads the bin's triangles, starting at number `first`. The store must outlive the stream.
+  // Reads the bin's triangles, starting at index `first`. The store must outlive the stream.
   virtual std::unique_ptr<TriangleStream> open(BinId bin, uint64_t first = 0) const = 0;
 
   // Returns true if references remain. The caller must then call release() when the bin's artifact
