@@ -23,7 +23,8 @@ class JsonVisitor {
   const Action& action_;
 };
 
-// Throws FieldError for values that break a limit and differ from their defaults.
+// Throws FieldError for an option that is not the default and breaks a limit, or that excludes an
+// earlier option that is not the default.
 class LimitChecker {
  public:
   explicit LimitChecker(const FieldJson& defaults) : defaults_(defaults) {}

@@ -32,14 +32,15 @@ constexpr std::array<const char*, 2> enum_names(ClusterEngine) { return {"", "sl
 
 // Options that determine the bytes of the global file.
 struct GeometryOptions {
-  std::vector<std::string> scenes;              // glTF files that together form one scene
+  std::vector<std::string> scenes;              // glTF and PLY files that together form one scene
   uint64_t resolution = 0;                      // R, a power of two from 4 to 2^20
   std::optional<std::array<double, 4>> bounds;  // X, Y, Z of the low corner, EDGE
   std::optional<double> voxel_size;
   bool skip_invalid = false;
   uint32_t hash_bits = 64;
   AttributeSet attributes;  // attributes of the color grid's cells
-  // K of the color grid, a power of two from 4 to the resolution; 0: the build chooses it.
+  // Cells per edge of the color grid, a power of two from 4 to the resolution; 0: the build chooses
+  // it.
   uint64_t color_resolution = 0;
 };
 
@@ -60,7 +61,8 @@ struct ClusterOptions {
   // Seconds until the record of an ended task must be visible on the shared disk.
   double grace_s = 15;
   double slurm_interval_s = 5;  // seconds between two queries to Slurm
-  // Seconds after Slurm's start in which Slurm may not know the requested nodes yet.
+  // Seconds for which a refusal because of missing nodes is retried: Slurm may have just started
+  // and not know its nodes yet.
   double slurm_start_s = 15;
   // Options of the merge job (MergeJob). Without them this process merges.
   struct MergeJobOptions {

@@ -22,7 +22,7 @@
 //                     more retained pages           1/8, up to 128 MiB           nobody
 //                     cache key, before build()     7/8 of the share             ArtifactCache
 //   color         surfaces; the rest is spilled     up to 1/3 of free            RecordStore
-//                   incomplete chunks of surfaces   1/8                          nobody
+//                   incomplete chunks of surfaces   1/8 of the budget            nobody
 //                 textures, or else spilled         up to 1/2 of the rest        TextureSet
 //                 ColorMemory, for every worker     free / workers
 //                   a region, and the encoded       1/2, 12 to 46 MiB            CubeBaker
@@ -35,10 +35,12 @@
 //                   positions of two levels         1/6 for each; then spilled   merge
 //                   hash partition                  the rest, less 1/16          merge
 //
-// "Free" is the part of the budget still available when a stage allocates. Two kinds of memory are
-// not charged: the parts marked "nobody" above, and lists that grow with the number of subvolumes
-// and frames. These lists are the artifact indexes of one merge pass (56 bytes per frame; the hash
-// partition leaves 1/16 of the budget for them) and the chunk lists of spilled triangles.
+// "Free" is the part of the budget still available when a stage allocates. A fraction without "of"
+// is a fraction of the budget, or, in an indented row, of the part above. "The rest" is the memory
+// left by the rows above. Two kinds of memory are not charged: the parts marked "nobody" above, and
+// lists that grow with the number of subvolumes and frames. These lists are the artifact indexes of
+// one merge pass (56 bytes per frame; the hash partition leaves 1/16 of the budget for them) and
+// the chunk lists of spilled triangles.
 #pragma once
 
 #include <algorithm>
@@ -52,9 +54,11 @@
 namespace voxdag {
 
 struct MemoryPlan {
-  // Memory of one thread that reads the scene: windows, batches, a piece and its counts for the top
-  // tree. Does not include its share of the vertices.
+  // Memory of one thread that reads the scene: the windows and batches of its TriangleCursor, a
+  // piece of the scene, and the piece's counts for the top tree. The vertices of indexed meshes are
+  // not included (first row of the table).
   static constexpr uint64_t kIngestWorkerBytes = uint64_t{6} << 20;
+  // Half-filled chunks while a subvolume is split; not charged.
   static constexpr uint64_t kSplitBufferBytes = uint64_t{512} << 10;
 
   uint64_t top_tree_bytes = 0;          // counters of the top tree
@@ -80,11 +84,12 @@ struct MemoryPlan {
 
 // Memory of the workers of the color stage.
 struct ColorMemory {
-  // Minimum for baking a region in pieces, and enough for baking it in one piece.
+  // Minimum for baking a region of the color grid in pieces, and enough memory for baking any
+  // region in one piece.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
   static constexpr uint64_t kSolidRegionBytes = uint64_t{46} << 20;
-  // Memory for attributes other than color. Includes kValueSumBytes for their sums, which may need
-  // more.
+  // Memory for the attributes other than color in a region. Includes kValueSumBytes for the sums of
+  // their values. Larger sums are charged in addition (CubeBaker).
   static constexpr uint64_t kValueBytes = uint64_t{16} << 20;
   static constexpr uint64_t kValueSumBytes = uint64_t{4} << 20;
 
@@ -97,8 +102,8 @@ struct ColorMemory {
   uint64_t surface_bytes = 0;
   uint64_t texture_bytes = 0;
 
-  // Divides 7/8 of the free memory among the workers; the directories of the sections need the
-  // rest.
+  // Divides 7/8 of the free memory among at most `wanted` workers. The directories of the attribute
+  // sections need the remaining 1/8.
   static constexpr ColorMemory divide(uint64_t free_bytes, unsigned wanted,
                                       const AttributeSet& attributes) {
     const uint64_t bytes = free_bytes - free_bytes / 8,
@@ -130,8 +135,8 @@ struct WorkerMemory {
     const uint64_t each = free_bytes / workers;
     return {static_cast<unsigned>(workers), each - std::min(each, kOutsideShareBytes)};
   }
-  // Returns the part of a worker's share for an artifact's key. The backend's retained pages take
-  // the rest.
+  // Returns the part of a worker's share that may be used to compute a subvolume's cache key. The
+  // pages that the backend retains take the rest of the share.
   static constexpr uint64_t key_bytes(uint64_t share_bytes) { return share_bytes / 8 * 7; }
 };
 

@@ -29,7 +29,7 @@ void fields(Visitor& visit, ColorReport& colors) {
   });
 }
 
-// Omits the number of split subvolumes, because the report has it under "subvolumes".
+// Omits ClusterTotals::split, because the report has this number under "subvolumes".
 template <class Visitor>
 void fields(Visitor& visit, ClusterTotals& totals) {
   visit("batches", totals.batches);

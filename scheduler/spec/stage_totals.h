@@ -9,12 +9,12 @@ namespace voxdag {
 
 // Totals of the tasks of a cluster build.
 struct ClusterTotals {
-  uint64_t batches = 0;   // built batches
-  uint64_t attempts = 0;  // failed attempts
-  uint64_t split = 0;     // subvolumes that tasks split
-  uint64_t rows_before = 0, rows_after = 0;
-  double cpu_s = 0;         // CPU time of all tasks whose records were accepted
-  double longest_s = 0;     // wall time of the longest of these tasks
+  uint64_t batches = 0;                      // built batches
+  uint64_t attempts = 0;                     // failed attempts
+  uint64_t split = 0;                        // subvolumes that tasks split
+  uint64_t rows_before = 0, rows_after = 0;  // DAG nodes before and after the tasks' merges
+  double cpu_s = 0;                          // CPU time of all tasks whose records were accepted
+  double longest_s = 0;                      // wall time of the longest of these tasks
   double first_task_s = 0;  // time from the first submission to the first task's start
   uint64_t requests = 0;    // requests to Slurm
   std::map<std::string, uint64_t> batches_of_node;
