@@ -17,8 +17,8 @@
 namespace voxdag {
 namespace {
 
-// Limit of the default resolution of the color grid. A finer grid is not the default, because
-// colors repeat less than geometry.
+// Upper limit of the default color resolution, in cells per edge. A finer color grid must be
+// requested: colors repeat less often than geometry, so they compress less well.
 constexpr uint64_t kColorResolution = 4096;
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
@@ -49,7 +49,8 @@ void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::strin
   const bool is_first = !own.empty() && !files.exists(WorkFolder::store_path(work_folder));
   own.insert(own.end(), outputs.begin(), outputs.end());
   refuse_inputs(files, own, spec.geometry.scenes);
-  // An output that begins with zeros may be unfinished, or a file of any other kind.
+  // An output file that begins with a zero byte may be an unfinished file of voxdag, or any other
+  // file. Only its path shows whether the scene reads it.
   const bool is_unknown = std::ranges::any_of(outputs, [&](const std::string& path) {
     const auto file = open_if_there(files, path);
     return file && begins_with(*file, std::string_view("\0", 1));
@@ -79,7 +80,8 @@ void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& 
                                  OutputLock::path_of(output)};
   refuse_own_files(spec, scene, work, outputs, context);
   refuse_foreign_file(files, output, is_global_file, " (-o)");
-  // A partial file next to a job was created by voxdag, even if its first bytes are damaged.
+  // If the work folder has a job, voxdag created the partial file, even if its first bytes are
+  // damaged.
   if (!files.exists(WorkFolder::store_path(work)))
     refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
   refuse_foreign_file(files, report, is_report, " (-o)");

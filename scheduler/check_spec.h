@@ -10,12 +10,13 @@
 namespace voxdag {
 
 // Returns the spec with its defaults filled in. Throws Error{kInvalidInput} with the name of the
-// invalid option, Error{kDevice} for a backend whose device is missing.
+// invalid option, or Error{kDevice} for a backend whose device is missing.
 BuildSpec checked(const BuildSpec& spec);
 
 // Throws Error{kInvalidInput} if the scene reads one of `outputs` or a file of the work folder,
-// because the build would overwrite or remove that file. Files named only inside the scene, such as
-// its buffers, are checked only if no earlier build can have checked them.
+// because the build would overwrite or remove that file. Files that are named only inside the
+// scene, such as its buffers, are checked only in two cases: the work folder has files but no job
+// store, so that no earlier build has checked them, or one of `outputs` begins with a zero byte.
 void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
                       std::span<const std::string> outputs, const BuildContext& context);
 

@@ -8,8 +8,9 @@
 namespace voxdag {
 namespace {
 
-// Levels of the finer pilot of a plan. Large builds are extrapolated from 8192^3, which takes one
-// or two seconds and, for the largest scenes, two reads of the triangles.
+// Returns the number of grid levels of the finer of a plan's two pilot builds (estimate.h). Large
+// builds are extrapolated from 13 levels (8192^3 voxels). This pilot takes one or two seconds; for
+// the largest scenes it reads the triangles twice.
 uint32_t plan_pilot_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels - std::min<uint32_t>(grid_levels, 2), 12, 13);
 }
@@ -26,7 +27,8 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& context) {
   BuildScene source(full.geometry, folder, budget, context);
   refuse_own_files(full, source, folder, {}, context);
   WorkFolder work(context, folder, full.run.lock_wait_s);
-  // Removes spilled triangles. A job in the work folder is left unchanged.
+  // Removes the temporary folder, or the spilled triangles in the user's work folder. A job in that
+  // work folder is left unchanged.
   struct Cleanup {
     WorkFolder& work;
     const bool own_folder;

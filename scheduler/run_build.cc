@@ -23,9 +23,11 @@
 namespace voxdag {
 namespace {
 
-// Version of artifacts, job store and digests of scenes. A job with a different version is refused.
+// Version of the formats of artifacts and job store, and of the rule for scene digests. A job with
+// a different version is refused.
 constexpr int64_t kWorkFormatVersion = 4;
-// Maximum number of reads of the scene and of merges. Damaged triangles or artifacts cause repeats.
+// Maximum number of reads of the scene, which is read again if stored triangles are damaged, and of
+// merges, which are repeated if artifacts are damaged.
 constexpr int kMaxReads = 3, kMaxMerges = 3;
 
 // Refuses a job with other geometry options before the scene is read.
@@ -40,7 +42,9 @@ void refuse_other_options(const BuildJob& job) {
     job.refuse("its geometry options are " + stored->geometry + ", requested are " + requested);
 }
 
-// Removes temporary files of other jobs.
+// Prepares the work folder for this job. Removes the state of an earlier job if the build starts
+// over; otherwise refuses an earlier job with other geometry options. Removes spilled triangles in
+// either case.
 void prepare_work_folder(BuildJob& job) {
   if (job.start_over) {
     job.checkpoint.forget();
@@ -127,7 +131,8 @@ void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
   report_artifacts(job);
 }
 
-// Called before subvolumes are queued again. Artifacts not recorded by then are discarded.
+// Closes the segments before subvolumes are built again. First records the finished artifacts in
+// the job store. Artifacts that cannot be recorded are discarded.
 void close_segments(BuildJob& job) {
   job.scene.close();
   job.commit_best_effort();
@@ -171,7 +176,7 @@ bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
 bool merge_and_publish(BuildJob& job, bool& has_restarted) {
   AttributeSections attributes(job);
   if (is_published(job, attributes)) return true;
-  bool reads_scene = false;  // errors in the scene are not damage of the work folder
+  bool reads_scene = false;  // if true, an error may come from the scene's files
   try {
     GlobalFileWriter out(job.context.files, job.report.output, job.report.grid,
                          job.report.hash_bits);
@@ -182,7 +187,8 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted) {
     publish(job, out, attributes);
     return true;
   } catch (const Error& error) {
-    // The scratch file of the colors is rebuilt, too.
+    // DamagedTriangles reports damage of a spill file in the work folder, not of the scene. The
+    // next call writes the file again.
     const bool is_scratch = dynamic_cast<const DamagedTriangles*>(&error) != nullptr;
     if ((reads_scene && !is_scratch) || !error.is_corruption() ||
         !recover(job, error, has_restarted))
@@ -296,8 +302,8 @@ BuildReport run_here(BuildJob& job) {
   return job.report;
 }
 
-// Submits the tasks and the merge job. Returns the job's id, or "" if the job or its result already
-// exists.
+// Submits the tasks and the merge job. Returns the merge job's id, or "" if the merge job or its
+// output already exists.
 std::string submit_merge_job(BuildJob& job, MergeJob& merge_job) {
   std::string id;
   resumable(job, [&] {

@@ -18,8 +18,8 @@ namespace voxdag {
 
 // Throws Error{kInvalidInput} if this program has no cluster support.
 void check_cluster_support();
-// Throws Error{kInvalidInput} if Slurm is not installed, or if it would refuse the tasks of a build
-// with cluster options.
+// Checks a build with cluster options. Throws Error{kInvalidInput} if Slurm is not installed or
+// would refuse the build's tasks.
 void check_cluster(const BuildSpec& spec, const BuildContext& context);
 
 // True if this process is the merge job.
@@ -43,8 +43,8 @@ std::unique_ptr<ClusterBuilder> make_cluster_builder(BuildJob& job);
 // as any later run does, resubmits failed batches, waits for their tasks and merges. The following
 // process may be stopped and started again with the same command. That command also submits the
 // merge job again if Slurm has lost it. A process finds a running merge job by the job's name,
-// which depends only on the state of the build. It finds an ended merge job by the report next to
-// the output, which contains the job's request.
+// which contains the id of the build in cluster.json. It finds an ended merge job by the report
+// next to the output, which contains the job's request().
 class MergeJob {
  public:
   virtual ~MergeJob() = default;
@@ -54,8 +54,8 @@ class MergeJob {
   virtual const std::string& request() const = 0;
   // Returns the report of a finished merge job with the same request whose output exists.
   virtual std::optional<BuildReport> finished() const = 0;
-  // True if the work folder still exists and the build does not keep it: the merge job is still
-  // removing it, or was stopped before it removed it.
+  // True if the work folder still has a job store although the build does not keep its work folder:
+  // the merge job is still removing the folder, or was stopped before it removed the folder.
   virtual bool has_remaining_work() const = 0;
   // Removes the report of an earlier merge job.
   virtual void forget_finished() = 0;
@@ -77,11 +77,11 @@ std::unique_ptr<MergeJob> make_merge_job(const BuildSpec& spec, const TriangleSo
 // Records the results of tasks that an earlier run started for the scene with this digest. Throws
 // Error{kInvalidInput} if there are such tasks and this program has no cluster support.
 void accept_earlier_tasks(BuildJob& job, const std::string& scene_digest);
-// Stops running tasks of the work folder and removes their files. Only warns if a task cannot be
-// stopped: the task will fail because its batch file is missing.
+// Stops running tasks of the work folder and removes their files. If Slurm cannot stop a task, only
+// warns: the task will fail because its batch file is missing.
 void remove_tasks(BuildJob& job);
-// Stops the merge job of an earlier build, because that job may hold the locks. Only warns if this
-// fails.
+// Stops the merge job of an earlier build, because that job may have locked the output and the work
+// folder. Only warns if the job cannot be stopped.
 void stop_earlier_merge_job(const BuildSpec& spec, const BuildContext& context);
 // Stops the merge job (unless this process is the merge job), then all tasks of the cluster build
 // in a work folder. Does nothing without a cluster build. If Slurm does not accept the request,
