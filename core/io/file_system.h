@@ -1,5 +1,5 @@
-// All file access of voxdag uses this interface, so that tests can replace the disk by one that is
-// full, loses unsynced data, or flips bits. Paths are plain byte strings.
+// All file access of voxdag uses this interface, so that tests can replace the disk: with a full
+// disk, or a disk that loses unsynced data or flips bits. Paths are plain byte strings.
 //
 // Error codes are kNotFound, kNoSpace (for ENOSPC, EDQUOT and EFBIG) and kIo. The message names the
 // call, the path, the offset if there is one, and the system's reason. Implementations handle short

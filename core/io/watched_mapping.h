@@ -10,7 +10,7 @@ namespace voxdag {
 
 class WatchedMapping {
  public:
-  // Maximum number of mappings watched at a time; further mappings are not protected.
+  // Maximum number of WatchedMappings that exist concurrently; further mappings are not protected.
   static constexpr int kMaxWatched = 256;
 
   // Watches `bytes` bytes from `begin`. The first WatchedMapping installs a handler for SIGBUS,
