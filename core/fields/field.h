@@ -1,5 +1,5 @@
-// One description per struct. A function `fields(visitor, value)` next to a struct visits its
-// members in order and names each of them:
+// Describes the members of a struct once, for all uses. A function `fields(visitor, value)` next to
+// a struct passes its members to a visitor in order, with their names:
 //
 //   template <class Visitor>
 //   void fields(Visitor& visit, Trip& trip) {
@@ -9,11 +9,16 @@
 //     visit.derived("daily_cost", trip.total / trip.days);
 //   }
 //
-// There are visitors for JSON, JSON schemas, command-line options, Python keywords and checks. A
-// member's type determines its form: an enumeration has enum_names(E), a set of names has
-// NameSetTraits.
-// Visitors that write are given a copy of the struct, so `fields` takes it by reference in both
-// directions.
+// There are visitors for JSON, JSON schemas, command-line options, Python keywords and checks.
+// object() makes a nested JSON object from members of the same struct. derived() adds a computed
+// value, which is written but not read.
+//
+// A visitor decides by the type of a member how to read and write it. An enumeration needs a
+// function enum_names(E), which returns the names of its values. A set of names needs a
+// specialization of NameSetTraits.
+//
+// `fields` takes the struct by reference because some visitors set its members. Visitors that only
+// read the struct are given a copy.
 #pragma once
 
 #include <algorithm>
@@ -34,27 +39,27 @@
 
 namespace voxdag {
 
-// The first of the commands submit, plan and build (in this order) that offers an option. The
-// commands after it also offer the option.
+// The first command that offers an option, in the order submit, plan, build. The commands after it
+// also offer the option.
 enum class Scope { kSubmit, kPlan, kBuild };
 
-// A member's name, and everything that the interfaces document about it. The name is also the JSON
-// member, the Python keyword and, with dashes, the command-line option.
+// A member's name, and its documentation and limits, from which all interfaces are made. The name
+// is also the JSON member, the Python keyword and, with dashes, the command-line option.
 struct Field {
   const char* name;
   const char* help = "";
-  const char* heading = "";       // heading of its group in --help
+  const char* heading = "";       // heading of the option's group in --help
   const char* shorthand = "";     // short option of the command line: "-r"
   const char* default_text = "";  // description of a default that is not a value: "half the RAM"
   const char* parts = "";         // names of an array's numbers: "X,Y,Z,EDGE"
   const char* excluded = "";      // another field that must not be given together with this one
   const char* needed = "";        // another field that must be given together with this one
   Scope scope = Scope::kSubmit;
-  std::optional<int64_t> min,
-      max;               // of an integer, of a size in bytes, or of the number of characters
-  size_t max_items = 0;  // for a list of at least one item; 0: no limit
+  // Limits, inclusive: of an integer, of a size in bytes, or of the number of characters.
+  std::optional<int64_t> min, max;
+  size_t max_items = 0;  // if not 0, a list must have 1 to max_items items
   bool is_power_of_two = false;
-  bool is_above_zero = false;  // for a number, or for the last number of an array
+  bool is_above_zero = false;  // the number, or the last number of an array, must be above 0
   bool is_bytes = false;       // an integer that users write as 8GiB
   bool is_line = false;        // a text without control characters (one line)
   bool is_path = false;
@@ -62,8 +67,8 @@ struct Field {
   bool is_required = false;
   bool is_positional = false;     // positional on the command line
   bool is_left_if_empty = false;  // JSON omits the member if it is empty
-  // True if geometry_json() contains the field. If not set, geometry_json() contains the field only
-  // if its value differs from the default.
+  // Controls geometry_json(), which identifies a build's options: true if it always contains the
+  // field, false if never. If not set, it contains the field if the value differs from the default.
   std::optional<bool> in_key;
 
   constexpr Field(const char* its_name, const char* its_help = "")
@@ -100,7 +105,7 @@ struct Field {
   constexpr Field needs(const char* other) const { return with(&Field::needed, other); }
 };
 
-// A value that a decoder refuses. The message has the field, the value and the expectation.
+// Thrown for a value that a decoder refuses. The message names the field and the expected value.
 struct FieldError : Error {
   FieldError(std::string its_field, std::string its_expectation)
       : Error(ErrorCode::kInvalidInput, "'" + its_field + "': expected " + its_expectation),
@@ -115,8 +120,9 @@ concept NamedEnum = std::is_enum_v<E> && requires(E e) {
   enum_names(e);
 };
 
-// Describes a set of names, such as AttributeSet. Members: `names(set)`; `add(set, name)`, which
-// returns false for an unknown name; and the list `all()`.
+// Describes a set of names, such as AttributeSet. Members: `names(set)` returns the names in the
+// set; `add(set, name)` adds a name, or returns false if it is unknown; `all()` returns all known
+// names.
 template <class T>
 struct NameSetTraits;
 template <class T>
@@ -145,7 +151,8 @@ struct IsNumbers : std::false_type {};
 template <size_t kCount>
 struct IsNumbers<std::array<double, kCount>> : std::true_type {};
 
-// Visits nothing. `fields` functions may use only the members that NoVisitor has.
+// A visitor that does nothing. The concept Described tests `fields` functions with it, so they may
+// use only the members of NoVisitor.
 struct NoVisitor {
   template <class T>
   void operator()(const Field&, T&) {}
@@ -153,7 +160,7 @@ struct NoVisitor {
   void derived(const char*, const auto&) {}
 };
 
-// A struct with a description.
+// A struct that has a `fields` function.
 template <class T>
 concept Described = requires(T& value, NoVisitor& visitor) {
   fields(visitor, value);
@@ -183,22 +190,26 @@ std::optional<E> enum_of(std::string_view text) {
   return std::nullopt;
 }
 
-// "a, b, c"
+// Returns the words with separators between them: "a, b, c".
 std::string joined(const std::vector<std::string>& words, const char* separator = ", ");
-// Returns a size in the largest unit that is exact, as parse_size() reads it: "64MiB".
+// Returns a size as text, in the largest unit that divides it: "64MiB". parse_size() reads this
+// text.
 std::string exact_size_text(uint64_t bytes);
-// Parses a size such as "8GiB" into bytes; nullopt for any other text.
+// Parses a size such as "8GiB" into bytes. Returns nullopt for any other text.
 std::optional<uint64_t> size_of_text(const std::string& text);
-// Returns the number of UTF-8 characters.
+// Returns the number of characters in a UTF-8 text.
 size_t character_count(std::string_view text);
 // Returns the spelling of a field on the command line: "--hash-bits".
 std::string option_name(const char* field_name);
 
-// Returns the expectation for values of type T, for messages: "a power of two from 4 to 1048576".
+// Returns the values that a field of type T accepts, as a phrase for messages: "a power of two from
+// 4 to 1048576".
 template <class T>
 std::string expectation(const Field& field);
+// Returns such a phrase for an integer field; `low` and `high` are its limits as text.
 std::string expected_integer(const Field& field, const std::string& low, const std::string& high);
 bool fits_integer_limits(const Field& field, int64_t value);
+// True if the text has no control characters and its number of characters is within the limits.
 bool is_valid_line(const Field& field, std::string_view text);
 
 template <class T>
@@ -264,7 +275,8 @@ bool fits(const Field& field, const T& value) {
   }
 }
 
-// Returns a text with the field's default; "" if it has none worth showing.
+// Returns the field's default, which is `value`, as text for its documentation. Returns "" if the
+// documentation does not mention the default, such as 0 or false.
 template <class T>
 std::string default_text(const Field& field, const T& value) {
   if (*field.default_text) return field.default_text;
@@ -282,7 +294,8 @@ std::string default_text(const Field& field, const T& value) {
   }
 }
 
-// Returns the help of a field with its default, and with its limits if `has_limits`.
+// Returns the help of a field with its default, which is `value`. Includes the field's limits if
+// `has_limits`.
 template <class T>
 std::string documentation(const Field& field, const T& value, bool has_limits) {
   using Inner = typename OptionalValue<T>::type;

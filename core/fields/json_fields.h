@@ -1,6 +1,9 @@
-// Structs with a description (field.h) as JSON, in both directions. The JSON of a *record* has all
-// members; a decoder ignores unknown members. The JSON of *options* has only the members that
-// differ from their defaults; a decoder refuses unknown members.
+// Converts structs that have a `fields` function (field.h) to and from JSON. There are two kinds:
+//
+//   - The JSON of a record has all members, except optional members without a value and empty
+//     members with omit_empty(). A decoder ignores unknown members.
+//   - The JSON of options has only the members that differ from their defaults. A decoder refuses
+//     unknown members.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +19,8 @@ using FieldJson = nlohmann::ordered_json;
 namespace json_fields {
 
 [[noreturn]] void refuse(const std::string& name, const std::string& expected);
-// Reads a whole number; also accepts 64.0. Calls `take_unsigned` or `take_signed` with the number
-// and returns its result. Returns false if `json` is not a whole number.
+// Reads a whole number, which may be written as 64.0. Calls `take_unsigned` or `take_signed` with
+// the number and returns the result of this call. Returns false if `json` is not a whole number.
 bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,
                   const std::function<bool(int64_t)>& take_signed);
 
@@ -43,7 +46,7 @@ FieldJson encode_value(T& value) {
   }
 }
 
-// Adds members to an object.
+// A visitor that adds the members of a struct to a JSON object.
 class Encoder {
  public:
   explicit Encoder(FieldJson& object) : object_(object) {}
@@ -76,12 +79,13 @@ FieldJson encode(T value) {
   return object;
 }
 
-// Returns the members of `options` that differ from the members of `defaults`.
+// Returns the members of `options` that differ from the members of `defaults`, also within nested
+// objects.
 FieldJson difference(const FieldJson& options, const FieldJson& defaults);
 
-inline constexpr size_t kMaxNames = 64;  // for a set of names in options
+inline constexpr size_t kMaxNames = 64;  // in a set of names, for options
 
-// Records have all members; options have only the given ones.
+// The members that JSON must have: kAll for records, kGiven for options.
 enum class Members { kAll, kGiven };
 
 template <class T>
@@ -135,8 +139,9 @@ void decode_value(const Field& field, const FieldJson& json, Members members, T&
     decode_value(Field(field.name).items(max_items), json, members, names);
     for (const std::string& name : names) expect(NameSetTraits<T>::add(value, name));
   } else if constexpr (IsVector<T>::value) {
-    // In options, a list of limited length may be a single item. Nothing is copied, because copying
-    // a value of a request recurses as deep as the value is nested.
+    // In options, a list of limited length may be written as a single item. The item is not copied
+    // into an array first, because copying nested JSON recurses, and a request may be nested
+    // deeply.
     const bool is_item = members == Members::kGiven && field.max_items > 0 && !json.is_array();
     expect(is_item || json.is_array());
     value.clear();
@@ -153,7 +158,7 @@ void decode_value(const Field& field, const FieldJson& json, Members members, T&
   expect(fits(field, value));
 }
 
-// Takes members out of an object.
+// A visitor that sets the members of a struct from a JSON object. Throws FieldError.
 class Decoder {
  public:
   Decoder(const FieldJson& object, const std::string& name, Members members)
@@ -182,7 +187,8 @@ class Decoder {
   }
   void derived(const char* name, const auto&) { known_.emplace_back(name); }
 
-  // Throws FieldError if the object has a member that no field names.
+  // Throws FieldError if the object has a member that the struct does not have. `where` is the
+  // object's name for the message.
   void refuse_unknown_members(const std::string& where) const;
 
  private:
@@ -205,7 +211,7 @@ FieldJson record_json(const T& record) {
   return json_fields::encode(record);
 }
 
-// Throws FieldError that names the member.
+// Throws a FieldError that names the member if the JSON is not such a record.
 template <class T>
 T record_from_json(const FieldJson& json) {
   T record;
@@ -213,7 +219,8 @@ T record_from_json(const FieldJson& json) {
   return record;
 }
 
-// Throws Error{kCorrupt}, beginning with `what`, for a text that is not such a record.
+// Throws Error{kCorrupt} if the text is not the JSON of such a record. The message begins with
+// `what`, which says where the text is from.
 template <class T>
 T record_from_text(std::string_view text, const std::string& what) {
   try {
@@ -230,8 +237,8 @@ FieldJson options_json(const T& options) {
   return json_fields::difference(json_fields::encode(options), json_fields::encode(T{}));
 }
 
-// Sets the given options. Throws FieldError with the name of the member. `name` is the object's
-// name in messages.
+// Sets the options that `json` contains and leaves the others unchanged. Throws a FieldError that
+// names the member. `name` is the name of `json` in messages.
 template <class T>
 void set_options(const FieldJson& json, const std::string& name, T& options) {
   json_fields::decode(json, name, json_fields::Members::kGiven, options);

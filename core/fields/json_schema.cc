@@ -3,7 +3,8 @@
 namespace voxdag::json_fields {
 namespace {
 
-// Sizes in whole MiB or GiB. The pattern can check the minimum of 64MiB only for these sizes.
+// The documented form of a size: whole MiB, at least 64, or whole GiB. A decoder also accepts other
+// units. The pattern omits them because it could not check their minimum of 64 MiB.
 constexpr const char* kSizePattern =
     "^((6[4-9]|[7-9][0-9]|[1-9][0-9]{2,5})MiB|[1-9][0-9]{0,5}GiB)$";
 constexpr const char* kLinePattern = "^[^\\u0000-\\u001f\\u007f]+$";

@@ -1,4 +1,4 @@
-// JSON schemas (2020-12, as in OpenAPI 3.1) of structs with a description.
+// Makes JSON schemas (2020-12, as in OpenAPI 3.1) of structs that have a `fields` function.
 #pragma once
 
 #include <map>
@@ -15,7 +15,7 @@ void write_schema(FieldJson& schema, Members members);
 
 FieldJson integer_schema(const Field& field, bool is_unsigned);
 FieldJson line_schema(const Field& field);
-// Returns the schema of an array of `count` numbers. If the field requires it, the last number must
+// Returns the schema of an array of `count` numbers. If field.is_above_zero, the last number must
 // be above 0.
 FieldJson numbers_schema(const Field& field, size_t count);
 
@@ -103,7 +103,8 @@ void write_schema(FieldJson& schema, Members members) {
 
 }  // namespace json_fields
 
-// Returns the schema of a record. All members are required.
+// Returns the schema of a record (json_fields.h). It requires all members, except optional members
+// and members with omit_empty().
 template <class T>
 FieldJson record_schema() {
   FieldJson schema;
@@ -111,7 +112,7 @@ FieldJson record_schema() {
   return schema;
 }
 
-// Returns the schema of options, with its list of required options.
+// Returns the schema of options (json_fields.h). It requires only the members that are required().
 template <class T>
 FieldJson options_schema() {
   FieldJson schema;
