@@ -1,14 +1,15 @@
 // The contract of all backends. A backend makes the sub-DAG of one subvolume from its triangles.
 //
-//   1. A voxel is set iff triangle_touches_cube() (core/geometry/overlap.h) holds for one of the
-//      triangles and the voxel's closed cube. Triangles that miss the subvolume's cube have no
+//   1. A voxel is set iff triangle_touches_cube() (core/geometry/overlap.h) holds for the voxel's
+//      closed cube and at least one triangle. Triangles that miss the subvolume's cube have no
 //      effect.
-//   2. The sub-DAG is unique: no nodes are equal, and level arrays are in total order. It does not
-//      depend on the order of the triangles, the memory, the method or the backend's caches.
+//   2. The sub-DAG is unique: no nodes are equal, and level arrays are in the total order
+//      (core/dag/level_array.h). The sub-DAG does not depend on the order of the triangles, the
+//      memory, the method or the backend's caches.
 //   3. All large buffers are charged to the given budget. If the budget cannot hold the subvolume,
 //      build() returns kNeedsSplit without calling the sink, and the caller splits the cube and
 //      tries again. A cube of kSmallestEdge voxels never needs more than kSmallestBudget.
-//   4. A backend is used for many subvolumes, by one thread, and may cache planes and tables.
+//   4. A backend is used for many subvolumes, by one thread, and may keep caches between them.
 //
 // tests/conformance tests every backend.
 #pragma once
@@ -61,7 +62,8 @@ class Backend {
  public:
   virtual ~Backend() = default;
   virtual std::string_view name() const = 0;
-  // Builds one subvolume. Throws Error (kCanceled, kDevice, kOutOfMemory) and the stream's errors;
+  // Builds one subvolume: passes its level arrays to `sink` and sets `summary`. Throws Error
+  // (kCanceled, kDevice, kOutOfMemory) and the errors of the stream and the sink. After an error
   // the backend remains usable.
   virtual BuildOutcome build(const SubvolumeTask& task, TriangleStream& triangles,
                              MemoryBudget& budget, const CancelToken& cancel, SubDagSink& sink,
@@ -87,8 +89,8 @@ enum class Method {
   kHashes,    // voxel list, DAG by hashes
 };
 
-// Creates a backend that runs the parallel pipeline on `threads` threads of the host (0: all of
-// them), for tests and comparisons.
+// Creates a backend that runs the parallel pipeline (core/backend/parallel) on `threads` threads of
+// the host, for tests and comparisons. 0 threads: one for each hardware thread.
 std::unique_ptr<Backend> make_parallel_host_backend(Method method, unsigned threads = 1);
 
 // Returns the number of GPUs that make_cuda_backend() can open. 0 if this build has no CUDA, or if

@@ -3,7 +3,9 @@
 // same. All other memory of a build (triangles, tile bricks, the tables as they grow) is allocated
 // on demand, until the budget refuses it and the subvolume is split.
 //
-// Only the CPU backend has these parts. kSmallestBudget (backend.h) suffices with these parts.
+// Only the CPU backend has these parts. kSmallestBudget (backend.h) is enough for a build with
+// these parts. In the functions, `budget_bytes` is the complete budget, and `free_bytes` the part
+// of it that is still available when the structure is allocated.
 #pragma once
 
 #include <algorithm>

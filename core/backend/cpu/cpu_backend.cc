@@ -30,7 +30,7 @@ class CpuBackend : public Backend {
  private:
   const cpu::Kernels& kernels_;
   PagePool pages_;
-  TableSizes table_sizes_;  // sizes for the last subvolume
+  TableSizes table_sizes_;  // sizes of the last subvolume's tables
 };
 
 }  // namespace

@@ -6,7 +6,7 @@ namespace voxdag::cpu {
 namespace {
 
 constexpr size_t kBatch = 256;  // triangles per read
-// Max triangles of a tile for which the plane memo may be faster.
+// Max triangles of a tile for which the plane memo may be faster than drawing.
 constexpr size_t kFewTriangles = 4;
 
 LatticeCube box_of(const SubvolumeTask& task) {

@@ -1,5 +1,7 @@
-// Builds the sub-DAG of one subvolume. Triangles descend the octree to tiles; tiles are drawn and
-// reduced to nodes, and nodes to the root.
+// Builds the sub-DAG of one subvolume. Descends the octree to tiles (cubes of at most 64^3 voxels)
+// and passes each triangle to the children of a cube that it may touch. The triangles of a tile are
+// drawn, and the drawn tile is reduced to a node. On the way back, nodes are combined up to the
+// root.
 #pragma once
 
 #include <cstdint>
@@ -21,17 +23,17 @@ class SubvolumeBuild {
   SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels, PooledMemory& memory,
                  const CancelToken& cancel, const TableSizes& expected);
   SubDagSummary run(TriangleStream& stream, SubDagSink& sink);
-  // Valid after run().
+  // Returns the sizes of the tables after run().
   TableSizes table_sizes() const { return tables_.sizes(); }
 
  private:
   NodeRef build_streamed(TriangleStream& stream);
   void read(TriangleStream& stream);
-  // Returns the node of a cube of 2^size_log2 voxels. The entries [first, first + count) of the
-  // stack may touch the cube.
+  // Returns the node of a cube with an edge of 2^size_log2 voxels. The triangles that may touch the
+  // cube are entries_[first, first + count).
   NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);
-  // True if it is better to split a cube of at most tile size, because its parts may be in the
-  // plane memo.
+  // True if splitting a cube of at most tile size is likely to be faster than drawing it, because
+  // the nodes of its parts may be in the plane memo.
   bool is_worth_splitting(int size_log2, size_t first, size_t count);
   NodeRef build_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   Octants test_octants(Entry entry, const LatticeCube& cube) const;
@@ -44,8 +46,9 @@ class SubvolumeBuild {
   PooledMemory& memory_;
   const CancelToken& cancel_;
   TriangleSet triangles_;
-  // The stack of entries of all cubes from the root to the current one, and the octants that the
-  // current cube's entries touch.
+  // A stack: for each cube from the root to the current cube, the triangles that may touch it. For
+  // each of the current cube's entries, octants_ has two masks: bits 0-7 are the children that the
+  // triangle may touch, bits 8-15 are the children that it covers.
   PooledArray<Entry> entries_;
   PooledArray<uint16_t> octants_;
   size_t entries_used_ = 0;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr uint64_t kMinSlots = 64;
 constexpr uint64_t kFirstSlots = 4096;
-constexpr uint64_t kMaxSlots = uint64_t{1} << 16;  // more would exceed the CPU caches
+constexpr uint64_t kMaxSlots = uint64_t{1} << 16;  // 5 MiB; more would exceed the CPU caches
 
 }  // namespace
 

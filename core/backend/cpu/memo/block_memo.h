@@ -5,11 +5,13 @@
 //   blocks    64 bytes each; all 0 if the slot is free
 //   nodes     the node of the block in the same slot
 //
-// It is direct-mapped: a new block replaces the block in its slot. All bytes of a block are
+// The cache is direct-mapped: a new block replaces the block in its slot. All bytes of a block are
 // compared, so a hit is correct even if different blocks have the same key. When most lookups miss,
-// the cache is not used for a while: in scans almost no blocks are equal. It is charged to the
-// budget. If it is larger than its minimum size, it is at most a sixteenth of the budget. Not
-// thread-safe. Throws OutOfBudget if not even the minimum size fits.
+// the cache is not used for a while. This happens in scans, where almost no blocks are equal.
+//
+// The cache is charged to the budget. It grows beyond its minimum size only up to a sixteenth of
+// the memory that is still free in the budget. Throws OutOfBudget if not even the minimum size
+// fits. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -44,8 +46,8 @@ class BlockMemo {
     return true;
   }
   void prefetch(uint64_t key) const { __builtin_prefetch(&blocks_[slot_of(key)]); }
-  // Returns the node of a block, which must not be empty. Returns null if the block is not in the
-  // memo.
+  // Returns the node of a block, or null if the block is not in the memo. The block must not be
+  // empty, because a free slot looks like an empty block. `key`: block_key() of the block.
   const Node* find(uint64_t key, const VoxelBlock& block) const {
     const uint64_t slot = slot_of(key);
     uint64_t differ = 0;
@@ -61,7 +63,9 @@ class BlockMemo {
   }
 
  private:
-  static constexpr int64_t kWindow = 1024;  // blocks
+  // After each window of kWindow lookups in which more than three quarters missed, the memo is
+  // bypassed for kBypass blocks.
+  static constexpr int64_t kWindow = 1024;
   static constexpr int64_t kBypass = 16 * kWindow;
 
   uint64_t slot_of(uint64_t key) const { return key * 0x9e3779b97f4a7c15ull >> shift_; }
@@ -76,7 +80,7 @@ class BlockMemo {
   uint64_t slots_ = 0;     // a power of two
   uint64_t inserted_ = 0;  // since the last growth
   int shift_ = 0;
-  int64_t lookups_ = 0, misses_ = 0;  // in this window
+  int64_t lookups_ = 0, misses_ = 0;  // in the current window
   int64_t bypassed_ = 0;              // blocks until the memo is used again
 };
 

@@ -1,5 +1,5 @@
-// The plane of a triangle. If the triangle covers a cube, the set voxels of the cube depend only on
-// the plane's direction and on its offset from the cube's corner.
+// The plane of a triangle. If the triangle covers a cube (see Entry in triangle_set.h), the set
+// voxels of the cube depend only on the plane's direction and on its offset from the cube's corner.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,18 @@
 
 namespace voxdag::cpu {
 
-// n.p + c = 0 for lattice positions p, n without a common divisor. For a cube whose low corner is q
-// let f = floor((n.q + c) / 256): with voxels k counted from there, the plane is at or above a
-// voxel corner iff n.k + f >= 0 (256 i + c >= 0 <=> i + floor(c / 256) >= 0 for integers i), so
-// the voxels depend only on f and on whether the division left a remainder.
+// The plane n.p + c = 0 of lattice positions p. The components of n have no common divisor.
+//
+// For a cube with low corner q, the offset of the plane is f = floor((n.q + c) / 256). Let k be the
+// position of a voxel corner in the cube, in voxels, so that its lattice position is q + 256 k. The
+// value of n.p + c at this corner is >= 0 iff n.k + f >= 0, because for an integer i and any x,
+// 256 i + x >= 0 <=> i + floor(x / 256) >= 0. So the set voxels of the cube depend only on n, on f
+// and on `fractional`.
 struct Plane {
   int64_t n[3];
   int128 c;
-  // (n.q + c) / 256 is not an integer; the same for all cubes, because q is a multiple of 256.
+  // True if (n.q + c) / 256 is not an integer. This is the same for all cubes, because q is a
+  // multiple of 256.
   bool fractional;
 
   // rising() returns the sum of the positive components of n, falling() the sum of the negative
@@ -26,16 +30,19 @@ struct Plane {
   int64_t rising() const;
   int64_t falling() const;
 
+  // In these functions, the cube has an edge of 2^size_log2 voxels.
+  //
   // True if all values n.k + f within a cube that the plane crosses fit in 62 bits.
   bool fits(int size_log2) const;
-  // True if the plane touches a cube of 2^size_log2 voxels with offset f. Requires fits().
+  // True if the plane touches a cube from which it has the offset f. Requires fits().
   bool crosses(int64_t f, int size_log2) const;
-  // Sets f for a cube. Returns false if the plane misses the cube. Requires fits().
+  // Sets `f` to the plane's offset from the cube. Returns false if the plane misses the cube; `f`
+  // is then unchanged. Requires fits().
   bool offset_from(const LatticeCube& cube, int size_log2, int64_t& f) const;
 };
 
-// Returns the plane of a triangle whose vertices have equal coordinates along an axis. Needs no
-// arithmetic.
+// Returns the plane of a triangle whose vertices have equal coordinates along an axis, and nullopt
+// for all other triangles. Unlike plane_of(), also accepts wide and degenerate triangles.
 template <class Int>
 std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t) {
   for (int a = 0; a < 3; ++a) {
@@ -50,7 +57,7 @@ std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t) {
 // Returns the plane of a triangle, which must not be degenerate.
 Plane plane_of(const NarrowTriangle& t);
 
-// Range of n.k: the plane n.k + f crosses voxel k iff low <= n.k <= high.
+// The range of n.k for the voxels k that a plane with offset f crosses: low <= n.k <= high.
 struct PlaneRange {
   int64_t low, high;
 
@@ -60,14 +67,14 @@ struct PlaneRange {
       rising += x > 0 ? x : 0;
       size += x > 0 ? x : -x;
     }
-    // Over a voxel's corners the value rises to n.k + f + rising. Its minimum is `size` below that
-    // maximum.
+    // At the corners of voxel k, the plane's largest value is n.k + f + rising. Its smallest value
+    // is `size` less.
     low = -(f + rising);
     high = low + size - (fractional ? 1 : 0);
   }
 };
 
-// Returns the voxels of a brick that the plane n.k + f crosses.
+// Returns the voxels of a brick that a plane with offset f from the brick crosses.
 inline uint64_t plane_brick(const int64_t (&n)[3], int64_t f, bool fractional) {
   const PlaneRange crossed(n, f, fractional);
   uint64_t mask = 0;

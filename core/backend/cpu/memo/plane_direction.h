@@ -1,7 +1,8 @@
-// All nodes of 8^3 voxels that planes of one direction can produce. Whether a plane passes above or
-// below a voxel corner k depends on whether f >= -n.k. A cube of 8^3 voxels has 729 corners, so the
-// sorted values -n.k divide all offsets f into at most 730 intervals; within an interval the node
-// is the same, so it is made once and then looked up.
+// All nodes of 8^3 voxels that planes of one direction n can produce. A plane with offset f
+// (plane.h) passes above or below a voxel corner k, depending on whether f >= -n.k. A cube of 8^3
+// voxels has 729 corners, so the sorted values -n.k divide all offsets f into at most 730
+// intervals. All planes with offsets in one interval produce the same node. It is made once and
+// then looked up.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +13,13 @@
 
 namespace voxdag::cpu {
 
-// Trivially copyable, 24 KiB. Only for planes whose offsets leave a remainder (Plane::fractional).
-// Not thread-safe.
+// Trivially copyable, 24 KiB. Only for planes with Plane::fractional. Not thread-safe.
 class PlaneDirection {
  public:
   static constexpr int kSizeLog2 = 3;  // size of the nodes
   static constexpr int kCorners = 9 * 9 * 9;
 
+  // A node of 8^3 voxels, and the numbers of voxels and octree nodes in it.
   struct Known {
     uint64_t hash;
     uint32_t id;
@@ -31,8 +32,8 @@ class PlaneDirection {
     return n_[0] == plane.n[0] && n_[1] == plane.n[1] && n_[2] == plane.n[2];
   }
 
-  // n.k for the voxels k of a node in Morton order. Multiplied by 8, these are the values for the
-  // nodes of a tile.
+  // Returns n.k for the 512 voxels k of a node, in Morton order. Multiplied by 8, these are the
+  // values of n.k at the low corners k of the 512 nodes in a tile of 64^3 voxels.
   const int64_t* offsets() const { return offsets_; }
   // A plane crosses a node iff its offset f is within [min_offset(), max_offset()].
   int64_t min_offset() const { return values_[0]; }
@@ -48,13 +49,14 @@ class PlaneDirection {
  private:
   static constexpr int kBuckets = 256;
 
-  // Returns the number of values <= f, minus one.
+  // Returns the index of the last element of values_ that is <= f.
   int interval(int64_t f) const {
     int i = bucket_[bucket(f)];
     while (values_[i + 1] <= f) ++i;
     return i;
   }
-  // Monotonic in f. The table was built with the same arithmetic, so rounding does not matter.
+  // Returns the bucket of an offset f. It is monotonic in f. bucket_ was built with this function,
+  // so the rounding of the doubles does not matter.
   int bucket(int64_t f) const {
     return static_cast<int>(static_cast<double>(f - values_[0]) * buckets_per_unit_);
   }
@@ -64,7 +66,7 @@ class PlaneDirection {
   double buckets_per_unit_;
   int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer
   int64_t offsets_[512];
-  uint16_t bucket_[kBuckets + 1];  // index of the last value that is <= every f of the bucket
+  uint16_t bucket_[kBuckets + 1];  // index of the last of values_ that is <= every f of the bucket
   Known known_[kCorners];
 };
 static_assert(sizeof(PlaneDirection) <= 24 << 10);

@@ -8,20 +8,21 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr int64_t kSmallNormal = 64;       // sum of magnitudes
-constexpr uint64_t kMinPlaneSlots = 1024;  // slots; a power of two
-// An upper bound of the slots that are filled before the next reserve_small_nodes().
+constexpr int64_t kSmallNormal = 64;       // max sum of |n_a| of a small normal
+constexpr uint64_t kMinPlaneSlots = 1024;  // a power of two
+// Upper bound of the number of slots that are filled between two calls of reserve_small_nodes().
 constexpr uint64_t kSpareSlots = 64;
 constexpr uint32_t kMaxPlanes = 1 << 20;
 
-// Packs all inputs of small_node() into a key: 24 + 1 + 5 + 28 bits, and one more bit so that no
-// key is 0.
+// Packs all inputs of small_node() into a key. Its lowest 58 bits are 24 bits for the normal, 1 for
+// `fractional`, 5 for the size and 28 for f. The next bit is always 1, so that no key is 0.
 uint64_t small_key(const Plane& plane, int64_t f, int size_log2) {
   uint64_t key = 1;
   for (const int64_t x : plane.n) key = key << 8 | static_cast<uint64_t>(x + kSmallNormal);
   key = key << 1 | (plane.fractional ? 1 : 0);
   key = key << 5 | static_cast<uint64_t>(size_log2);
-  // |f| <= 64 * 2^20 where the plane crosses the cube.
+  // |f| <= 64 * 2^20 (kSmallNormal times the max edge in voxels), because the plane crosses the
+  // cube.
   return key << 28 | static_cast<uint64_t>(f + (1 << 27));
 }
 
@@ -115,7 +116,7 @@ NodeRef PlaneMemo::node(const Plane& plane, PlaneDirection& direction, int64_t f
 
 NodeRef PlaneMemo::tile_node(PlaneDirection& direction, int64_t f, int size_log2) {
   constexpr int kLog2 = PlaneDirection::kSizeLog2;
-  // The plane's offset from a node is f plus the corner's offset, which is 8 times `offsets`.
+  // The plane's offset from the m-th node of the tile is f + 8 * offsets[m].
   const int64_t* offsets = direction.offsets();
   const int64_t low = direction.min_offset() - f, high = direction.max_offset() - f;
   uint64_t crossed[8];

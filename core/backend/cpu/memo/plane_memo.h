@@ -1,13 +1,15 @@
 // The memo of planes. With it, large flat surfaces cost a lookup per cube instead of rasterization.
-// It is used for cubes that a single triangle covers.
+// It is used for cubes that one triangle covers (see Entry in triangle_set.h) and no other triangle
+// touches.
 //
-//   small normals    (walls, floors, 45 degrees) The nodes for every offset and size of cube, in a
-//                    hash table. Its keys contain all inputs, so a hit is exact.
-//   other planes     The nodes of 8^3 voxels by direction (plane_direction.h), for triangles that
-//                    have covered enough tiles.
+//   small normals    Planes whose |n_a| sum to at most 64, such as walls, floors and slopes of 45
+//                    degrees. The nodes for every offset and size of cube are in a hash table. Its
+//                    keys contain all inputs, so a hit is exact.
+//   other planes     The nodes of 8^3 voxels are stored by direction (plane_direction.h), for
+//                    triangles that have covered enough tiles.
 //
-// All memory is charged to the budget, is at most an eighth of it, and is kept until the build
-// ends. Not thread-safe.
+// All memory is charged to the budget and kept until the build ends.
+// BackendMemory::plane_table_bytes() limits each table. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -30,8 +32,9 @@ class PlaneMemo {
   // log2 of the edge of the smallest cube for which build() is worthwhile.
   static constexpr int kSmallestLog2 = 4;
 
-  // Sets `node` to the node of a cube that one triangle covers and no other triangle touches.
-  // Returns false if the plane is not in the memo (yet), or not for cubes of this size.
+  // Sets `node` to the node of a cube that the triangle `entry` covers and no other triangle
+  // touches. `node` has no node (NodeRef::exists) if the plane misses the cube. Returns false if
+  // the memo does not contain the plane (yet), or not for cubes of this size.
   bool build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube, int size_log2,
              NodeRef& node);
   // True if build() would succeed for cubes of up to 64^3 voxels that the triangle covers.
@@ -49,10 +52,11 @@ class PlaneMemo {
     uint32_t id;
   };
 
-  // Meaning of the values in known_: below kWorthwhile, the number of tiles that the triangle has
-  // covered so far; from kWorthwhile, kWorthwhile plus the number of the triangle's plane; or
-  // kNever.
-  static constexpr uint32_t kWorthwhile = 24;  // tiles
+  // Values of known_:
+  //   below kWorthwhile    number of tiles that the triangle has covered so far
+  //   kWorthwhile + i      the triangle's plane is planes_[i]
+  //   kNever               the memo does not accept the triangle's plane
+  static constexpr uint32_t kWorthwhile = 24;
   static constexpr uint32_t kNever = UINT32_MAX;
 
   const KnownPlane* find(const TriangleSet& triangles, Entry entry, uint64_t tiles);
@@ -65,14 +69,14 @@ class PlaneMemo {
   NodeRef node(const Plane& plane, PlaneDirection& direction, int64_t f, int size_log2);
   NodeRef tile_node(PlaneDirection& direction, int64_t f, int size_log2);
   SmallNode& small_slot(uint64_t key);
-  // Makes free slots by growing, or by clearing the table.
+  // Makes free slots: enlarges the table or, if the budget does not allow this, clears the table.
   void reserve_small_nodes();
 
   PooledMemory& memory_;
   SubDagTables& tables_;
   TileReducer& reducer_;
   const Kernels& kernels_;
-  PooledArray<uint32_t> known_;  // by triangle, narrow ones first
+  PooledArray<uint32_t> known_;  // by number of the narrow triangle
   PooledArray<KnownPlane> planes_;
   uint32_t plane_count_ = 0;
   std::vector<PooledArray<PlaneDirection>> directions_;

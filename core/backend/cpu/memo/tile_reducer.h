@@ -1,7 +1,7 @@
 // Reduces the bricks of a tile to one node, level by level. Voxel blocks that occurred before are
-// found in the block memo. The other nodes of a level are processed in three steps, so that memory
-// latencies overlap: all are hashed, then their slots and records are prefetched, and then all are
-// looked up.
+// found in the block memo. The other nodes of a level are processed in three steps: all nodes are
+// hashed, then their slots and records in the tables are prefetched, and then the tables are
+// searched for all nodes. So the memory latencies of the nodes overlap.
 //
 // The non-empty cubes of a level are a bit set in Morton order. Each byte of this set is the child
 // mask of a node of the next coarser level, and the positions of the nonzero bytes are the bit set
@@ -23,13 +23,15 @@ class TileReducer {
   TileReducer(SubDagTables& tables, const Kernels& kernels)
       : tables_(tables), kernels_(kernels), memo_(tables.memory()) {}
 
-  // Returns the node of a tile of 2^size_log2 voxels, adds the tile's octree nodes and voxels to
-  // the tables' counts, and empties the tile.
+  // Returns the node of a tile with an edge of 2^size_log2 voxels, or a NodeRef without a node if
+  // the tile has no voxels. Adds the tile's octree nodes and voxels to the tables' counts, and
+  // empties the tile.
   NodeRef reduce_bricks(TileBricks& tile, int size_log2);
 
-  // Returns the node of a cube, given its nodes of 2^from_log2 voxels. The bits set in `existing`
-  // are these nodes' cubes, in Morton order. next(m) returns the id and hash of the m-th node,
-  // which is already counted.
+  // Returns the node of a cube with an edge of 2^size_log2 voxels, from its nodes with an edge of
+  // 2^from_log2 voxels. Bit m of `existing` is set if the m-th cube of this smaller size, in Morton
+  // order, has a node; next(m) returns the node's id and hash. Counts only the nodes above these
+  // nodes.
   template <class Next>
   NodeRef reduce_nodes(const uint64_t* existing, int from_log2, int size_log2, Next next) {
     const int words = words_of(size_log2 - from_log2);
@@ -46,8 +48,8 @@ class TileReducer {
   }
 
  private:
-  // A group of nodes for one batch of lookups: child masks, and the position of their first child
-  // in a list.
+  // A group of nodes that look_up() processes together: their child masks, and the position of each
+  // node's first child in the list of all children of the group.
   struct Parents {
     int count = 0, children = 0;
     uint16_t first_child[kTileBlocks];
@@ -62,15 +64,18 @@ class TileReducer {
 
   // Number of words in the bit set of all cubes `levels` levels below a cube.
   static int words_of(int levels) { return levels > 2 ? 1 << (3 * levels - 6) : 1; }
-  // Finds ids and hashes of the listed voxel blocks, and clears the blocks in the tile.
+  // Sets the first `count` elements of ids_ and hashes_ to the nodes of the voxel blocks in
+  // blocks_, and clears these blocks in the tile.
   void find_blocks(TileBricks& tile, int count);
   void find_new_blocks(TileBricks& tile, int count, bool insert);
   NodeRef reduce(int words, int count, int from_log2, int size_log2);
-  // Overwrites the children's hashes and ids with the parents'.
+  // `hashes` and `ids` contain the children's values before the call and the parents' values after
+  // it.
   static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
 
   static constexpr int kMaxBricks = kTileBlocks * kBlockBricks;
-  // Words that must be readable after the first child of any node.
+  // Max children of a node. A table reads this many ids from a node's first child on, even if the
+  // node has fewer children, so the arrays of ids have as many elements more.
   static constexpr int kChildren = 8;
 
   SubDagTables& tables_;
@@ -83,9 +88,9 @@ class TileReducer {
   } existing_;
   uint32_t ids_[kTileBlocks + kChildren] = {};
   uint64_t hashes_[kTileBlocks];
-  Parents parents_;  // nodes of the level above
-  // Voxel blocks of a tile: their numbers, their keys, and the positions of new blocks in this
-  // list.
+  Parents parents_;  // nodes of the next coarser level
+  // The non-empty voxel blocks of the tile: their numbers in the tile and their keys. New blocks
+  // are the blocks that were not in the memo: their positions in this list, and their voxel counts.
   uint16_t blocks_[kTileBlocks + 1];
   uint64_t keys_[kTileBlocks + 1];
   uint16_t new_blocks_[kTileBlocks];

@@ -45,8 +45,9 @@ uint64_t plane_mask(const VoxelOffsets<Int>& offsets, Int at_first, Int width) {
   return mask;
 }
 
-// Removes the voxels whose column along `axis` is on the outer side of an edge. Most edges cross
-// few bricks. An edge whose smallest value over the brick is not negative removes nothing.
+// Removes the voxels whose column along `axis` is on the outer side of an edge. An edge whose
+// smallest value over the brick is not negative removes nothing and is skipped. This is the usual
+// case, because most edges cross few bricks.
 template <class Edge>
 void cut_by_edges(const Edge (&edges)[3], int axis, const int (&brick)[3], uint64_t& mask) {
   const int p = (axis + 1) % 3, q = (axis + 2) % 3;
@@ -59,7 +60,8 @@ void cut_by_edges(const Edge (&edges)[3], int axis, const int (&brick)[3], uint6
   }
 }
 
-// Returns the voxels of a brick within [first, last] along an axis, counted from the brick's first.
+// Returns the voxels of a brick whose coordinates along `axis` are in [first, last]. Coordinates
+// are relative to the brick's first voxel.
 uint64_t range_mask(int axis, int first, int last) {
   if (first <= 0 && last >= 3) return ~uint64_t{0};
   const int p = (axis + 1) % 3, q = (axis + 2) % 3;

@@ -1,7 +1,12 @@
-// The dispatch table of the inner loops: portable, for AVX2 with FMA and BMI2, and some of them for
-// AVX-512 (F, BW, DQ, VL, VBMI), chosen at run time; all set the same voxels. Sources in avx2/ and
-// avx512/ are compiled for these instruction sets, so nothing in them, including inline functions
-// of shared headers, may run before the choice is made. The kernels are stateless.
+// The dispatch table of the inner loops (kernels). There are three sets of kernels:
+//
+//   portable
+//   AVX2       also needs FMA and BMI2
+//   AVX-512    needs F, BW, DQ, VL and VBMI; the kernels that it does not replace are AVX2's
+//
+// The set is chosen at run time. All sets produce the same voxels. Sources in avx2/ and avx512/ are
+// compiled for these instruction sets. So nothing in them, including inline functions of shared
+// headers, may run before the choice is made. The kernels are stateless.
 #pragma once
 
 #include <cstdint>
@@ -16,28 +21,29 @@ namespace voxdag::cpu {
 // Bit masks of the children of a cube.
 struct Octants {
   uint32_t touched;  // every child that the triangle touches, and possibly some others
-  // Children of `touched` that are inside the triangle's projection, so that the plane test
-  // decides.
-  uint32_t inside;
+  uint32_t inside;   // touched children that the triangle covers (see Entry in triangle_set.h)
 };
 
 struct VoxelBlockContent {
-  uint32_t mask;  // mask of the non-empty bricks
-  uint32_t voxels;
+  uint32_t mask;    // bit i is set if brick i is not empty
+  uint32_t voxels;  // number of voxels in the block
 };
 
 struct Kernels {
   const char* name;
   // Sets exactly the voxels of the tile that the triangle touches.
   void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
-  // Requires that the triangle touches the cube. `inside`: the triangle covers the complete cube.
+  // Finds the children of the cube that the triangle may touch. Requires that the triangle touches
+  // the cube. `inside`: the triangle covers the complete cube.
   Octants (*test_octants)(const NarrowTriangle& triangle, const LatticeCube& cube, bool inside);
   // Sets bit i of `bits` iff low <= values[i] <= high, for `count` values, a multiple of 4; the
   // other bits of the last word are 0.
   void (*find_in_range)(const int64_t* values, int count, int64_t low, int64_t high,
                         uint64_t* bits);
-  // Lists numbers and keys of a tile's non-empty voxel blocks in Morton order, and sets their bits
-  // in `existing` (8 * groups bits). Clears all touched marks of the tile.
+  // Finds the non-empty blocks among the first 8 * groups voxel blocks of the tile and returns
+  // their number. Writes their numbers in the tile and their keys (block_key()) in Morton order,
+  // and sets their bits in the 8 * groups bits of `existing`. Clears the touched marks of all these
+  // blocks. `numbers` and `keys` need space for one more element.
   int (*list_blocks)(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
                      uint64_t* keys);
   // Copies the non-empty bricks of a voxel block to the front of `bricks`, which has space for
@@ -51,7 +57,8 @@ const Kernels* avx2_kernels();
 const Kernels* avx512_kernels();
 
 // The rasterizers: each sets exactly the voxels of the tile that the triangle touches.
-// Plain integer code, for narrow and wide triangles and for degenerate ones.
+//
+// Plain integer code, for narrow, wide and degenerate triangles.
 template <class Coordinate>
 void draw_exactly(const TileTriangle<Coordinate>& triangle, TileBricks& tile);
 // Requires a machine with AVX2, FMA and BMI2.

@@ -2,13 +2,16 @@
 // in one step, in doubles. The four elements of a quad belong to the three edges of the triangle
 // (the fourth is ignored) or to four children.
 //
-// This culling need not be exact, because the rasterizers are. It may keep an untouched child, but
-// must never omit a touched child, and "inside" must never be wrong. Both hold because every sum is
-// widened, or narrowed, by more than its rounding error. Vertices and edges are exact in doubles
-// (below 2^42). Normals are computed in integers and rounded once. All other values are sums of at
-// most eight products, each with an error of at most 3 * 2^-53 of |coefficient| * |distance|.
+// The test need not be exact, because the rasterizers are exact. It may report a child that the
+// triangle does not touch, but two errors must never happen: a touched child is omitted, or a child
+// is reported as inside that the triangle does not cover. Therefore bounds for touched children are
+// widened, and bounds for inside children are narrowed, by more than the rounding error. Vertices
+// and edges are exact in doubles (below 2^42). Normals are computed in integers and rounded once.
+// All other values are sums of at most eight products, each with an error of at most 3 * 2^-53 of
+// |coefficient| * |distance|.
 //
-// Quad is a vector of four doubles with load(coordinates, origin), arithmetic and
+// Quad is a vector of four doubles with load(coordinates, origin), which returns the coordinates
+// relative to the origin, with arithmetic, and with
 //   rotated()          elements 1, 2, 0, 3
 //   clamp_to_zero()    max(x, 0)
 //   negative()         the sign bits, one per element
@@ -23,7 +26,9 @@
 
 namespace voxdag::cpu {
 
-// [projection][set of columns, bit = first axis + 2 * second]: the children in these columns.
+// children[d][set] is the mask of the children in a set of columns along axis d. Each of the four
+// columns is two children long. Its bit in the set is its coordinate along axis d + 1 plus twice
+// its coordinate along axis d + 2 (axes modulo 3).
 struct ColumnTable {
   uint8_t children[3][16] = {};
   constexpr ColumnTable() {
@@ -47,7 +52,7 @@ struct OctantTest {
   const Triangle<Coordinate>& t;
   const LatticeCube& cube;
   double half;        // edge of a child
-  double reach;       // max coordinate relative to the cube's low corner
+  double reach;       // max |coordinate| of vertices and cube, relative to the cube's low corner
   int long_axes = 0;  // number of axes along which the triangle is as long as a child
   double normal[3];
 
@@ -105,8 +110,9 @@ struct OctantTest {
     return ~touched & 0xff;
   }
 
-  // Returns the children on the inner side of the edges in projection `d`. `inside`, if not null,
-  // receives the children whose complete area is on that side.
+  // Returns the children that may touch the inner side of all edges, in the projection along axis
+  // d. `inside`, if not null, receives the children that are completely on the inner side of all
+  // edges.
   uint32_t edge_test(int d, uint32_t* inside) const {
     const int p = (d + 1) % 3, q = (d + 2) % 3;
     const Quad vp = Quad::load(t.v[p], cube.low[p]), vq = Quad::load(t.v[q], cube.low[q]);
@@ -137,8 +143,8 @@ struct OctantTest {
 
   Octants run(bool whole_cube_inside) {
     Octants out{box_test(), 0};
-    // A small triangle covers no child; if its box touches two children, the triangle most likely
-    // touches both.
+    // Other tests are not worth their cost here. A triangle shorter than a child along two axes
+    // covers no child, and if its box touches two children, it most likely touches both.
     if (!whole_cube_inside && kPopcount8[out.touched] <= (long_axes < 2 ? 2 : 1)) return out;
     set_normal();
     out.touched &= plane_test();

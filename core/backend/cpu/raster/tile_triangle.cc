@@ -71,7 +71,8 @@ void TileTriangle<Coordinate>::set_edges(const int64_t (&v)[3][3], const int64_t
   constexpr int64_t kClamp = int64_t{1} << 60;
   for (int d = 0; d < 3; ++d) {
     const int p = (d + 1) % 3, q = (d + 2) % 3;
-    // set_plane() may have negated both normal and half-edges; their product keeps its sign.
+    // If set_plane() has negated the half-edges, it has also negated the normal, so `sign`
+    // compensates for it.
     const int64_t sign = normal[d] < 0 ? -1 : 1;
     for (int i = 0; i < 3; ++i) {
       const int64_t a = -half[q][i] * sign, b = half[p][i] * sign;

@@ -1,16 +1,17 @@
 // A triangle prepared for the rasterizers: the overlap test of core/geometry/overlap.h (Schwarz and
 // Seidel 2010, section 4.1) as exact integer tests on the voxels of one tile.
 //
-// Let v be the vertices relative to the tile's low corner, k a voxel of the tile, and n the quarter
-// normal: vertices are odd, so edges are even, and the cross product of half-edges is a quarter of
-// the normal. The two tests are:
+// Let v be the vertices relative to the tile's low corner, k the coordinates of a voxel in the
+// tile, and n the quarter normal, which is the cross product of two half-edges. Half-edges are
+// integers, because lattice coordinates of vertices are odd, so edges are even. The two tests are:
 //
 //   plane   n.(256 k - v0) changes sign over the voxel's box   <=>   0 <= n.k + lowest <= width
 //   edge    the edge function's largest value over the box, in one of the three projections, is
 //           not negative                                       <=>   a k_p + b k_q + c >= 0
 //
-// since for an integer i and any c: 256 i + c >= 0 <=> i + floor(c / 256) >= 0. So the tests do not
-// need the eight bits within a voxel.
+// set_up() computes the integers lowest, width, a, b and c once per tile. The tests do not need the
+// eight bits of a coordinate within a voxel, because for an integer i and any x,
+// 256 i + x >= 0 <=> i + floor(x / 256) >= 0.
 //
 // Bounds for narrow triangles: half-edges are <= 2^27, so |n_a| <= 2^54 (the triangle's projection
 // is in its box), and the sum of |n_a| is <= 3 * 2^54. If the plane misses the tile, there is
@@ -18,8 +19,8 @@
 // edges, |a|, |b| <= 2^27 and |c| < 2^50.
 //
 // Bounds for wide triangles: half-edges are < 2^40, so |n_a| < 2^81, and n.v < 2^124 in 128 bits.
-// Edge constants are below 2^82. They are clamped to +-2^60, which changes no sign since
-// |a k_p + b k_q| < 2^47.
+// Edge constants c are below 2^82. They are clamped to +-2^60. This does not change the sign of
+// a k_p + b k_q + c, because |a k_p + b k_q| < 2^47.
 #pragma once
 
 #include <cstdint>
@@ -35,13 +36,14 @@ struct TileTriangle {
   static constexpr bool kNarrow = sizeof(Coordinate) == 4;
   using Int = std::conditional_t<kNarrow, int64_t, int128>;
 
-  // The voxel (p, q) of projection d, along axes d + 1 and d + 2, is on the inner side of the edge
-  // iff a p + b q + c >= 0.
+  // An edge in the projection along axis d. Let p and q be a voxel's coordinates along the axes
+  // d + 1 and d + 2 (modulo 3). The voxel touches the inner side of the edge iff
+  // a p + b q + c >= 0.
   struct Edge {
     int64_t a, b, c;
   };
 
-  bool inside;  // edges do not matter in this tile, and are not set
+  bool inside;  // the triangle covers the tile (triangle_set.h); `edges` is not set
   int first_voxel[3], last_voxel[3];
   int dominant;   // axis of the normal's largest component, which is >= 0
   Int normal[3];  // all 0 if the triangle is degenerate

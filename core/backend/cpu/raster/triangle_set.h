@@ -71,8 +71,12 @@ inline NarrowTriangle narrowed(const WideTriangle& t) {
 }
 
 // A triangle during the descent of the octree: its number, and two flags.
+//
+// A triangle *covers* a cube if, in the projection along the axis of the largest component of the
+// triangle's normal, the cube is inside the triangle. Then the triangle touches a voxel of the cube
+// iff the triangle's plane touches the voxel, so no edge tests are necessary.
 struct Entry {
-  static constexpr uint32_t kInside = 1u << 31;  // covers the cube: only its plane matters there
+  static constexpr uint32_t kInside = 1u << 31;  // the triangle covers the current cube
   static constexpr uint32_t kWide = 1u << 30;    // the number is an index of wide triangles
   uint32_t bits;
 
@@ -86,8 +90,8 @@ class TriangleSet {
  public:
   explicit TriangleSet(PooledMemory& memory) : memory_(memory) {}
 
-  // Entries of narrow triangles are 0..narrow_count()-1. Entries of wide triangles are counted in
-  // the same way, with kWide set.
+  // Narrow triangles have the numbers 0..narrow_count()-1. Wide triangles have the numbers
+  // 0..wide_count()-1, and kWide is set in their entries.
   uint32_t narrow_count() const { return narrow_count_; }
   uint32_t wide_count() const { return wide_count_; }
   void add(const WideTriangle& triangle);
@@ -98,8 +102,8 @@ class TriangleSet {
 
  private:
   PooledMemory& memory_;
-  // narrow_ has one more element than is used, so that a load of four coordinates is possible at
-  // the last three coordinates.
+  // narrow_ has one unused element at its end, because the AVX2 kernels load four coordinates at a
+  // time, even where only the last three remain.
   PooledArray<NarrowTriangle> narrow_;
   PooledArray<WideTriangle> wide_;
   uint32_t narrow_count_ = 0;

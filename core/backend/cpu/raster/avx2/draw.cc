@@ -11,9 +11,9 @@ namespace {
 // its half.
 template <int D>
 struct ByteOrder {
-  alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel's column
-  alignas(32) int8_t height[4][2][32] = {};  // of the voxel above the first of four bricks
-  alignas(32) int8_t depth[4][2][32] = {};   // below the highest voxel of the four
+  alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel column's number
+  alignas(32) int8_t height[4][2][32] = {};  // voxels above the floor of the first of four bricks
+  alignas(32) int8_t depth[4][2][32] = {};   // voxels below the highest voxel of the four bricks
   constexpr ByteOrder() {
     for (int voxel = 0; voxel < 64; ++voxel) {
       const int p = brick_coordinate(voxel, kP<D>), q = brick_coordinate(voxel, kQ<D>);
@@ -29,7 +29,7 @@ struct ByteOrder {
 template <int D>
 inline constexpr ByteOrder<D> kByteOrder;
 
-// HeightBounds spread over the voxels of a column of bricks, a byte per voxel of a brick.
+// The HeightBounds of a column of bricks, copied to one byte for each of the 64 voxels of a brick.
 template <int D>
 class Spread {
  public:

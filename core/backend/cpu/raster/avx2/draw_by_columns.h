@@ -1,16 +1,19 @@
 // The rasterizer for AVX2 and AVX-512. It visits the bricks in columns along the axis of the
-// normal's largest component ("height"): along this axis the plane passes a voxel column within a
-// few voxels.
+// normal's largest component; the coordinate along this axis is called the height. A column of
+// bricks consists of 4 x 4 voxel columns. The plane crosses each voxel column within a few voxels
+// of height.
 //
 //   1. For each row of voxels of the tile, the edges give bounds in the three projections. The
 //      projection along the columns gives the voxel columns inside (footprint.h), and the two
 //      other projections give bounds of the heights (sides.h).
-//   2. For all 16 voxel columns of a column of bricks in one step, the plane gives the heights
-//      between which it passes them (heights.h). The bounds of step 1 limit these heights.
-//   3. The heights become one bit per voxel of each brick. Only here the two rasterizers differ.
+//   2. For all 16 voxel columns of a column of bricks in one step, the plane gives the lowest and
+//      highest voxel that it touches in each voxel column (heights.h). The bounds of step 1 limit
+//      these heights.
+//   3. The heights become one bit per voxel of each brick. This step is the only difference between
+//      the rasterizers for AVX2 and AVX-512.
 //
-// No branch depends on which edges cross a column of bricks, because it would be mispredicted. A
-// triangle perpendicular to an axis is one layer of voxels: its columns are its voxels.
+// No branch depends on which edges cross a column of bricks, because the CPU would mispredict it. A
+// triangle perpendicular to an axis touches one layer of voxels, so it needs no heights.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -26,7 +29,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// [16-bit lane]: the bit of its voxel column in Footprint::inside.
+// bit[i] is the bit of voxel column i in Footprint::inside. A vector has a 16-bit lane for each
+// voxel column.
 struct InsideBits {
   alignas(32) uint16_t bit[16] = {};
   constexpr InsideBits() {
@@ -82,12 +86,13 @@ class ColumnWalk {
   Sides<D> sides;
 };
 
-// Returns voxel columns (bit p + 4 q for column (p, q)) as a layer of a brick, in Morton order.
+// Converts a set of voxel columns, in which column (p, q) has bit p + 4 q, to the set of a brick
+// layer's voxels in Morton order.
 template <int D>
 VOXDAG_INLINE uint32_t in_layer(uint32_t columns) {
   const uint32_t middle = (columns >> 2 ^ columns) & 0x0c0c;
   columns ^= middle | middle << 2;
-  // The voxels of a layer are numbered with the axis of the larger index first.
+  // In Morton order, the axis with the larger index has the lower bits.
   return kP<D> < kQ<D> ? transposed(columns) : columns;
 }
 

@@ -1,9 +1,10 @@
 // The edge tests in one projection, as bounds of one coordinate in each row of voxels: edges are
 // tested once per row of the tile, not once per column of bricks.
 //
-// In row k, the inner side of an edge has the voxels x with across k + up x + c >= 0
-// (tile_triangle.h). All of these are integers. So with t = -(across k + c) and
-// y = (t - 1/2) / |up|, these voxels x are:
+// Let k be the coordinate of a row and x the coordinate of a voxel in the row. The inner side of an
+// edge has the voxels with across k + up x + c >= 0. This is the test of tile_triangle.h: across
+// and up are the edge's factors a and b, in this or the reverse order. All values are integers. So
+// with t = -(across k + c) and y = (t - 1/2) / |up|, the voxels on the inner side are:
 //     up > 0:  x > floor(y)
 //     up < 0:  -x > floor(y)
 //     up = 0:  no voxel if t > 0, otherwise all. Divided by 2^-60 instead of 0, y is far above or
@@ -13,8 +14,9 @@
 // that matters:
 //     |c| <= 2^36:  The error of y is below 2^-12 / |up| + 2^-45, including the error of adding
 //                   small numbers.
-//     |c| > 2^36:   |y| > 2^8 is outside the tile, so only the side matters. The error is below 1.
-//     up = 0:       |y| >= 2^59, and its error is below 2^58.
+//     |c| > 2^36:   |y| > 2^8 is outside the tile, so only the sign of y matters. The error is
+//                   below 1.
+//     up = 0:       |y| >= 2^59, and the error is below 2^58, so the sign is correct.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -31,7 +33,7 @@ using Edge = TileTriangle<int32_t>::Edge;
 
 VOXDAG_INLINE __m256d load_doubles(const double* at) { return _mm256_load_pd(at); }
 
-// The rows 0..63 of a tile.
+// The row numbers 0..63 of a tile as doubles.
 struct Doubles {
   alignas(32) double of[64] = {};
   constexpr Doubles() {
@@ -40,7 +42,7 @@ struct Doubles {
 };
 constexpr Doubles kDoubles;
 
-// Three edges, one per lane, the fourth lane unused.
+// The coefficients of three edges as doubles, one edge per lane. The fourth lane is unused.
 struct EdgeLanes {
   __m256d a, b, c;
 
@@ -65,10 +67,12 @@ struct EdgeLanes {
   }
 };
 
-// Index: the set of edges with up < 0. Value: the lanes, in halves of 32 bits, of two edges that
-// bound x from below, and then of two edges that bound it from above. Lane 3 is unused. The three
-// edges sum to 0, so one or two of them have up < 0, unless up = 0 for all three. An edge with
-// up = 0 may be a bound on either side.
+// lane[set] is the permutation that sorts the lanes of three edges into bounds of x, if `set` is
+// the set of edges with up < 0. Its first two 64-bit lanes are edges that bound x from below, the
+// other two are edges that bound x from above. Each lane is given as two 32-bit lanes. A bound
+// without an edge gets lane 3, which excludes nothing. The values of `up` of the three edges sum to
+// 0. So one or two edges have up < 0, unless up = 0 for all three. An edge with up = 0 may be a
+// bound on either side.
 struct BoundOrder {
   alignas(32) int32_t lane[8][8] = {};
   constexpr BoundOrder() {
@@ -111,8 +115,8 @@ class EdgeBounds {
     spread(starts, start_);
   }
 
-  // Returns, for the rows k (one per lane), the largest y of the edges on this side, not rounded
-  // yet.
+  // below() returns the largest y of the edges that bound x from below, over() the largest y of the
+  // edges that bound x from above. The values are not rounded yet. Each lane is one of four rows k.
   VOXDAG_INLINE __m256d below(__m256d k) const {
     return _mm256_max_pd(_mm256_fmadd_pd(slope_[0], k, start_[0]),
                          _mm256_fmadd_pd(slope_[1], k, start_[1]));

@@ -2,7 +2,8 @@
 // edges in the projection along the columns. The footprint is also limited to the triangle's box.
 // Exact: these are the overlap test's edge and box tests in this projection.
 //
-// A row of bricks is four rows of 64 voxels, one bit each: the edges bound p in every row.
+// A row of bricks is processed as four rows of 64 voxel columns, one bit for each voxel column. In
+// each of the four rows, the edges bound the coordinate p.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -19,8 +20,8 @@ namespace {
 template <int D>
 struct Footprint {
   ColumnList columns;  // columns of bricks that have a voxel column inside
-  // Voxel columns inside the footprint, indexed [q][p of a brick]: bit p + 4 q. Only the rows in
-  // `columns` are set.
+  // inside[q][p] is the set of voxel columns inside the footprint, in the column of bricks (p, q).
+  // Bit i + 4 j is voxel column (i, j). Only rows q that occur in `columns` are set.
   alignas(32) uint16_t inside[16][16];
 
   VOXDAG_INLINE explicit Footprint(const TileTriangle<int32_t>& t) {

@@ -1,17 +1,19 @@
-// The plane test: the heights between which the plane passes each of the 16 voxel columns of a
+// The plane test: the range of heights at which the plane touches each of the 16 voxel columns of a
 // column of bricks.
 //
-// Let D be the axis of the normal's largest component. The plane touches a column at the heights z
+// Let D be the axis of the normal n's largest component. The plane touches voxel column (p, q) at
+// the heights z with
 //     0 <= n_D z + n.(p, q) + lowest <= width       (tile_triangle.h), that is
 //     y <= z <= y + width / n_D                     with y = -(n.(p, q) + lowest) / n_D
 // These are at most four voxels, since width <= 3 n_D.
 //
-// A lane holds y in 16 bits, 12 of them for the fraction of a voxel, relative to the brick where
-// the column of bricks begins. For the lowest of the 16 voxel columns y is in 0..4; for the others
-// it is up to 6 more, and the upper bound is up to 3 above y. y is rounded down and the upper bound
-// up, by little more than 2 units of a lane. If a lane is so close to a whole number that the exact
-// height may be on the other side of it, the code computes the height exactly by division. About 2
-// in 100 columns of bricks have such a lane.
+// A vector has a 16-bit lane for the y of each voxel column. The unit of a lane is 2^-12 voxel, and
+// y is relative to the floor of the brick in which the column of bricks begins. For the lowest of
+// the 16 voxel columns, y is in 0..4 voxels. For the other voxel columns y is up to 6 voxels more.
+// The upper bound y + width / n_D is up to 3 voxels above y. y is rounded down and the upper bound
+// is rounded up, by little more than 2 units of a lane. A lane can be so close to a whole number of
+// voxels that the exact value may be on the other side of this number. In this case the code
+// computes the height exactly by division. About 2 in 100 columns of bricks have such a lane.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -31,7 +33,7 @@ VOXDAG_INLINE __m256i load(const void* at) {
   return _mm256_load_si256(static_cast<const __m256i*>(at));
 }
 
-// [column]: all ones in its 16-bit lane.
+// only[i] has all ones in the 16-bit lane of voxel column i, and 0 in the other lanes.
 struct SingleLanes {
   alignas(32) uint16_t only[16][16] = {};
   constexpr SingleLanes() {
@@ -69,7 +71,7 @@ class Heights {
     int p, q;
     int64_t from, to;  // range of bricks that the plane may touch; empty if from > to
     int brick;         // brick in which the lowest voxel column begins
-    int within;        // units of 16-bit lanes above the floor of `brick`
+    int within;        // height of that voxel column above the floor of `brick`, in units of a lane
   };
   // Returns the column of bricks (p, q), limited to the bricks from `first` to `last`.
   VOXDAG_INLINE Column column(int p, int q, int first, int last) const {
@@ -98,7 +100,8 @@ class Heights {
     if (!_mm256_testz_si256(differ, whole)) [[unlikely]]
       divide_exactly(c.p, c.q, c.brick, _mm256_and_si256(differ, whole), below, top);
     below = _mm256_or_si256(below, outer);
-    // The result for the top is the distance from the highest voxel: all four bits inverted.
+    // The result for the top is its distance from the highest voxel, 15 - top. This is `top` with
+    // its four bits inverted.
     return _mm256_packus_epi16(_mm256_srli_epi16(below, kHeightBits),
                                _mm256_srli_epi16(_mm256_andnot_si256(top, whole), kHeightBits));
   }
@@ -106,17 +109,20 @@ class Heights {
  private:
   static constexpr int P = kP<D>, Q = kQ<D>;
 
-  // Offsets in units of 16-bit lanes, including 0.02 for rounding in floats. The base of a column
-  // is truncated to a whole unit, below_lanes_ are rounded, top_lanes_ truncated:
-  //   below is in (y - 2.02, y - 0.02]: a whole number in doubt is 1 or 2 units above it
-  //   top is in (y + width / n_D + 0.02, y + width / n_D + 2.02]: a whole number in doubt is
-  //       0, 1 or 2 units below it
+  // Offsets in units of a lane, including 0.02 for the rounding of floats. They make `below` and
+  // `top` in bounds() safe although a column's base is truncated to a whole unit, below_lanes_ are
+  // rounded, and top_lanes_ are truncated:
+  //   below   is in (y - 2.02, y - 0.02]. It may be on the wrong side of a whole number of voxels
+  //           that is 1 or 2 units above it.
+  //   top     is in (y + width / n_D + 0.02, y + width / n_D + 2.02]. It may be on the wrong side
+  //           of a whole number of voxels that is 0, 1 or 2 units below it.
   static constexpr double kLowered = 0.52;
   static constexpr float kTopRaised = 2.54f;
   static constexpr int16_t kBelowDoubt = 2, kTopDoubt = 3;
 
-  // Sets the lanes to the height of each voxel column above the lowest one. sp and sq are the
-  // magnitudes of the slopes.
+  // Sets below_lanes_ and top_lanes_ to the heights of the 16 voxel columns above the lowest of
+  // them. sp and sq are the magnitudes of the plane's slopes along p and q, and p_falls and q_falls
+  // are true if the height falls along the axis.
   VOXDAG_INLINE void set_lanes(bool p_falls, float sp, bool q_falls, float sq, float width) {
     const __m256 p_low =
         p_falls ? _mm256_setr_ps(3, 2, 3, 2, 3, 2, 3, 2) : _mm256_setr_ps(0, 1, 0, 1, 0, 1, 0, 1);
@@ -135,12 +141,13 @@ class Heights {
     top_lanes_ = lanes(width + kTopRaised);
   }
 
-  // Computes exactly the columns whose lanes in `doubtful` are not 0.
+  // Replaces the lanes of `below` and `top` by exact heights for the voxel columns whose lanes in
+  // `doubtful` are not 0.
   [[gnu::noinline]] void divide_exactly(int p, int q, int brick, __m256i doubtful, __m256i& below,
                                         __m256i& top) const {
     const __m256i certain = _mm256_cmpeq_epi16(doubtful, _mm256_setzero_si256());
     const int64_t n = t.normal[D];
-    // Two bits per lane.
+    // The mask has two bits per lane, of which 0x55555555 selects one.
     for (uint32_t rest = ~static_cast<uint32_t>(_mm256_movemask_epi8(certain)) & 0x55555555u;
          rest != 0; rest &= rest - 1) {
       const int column = __builtin_ctz(rest) / 2;
@@ -165,10 +172,11 @@ class Heights {
 
   const TileTriangle<int32_t>& t;
   // The height of the column of bricks (p, q) is origin_ + step_p_ p + step_q_ q, with kColumnBits
-  // bits for the fraction of a voxel. It is the height of the lowest voxel column, minus kLowered
-  // units of 16-bit lanes. The error is less than 2^-30 after 16 columns.
+  // bits for the fraction of a voxel. This is the y of its lowest voxel column, minus kLowered
+  // units of a lane. The error is less than 2^-30 voxel after 16 columns of bricks.
   int64_t origin_, step_p_, step_q_;
-  // An upper bound of the distance from the height of a column of bricks to its highest top.
+  // An upper bound of the distance from the height of a column of bricks to the highest `top` of
+  // its voxel columns.
   int64_t reach_;
   __m256i below_lanes_, top_lanes_;
 };

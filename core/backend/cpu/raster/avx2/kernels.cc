@@ -14,7 +14,7 @@ struct Avx2Quad {
   explicit Avx2Quad(__m256d quad) : x(quad) {}
   explicit Avx2Quad(double all) : x(_mm256_set1_pd(all)) {}
   Avx2Quad(double x0, double x1, double x2, double x3) : x(_mm256_setr_pd(x0, x1, x2, x3)) {}
-  // Reads a fourth coordinate, which is ignored.
+  // Reads four coordinates. The fourth belongs to other data and is ignored.
   static Avx2Quad load(const int32_t (&v)[3], int64_t origin) {
     const __m128i four = _mm_loadu_si128(reinterpret_cast<const __m128i*>(v));
     const __m128i local = _mm_sub_epi32(four, _mm_set1_epi32(static_cast<int32_t>(origin)));

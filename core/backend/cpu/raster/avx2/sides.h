@@ -14,16 +14,16 @@
 namespace voxdag::cpu {
 namespace {
 
-// Bounds of the heights in the 16 voxel columns of a column of bricks, one byte each, counted from
-// the floor of the brick where the column of bricks begins. The touched voxels are those with
-// below < z <= 15 - over. Each half has eight columns, first their `below`, then their `over`. A
-// bound of 0 excludes nothing, so bounds are combined by their maximum. `below` of 15 or more, or
-// `over` of 16 or more, excludes everything.
+// Bounds `below` and `over` of the heights in the 16 voxel columns of a column of bricks, one byte
+// each. Heights z are counted from the floor of the brick in which the column of bricks begins. The
+// touched voxels have below < z <= 15 - over. Each half of the vector is for eight voxel columns:
+// first their `below`, then their `over`. A bound of 0 excludes nothing, so bounds are combined by
+// their maximum. `below` of 15 or more, or `over` of 16 or more, excludes everything.
 using HeightBounds = __m256i;
 constexpr int kMaxHeight = 15;
 
-// Byte indexes that spread the four bounds from below and the four from above of a row of bricks to
-// the 16 columns. [1] spreads bounds that depend on p, [0] bounds that depend on q.
+// Byte indexes that copy the bounds of a row of bricks, four from below and four from above, to the
+// 16 voxel columns. byte[1] is for bounds that depend on p, byte[0] for bounds that depend on q.
 struct SideOrder {
   alignas(32) uint8_t byte[2][32] = {};
   constexpr SideOrder() {
@@ -37,9 +37,10 @@ struct SideOrder {
 };
 constexpr SideOrder kSideOrder;
 
-// Bounds of heights in the tile are stored with kBelowFloor added to `below` and kOverFloor added
-// to `over`, so that none is negative. Element [brick + kLowestBrick] is subtracted from them for a
-// column of bricks that begins in `brick`, at most ten voxels below the tile (heights.h).
+// Sides stores bounds of heights in the tile, with kBelowFloor added to `below` and kOverFloor
+// added to `over`, so that no bound is negative. To get the HeightBounds of a column of bricks that
+// begins in `brick`, it subtracts byte[brick + kLowestBrick]. `brick` can be negative, because a
+// column can begin up to ten voxels below the tile (heights.h).
 constexpr int kBelowFloor = 16, kOverFloor = 64, kLowestBrick = 4;
 struct BrickFloors {
   alignas(16) uint8_t byte[16 + kLowestBrick][16] = {};
@@ -77,11 +78,12 @@ class Sides {
     const EdgeBounds bounds(edges, bound_first, kBelowFloor, kOverFloor + kMaxHeight + 1);
     const __m256i order =
         _mm256_load_si256(reinterpret_cast<const __m256i*>(kSideOrder.byte[of_p]));
-    // This excludes everything, and fits in a signed byte.
+    // A bound of 120 excludes everything and fits in a signed byte.
     const __m256d most = _mm256_set1_pd(120.0);
     for (int i = t.first_voxel[Axis] / 4; i <= t.last_voxel[Axis] / 4; ++i) {
       const __m256d k = load_doubles(kDoubles.of + 4 * i);
-      // Values too small for an integer become the smallest one, and then 0.
+      // The conversion turns values below the range of integers into the smallest integer. Packing
+      // turns negative integers into 0.
       const __m128i words =
           _mm_packs_epi32(_mm256_cvttpd_epi32(_mm256_min_pd(bounds.below(k), most)),
                           _mm256_cvttpd_epi32(_mm256_min_pd(bounds.over(k), most)));

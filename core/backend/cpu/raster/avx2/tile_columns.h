@@ -16,9 +16,10 @@
 namespace voxdag::cpu {
 namespace {
 
-// P and Q: the axes of the footprint of columns along D. A voxel column has the number p + 2 q (low
-// bits of p, q) + 4 p + 8 q (high bits). Q is chosen so that the high bit of q is one of the two
-// highest of a brick's bits.
+// kP and kQ are the axes of the footprint of columns along D; p and q are coordinates along them.
+// The number of a voxel column in its column of bricks has, from bit 0 on: the low bit of p, the
+// low bit of q, the high bit of p, and the high bit of q. kQ is chosen so that the high bit of q is
+// one of the two highest bits in the number of a brick's voxel.
 template <int D>
 constexpr int kP = D == 2 ? 0 : 2;
 template <int D>
@@ -27,7 +28,7 @@ constexpr int kQ = D == 1 ? 0 : 1;
 constexpr int column_p(int column) { return (column & 1) | (column >> 1 & 2); }
 constexpr int column_q(int column) { return (column >> 1 & 1) | (column >> 2 & 2); }
 
-// [axis][coordinate]: the voxels of a brick in one layer.
+// voxels[axis][k] has the voxels of a brick whose coordinate along the axis is k.
 struct Layers {
   uint64_t voxels[3][4] = {};
   constexpr Layers() {
@@ -73,7 +74,7 @@ struct BrickIndex {
 template <int D>
 inline constexpr BrickIndex<D> kBrickIndex;
 
-// Bits of 4 x 4 voxel columns in Morton order, with the axes exchanged.
+// Returns a set of 4 x 4 voxel columns, in Morton order, with the two axes exchanged.
 VOXDAG_INLINE uint32_t transposed(uint32_t columns) {
   const uint32_t low = (columns >> 1 ^ columns) & 0x2222;
   columns ^= low | low << 1;

@@ -11,10 +11,11 @@ namespace {
 // Tables indexed by the voxel of a brick.
 template <int D>
 struct VoxelBytes {
-  alignas(64) uint8_t below[64] = {};  // index in HeightBounds of the bounds of the voxel's column
+  // Indexes in HeightBounds of the bounds of the voxel's column.
+  alignas(64) uint8_t below[64] = {};
   alignas(64) uint8_t over[64] = {};
-  alignas(64) uint8_t height[4][64] = {};  // above the floor of the first of four bricks
-  alignas(64) uint8_t depth[4][64] = {};   // below the highest voxel of the four
+  alignas(64) uint8_t height[4][64] = {};  // voxels above the floor of the first of four bricks
+  alignas(64) uint8_t depth[4][64] = {};   // voxels below the highest voxel of the four bricks
   constexpr VoxelBytes() {
     for (int voxel = 0; voxel < 64; ++voxel) {
       const int p = brick_coordinate(voxel, kP<D>), q = brick_coordinate(voxel, kQ<D>);
@@ -34,7 +35,7 @@ inline constexpr VoxelBytes<D> kVoxelBytes;
 
 VOXDAG_INLINE __m512i load512(const void* at) { return _mm512_load_si512(at); }
 
-// HeightBounds spread over the voxels of a column of bricks.
+// The HeightBounds of a column of bricks, copied to one byte for each of the 64 voxels of a brick.
 template <int D>
 class Spread512 {
  public:
