@@ -18,15 +18,18 @@ VOXDAG_HD inline int brick_bit(int x, int y, int z) {
   return (x & 2) << 4 | (y & 2) << 3 | (z & 2) << 2 | (x & 1) << 2 | (y & 1) << 1 | (z & 1);
 }
 
-// The inverse of brick_bit(): the coordinate along an axis (0 is x) of a bit's voxel, 0 to 3.
+// Returns the coordinate, 0 to 3, of a bit's voxel along an axis (0: x, 1: y, 2: z). This is the
+// inverse of brick_bit().
 VOXDAG_HD constexpr int brick_coordinate(int bit, int axis) {
   return (bit >> (2 - axis) & 1) | (bit >> (5 - axis) & 1) << 1;
 }
 
-// Returns the octants of a brick that have voxels: bit i for byte i of its mask.
+// Returns a bit for each octant (2x2x2 voxels) of a brick: bit i is set if octant i has voxels,
+// which means that byte i of `mask` is not 0.
 VOXDAG_HD constexpr uint32_t octants(uint64_t mask) {
   constexpr uint64_t kLowBits = 0x7f7f7f7f7f7f7f7full;
-  // The top bit of each byte that is not 0. The product collects these eight bits.
+  // Has the top bit of each byte of `mask` that is not 0. The product collects these eight bits in
+  // one byte.
   const uint64_t tops = (((mask & kLowBits) + kLowBits) | mask) & ~kLowBits;
   return static_cast<uint32_t>((tops >> 7) * 0x0102040810204080ull >> 56);
 }

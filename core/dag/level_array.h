@@ -1,5 +1,5 @@
-// Level arrays: the nodes of one level of a sub-DAG, or of several merged sub-DAGs. They are in the
-// total order, by
+// Level arrays: the nodes of one level of a sub-DAG, or of several merged sub-DAGs. They are sorted
+// in the total order, by
 //
 //     (hash, mask, child indices lexicographically)         or, for bricks, (hash, mask)
 //
@@ -14,8 +14,8 @@
 
 namespace voxdag {
 
-// Level L-2: masks in the order of (truncated hash, mask). Hashes are not stored: hash_brick()
-// computes them.
+// The bricks (level L-2): masks in the order of (truncated hash, mask). Hashes are not stored
+// because hash_brick() computes them from the masks.
 struct BrickLevelView {
   std::span<const uint64_t> masks;
 };

@@ -1,6 +1,6 @@
-// Hashes of bricks and nodes: functions of the subtree alone, not of level, position or index. A
-// hash only finds candidates; equality is always decided on masks and children.
-// docs/format.md, "Node hash", is the specification; changing a constant is a new format version.
+// Hashes of bricks and nodes. A hash depends on the subtree alone, not on level, position or index.
+// It only finds candidates; equality is always decided by masks and children. docs/format.md, "Node
+// hash", is the specification. A changed constant requires a new format version.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace voxdag {
 
-// A bijection of 64-bit words (two rounds of xor-shift and odd multiplication), so that two bricks
-// have the same full hash only if they are the same brick.
+// Returns the hash of a brick. This is a bijection of 64-bit words (two rounds of xor-shift and odd
+// multiplication), so two bricks have the same full hash only if they are the same brick.
 VOXDAG_HD inline uint64_t hash_brick(uint64_t mask) {
   uint64_t h = mask ^ 0x9e3779b97f4a7c15ull;
   h = (h ^ h >> 32) * 0xd6e8feb86659fd93ull;
@@ -19,8 +19,9 @@ VOXDAG_HD inline uint64_t hash_brick(uint64_t mask) {
   return h ^ h >> 32;
 }
 
-// Compute the hash of a node step by step: node_hash_begin() with its mask, node_hash_add() for the
-// hash of each child in child order, then node_hash_end().
+// Compute the hash of a node step by step. Call node_hash_begin() with the child mask,
+// node_hash_add() for the hash of each child in child order, then node_hash_end(). Each call takes
+// the result of the previous call as `state`.
 VOXDAG_HD inline uint64_t node_hash_begin(uint32_t child_mask) {
   return child_mask * 0x9e3779b97f4a7c15ull ^ 0xe7037ed1a0b428dbull;
 }

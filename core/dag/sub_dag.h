@@ -1,4 +1,4 @@
-// A sub-DAG: the DAG of one subvolume, which a backend delivers level by level.
+// A sub-DAG: the DAG of one subvolume. A backend delivers it level by level to a SubDagSink.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +20,9 @@ struct DagShape {
   bool operator==(const DagShape&) const = default;
 };
 
-// The position of a sub-DAG in the grid's octree, and the hash of its nodes. A struct, so that
-// callers name these numbers (`{.cube_level = 2, .grid_levels = 11, .hash_bits = 64}`) instead of
-// passing adjacent integers that could be swapped.
+// The position of a sub-DAG in the grid's octree, and the hash of its nodes. This is a struct so
+// that callers name the numbers (`{.cube_level = 2, .grid_levels = 11, .hash_bits = 64}`); as
+// adjacent parameters, they could be swapped by mistake.
 struct SubDagShape {
   uint32_t cube_level = 0;   // level of the root
   uint32_t grid_levels = 2;  // L; bricks are level L-2

@@ -1,9 +1,9 @@
 // The unique bricks of one subvolume: an open-addressing table from masks to ids 0, 1, 2, ...
 //
-// Slots are indexed by the top bits of the brick's hash and probed linearly. So the table grows in
-// one sequential pass, and its slots are almost in the order of the hash. To make the level array,
-// only a nearly sorted array must be sorted (sort_slots()). Not thread-safe. Throws
-// OutOfBudget when the budget cannot hold more.
+// The slot of a brick is at the top bits of its hash, or, if that slot is taken, the next free slot
+// (linear probing). So the slots are almost in the order of the hash. The table therefore grows in
+// one sequential pass, and sort_slots(), which makes the level array, only has to sort a nearly
+// sorted array. Not thread-safe. Throws OutOfBudget when the budget cannot hold more.
 #pragma once
 
 #include <cstdint>
@@ -25,14 +25,15 @@ class BrickTable {
 
   uint64_t size() const { return count_; }
 
-  // Reserves slots for `more` bricks. Call it before the functions below.
+  // Reserves slots for `more` bricks beyond size(). Call it before the functions below.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow(count_ + more);
   }
 
   void prefetch(uint64_t hash) const { __builtin_prefetch(&slots_[hash >> shift_]); }
 
-  // Requires mask != 0. `hash` is hash_brick(mask).
+  // Returns the id of the brick; adds the brick if it is new. Requires mask != 0, and that `hash`
+  // is hash_brick(mask).
   uint32_t find_or_add(uint64_t mask, uint64_t hash) {
     uint64_t at = hash >> shift_;
     while (true) {
@@ -53,8 +54,8 @@ class BrickTable {
       if (slot.mask != 0) visit(slot.mask, slot.id);
   }
 
-  // Returns all used slots, in the order of (hash truncated to `hash_bits`, mask). Afterwards the
-  // table cannot be searched.
+  // Returns all used slots, sorted by (hash truncated to `hash_bits`, mask). Afterwards the table
+  // cannot be searched.
   std::span<const Slot> sort_slots(uint32_t hash_bits);
 
  private:

@@ -1,5 +1,5 @@
-// The parts of a budget that only make hash-consing faster. A part that would exceed its limit is
-// made smaller or omitted; the result is the same.
+// Memory that only makes hash-consing faster: finding equal nodes by their hashes while a sub-DAG
+// is built. If such memory would exceed its limit, less or none of it is used; the DAG is the same.
 #pragma once
 
 #include <algorithm>
@@ -8,15 +8,16 @@
 namespace voxdag {
 
 struct ConsingMemory {
-  // Retained pages for the next sub-DAG. They are not charged, and are kept only while they fit
-  // next to the charged memory. A budget of less than eight times kMinPageBytes can be exceeded by
-  // kMinPageBytes.
+  // Maximum size of the free pages that are retained for the next sub-DAG. They are not charged,
+  // and are freed before an allocation that would not fit next to them in the budget. A budget of
+  // less than eight times kMinPageBytes can be exceeded by kMinPageBytes.
   static constexpr uint64_t kMinPageBytes = uint64_t{8} << 20;
   static constexpr uint64_t kMaxPageBytes = uint64_t{128} << 20;
   static constexpr uint64_t page_bytes(uint64_t budget_bytes) {
     return std::clamp(budget_bytes / 8, kMinPageBytes, kMaxPageBytes);
   }
-  // Total size of the brick and node tables that are reserved at the sizes of the last sub-DAG.
+  // Maximum total size of the brick and node tables that are reserved in advance, at the sizes that
+  // they had for the last sub-DAG.
   static constexpr uint64_t table_bytes(uint64_t free_bytes) { return free_bytes / 4; }
 };
 

@@ -1,7 +1,10 @@
-// Converts tables to level arrays, from the bricks up. Each level takes three passes. First, child
-// ids in records are replaced by positions in the array below; this uses the order in which records
-// were added, because neighbors in this order are neighbors in memory. Second, slots are sorted.
-// Third, records are copied in the sorted order and get their positions.
+// Converts tables to level arrays, from the bricks up. Each level of nodes takes three passes:
+//
+//   1. Replace the child ids in the level's records by the children's positions in the next level's
+//      array. This pass visits the records in the order in which they were added, which is also
+//      their order in memory.
+//   2. Sort the slots.
+//   3. Copy the records in the sorted order, and store the position of each record in it.
 #include <algorithm>
 #include <cstring>
 
@@ -45,7 +48,8 @@ class LevelEmitter {
   }
 
  private:
-  // Truncates the hashes of all records to --hash-bits, from the bricks up.
+  // Replaces the hashes of all records by hashes of `hash_bits_` bits (--hash-bits), from the
+  // bricks up: a parent is hashed from the truncated hashes of its children.
   void truncate_hashes() {
     PooledArray<uint64_t> brick_hashes(tables_.memory(), tables_.bricks().size());
     tables_.bricks().for_each([&](uint64_t mask, uint32_t id) {
@@ -100,8 +104,8 @@ class LevelEmitter {
       NodeTable::Record record = table.record(static_cast<uint32_t>(slots[i]));
       hashes_[i] = record.hash();
       masks_[i] = static_cast<uint8_t>(record.mask());
-      // Always copies eight children. The next node overwrites the surplus. Tables and arrays have
-      // space for them.
+      // Always copies eight children, because a copy of constant size needs no loop. The next node
+      // overwrites the surplus. Records and `children_` have space for it.
       std::memcpy(&children_[at], record.children(), 8 * sizeof(uint32_t));
       at += record.child_count();
       record.set_place(i);
@@ -116,7 +120,7 @@ class LevelEmitter {
   const uint32_t hash_bits_;
   SubDagSink& sink_;
   PooledArray<uint32_t> brick_places_;  // indexed by brick id
-  PooledArray<uint64_t> hashes_;        // hashes of a level's nodes; for bricks, their masks
+  PooledArray<uint64_t> hashes_;        // hashes of the level's nodes, or masks of the bricks
   PooledArray<uint8_t> masks_;
   PooledArray<uint32_t> children_;
 };

@@ -19,7 +19,8 @@ uint32_t NodeTable::add(uint64_t at, uint64_t hash, uint32_t mask, const uint32_
   Record added = record(id);
   added.set_hash(hash);
   added.words[2] = mask;
-  // Always copies eight children. The next node overwrites the surplus.
+  // Always copies eight children, because a copy of constant size needs no loop. The next node
+  // overwrites the surplus.
   std::memcpy(added.children(), children, 8 * sizeof(uint32_t));
   slots_[at] = hash >> 32 << 32 | id;
   used_ += Record::kWords + static_cast<uint64_t>(child_count);

@@ -1,13 +1,14 @@
-// The unique nodes of one level of one subvolume: hash-consing.
+// The unique nodes of one level of one subvolume, found by their hashes (hash-consing).
 //
 //   slots     [tag | id]  [tag | id] ...           8 bytes each; tag: upper half of the node's hash
-//   records   hash (2 words), child mask, children        words of 32 bits; id = word of its start
+//   records   hash (2 words), child mask, children        words of 32 bits; id = first word
 //
-// Slots are indexed by the top bits of the hash and probed linearly. So the table grows in one
-// sequential pass over the tags, and its slots are almost in the order of the hash. To make the
-// level array, only a nearly sorted array must be sorted (sort_slots()). Records never move, and
-// neighbors in space are neighbors in memory. Not thread-safe. Throws OutOfBudget when the budget,
-// or 2^32 words, cannot hold more.
+// The slot of a node is at the top bits of its hash, or, if that slot is taken, the next free slot
+// (linear probing). So the slots are almost in the order of the hash. The table therefore grows in
+// one sequential pass over the slots, and sort_slots(), which makes the level array, only has to
+// sort a nearly sorted array. Records never move. They are in the order in which they were added,
+// so neighbors in space are neighbors in memory. Not thread-safe. Throws OutOfBudget when the
+// budget, or 2^32 words, cannot hold more.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,8 @@
 
 namespace voxdag {
 
-// [count]: all ones in the first `count` words.
+// of[count] has all bits set in its first `count` words, and no others. It selects the children
+// that a node has.
 struct FirstWords {
   alignas(32) uint32_t of[9][8] = {};
   constexpr FirstWords() {
@@ -33,7 +35,7 @@ class NodeTable {
   // A reference to a record. Once the record's level is emitted, the record's position in the level
   // array replaces the low half of its hash.
   struct Record {
-    static constexpr uint32_t kWords = 3;  // before the children
+    static constexpr uint32_t kWords = 3;  // words before the children
 
     uint32_t* words;
     uint64_t hash() const { return words[0] | uint64_t{words[1]} << 32; }
@@ -41,6 +43,7 @@ class NodeTable {
       words[0] = static_cast<uint32_t>(hash);
       words[1] = static_cast<uint32_t>(hash >> 32);
     }
+    // The record's position in the level array.
     uint32_t place() const { return words[0]; }
     void set_place(uint32_t index) { words[0] = index; }
     uint32_t mask() const { return words[2]; }
@@ -54,8 +57,8 @@ class NodeTable {
   uint64_t total_children() const { return used_ - count_ * Record::kWords; }
   Record record(uint32_t id) { return {&records_[id]}; }
 
-  // Reserves memory for `more` nodes. Call it before the functions below. Eight children can be
-  // read from any record, even if it has fewer.
+  // Reserves memory for `more` nodes beyond size(). Call it before the functions below. Eight
+  // children can be read from any record, even if the node has fewer.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow_slots(count_ + more);
     const uint64_t words = kFirstId + used_ + more * (Record::kWords + 8);
@@ -63,7 +66,7 @@ class NodeTable {
   }
 
   void prefetch_slot(uint64_t hash) const { __builtin_prefetch(&slots_[hash >> shift_]); }
-  // Prefetches the record that find_or_add() will most likely compare.
+  // Prefetches the record that find_or_add() will most likely compare with the node.
   void prefetch_record(uint64_t hash) const {
     __builtin_prefetch(&records_[static_cast<uint32_t>(slots_[hash >> shift_])]);
   }
@@ -90,9 +93,9 @@ class NodeTable {
     }
   }
 
-  // Returns all used slots, in the order of (hash, mask, children) of their records. The lower half
-  // of a slot is an id. `hashes_changed`: records were given new hashes after they were added.
-  // Afterwards the table cannot be searched.
+  // Returns all used slots, sorted by (hash, mask, children) of their records. The lower half of a
+  // slot is the id of its record. `hashes_changed`: records were given new hashes after they were
+  // added. Afterwards the table cannot be searched.
   std::span<const uint64_t> sort_slots(bool hashes_changed);
 
  private:
@@ -100,8 +103,8 @@ class NodeTable {
 
   bool is_node(uint32_t id, uint32_t mask, const uint32_t* children, int child_count) const {
     const uint32_t* words = &records_[id + 2];
-    // Compares all eight without branches, because a loop over the children would often be
-    // mispredicted.
+    // Compares eight children without branches. The branches of a loop over the node's children
+    // would often be mispredicted.
     const uint32_t(&compared)[8] = kFirstWords.of[child_count];
     uint32_t differ = words[0] ^ mask;
     for (int i = 0; i < 8; ++i) differ |= (words[1 + i] ^ children[i]) & compared[i];
@@ -119,7 +122,7 @@ class NodeTable {
   uint64_t capacity_ = 0;
   int shift_ = 64;  // index of a hash = hash >> shift_
   uint64_t count_ = 0;
-  uint64_t used_ = 0;  // words of records, from kFirstId on
+  uint64_t used_ = 0;  // number of words that the records occupy; they begin at word kFirstId
 };
 
 }  // namespace voxdag

@@ -13,8 +13,8 @@ namespace {
 constexpr char kWhat[] = "a subvolume";
 constexpr size_t kPage = size_t{4} << 10;
 constexpr size_t kLargestPower = size_t{4} << 20;
-// A subvolume has up to some hundred arrays. With a lower limit, the small ranges, which are freed
-// last, would evict the large ranges.
+// Maximum number of cached ranges. The build of a subvolume uses up to some hundred arrays. With a
+// lower limit, the small ranges, which are freed last, would evict the large ranges.
 constexpr size_t kMaxRanges = 1024;
 
 }  // namespace
@@ -91,8 +91,8 @@ PagePool::Pages PooledMemory::allocate(size_t bytes, bool zero) {
 
 void PooledMemory::grow(PagePool::Pages& pages, size_t bytes) {
   const size_t new_bytes = PagePool::range_bytes(bytes), more = new_bytes - pages.bytes;
-  // If the system cannot move the pages, old and new pages exist for a moment. Only one of them is
-  // charged.
+  // Where grow_pages() copies the pages (under ThreadSanitizer), old and new pages exist for a
+  // moment. Only the new pages are charged.
   charge(more);
   try {
     pages.data = grow_pages(pages.data, pages.bytes, new_bytes, kWhat);

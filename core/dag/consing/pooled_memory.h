@@ -1,5 +1,5 @@
 // Memory for the build of one subvolume: arrays charged to its budget. Their pages are cached
-// between subvolumes, because new pages from the system cost more than filling them.
+// between subvolumes, because getting new pages from the system takes longer than filling them.
 #pragma once
 
 #include <cstddef>
@@ -28,8 +28,8 @@ class PagePool {
   // Returns the size of a new page range for `bytes`: a power of two up to 4 MiB, and a multiple of
   // the page size above 4 MiB.
   static size_t range_bytes(size_t bytes);
-  // Removes and returns the smallest cached range of `bytes` to `max_bytes` bytes; null if there is
-  // none.
+  // Removes and returns the smallest cached range of `bytes` to `max_bytes` bytes. Returns a range
+  // with null data if no range fits.
   Pages take(size_t bytes, size_t max_bytes);
   // Caches the range. Frees the oldest ranges if the cache would exceed `max_cached` bytes.
   void put(Pages pages, size_t max_cached) noexcept;
@@ -43,15 +43,16 @@ class PagePool {
   size_t cached_bytes_ = 0;
 };
 
-// Allocates the arrays of one build, charged to `budget` during their lifetime. Cached pages are
-// not charged. They are freed if the budget has no space for both them and an allocation.
+// Allocates the arrays of one build. An array is charged to `budget` during its lifetime. Cached
+// pages are not charged. All of them are freed if the budget cannot hold them in addition to a new
+// allocation.
 class PooledMemory {
  public:
   MemoryBudget& budget;
   PagePool& pool;
 
-  // Returns zeroed pages of range_bytes(bytes). If `zero` is false, returns up to twice as many
-  // bytes, with undefined contents. Throws OutOfBudget if the budget has no space,
+  // Returns range_bytes(bytes) bytes of zeroed pages. If `zero` is false, returns up to twice as
+  // many bytes, with undefined contents. Throws OutOfBudget if the budget has no space,
   // Error{kOutOfMemory} if the system has none.
   PagePool::Pages allocate(size_t bytes, bool zero);
   // Enlarges a range and preserves its contents. Throws like allocate(); the range is then
@@ -63,7 +64,8 @@ class PooledMemory {
   void charge(size_t bytes);
 };
 
-// An array of at least the requested size, on cached or new pages. Throws OutOfBudget.
+// An array of at least `size` elements, on cached or new pages. Throws like
+// PooledMemory::allocate().
 template <class T>
 class PooledArray {
   static_assert(std::is_trivially_copyable_v<T>);

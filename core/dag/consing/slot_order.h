@@ -1,5 +1,5 @@
-// The common part of the two hash tables: the number of their slots, and a sort of the slots, which
-// linear probing leaves nearly in hash order.
+// Functions that BrickTable and NodeTable share: the number of their slots, and a sort of the
+// slots, which linear probing leaves nearly in hash order.
 #pragma once
 
 #include <algorithm>
@@ -10,17 +10,19 @@
 
 namespace voxdag {
 
-// Returns the maximum number of used slots: 5/8 of `slots`, which is a power of two.
+// Returns the maximum number of entries in a table: 5/8 of `slots`, its number of slots, which is a
+// power of two.
 inline uint64_t entries_for(uint64_t slots) { return slots / 8 * 5; }
+// Returns the smallest number of slots that can hold `entries` entries; at least 512.
 inline uint64_t slots_for(uint64_t entries) {
   uint64_t slots = 512;
   while (entries > entries_for(slots)) slots *= 2;
   return slots;
 }
 
-// Moves the used slots to the front without changing their order. Slots that wrapped around the end
-// of the table go behind the others, which is their correct place. `tag(slot)` is the upper half of
-// the hash.
+// Moves the used slots to the front without changing their order, and returns them. The entries
+// with the highest hashes can have wrapped around to the first slots; they go behind all other
+// entries. `tag(slot)` is the upper half of the hash.
 template <class Slot, class InUse, class Tag>
 std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   std::vector<Slot> wrapped;
@@ -31,8 +33,8 @@ std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
     else
       slots[count++] = slots[i];
   }
-  // Always writes; an unused slot is then overwritten. A branch would be mispredicted half the
-  // time.
+  // Always writes the slot. If it is unused, the next write replaces it. A branch would be
+  // mispredicted half the time.
   for (; i < slots.size(); ++i) {
     const bool used = in_use(slots[i]);
     slots[count] = slots[i];
@@ -42,13 +44,15 @@ std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   return slots.first(count + wrapped.size());
 }
 
-// Sorts slots whose distance from their final position is at most the longest cluster of the table.
-// `tag(slot)` is the upper half of the hash; `less(a, b)` must be consistent with it.
+// Sorts slots by tag and, for equal tags, by less(a, b). Fast if no slot is far from its final
+// position; with linear probing, the distance is at most the length of the longest run of used
+// slots. `tag(slot)` is the upper half of the hash.
 template <class Slot, class Tag, class Less>
 void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
   if (slots.empty()) return;
-  // First pass: most of the work, almost without branches. From the back, the slot with the
-  // smallest tag so far moves down until it meets a smaller tag.
+  // First pass: does most of the work, almost without branches. Goes from the back to the front and
+  // carries the slot with the smallest tag so far along, until it meets a slot whose tag is not
+  // larger.
   Slot down = slots.back();
   for (size_t i = slots.size() - 1; i-- > 0;) {
     const Slot other = slots[i];

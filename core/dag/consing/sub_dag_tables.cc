@@ -12,7 +12,8 @@ constexpr uint64_t kBytesPerEntry = 80;  // upper bound per entry of a table, in
 
 SubDagTables::SubDagTables(PooledMemory& memory, int size_log2, const TableSizes& expected)
     : memory_(memory), bricks_(memory) {
-  // Reserves only an amount that also leaves space if the cube turns out to be smaller.
+  // Reserves at most a part of the free memory, so that enough remains for other memory even if the
+  // cube is smaller than expected and does not fill the tables.
   uint64_t fits_budget = ConsingMemory::table_bytes(memory.budget.available());
   const auto reserve = [&](auto& table, int s) {
     const uint64_t bytes = expected.entries[s] * kBytesPerEntry;

@@ -1,5 +1,5 @@
-// All unique nodes of one subvolume while it is being built, one table per level, and the number of
-// octree nodes and voxels that they represent. Not thread-safe.
+// All unique nodes of one subvolume while it is built, in one table per level, and the numbers of
+// octree nodes and voxels that the nodes represent. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,9 @@
 
 namespace voxdag {
 
-// A node of a known level: its id in that level's table, and its full hash, so that hashing a
-// parent needs no lookup of its children. `exists` is false for an empty cube, which has no node.
+// A node in the table of its level: its id in the table, and its complete hash, so that a parent
+// can be hashed without a lookup of its children. `exists` is false for an empty cube, which has no
+// node.
 struct NodeRef {
   uint64_t hash = 0;
   uint32_t id = 0;
@@ -36,30 +37,33 @@ struct OctreeCounts {
   }
 };
 
-// The numbers of entries in the tables of one cube; entries[s] is for the table of cubes of edge
-// 2^s. The numbers of one cube are an estimate for the next cube.
+// The numbers of entries in the tables of one cube. entries[s] is for the table of the nodes whose
+// cubes have an edge of 2^s voxels. The numbers for one cube are used as an estimate for the next
+// cube.
 struct TableSizes {
   uint64_t entries[kMaxGridLevels + 1] = {};
 };
 
-// A cube of `size_log2` = s has an edge of 2^s voxels; bricks have s = 2.
+// The tables of a cube. A cube of `size_log2` = s has an edge of 2^s voxels; bricks have s = 2.
+// `expected` estimates the sizes of the tables, for which memory is reserved.
 class SubDagTables {
  public:
   SubDagTables(PooledMemory& memory, int size_log2, const TableSizes& expected = {});
 
   int size_log2() const { return kBrickLevels + static_cast<int>(nodes_.size()); }
   BrickTable& bricks() { return bricks_; }
-  // The table for cubes of edge 2^size_log2, size_log2 > 2.
+  // Returns the table for nodes whose cubes have an edge of 2^size_log2 voxels, size_log2 > 2.
   NodeTable& nodes(int size_log2) { return nodes_[size_log2 - kBrickLevels - 1]; }
   PooledMemory& memory() { return memory_; }
 
   OctreeCounts& counts() { return counts_; }
   TableSizes sizes() const;
 
-  // Adds a brick, which may be empty. Counts one octree node if it is not empty.
+  // Adds a brick. For an empty brick, returns a NodeRef that does not exist; otherwise counts one
+  // octree node and the brick's voxels.
   NodeRef add_brick(uint64_t mask);
-  // Adds the parent of eight cubes of half its size. Counts one octree node if the parent is not
-  // empty.
+  // Adds the node of a cube whose octants are `children`. If no child exists, returns a NodeRef
+  // that does not exist; otherwise counts one octree node.
   NodeRef add_node(int size_log2, const NodeRef (&children)[8]);
 
  private:
