@@ -32,16 +32,16 @@ void BatchTable::resume(const std::string& scene_digest, const DagShape& shape) 
     start_new(scene_digest, shape);
   }
   earlier_requests_ = state_.totals.requests;
-  // Segment names contain batch numbers. New numbers start after all existing segments, so they are
-  // unique even if the table was lost.
+  // Segment names contain batch numbers. New numbers start after the segments of all recorded
+  // subvolumes, so they are unique even if cluster.json was lost.
   for (const StoredSubvolume& subvolume : cluster_.job.store->leaves()) {
     rows_[subvolume.id] = subvolume;
     if (const uint32_t segment = subvolume.artifact.segment; segment >= kFirstClusterSegment)
       state_.next_batch = std::max(state_.next_batch, segment - kFirstClusterSegment + 1);
   }
-  // If an open batch has built subvolumes, its record was accepted just before the earlier process
-  // was killed. Batches with such subvolumes, with unknown subvolumes or without a file are
-  // dropped.
+  // Drops open batches without a batch file, with subvolumes that the job store does not have, or
+  // with built subvolumes. In the last case the earlier process accepted the record and was killed
+  // before it saved this table.
   std::erase_if(state_.open, [&](const OpenBatch& batch) { return !is_valid(batch); });
   save();
 }
@@ -102,7 +102,8 @@ void BatchTable::add(std::span<const StoredSubvolume> subvolumes, std::span<cons
   save();
 }
 
-// Returns the share of ClusterOptions::tasks for subvolumes of this total weight.
+// Returns the number of tasks for subvolumes of this total weight: the subvolumes' share of
+// ClusterOptions::tasks, or default_tasks() if the option is not set.
 uint64_t BatchTable::tasks_for(double weight, uint64_t subvolumes) const {
   if (cluster_.options.tasks == 0) return default_tasks(weight, subvolumes);
   double all = 0;
@@ -112,12 +113,16 @@ uint64_t BatchTable::tasks_for(double weight, uint64_t subvolumes) const {
       static_cast<uint64_t>(std::llround(static_cast<double>(cluster_.options.tasks) * share)), 1);
 }
 
-// Writes the batch files and opens the batches. The caller saves the table.
+// Writes the batch files and adds the batches to the table as open. Calls after_each() for each
+// file. The caller saves the table.
 void BatchTable::open_batches(CutBatches cut, std::span<const BinId> bins,
                               const TriangleStore& triangles, unsigned threads,
                               const std::function<void()>& after_each) {
   if (state_.next_batch + cut.batches.size() >= kMaxBatches)
-    throw Error(ErrorCode::kLimit, "over " + std::to_string(kMaxBatches) + " batches: start over");
+    throw Error(ErrorCode::kLimit, "the build needs batch numbers up to " +
+                                       std::to_string(state_.next_batch + cut.batches.size()) +
+                                       ": expected less than " + std::to_string(kMaxBatches) +
+                                       "; start over (--restart)");
   parallel_for(threads, cut.batches.size(), [&](unsigned, size_t i) {
     const Batch& batch = cut.batches[i];
     write_batch(

@@ -24,11 +24,11 @@ namespace {
   throw Error(ErrorCode::kIo, what + ": " + std::strerror(error));
 }
 
-// A pipe. Its destructor and exec() close both ends.
+// A pipe, read from end 0 and written to end 1. Its destructor and exec() close both ends.
 class Pipe {
  public:
   Pipe() {
-    if (pipe2(ends_.data(), O_CLOEXEC) != 0) fail("pipe", errno);
+    if (pipe2(ends_.data(), O_CLOEXEC) != 0) fail("creating a pipe to a command", errno);
   }
   ~Pipe() {
     close_end(0);
@@ -40,7 +40,7 @@ class Pipe {
     if (fd >= 0) ::close(fd);
     fd = -1;
   }
-  // Makes this process's end nonblocking.
+  // Makes end `i`, which this process uses, nonblocking.
   void unblock(int i) { fcntl(end(i), F_SETFL, O_NONBLOCK); }
 
  private:
@@ -60,8 +60,8 @@ class FileActions {
 
 class Attributes {
  public:
-  // Resets SIGPIPE and SIGINT to their default in the program, because this process may ignore
-  // them.
+  // Resets SIGPIPE and SIGINT to their defaults in the started program, because this process may
+  // ignore these signals.
   Attributes() {
     posix_spawnattr_init(&attributes_);
     sigset_t defaults;
