@@ -2,9 +2,9 @@
 // attempts failed, and the totals of built batches. The table is stored in cluster.json
 // (cluster_state.h), which is written by one process only. Used by one thread.
 //
-// Losing cluster.json is harmless: its subvolumes are still planned in the job store, so the next
-// run makes new batches of them. Building a batch twice is harmless too: both results have the same
-// bytes, and only the first valid record is accepted.
+// Losing cluster.json is harmless: the subvolumes of open batches are still planned in the job
+// store, so the next run makes new batches of them. Building a batch twice is harmless too: both
+// results have the same bytes, and only the first valid record is accepted.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ class BatchTable {
  public:
   explicit BatchTable(ClusterContext& cluster) : cluster_(cluster) {}
 
-  // Loads the table that an earlier run stored for the same scene. Discards the table of another
-  // build or program version and cancels its tasks.
+  // Loads the table of an earlier run with the same scene, grid and program version. Otherwise
+  // cancels the tasks of the earlier table, if any, and starts an empty table.
   void resume(const std::string& scene_digest, const DagShape& shape);
 
   const ClusterState& state() const { return state_; }
@@ -41,11 +41,12 @@ class BatchTable {
   bool is_changed() const { return is_changed_; }
   void mark_changed() { is_changed_ = true; }
 
-  // Cuts subvolumes, whose triangles are in `bins`, into new batches and writes their files.
+  // Cuts subvolumes into new batches and writes the batch files. The triangles of subvolumes[i] are
+  // in bins[i] of the store `triangles`.
   void add(std::span<const StoredSubvolume> subvolumes, std::span<const BinId> bins,
            const TriangleStore& triangles);
-  // Replaces a batch by two halves, or by the octants of its only subvolume. Returns the numbers of
-  // the new batches.
+  // Replaces a batch by at most two batches of about equal weight. They contain its subvolumes, or
+  // the octants of its only subvolume. Returns the numbers of the new batches.
   std::vector<uint32_t> split(uint32_t batch);
   bool can_be_split(const OpenBatch& batch) const;
   // Records the subvolumes of a built batch in the job store and closes the batch. The batch's
@@ -53,10 +54,10 @@ class BatchTable {
   void record_built(const CompletionRecord& record);
   void record_submission(double now_s);
   void record_failed_attempt() { ++state_.totals.attempts; }
-  // Forgets earlier failures: a new run of the command has the full number of retries.
+  // Forgets earlier failures, so that each batch has the full number of retries in this run.
   void forget_failures();
-  // Removes a batch and throws Error. The next run makes a new batch of its subvolumes, from the
-  // scene, because the batch file may be at fault.
+  // Removes a batch and its file, and throws Error{code, why}. The batch file may be the cause of
+  // the error, so the next run writes a new one from the triangles of the scene.
   [[noreturn]] void give_up(uint32_t batch, ErrorCode code, const std::string& why);
 
   void save();

@@ -20,7 +20,8 @@ std::vector<size_t> cut_into_batches(std::span<const double> weights, uint64_t b
     const double wanted =
         total * static_cast<double>(ends.size() + 1) / static_cast<double>(batches);
     const bool is_last = i + 1 == weights.size();
-    // An item belongs to the part that contains the larger half of its weight.
+    // An item that crosses the end of a part belongs to the part with the larger share of its
+    // weight.
     if (is_last || (ends.size() + 1 < batches && sum + weights[i + 1] / 2 > wanted))
       ends.push_back(i + 1);
   }

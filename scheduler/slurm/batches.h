@@ -12,12 +12,12 @@
 
 namespace voxdag {
 
-// Position of a cube along the Morton curve. Cubes close together on this curve share the most
-// nodes.
+// Returns the position of a cube's low corner along the Morton curve. Batches are cut in this
+// order, because cubes close together on the curve share the most nodes.
 uint64_t morton_place(const Cube& cube);
 
-// Cuts items, in the given order, into at most `batches` parts of about equal weight, each with at
-// least one item. Returns the end index of each part.
+// Cuts items with these weights, in the given order, into at most `batches` parts of about equal
+// weight, each with at least one item. Returns the end index of each part.
 std::vector<size_t> cut_into_batches(std::span<const double> weights, uint64_t batches);
 
 // Batches of subvolumes, in the given order.

@@ -9,8 +9,8 @@
 namespace voxdag {
 
 struct ClusterContext {
-  // Works without cluster options. Such a build can accept the results of earlier tasks, but
-  // submits none.
+  // A build without cluster options also has a context: it accepts the results of tasks that an
+  // earlier run started, but submits no tasks.
   explicit ClusterContext(BuildJob& build_job);
 
   FileSystem& files() const { return job.context.files; }

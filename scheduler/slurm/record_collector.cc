@@ -23,7 +23,7 @@ void RecordCollector::collect() {
     if (entry.kind == ClusterFolder::Kind::kRecord) read_record(entry);
     if (entry.kind == ClusterFolder::Kind::kFailure) read_failure(entry);
   }
-  // Killed attempts leave a folder behind.
+  // Removes the folders that killed attempts of built batches left behind.
   for (const ClusterFolder::Entry& entry : entries)
     if (entry.kind == ClusterFolder::Kind::kAttempt && !batches_.find(entry.batch))
       remove_attempt(entry);
@@ -40,7 +40,8 @@ void RecordCollector::read_failure(const ClusterFolder::Entry& entry) {
     try {
       const AttemptFailure failure =
           decode_failure(read_small_file(cluster_.files(), entry.path, kMaxRecordBytes));
-      // On a shared file system the failure of an earlier task can become visible later.
+      // On a shared file system the failure of an earlier task can become visible when the batch
+      // already has a new task.
       const bool is_earlier =
           batch->task && !failure.task.empty() && failure.task != batch->task->name();
       // Tasks use the absolute path of the work folder; the message shows the user's path.
@@ -50,7 +51,7 @@ void RecordCollector::read_failure(const ClusterFolder::Entry& entry) {
                             (failure.node.empty() ? "" : " (on " + failure.node + ")"),
                         true};
     } catch (const Error&) {
-      // Slurm will report that the task ended.
+      // The file is damaged or no longer exists. Slurm will report that the task ended.
     }
   }
   remove_attempt(entry);

@@ -36,6 +36,7 @@ uint64_t environment_number(const char* name) {
   return text ? std::strtoull(text, nullptr, 10) : 0;
 }
 
+// Minimum of the allocation that is reserved for the program itself, buffers and page tables.
 constexpr uint64_t kProgramBytes = uint64_t{96} << 20;
 constexpr std::string_view kTemporaryName = "voxdag-batch-";
 constexpr const char* kTemporaryLock = "/lock";
@@ -212,8 +213,9 @@ class Task {
       record.subvolumes.push_back({batch.subvolumes[i].id, {}});
   }
 
-  // Merges the artifacts into one on the shared disk. The record refers to it and contains the sums
-  // over the parts of each subvolume.
+  // Merges the subvolumes' artifacts into one artifact on the shared disk. Sets in `record` the new
+  // artifact, the size of its segment, and the summary of each subvolume: the sums over the
+  // subvolume's parts.
   void merge_artifacts(const Batch& batch, JobStore& jobs, const std::string& temporary,
                        unsigned threads, MemoryBudget& budget, CompletionRecord& record) {
     const std::vector<StoredSubvolume> leaves = jobs.leaves();
@@ -292,7 +294,8 @@ Allocation slurm_allocation() {
   const uint64_t per_node = environment_number("SLURM_MEM_PER_NODE");
   const uint64_t per_cpu = environment_number("SLURM_MEM_PER_CPU");
   given.memory_bytes = (per_node ? per_node : per_cpu * std::max(given.cpus, 1u)) << 20;
-  given.memory_bytes = std::min(given.memory_bytes, 2 * default_memory());  // RAM, cgroup
+  given.memory_bytes =
+      std::min(given.memory_bytes, 2 * default_memory());  // limit of RAM and cgroup
   const char* const job = std::getenv("SLURM_ARRAY_JOB_ID");
   const char* const index = std::getenv("SLURM_ARRAY_TASK_ID");
   if (job && index) given.task = std::string(job) + "_" + index;

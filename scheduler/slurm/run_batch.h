@@ -38,7 +38,7 @@ Allocation slurm_allocation();
 // Returns the memory budget for building a batch in an allocation of `given_bytes`. The
 // allocation's remaining memory is for the program itself, buffers and page tables.
 uint64_t batch_budget(uint64_t given_bytes);
-// Allocation that a task needs for this budget.
+// Returns the allocation, in bytes, that a task needs for a memory budget of `budget_bytes`.
 uint64_t allocation_for(uint64_t budget_bytes);
 
 }  // namespace voxdag

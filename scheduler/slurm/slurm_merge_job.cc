@@ -39,7 +39,8 @@ std::string last_lines(FileSystem& files, const std::string& path) {
   }
 }
 
-// Returns the error code of Slurm's exit status, STATUS:SIGNAL.
+// Returns the error code with which voxdag ended the job, found from the exit status that Slurm
+// reports as STATUS:SIGNAL; kIo if the job ended for another reason.
 ErrorCode code_of(const SlurmEnd& end) {
   if (end.state != "FAILED") return ErrorCode::kIo;
   for (int code = 0; code <= static_cast<int>(ErrorCode::kLimit); ++code)
@@ -190,8 +191,9 @@ BuildReport SlurmMergeJob::follow(const std::string& submitted) {
   return *report;
 }
 
-// Cancels tasks that Slurm could not start and holds. The merge job starts when these tasks have
-// ended and resubmits their batches. A canceled merge job is resubmitted by the next command.
+// Cancels the merge job and the build's tasks if Slurm could not start them and holds them. A
+// waiting merge job starts when these tasks have ended, and resubmits their batches. A canceled
+// merge job is resubmitted when the user runs the same command again.
 void SlurmMergeJob::cancel_held(const SlurmJob& job) {
   std::vector<std::string> given_up;
   if (job.is_held()) given_up.push_back(job.id);
@@ -205,7 +207,8 @@ void SlurmMergeJob::cancel_held(const SlurmJob& job) {
                            " tasks, such as " + given_up[0] + ": canceled");
 }
 
-// Reports once that the job runs, or why it does not.
+// Reports once that the job is running, and once for each reason why it waits that needs a person
+// to act.
 void SlurmMergeJob::report_state(const SlurmJob& job) {
   if (job.state == "PENDING" && !waits_for_its_turn(job.reason) &&
       warned_reasons_.insert(job.reason).second)

@@ -6,7 +6,7 @@
 namespace voxdag {
 namespace {
 
-// Returns false if Slurm does not accept the request.
+// Cancels the work folder's merge job, if any. Returns false if Slurm does not accept the request.
 bool stop_merge_job(FileSystem& files, const std::string& work_folder, CommandRunner& commands) {
   const auto state = read_cluster_state(files, work_folder);
   const CancelToken never;

@@ -68,7 +68,7 @@ void TaskPoller::poll() {
 void TaskPoller::update(const SlurmTask& task) {
   OpenBatch* const batch = batches_.find(task.batch());
   if (!batch) return;
-  // If two attempts exist, the running one is shown.
+  // If Slurm lists two tasks of the same batch, the running task is stored.
   if (batch->task && batch->task->name() != task.name() && task.state != "RUNNING") return;
   if (batch->task != task) batches_.mark_changed();
   batch->task = task;
@@ -81,8 +81,9 @@ void TaskPoller::warn_waiting(const SlurmTask& task) {
     cluster_.progress().warn("task " + task.name() + " waits: " + task.reason);
 }
 
-// Cancels tasks that Slurm will never start. Tasks that cannot be canceled remain `listed`. The
-// next attempt starts after the grace period: a node that fails immediately could take it again.
+// Cancels tasks that Slurm will never start. If Slurm does not accept the request, adds their
+// batches to `listed`. The next attempt starts only after the grace period, because a node that
+// fails immediately could also take the new task.
 void TaskPoller::cancel_held(const std::vector<SlurmTask>& tasks, std::set<uint32_t>& listed) {
   std::vector<std::string> names;
   for (const SlurmTask& task : tasks) names.push_back(task.name());
@@ -97,7 +98,8 @@ void TaskPoller::cancel_held(const std::vector<SlurmTask>& tasks, std::set<uint3
   }
 }
 
-// Ends the attempts of tasks that are not listed. Returns the batches to submit.
+// Ends the attempts whose batches are not in `listed`, the batches that have a task in Slurm.
+// Returns the batches to submit.
 std::vector<uint32_t> TaskPoller::end_missing(const std::set<uint32_t>& listed) {
   std::vector<uint32_t> to_submit, to_split;
   for (OpenBatch& batch : batches_.open()) {

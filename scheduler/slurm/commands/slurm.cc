@@ -11,9 +11,9 @@
 namespace voxdag {
 namespace {
 
-// Slurm's own default.
+// Slurm's default of MaxArraySize, which is one more than the largest index of an array.
 constexpr uint32_t kDefaultMaxArraySize = 1001;
-constexpr size_t kMaxTasksOfCommand = 200;
+constexpr size_t kMaxTasksOfCommand = 200;  // tasks in one scancel command
 
 std::string trimmed(std::string text) {
   while (!text.empty() && std::string_view(" \t\r\n").find(text.back()) != std::string_view::npos)
@@ -36,7 +36,7 @@ std::optional<uint32_t> number(const std::string& text) {
   return value;
 }
 
-// "3,7-9" for 3, 7, 8, 9.
+// Returns "3,7-9" for 3, 7, 8, 9.
 std::string ranges(const std::vector<uint32_t>& sorted) {
   std::string text;
   for (size_t i = 0; i < sorted.size();) {
@@ -60,21 +60,24 @@ std::string quoted(const std::string& word) {
   return text + "'";
 }
 
-// Returns the line of a script that runs a command, without the newline.
+// Returns a shell script that runs a command. The last line has no newline, so that the caller can
+// append an argument.
 std::string script_line(const std::vector<std::string>& command) {
   std::string line = "#!/bin/sh\nexec";
   for (const std::string& word : command) line += " " + quoted(word);
   return line;
 }
 
-// sbatch replaces patterns such as %A; only the log's name may contain them.
+// Escapes % in the path of the log folder, because sbatch replaces patterns such as %A. Only `name`
+// may contain such patterns.
 std::string output_option(const std::string& log_folder, const std::string& name) {
   std::string option = "--output=";
   for (const char c : log_folder) option += c == '%' ? "%%" : std::string(1, c);
   return option + "/" + name;
 }
 
-// Returns the value in "... NAME=value ...", up to the next blank.
+// Returns the value in "... NAME=value ...", up to the next blank; "" if `text` has no such field
+// or its value is "(null)".
 std::string field(const std::string& text, const std::string& name) {
   size_t at = text.find(name + "=");
   while (at != std::string::npos && at > 0 && text[at - 1] != ' ')
@@ -99,14 +102,16 @@ bool is_unreachable(const CommandResult& result) {
   return result.exit_status >= 128;
 }
 
-// True if the array, or the user's jobs together, exceed a limit of Slurm.
+// True if sbatch refused an array because the array, or all jobs of the user together, would exceed
+// a limit of Slurm.
 bool is_too_much(const CommandResult& result) {
   for (const char* sign : {"MaxJobCount", "MaxSubmitJob", "MaxSubmitPU", "job submit limit"})
     if (result.error.find(sign) != std::string::npos) return true;
   return false;
 }
 
-// Slurm's commands print the reason with blanks or with underscores.
+// Implements is_held(). Slurm's commands print the words of a reason with blanks or underscores
+// between them.
 bool is_held_forever(const std::string& state, std::string reason) {
   std::ranges::replace(reason, ' ', '_');
   return state == "PENDING" &&
@@ -159,7 +164,8 @@ void Slurm::check(const std::vector<std::string>& options, double pause_s, Progr
                     "--cluster-options: " + option +
                         " is set by voxdag: expected options such as --partition, --mem, --time "
                         "(--cluster-running limits how many tasks run at a time)");
-  // sbatch takes the first word that is not an option for a script, and the rest for its arguments.
+  // sbatch would take the first word that is not an option as a script, and the following words as
+  // the script's arguments.
   for (size_t i = 0; i < options.size(); ++i) {
     const bool may_be_value = i > 0 && takes_next_word(options[i - 1]);
     if (!options[i].starts_with('-') && !may_be_value)
@@ -223,8 +229,9 @@ void Slurm::submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTas
                     "--comment=" + std::to_string(first), "--array=" + ranges(indexes) + limit});
     const CommandResult submitted =
         run(command, line + " $((" + std::to_string(first) + " + SLURM_ARRAY_TASK_ID))\n");
-    // Slurm may accept half of the array now. Once Slurm has accepted some tasks, the remaining
-    // tasks are submitted after these have ended.
+    // The array exceeds a limit of Slurm, but half of it may not. If Slurm has already accepted
+    // some tasks of this request, accepted_job() throws Error{kIo} instead, and the caller submits
+    // the remaining batches later.
     if (submitted.exit_status != 0 && is_too_much(submitted) && indexes.size() > 1 &&
         tasks.empty()) {
       const auto middle = indexes.begin() + static_cast<ptrdiff_t>(indexes.size() / 2);

@@ -21,10 +21,10 @@ namespace voxdag {
 struct SlurmTask {
   std::string job;
   uint32_t index = 0;
-  std::string state;   // "PENDING", "RUNNING", ...
-  std::string reason;  // why the task waits
-  std::string node;    // "" before the task runs
-  uint32_t first_batch = 0;
+  std::string state;         // "PENDING", "RUNNING", ...
+  std::string reason;        // why the task waits
+  std::string node;          // "" before the task runs
+  uint32_t first_batch = 0;  // number of the batch with index 0
 
   uint32_t batch() const { return first_batch + index; }
   std::string name() const { return job + "_" + std::to_string(index); }
@@ -73,18 +73,21 @@ struct SlurmJob {
 
 class Slurm {
  public:
-  // Canceling `cancel` ends a running command. For some seconds after Slurm has started, it knows
-  // no nodes and refuses all requests. Such refusals are retried for `start_s`.
+  // Canceling `cancel` ends a running command. For some seconds after its start, Slurm knows no
+  // nodes and refuses all submissions. For `start_s` seconds after the first such refusal, check()
+  // repeats its request, and submissions throw Error{kIo}, so that the caller tries again later.
   Slurm(CommandRunner& commands, const CancelToken& cancel, double start_s = 0)
       : commands_(commands), cancel_(cancel), start_s_(start_s) {}
 
   // Throws Error{kInvalidInput} if Slurm is not installed, or if sbatch would refuse these options.
-  // Repeats the request every `pause_s`, with a warning, while Slurm may not know its nodes yet.
+  // Repeats the request every `pause_s` seconds, after one warning, while Slurm may not know its
+  // nodes yet.
   void check(const std::vector<std::string>& options, double pause_s, Progress& progress);
-  // Submits one array, or several if the batch numbers differ by more than Slurm's MaxArraySize.
-  // Adds each batch's task to `tasks` as soon as its array is accepted. Throws Error{kInvalidInput}
-  // with sbatch's message if it refuses. Throws Error{kIo} if Slurm does not answer or cannot
-  // accept the array now; the array may exist nevertheless.
+  // Submits the batches as one array, or as several if Slurm's limits require this (such as
+  // MaxArraySize, the limit of an index). Adds each batch's task to `tasks` as soon as its array is
+  // accepted. Throws Error{kInvalidInput} with sbatch's message if sbatch refuses the array. Throws
+  // Error{kIo} if Slurm does not answer or cannot accept the array now; the array may exist
+  // nevertheless.
   void submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks);
   // Returns the waiting and running tasks with this name; nullopt if Slurm does not answer.
   std::optional<std::vector<SlurmTask>> active(const std::string& name);
@@ -109,8 +112,8 @@ class Slurm {
   std::string accepted_job(const CommandResult& submitted);
   // Returns a setting of slurm.conf, "" if unknown.
   std::string setting(const std::string& name);
-  // True if Slurm refused the request because of missing nodes, and if it may have just started and
-  // not know its nodes yet.
+  // True if Slurm refused the request because of missing nodes, at most start_s_ seconds after the
+  // first such refusal: Slurm may have just started and not know its nodes yet.
   bool may_be_starting(const CommandResult& refused);
 
   CommandRunner& commands_;
@@ -124,8 +127,8 @@ class Slurm {
 // True if a task that waits for this reason will start without help; false if a person must act.
 bool waits_for_its_turn(const std::string& reason);
 
-// Splits a text into words as a shell does: at blanks outside of quotes. A backslash escapes the
-// next character. Throws Error{kInvalidInput} for an unterminated quote.
+// Splits a text into words as a shell does: at blanks outside of quotes. A backslash outside of
+// single quotes escapes the next character. Throws Error{kInvalidInput} for an unterminated quote.
 std::vector<std::string> split_words(const std::string& text);
 
 }  // namespace voxdag

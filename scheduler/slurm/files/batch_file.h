@@ -1,6 +1,6 @@
 // The input of a cluster task: its subvolumes and their triangles, in one write-once file.
 //
-//   "vdbatch2"  u64 bytes of the header  u64 its XXH64  header (JSON)
+//   "vdbatch2"  u64 size of the header in bytes  u64 XXH64 of the header  header (JSON)
 //   chunks of records: u64 XXH64 of the records  up to kBatchChunkRecords records (chunk.h)
 //
 // Chunks are contiguous, in the order of the subvolumes. All chunks of a subvolume but the last
@@ -48,8 +48,8 @@ struct Batch {
   double weight() const;
 };
 
-// Writes the file. When this returns, the file is durable under its name. `open` returns the
-// triangles of the subvolume with the given index.
+// Writes the file. When this returns, the file is durable under its name. open(i) returns the
+// triangles of batch.subvolumes[i]. Throws DamagedTriangles if there are fewer than expected.
 void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
                  const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,
                  const CancelToken& cancel);

@@ -10,7 +10,8 @@
 namespace voxdag {
 namespace {
 
-// Removes the number at the beginning of `text` and returns it.
+// Removes the number at the beginning of `text` and returns it. Returns nullopt if `text` does not
+// begin with a number below kMaxBatches.
 std::optional<uint32_t> parse_number(std::string_view& text) {
   uint32_t number = 0;
   const auto [rest, failure] = std::from_chars(text.data(), text.data() + text.size(), number);

@@ -6,7 +6,10 @@
 //   batch-7.record-ATTEMPT.json        record of the built batch (completion_record.h)
 //   batch-7.failure-ATTEMPT.json       the reason why the attempt failed
 //   attempt-7-ATTEMPT/segment-N.vdseg  output of the attempt
-//   log-JOB_INDEX.txt                  standard error of a task
+//   log-JOB_INDEX.txt                  output of a task
+//   log-JOB.txt                        output of the merge job
+//
+// ATTEMPT is the random id of an attempt at a batch; N is the segment's id (segment_of()).
 //
 // The segment of a batch's first valid record is moved to the work folder, where the merge reads
 // it.
@@ -69,7 +72,7 @@ class ClusterFolder {
   std::string path_;
 };
 
-// Parses the name of an entry.
+// Parses the name of an entry. The result has no path. Its kind is kOther for an unknown name.
 ClusterFolder::Entry parse_cluster_name(const std::string& name);
 
 }  // namespace voxdag

@@ -1,7 +1,8 @@
 // The state of the submitting process of a cluster build, in cluster.json: open batches with their
 // tasks and failures, and totals. Only the submitting process writes the file, by an atomic rename;
-// `voxdag status` reads it. No other file maps records to batches. If cluster.json is lost, batches
-// are built again unless a run has already accepted their records.
+// `voxdag status` reads it. No other file lists the open batches and their subvolumes, which a run
+// needs to accept records. So if cluster.json is lost, all batches are built again whose records no
+// run has accepted.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +31,9 @@ struct AttemptEnd {
   std::string reason;  // Slurm's reason, or the task's error
 };
 
-// Error of a batch's current attempt, reported by the task before Slurm reports the task's end.
+// Error of a batch's current attempt that is known before Slurm reports the task's end: the error
+// that the task reported, the reason why its record was rejected, or Slurm's reason for not
+// starting it.
 struct AttemptError {
   std::string text;
   bool has_ended = false;  // the task has ended, even if Slurm still lists it
