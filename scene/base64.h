@@ -7,12 +7,14 @@
 
 namespace voxdag {
 
-// Returns the number of bytes that `character_count` characters encode. `tail` is the last two
-// characters, or all if there are fewer; padding may be absent.
+// Returns the number of bytes that `character_count` base64 characters encode. The characters may
+// end with padding ("=") or without it. `tail` is the last two characters, or all if there are
+// fewer; it shows how many are padding.
 uint64_t base64_bytes(uint64_t character_count, std::span<const std::byte> tail);
 
-// Decodes groups of four characters; the last group may be shorter. `out` has space for three bytes
-// per group. At most 2^31 characters. Returns false for a character outside the alphabet.
+// Decodes fewer than 2^31 characters. The last group of four may be shorter, if its padding is
+// absent. `out` has space for three bytes per group, including an incomplete group. Returns false
+// if the characters are not base64.
 bool decode_base64(std::span<const std::byte> characters, std::byte* out);
 
 }  // namespace voxdag

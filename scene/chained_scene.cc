@@ -16,7 +16,8 @@ struct Part {
   uint32_t first_material;
 };
 
-// Appends the materials of another source.
+// Appends the materials `more` of another scene to `all`. Increases their image and name indices by
+// the numbers of images and names that `all` already has.
 void add_materials(SceneMaterials& all, SceneMaterials more) {
   for (Material& material : more.materials) {
     if (material.image != Material::kNoImage)
@@ -30,8 +31,8 @@ void add_materials(SceneMaterials& all, SceneMaterials more) {
   std::ranges::move(more.warnings, std::back_inserter(all.warnings));
 }
 
-// Returns a visitor of triangles whose materials are numbered starting at `first_material`. `visit`
-// must outlive it.
+// Returns a visitor that adds `first_material` to the material index of each triangle, and passes
+// the triangles to `visit`. `visit` must outlive the returned visitor.
 TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
                                                     const TriangleCursor::SurfaceVisitor& visit) {
   if (first_material == 0) return std::cref(visit);
@@ -43,8 +44,8 @@ TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
   };
 }
 
-// Reads the parts one after another. The cursor of only one part is open at a time, so each part's
-// cursor can use all memory of this cursor.
+// Reads the parts one after another. Only the cursor of the current part is open, so it can use all
+// memory of this cursor.
 class ChainedCursor : public TriangleCursor {
  public:
   ChainedCursor(const std::vector<Part>& parts, unsigned cursors)

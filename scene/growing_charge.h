@@ -17,8 +17,8 @@ class GrowingCharge {
   GrowingCharge(MemoryBudget& budget, std::string what)
       : charge_(budget, 0, what), what_(std::move(what)) {}
 
-  // Increases the charge to a total of `bytes`, unless it is already larger. Throws
-  // Error{kOutOfMemory} if this total does not fit the budget.
+  // Increases the charge to at least `bytes` in total. Throws Error{kOutOfMemory} if this total
+  // does not fit the budget.
   void grow_to(uint64_t bytes) {
     if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
     throw Error(ErrorCode::kOutOfMemory, "out of memory: " + what_ + " needs over " +

@@ -7,16 +7,17 @@
 
 namespace voxdag {
 
-// Returns a text from the file for use in a message. Control characters (one byte, or U+0080 to
-// U+009F, which terminals also obey) and quotes are replaced, and the text is shortened to
-// `max_bytes`. So the text cannot forge a line of a log.
+// Returns a text from the file for use in a message. Quotes and control characters (one byte, or
+// U+0080 to U+009F, which terminals also obey) become question marks, so that the text cannot forge
+// a line of a log. A text of over `max_bytes` is cut and ends with "...".
 std::string printable(std::string_view text, size_t max_bytes = 64);
 
 // Returns the message of an exception of the JSON library without its prefix "[json.exception...]
 // ". Other messages are returned unchanged.
 std::string without_prefix(std::string message);
 
-// Returns "16 \"name\"", or only the number if the object has no name.
+// Returns the index with the name in quotes: 16 "wheel". Returns only the index if the name is
+// empty.
 std::string numbered(int index, const std::string& name);
 
 // Throws Error{kInvalidInput}: "<scene file>: <what>".

@@ -32,32 +32,33 @@ class TriangleCursor {
   using SurfaceVisitor = std::function<void(std::span<const SurfaceTriangle>)>;
 
   virtual ~TriangleCursor() = default;
-  // Calls `visit` with batches of 1 to 1024 triangles, all finite, in the scene's order: the
-  // declared triangles [first, first + count), without those that skip_invalid drops. Going back to
-  // earlier triangles takes longer. Throws Error with scene file, node, mesh, primitive or
-  // accessor.
+  // Visits the declared triangles [first, first + count) in the scene's order, in batches of 1 to
+  // 1024 triangles. An invalid triangle is dropped if SceneOptions::skip_invalid is set. Otherwise
+  // read() throws an Error that names the scene file and the node, mesh, primitive, accessor or
+  // face. So all visited vertices are finite. Going back to earlier triangles takes longer.
   virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
   // Like read(), but with each vertex snapped to `grid`.
   virtual void read_snapped(uint64_t first, uint64_t count, const Grid& grid, const Visitor& visit);
-  // Visits the triangles with their surfaces. The default implementation makes all triangles white,
-  // with material 0.
+  // Like read(), but each triangle has its material, texture coordinates and colors. The default
+  // implementation makes all triangles white, with material 0.
   virtual void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
   // Returns the bounds of the triangles that read() visits.
   virtual WorldBounds read_bounds(uint64_t first, uint64_t count);
 };
 
-// A stored image of a scene: a PNG or JPEG file, or anything that claims to be one. Its source is
-// the range [offset, offset + size) of the file. The image is `bytes` bytes of the source's
-// (decoded) contents, starting at `skip`.
+// The place where an image of a scene is stored. The image should be a PNG or JPEG, but is not
+// checked when the scene is opened. The range [offset, offset + size) of `file` holds bytes, or
+// base64 characters that encode bytes. The first `skip` of these bytes do not belong to the image.
+// The following `bytes` bytes are the image.
 struct ImageSource {
   std::string name;  // name in messages: the image and its scene file
   SourceFile file;
   uint64_t offset = 0, size = 0;
-  // The source has base64 characters, some of which may be escaped by JSON.
+  // The range holds base64 characters, some of which may be escaped by JSON.
   bool is_base64 = false;
   bool is_data_uri = false;  // the base64 characters begin after the first comma
   uint64_t skip = 0;
-  uint64_t bytes = UINT64_MAX;  // fewer if the source has fewer
+  uint64_t bytes = UINT64_MAX;  // fewer if the range ends earlier
   std::string problem;          // why the image cannot be read, if known; otherwise ""
 };
 
@@ -72,8 +73,8 @@ struct SceneMaterials {
     for (Material& material : materials) material.image = Material::kNoImage;
     images.clear();
   }
-  // Appends the name "" to `names`, and gives its number to the materials without a number, which
-  // are used by triangles without material.
+  // Gives one common new number to all materials without a number, which are the materials of
+  // triangles without material. Appends their name, "", to `names`.
   void name_unlisted() {
     for (Material& material : materials)
       if (material.number == Material::kNoNumber)
@@ -92,16 +93,16 @@ class TriangleSource {
   virtual std::unique_ptr<TriangleCursor> open(unsigned cursors) = 0;
   // Calls `visit` with all triangles, in batches as in TriangleCursor::read().
   void for_each_batch(const Visitor& visit) { open(1)->read(0, declared_triangles(), visit); }
-  // Number of triangles that the scene declares, including instances: visited triangles and
-  // triangles that skip_invalid drops.
+  // Number of triangles that the scene declares. Each instance counts separately. Triangles that
+  // skip_invalid drops are included.
   virtual uint64_t declared_triangles() const = 0;
   // The materials that TriangleCursor::read_surfaces() refers to. Opens image files, but reads no
   // image. An image that cannot be opened is not an error.
   virtual SceneMaterials materials() const { return {}; }
   // Number of materials that materials() would return.
   virtual uint32_t material_count() const { return 1; }
-  // All files that the triangles come from, with their identity when they were first opened. If a
-  // file has a different identity when it is opened again, this is an error.
+  // All files that the triangles come from, with their identity when they were first opened.
+  // Reading throws an Error if a file has another identity when it is opened again.
   virtual std::vector<SourceFile> files() const { return {}; }
   // Warnings for the user, one sentence each (ignored optional extensions, points and lines that
   // make no voxels).
@@ -112,8 +113,8 @@ struct SceneOptions {
   // Drop and count invalid triangles (non-finite vertices, indices out of range) instead of
   // refusing the scene.
   bool skip_invalid = false;
-  // File for decoded geometry, in an existing folder. The file has this name only for a moment. "":
-  // in a new folder in temporary_parent().
+  // Path of the temporary file for decompressed geometry, in an existing folder. The name is
+  // removed as soon as the file is open. "": a path in a new folder in temporary_parent().
   std::string scratch_path = {};
 };
 

@@ -37,10 +37,10 @@ std::string list_scene_endings(const std::string& separator = ", ",
 
 // Opens scene files, each of any format, as one scene: the triangles of the first file, then the
 // triangles of the next. The format is determined by the contents, not the name. Geometry is read
-// in windows charged to `budget`; images are never read. Opening checks the structure, streaming
-// checks the contents; `cancel` is checked between batches. Throws Error{kInvalidInput},
-// {kNotFound}, {kLimit} or {kOutOfMemory} with the name of the file. The references must outlive
-// the scene.
+// in windows charged to `budget`; images are never read. Opening checks the structure of a file,
+// and reading the triangles checks their contents. `cancel` is checked during both. Throws
+// Error{kInvalidInput}, {kNotFound}, {kLimit} or {kOutOfMemory} with the name of the file. `files`,
+// `budget` and `cancel` must outlive the scene.
 std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
                                            const SceneOptions& options, MemoryBudget& budget,
                                            const CancelToken& cancel);

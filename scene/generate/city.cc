@@ -53,8 +53,8 @@ class City {
     const Vec3 center{
         kPitch * (static_cast<double>(2 * column) - static_cast<double>(columns_ - 1)) / 2, 0,
         kPitch * (static_cast<double>(2 * row) - static_cast<double>(rows_ - 1)) / 2};
-    // Whether the block is a park is decided only after its street was made. With colors, the
-    // ground is added after this decision.
+    // The street uses the random numbers before it is decided whether the block is a park. With
+    // colors, the ground's color depends on this decision, so the ground is added after it.
     if (!scene_.has_colors()) make_ground(center, false);
     make_street(center, random);
     const bool is_park = random.chance(10);
@@ -95,7 +95,8 @@ class City {
       }
   }
 
-  // Returns a place on a side. Sides 0 and 1 run along x, 2 and 3 along z.
+  // Returns the point that is `along` and `across` away from the block's center `c`, measured along
+  // a side and across it. Sides 0 and 1 run along x, 2 and 3 along z.
   static Vec3 place(const Vec3& c, int side, double along, double across, double height) {
     return side < 2 ? Vec3{c.x + along, height, c.z + across}
                     : Vec3{c.x + across, height, c.z + along};

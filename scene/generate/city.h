@@ -1,5 +1,6 @@
-// The pieces of a generated city, in meters, y up. Sizes are small multiples of 1/64, so that a
-// window stored as triangles and the same window as an instance have exactly the same corners.
+// The pieces of a generated city, in meters, y up. The sizes and places of windows are small
+// multiples of 1/64, which floats represent exactly. So a window has exactly the same corners as
+// triangles and as an instance.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +31,7 @@ struct Lot {
 };
 
 void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, Random& random);
-// A small house at any angle, without windows.
+// Adds a small house without windows, rotated about the vertical axis.
 void add_turned_house(SceneBuilder& scene, const Lot& lot, Random& random);
 
 }  // namespace voxdag

@@ -49,7 +49,7 @@ void add_tier(SceneBuilder& scene, const CityParts& parts, const Tier& tier, con
                             {tier.x + x, tier.top() + kSlabHeight, tier.z + z});
 }
 
-// Adds a roof with a ridge along the longer side. Its ends are upright or sloping (a hip).
+// Adds a roof with a ridge along the longer side. The roof's ends are upright, or sloping (a hip).
 void add_ridge_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double y = tier.top() + kSlabHeight;
   const bool along_x = tier.bays_x >= tier.bays_z;
@@ -69,7 +69,7 @@ void add_ridge_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   for (const auto& f : kFaces) mesh.add_triangle(first + f[0], first + f[1], first + f[2]);
 }
 
-// Adds a box that is rotated relative to the building, and on it a pyramid that is rotated further.
+// Adds a box that is rotated relative to the building, and on it a pyramid with the same rotation.
 void add_crown(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double half = std::min(tier.half_x(), tier.half_z());
   const double y = tier.top() + kSlabHeight;

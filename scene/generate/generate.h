@@ -1,5 +1,5 @@
 // Scenes generated from a seed. They can have any size, are streamed to a .glb in a few MB of
-// memory, and have the same bytes on every machine. To get the same bytes, the generators use only
+// memory, and have the same bytes on every machine. For this purpose, the generators use only
 // integers, + - * / and sqrt of IEEE doubles (compiled without fused multiply-add) and their own
 // random numbers, never the math library. docs/generate.md describes the kinds; tests pin a digest
 // of each.

@@ -32,7 +32,7 @@ json vectors(uint64_t count) {
   return {{"componentType", kFloat}, {"type", "VEC3"}, {"count", count}};
 }
 
-// Returns a primitive of consecutive arrays.
+// Returns a primitive whose arrays are consecutive, starting with array `positions`.
 json primitive(uint64_t positions, bool has_colors, uint32_t material) {
   if (!has_colors) return {{"attributes", {{"POSITION", positions}}}, {"indices", positions + 1}};
   return {{"attributes", {{"POSITION", positions}, {"COLOR_0", positions + 1}}},
@@ -106,7 +106,7 @@ void GlbLayout::add_bytes(uint64_t bytes) {
                     std::to_string(stored_triangles_) + " triangles; request fewer");
 }
 
-// Parts come first, so that part p is mesh p. Then comes one mesh with everything that is not
+// Parts come first, so that part p is mesh p. The last mesh has all triangles that are not
 // instanced. There is one node for this mesh, and one for each block of instances.
 std::string GlbLayout::json_text(const std::string& generator,
                                  std::span<const SceneMaterial> materials) const {

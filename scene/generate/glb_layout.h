@@ -6,7 +6,7 @@
 //                  indices (2 bytes each), padded to 4
 //     instances:   translations (12 bytes each)    | scales (12 bytes each)
 //
-// Each array is a bufferView and an accessor of the same number.
+// The numbers are bytes. Array i of the file is bufferView i and accessor i.
 #pragma once
 
 #include <cstdint>

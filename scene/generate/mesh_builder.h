@@ -32,6 +32,7 @@ inline Float3 rounded(const Vec3& v) {
 struct Turn {
   double cosine = 1, sine = 0;
 };
+// Returns rotation `choice` modulo 12 of a fixed list.
 Turn pythagorean_turn(uint32_t choice);
 
 struct MeshBuilder {
@@ -62,9 +63,11 @@ struct MeshBuilder {
   void quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
   // Adds a box: 8 new vertices, 12 triangles, or 10 without its bottom.
   void box(const Vec3& low, const Vec3& high, bool bottom = true);
-  // Adds a box that stands on `base`, turned about its axis: 8 new vertices, 10 triangles.
+  // Adds a box without bottom that stands on `base`, turned about its vertical axis: 8 new
+  // vertices, 10 triangles. In `half_and_height`, x and z are half of the edges, and y is the
+  // height.
   void turned_box(const Vec3& base, const Vec3& half_and_height, const Turn& turn);
-  // Adds a pyramid on a turned rectangle: 5 new vertices, 4 triangles.
+  // Adds a pyramid on a turned rectangle, with the same parameters: 5 new vertices, 4 triangles.
   void pyramid(const Vec3& base, const Vec3& half_and_height, const Turn& turn);
 };
 

@@ -32,7 +32,7 @@ class SceneBuilder {
   SceneBuilder(BlockSink& sink, bool instances, bool colors);
   bool has_colors() const { return colors_; }
 
-  // Material of the following additions. Has no effect without colors.
+  // Sets the material and color of the following additions. Has no effect without colors.
   void paint(uint32_t material, const Rgba8& color) { paint_ = {material, color}; }
 
   // Returns a mesh of the current paint with space for `vertices` and `triangles` more. This is the

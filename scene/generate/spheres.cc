@@ -9,8 +9,8 @@ namespace voxdag {
 namespace {
 
 constexpr double kBallRadius = 512;
-// Radii from 64 down to slightly over 1. The octahedron's edges are divided into 64 down to 1
-// parts.
+// Number of sizes. A sphere of size s (0 to 6) has a radius from 2^s to 2^(s + 1), and the edges of
+// its octahedron are divided into 2^s parts.
 constexpr uint32_t kSizes = 7;
 
 // Adds a face of the octahedron with its edges divided into n parts.

@@ -18,8 +18,8 @@ class Noise {
  public:
   explicit Noise(uint64_t seed) : seed_(mix_bits(seed)) {}
 
-  // Returns gradient noise, about [-1, 1], 0 on the integer lattice. Coordinates must not be
-  // negative.
+  // Returns gradient noise: from about -1 to about 1, and 0 at integer coordinates. Coordinates
+  // must not be negative.
   double at(double x, double z, uint64_t octave) const {
     const auto ix = static_cast<uint64_t>(x), iz = static_cast<uint64_t>(z);
     const double fx = x - static_cast<double>(ix), fz = z - static_cast<double>(iz);
@@ -59,7 +59,7 @@ class Heights {
   }
 
  private:
-  // Returns the height at a point of the square [0, 1]^2; about [0, 1].
+  // Returns the height, from about 0 to about 1, at a point of the square [0, 1]^2.
   double height(double s, double t) const {
     const double x = 8 + 2.5 * s + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 100);
     const double z = 8 + 2.5 * t + 0.12 * noise_.at(8 + 6 * s, 8 + 6 * t, 101);

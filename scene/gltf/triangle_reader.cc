@@ -94,8 +94,9 @@ WorldBounds TriangleReader::read_bounds(uint64_t first, uint64_t count) {
   return bounds;
 }
 
-// Calls body(first, count) for each part of the triangles that one instance declares, after placing
-// the instance.
+// Divides triangles [first, first + count) into ranges of one instance each. For each range, sets
+// world_ to the instance's transform, then calls body(first triangle within the instance, number of
+// triangles).
 template <class Body>
 void TriangleReader::for_each_instance(uint64_t first, uint64_t count, const Grid* grid,
                                        const Body& body) {
@@ -117,7 +118,7 @@ void TriangleReader::for_each_instance(uint64_t first, uint64_t count, const Gri
   }
 }
 
-// Sets draw_ to the draw of this triangle.
+// Sets draw_ to the draw that contains this triangle.
 void TriangleReader::seek(uint64_t triangle) {
   if (!walk_ || triangle < draw_.first) {
     walk_.emplace(document_, budget_);
@@ -177,7 +178,8 @@ void TriangleReader::bind(const Node& node, size_t primitive_index) {
   binding_ = next;
 }
 
-// Calls body(corners, count) for each part of an instance's triangles that fits in the window.
+// Divides triangles [first, first + count) of an instance into parts that fit in the window. Calls
+// body(vertex indices, number of triangles) for each part.
 template <class Body>
 void TriangleReader::for_each_window(uint64_t first, uint64_t count, const Body& body) {
   while (count > 0) {
@@ -189,8 +191,9 @@ void TriangleReader::for_each_window(uint64_t first, uint64_t count, const Body&
   }
 }
 
-// Returns the corners of triangle `first` and its successors. Loads at most `count` triangles, or
-// the complete primitive if it fits the window.
+// Returns the vertex indices of triangle `first` and of the following triangles in the window. If
+// `first` is not in the window, loads at most `count` triangles from there, or the complete
+// primitive if it fits in the window.
 const uint32_t* TriangleReader::load_corners(uint64_t first, uint64_t count) {
   if (first < window_first_ || first >= window_first_ + window_count_) {
     window_count_ = 0;

@@ -36,12 +36,12 @@ class TriangleReader {
 
   // Visits the triangles of [first, first + count), numbered in the order in which the document
   // declares them, in batches of up to 1024. The triangles are in world space, or snapped to `grid`
-  // if it is not null. An invalid triangle is dropped if `skip_invalid` is set; otherwise throws
-  // Error{kInvalidInput} with its node, mesh and primitive.
+  // if it is not null. An invalid triangle is dropped if `skip_invalid` is set; otherwise read()
+  // throws Error{kInvalidInput} with its node, mesh and primitive.
   void read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit);
   // Visits the same triangles in world space with their surfaces, in batches of the same size.
   void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
-  // Returns the bounds of these triangles in world space.
+  // Returns the bounds of triangles [first, first + count) in world space.
   WorldBounds read_bounds(uint64_t first, uint64_t count);
 
  private:
@@ -56,7 +56,8 @@ class TriangleReader {
     uint64_t triangles = 0;  // triangles per instance
     bool is_bound = false;
   };
-  // The node, mesh and primitive that the readers are set up for.
+  // The mesh, primitive, morph weights and skin for which vertices_, corner_reader_ and
+  // surface_reader_ are set up.
   struct Binding {
     int mesh = -1;
     size_t primitive = 0;

@@ -3,8 +3,8 @@
 namespace voxdag::ply {
 namespace {
 
-// Maximum length of a word. No program writes longer numbers. A longer word is truncated, so that
-// the row is refused.
+// Maximum length of a word. No program writes longer numbers. A longer word is returned in pieces,
+// so the row has too many words and is refused.
 constexpr size_t kMaxWord = 64;
 
 bool is_line_end(char c) { return c == '\n' || c == '\r'; }

@@ -24,8 +24,8 @@ uint64_t FaceReader::face_of(uint64_t triangle) {
   return face_;
 }
 
-// Reads the face of the triangle. Starts at the current face, or at a later block if that is
-// nearer.
+// Reads the face that contains the triangle. Continues from the current face, unless the triangle
+// is in an earlier face or a later block. In these cases, starts at the triangle's block.
 void FaceReader::seek(uint64_t triangle) {
   const auto& blocks = ply_.face_blocks();
   const bool is_ahead = is_loaded_ && triangle >= first_triangle_;

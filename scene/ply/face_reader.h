@@ -14,10 +14,10 @@ class FaceReader {
   // The file must outlive the reader.
   FaceReader(const PlyFile& ply, MemoryBudget& budget) : ply_(ply), rows_(ply.open_faces(budget)) {}
 
-  // Reads the indices of triangles [first, first + count), which must exist. Their vertex indices
-  // may be out of range.
+  // Writes the vertex indices of triangles [first, first + count) to `corners`, three per triangle.
+  // The triangles must exist, but their vertex indices may be out of range.
   void read(uint64_t first, uint64_t count, uint32_t* corners);
-  // Returns the face that contains a triangle.
+  // Returns the number of the face that contains a triangle.
   uint64_t face_of(uint64_t triangle);
 
  private:

@@ -8,13 +8,14 @@
 namespace voxdag::ply {
 namespace {
 
-// std::from_chars does not accept a plus sign.
+// Removes a leading plus sign, which std::from_chars does not accept. "+-1" remains invalid.
 std::string_view without_plus(std::string_view text) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   return text;
 }
 
-// A program that links this library may use another locale.
+// Returns the locale whose decimal point is "." for strtod_l(). A program that links this library
+// may have set another locale.
 locale_t c_locale() {
   static const locale_t locale = newlocale(LC_ALL_MASK, "C", nullptr);
   return locale;
@@ -26,7 +27,7 @@ std::optional<double> parse_as(std::string_view text) {
   const char* const end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data(), end, value);
   if (parsed.ptr != end || parsed.ec == std::errc::invalid_argument) return std::nullopt;
-  // The number is too large or too close to zero. strtod distinguishes these cases.
+  // The number is too large or too close to zero. strtod_l() returns infinity or a value near zero.
   if (parsed.ec == std::errc::result_out_of_range)
     return static_cast<T>(strtod_l(std::string(text).c_str(), nullptr, c_locale()));
   return value;

@@ -14,7 +14,7 @@
 
 namespace voxdag::ply {
 
-// An index that is negative or needs more than 32 bits. No vertex has this index.
+// Replaces an index that is negative or needs more than 32 bits. No vertex has this index.
 constexpr uint32_t kNoVertex = std::numeric_limits<uint32_t>::max();
 
 // Calls body(T{}) with the C++ type for `type`.
@@ -55,9 +55,10 @@ uint32_t as_index(T value) {
   return value < 0 ? kNoVertex : static_cast<uint32_t>(value);
 }
 
-// Parse the complete text as an integer, or as a number of a real type (rounded to nearest). Return
-// nullopt for any other text. parse_real() accepts "nan" and "inf", and returns infinity for a real
-// number that is too large.
+// parse_integer() returns the integer that the complete text denotes. parse_real() returns the
+// number of type `type` that it denotes. Both return nullopt for any other text. For real types,
+// parse_real() rounds to nearest, accepts "nan" and "inf", and returns infinity for a number that
+// is too large.
 std::optional<int64_t> parse_integer(std::string_view text);
 std::optional<double> parse_real(std::string_view text, Type type);
 

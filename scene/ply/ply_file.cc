@@ -80,7 +80,8 @@ void PlyFile::find_face_list() {
     refuse("has faces whose property " + list.name + " is not a list of integers");
 }
 
-// Finds the rows of an element that begins at this offset. Returns the end of the element.
+// Returns the end of element `index`, which begins at offset `begin`. If its rows vary in size,
+// reads them all, records the blocks of vertices and faces, and counts the triangles.
 uint64_t PlyFile::pass_over(size_t index, uint64_t begin, MemoryBudget& budget,
                             const CancelToken& cancel) {
   const Element& element = header_.elements[index];
@@ -122,7 +123,7 @@ uint64_t PlyFile::end_of_fixed_rows(const Element& element, uint64_t begin) cons
   return static_cast<uint64_t>(end);
 }
 
-// Records the first row of a block.
+// Records the offset of the first row of a block, if the element is the vertices or the faces.
 void PlyFile::note_row(size_t element, uint64_t offset) {
   if (element == face_) {
     charge_.add(sizeof(FaceBlock));

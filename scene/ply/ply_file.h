@@ -2,8 +2,9 @@
 // triangles. A polygon of n corners is the fan of n - 2 triangles around its first corner. A
 // polygon with fewer than three corners has no triangle.
 //
-// Rows of faces and all rows of ASCII files have no fixed size. So one pass over the file finds
-// every 1024th row, and any other row is found from there.
+// Rows of faces and all rows of ASCII files have no fixed size. So one pass over the file records
+// the offset of every 1024th row. Any other row is found by reading on from the last recorded row
+// before it.
 #pragma once
 
 #include <array>
@@ -30,7 +31,8 @@ class PlyFile {
   // or more vertices, Error{kOutOfMemory}.
   PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
-  // The first row of a block, and the number of its first triangle.
+  // A block of kBlockRows faces: the offset of its first face in the file, and the number of its
+  // first triangle.
   struct FaceBlock {
     uint64_t offset;
     uint64_t first_triangle;
@@ -43,7 +45,8 @@ class PlyFile {
 
   const Element& vertex_element() const { return header_.elements[vertex_]; }
   uint64_t vertices_begin() const { return vertices_begin_; }
-  // Offsets of every kBlockRows-th vertex of an ASCII file.
+  // Offsets in the file of every kBlockRows-th vertex. Empty for a binary file, whose vertices have
+  // a fixed size.
   const std::deque<uint64_t>& vertex_blocks() const { return vertex_blocks_; }
   // Indices of the properties x, y and z.
   const std::array<size_t, 3>& axes() const { return axes_; }

@@ -20,7 +20,8 @@ namespace voxdag::ply {
 namespace {
 
 constexpr size_t kBatchTriangles = 1024;
-// Triangles per window when bounds are computed. Each vertex of a window is read once.
+// Triangles per window when bounds are computed. A vertex that several triangles of a window share
+// is read once, if the window's vertex indices are close together.
 constexpr size_t kWindowTriangles = 4096;
 
 class PlyCursor : public TriangleCursor {
@@ -71,7 +72,8 @@ class PlyCursor : public TriangleCursor {
   }
 
  private:
-  // T is RealTriangle or SurfaceTriangle.
+  // Visits triangles [first, first + count) in batches, with vertices snapped to `grid` if it is
+  // not null. T is RealTriangle or SurfaceTriangle.
   template <class T, class VisitBatch>
   void read_placed(uint64_t first, uint64_t count, const Grid* grid, PageBuffer<T>& batch,
                    const VisitBatch& visit) {

@@ -9,7 +9,7 @@
 namespace voxdag::ply {
 namespace {
 
-// Decodes `count` integers at `bytes`.
+// Converts `count` integers at `bytes` to vertex indices.
 using Decode = void (*)(const std::byte* bytes, size_t count, uint32_t* out);
 
 template <class T, bool kBigEndian>
@@ -107,7 +107,7 @@ class BinaryRows : public Rows {
   const bool is_big_endian_;
   FileWindow window_;
   std::vector<List> lists_;
-  size_t bytes_before_ = 0;  // bytes after the last list
+  size_t bytes_before_ = 0;  // bytes of a row after its last list
   bool is_plain_ = false;    // true if read_plain() can read the rows
 };
 

@@ -1,5 +1,5 @@
 // The colors of the vertices of a PLY file, within a fixed amount of memory. Blocks of consecutive
-// vertices are cached, each in the slot given by its number. Not thread-safe.
+// vertices are cached; block b can only be in slot b modulo the number of slots. Not thread-safe.
 //
 // Red, green and blue are sRGB and become linear light; alpha is linear. Reals are from 0 to 1,
 // ushort numbers from 0 to 65535 and all other integers from 0 to 255. Values outside are clamped.

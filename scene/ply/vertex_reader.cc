@@ -8,7 +8,8 @@
 namespace voxdag::ply {
 namespace {
 
-// Fills every `stride`-th number of `out` from rows of `row_bytes` bytes.
+// Reads one property of `count` rows of `row_bytes` bytes each. The property of row i begins at
+// bytes + i * row_bytes and is written to out[i * stride].
 template <class T, bool kBigEndian>
 void decode_property(const std::byte* bytes, size_t row_bytes, size_t count, size_t stride,
                      double* out) {

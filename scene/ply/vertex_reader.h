@@ -20,8 +20,8 @@ class VertexReader : public PositionSource {
   VertexReader(const PlyFile& ply, std::span<const size_t> properties, MemoryBudget& budget);
 
   uint64_t count() const override { return ply_.vertex_element().count; }
-  // Writes one number per property for each vertex. Throws Error{kInvalidInput} with the vertex for
-  // a text that is not a number.
+  // Writes one number per property for each of the vertices [first, first + count). Throws
+  // Error{kInvalidInput} with the vertex for a text that is not a number.
   void read(uint64_t first, size_t count, double* out) override;
 
  private:

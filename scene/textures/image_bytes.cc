@@ -59,7 +59,8 @@ size_t ImageBytes::read_plain(std::span<std::byte> out) {
   return size;
 }
 
-// Reads the next character of the text. Decodes the JSON escapes \/ and \u00xx.
+// Reads the next character of the base64 text. Returns false at the end of the range. Decodes the
+// JSON escapes \/ and \u00xx; any other \u escape becomes "!", which is not base64.
 bool ImageBytes::next_character(char& c) {
   const auto raw = [&](char& out) {
     if (window_at_ == window_.size()) {

@@ -7,7 +7,8 @@
 
 namespace voxdag {
 
-// Rounds to nearest. `encoded` is from 0 to 1.
+// Returns the linear light of an sRGB channel, from 0 to 65535, rounded to nearest. `encoded` is
+// from 0 to 1.
 inline uint16_t linear_light(double encoded) {
   double linear = encoded / 12.92;
   if (encoded > 0.04045) {

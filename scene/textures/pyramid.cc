@@ -66,7 +66,7 @@ void PyramidBuilder::add_row(size_t index, std::span<const uint64_t> row) {
   if (taps.first + taps.count == stage.added) reduce(index, next);
 }
 
-// Computes row `y` of the level above `index` from the rows of `index`.
+// Computes row `y` of level `index` + 1, which is coarser, from the rows of level `index`.
 void PyramidBuilder::reduce(size_t index, uint32_t y) {
   const TextureLevel& fine = levels_[index];
   const Stage& stage = stages_[index];

@@ -1,6 +1,7 @@
-// Builds the levels of one image from its rows. A texel of a coarser level is the mean of the
-// texels it covers in the level below. Along an even edge these are two texels. Along an edge of 2n
-// + 1 these are three, weighted (n - i), n and (i + 1) of 2n + 1, so that no column or row is
+// Builds the pyramid of one image, which is the image and its coarser levels, from the image's
+// rows. A texel of a coarser level is the mean of the texels that it covers in the next finer
+// level. Along an edge of 2n texels, each texel covers two. Along an edge of 2n + 1 texels, texel i
+// covers three, with the weights (n - i), n and (i + 1), divided by 2n + 1. So no column or row is
 // dropped.
 #pragma once
 
@@ -15,7 +16,8 @@
 
 namespace voxdag {
 
-// Returns the levels of an image of this size. `first_page` is the first page of the first level.
+// Returns the levels of an image of this size, the finest first. `first_page` is the number of the
+// first page of the finest level; the pages of the other levels follow.
 std::vector<TextureLevel> pyramid_levels(uint32_t width, uint32_t height, uint64_t first_page);
 
 class PyramidBuilder {

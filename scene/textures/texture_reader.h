@@ -1,9 +1,10 @@
-// Reads texels of the pyramids of a TextureSet, for one thread. The texels come from memory if the
-// pyramids fit, and otherwise from pages of the scratch file. A reader caches as many pages as its
-// memory can hold. Not thread-safe; any number of readers may be open.
+// Reads texels of the pyramids of a TextureSet, for one thread. A pyramid is an image and its
+// coarser levels. The texels come from memory if the pyramids fit, and otherwise from pages of the
+// scratch file. A reader caches as many pages as its memory can hold. Not thread-safe; any number
+// of readers may be open.
 //
 // A level is cut into tiles of 32 x 32 texels, row by row. Tiles at the right and lower border are
-// padded. A tile is a page: its texels are stored row by row, eight bytes each.
+// padded. Each tile is stored as one page: its texels row by row, eight bytes each.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +30,7 @@ uint32_t page_checksum(std::span<const uint64_t> texels);
 struct TextureLevel {
   uint32_t width = 0, height = 0;
   uint32_t tiles_per_row = 0;
-  uint64_t first_page = 0;  // number of the page in the scratch file, or in memory
+  uint64_t first_page = 0;  // number of its first page in the scratch file, or in memory
 
   uint64_t pages() const {
     return uint64_t{tiles_per_row} * ((height + kTileEdge - 1) >> kTileShift);
@@ -47,13 +48,14 @@ class TextureReader {
   // Makes a reader of pyramids in memory. `layout` and `pages` must outlive the reader.
   TextureReader(const TextureLayout& layout, const uint64_t* pages)
       : layout_(layout), all_(pages) {}
-  // Makes a reader of pyramids in a file. Caches pages of about `memory_bytes`, at least one.
+  // Makes a reader of pyramids in a file. Caches pages in about `memory_bytes`, at least two.
   // `checksums` has one value per page. The references must outlive the reader.
   TextureReader(const TextureLayout& layout, const ReadableFile& file, const uint32_t* checksums,
                 uint64_t memory_bytes, MemoryBudget& budget);
 
-  // An image has at least one level. Each further level has half the width and height, rounded
-  // down, until both are 1. Images that no material refers to have no levels.
+  // Returns the number of levels of an image. It is 0 for an image that no material uses or that is
+  // unreadable. The first level has the size of the image. Each further level has half the width
+  // and height, rounded down but at least 1. The last level has one texel.
   uint32_t levels(uint32_t image) const {
     return layout_.first_level[image + 1] - layout_.first_level[image];
   }
@@ -72,7 +74,7 @@ class TextureReader {
       const uint64_t place = place_of(x, y);
       return texels_ ? texels_[place] : reader_.cached_texel(first_ + place);
     }
-    // Call it some time before texel().
+    // Starts to load a texel that is in memory into the CPU's cache, for a later texel().
     void prefetch(uint32_t x, uint32_t y) const {
       if (texels_) __builtin_prefetch(&texels_[place_of(x, y)]);
     }
@@ -108,7 +110,8 @@ class TextureReader {
 
  private:
   static constexpr uint64_t kNoPage = ~uint64_t{0};
-  // Neighbors in adjacent rows of tiles are powers of two apart and must not share a slot.
+  // Spreads pages over the slots. The numbers of vertically adjacent tiles often differ by a power
+  // of two, and without this factor they would share a slot.
   static constexpr uint64_t kSpread = 0x9e3779b97f4a7c15ull;
 
   const TextureLevel& at(uint32_t image, uint32_t level) const {

@@ -62,7 +62,8 @@ std::string user_of(const SceneMaterials& materials, uint32_t image) {
   return ", the base color of material " + numbered(index, found->name) + ",";
 }
 
-// Runs `body` concurrently with others. If memory is short, runs it again alone.
+// Runs `body`, concurrently with other threads that do the same. If the memory does not suffice,
+// runs it again while no other thread does.
 template <class Body>
 void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const Body& body) {
   try {
@@ -91,7 +92,7 @@ std::string image_digest(FileSystem& files, const ImageSource& source, const Can
       hash.add(std::span(buffer).first(size));
     }
   } catch (const BrokenImage&) {
-    hash.add(buffer);  // a decoder may ignore a damaged part
+    hash.add(buffer);  // a decoder may use the bytes before the damaged part
     return "broken " + hash.finish();
   }
   return hash.finish();
@@ -285,7 +286,8 @@ class TextureSet::Builder {
   const CancelToken& cancel_;
   std::unique_ptr<TextureSet> set_;
   std::unique_ptr<WritableFile> writer_;  // writes the scratch file; null if none is needed
-  // Held exclusively by an image that does not fit in memory next to others.
+  // Held shared by every thread that decodes. Held exclusively by a thread whose image did not fit
+  // in memory while others decoded.
   std::shared_mutex mutex_;
   // For each image: the material that uses it, for messages ("": none), and why it is unreadable.
   std::vector<std::string> users_, problems_;

@@ -1,14 +1,15 @@
-// The materials of a scene with their images, decoded once into pyramids (docs/color.md): linear
-// light, 16 bits, RGBA, and an integer box filter that omits no column, for any image size. Their
-// contents depend only on the scene, never on memory or threads.
+// The materials of a scene with their images, decoded once into pyramids (docs/color.md). A texel
+// is linear RGBA with 16 bits per channel. An integer box filter makes the coarser levels; it omits
+// no column or row, for any image size. The texels depend only on the scene, never on memory or
+// threads.
 //
 // The pyramids are kept in memory if they take at most half of the free budget. Otherwise they are
 // in a scratch file. Images are decoded row by row.
 //
 // An image can be missing, broken, too large (over kMaxTexels), or neither PNG nor JPEG (WebP,
-// KTX2). Then one warning names the image and a material, and the materials of this image have only
-// their factors. A valid image whose decoder exceeds the budget (progressive JPEG, interlaced PNG)
-// is an error, because memory must not decide the colors.
+// KTX2). Then one warning names the image and a material that uses it, and the materials of this
+// image keep only their base color factors. A valid image whose decoder exceeds the budget
+// (progressive JPEG, interlaced PNG) is an error, because memory must not decide the colors.
 #pragma once
 
 #include <cstdint>
@@ -28,15 +29,15 @@ namespace voxdag {
 
 class TextureSet {
  public:
-  // Texels of one image: 16384 x 16384.
+  // Maximum number of texels of one image: 16384 x 16384.
   static constexpr uint64_t kMaxTexels = uint64_t{1} << 28;
 
   // Decodes the images that materials refer to, on up to `threads` threads, and warns about
   // unreadable ones. Advances `progress` by one for each image, in a stage that the caller began.
-  // The scratch file is created at `path`, in an existing folder, only if it is needed; it has this
-  // name only for a moment. Throws Error{kOutOfMemory} with image and material, {kNoSpace}, {kIo},
-  // {kCanceled}, and {kInvalidInput} for an image file that changed since the scene was opened.
-  // `files` and `budget` must outlive the set.
+  // The scratch file is created at `path`, in an existing folder, only if it is needed. Its name is
+  // removed as soon as it is open. Throws Error{kOutOfMemory} with image and material, {kNoSpace},
+  // {kIo}, {kCanceled}, and {kInvalidInput} for an image file that changed since the scene was
+  // opened. `files` and `budget` must outlive the set.
   static std::unique_ptr<TextureSet> prepare(FileSystem& files, const SceneMaterials& materials,
                                              const std::string& path, unsigned threads,
                                              MemoryBudget& budget, Progress& progress,
@@ -48,7 +49,8 @@ class TextureSet {
   // memory, they are shared and the reader takes no memory. The set must outlive the reader.
   // Thread-safe.
   std::unique_ptr<TextureReader> open(uint64_t memory_bytes);
-  // Bytes of all pages, and true if they are in memory.
+  // bytes() returns the size of all pages. is_in_memory() is true if they are not in a scratch
+  // file.
   uint64_t bytes() const { return pages_ * kPageBytes; }
   bool is_in_memory() const { return !file_; }
 

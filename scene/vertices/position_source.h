@@ -10,7 +10,7 @@ class PositionSource {
  public:
   virtual ~PositionSource() = default;
   virtual uint64_t count() const = 0;
-  // Reads the positions of vertices [first, first + count), three doubles each.
+  // Writes the positions of vertices [first, first + count) to `out`, three doubles each.
   virtual void read(uint64_t first, size_t count, double* out) = 0;
 };
 

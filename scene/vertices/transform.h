@@ -1,5 +1,5 @@
-// Affine transforms of glTF nodes. Uses only + - * / of IEEE doubles, with every association
-// written out, so that all machines get the same bits. docs/scenes.md has the formulas.
+// Affine transforms of glTF nodes. Uses only + - * / of IEEE doubles, in an order fixed by
+// parentheses, so that all machines get the same bits. docs/scenes.md has the formulas.
 #pragma once
 
 #include <array>
@@ -24,7 +24,8 @@ inline Transform multiply(const Transform& outer, const Transform& inner) {
   return product;
 }
 
-// True if the transform reverses the order of a triangle's corners.
+// True if the determinant is negative. The transform then changes clockwise triangles to
+// counter-clockwise ones, and the reverse.
 inline bool mirrors(const Transform& transform) {
   const auto& m = transform.m;
   return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
@@ -40,8 +41,9 @@ inline void apply(const Transform& transform, const double* local, double* world
   }
 }
 
-// Returns T * R * S. The quaternion (x, y, z, w) is used without normalization, like in all other
-// readers of glTF. Quantized quaternions have only nearly unit length.
+// Returns the transform that applies scale `s` first, then rotation `r`, then translation `t`. `r`
+// is a quaternion (x, y, z, w). It is not normalized, like in all other readers of glTF, although
+// quantized quaternions have only nearly unit length.
 inline Transform from_trs(const std::array<double, 3>& t, const std::array<double, 4>& r,
                           const std::array<double, 3>& s) {
   const double x = r[0], y = r[1], z = r[2], w = r[3];
@@ -58,8 +60,8 @@ inline Transform from_trs(const std::array<double, 3>& t, const std::array<doubl
 }
 
 // Converts a column-major 4x4 matrix, as stored in glTF. Returns false if a number is not finite or
-// the last row differs from 0 0 0 1 by more than 2^-10. The tolerance admits inverse bind matrices
-// that were computed in single precision.
+// the last row differs from 0 0 0 1 by more than 2^-10. The tolerance admits matrices that were
+// computed in single precision, such as the inverse bind matrices of skins.
 inline bool from_columns(const double* columns, Transform& out) {
   const auto near = [](double value, double wanted) {
     return value - wanted <= 1.0 / 1024 && wanted - value <= 1.0 / 1024;

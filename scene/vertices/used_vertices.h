@@ -1,5 +1,6 @@
-// Collects the vertices that some triangles use, to find their bounds. Each vertex occurs once if
-// the indices are close together, as in most meshes. Not thread-safe.
+// Collects the vertices that some triangles use, to find the bounds of these triangles. If the
+// vertex indices are close together, as in most meshes, each vertex is collected once. Not
+// thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,17 +14,18 @@ namespace voxdag {
 
 class UsedVertices {
  public:
-  // Finds the vertices of these corners. There must be at least one corner.
+  // Replaces the collected vertices by the vertices with the indices `corners`. There must be at
+  // least one corner.
   void find(std::span<const uint32_t> corners);
   void clear() { vertices_.clear(); }
   bool is_empty() const { return vertices_.empty(); }
 
   // Adds the positions of the vertices to `bounds`. Returns false, with the bounds unchanged, if a
-  // vertex is not finite or not below `count`, the number of vertices.
+  // position is not finite or an index is not below `count`, the number of vertices.
   bool add_to(WorldBounds& bounds, VertexCache& positions, uint64_t count) const;
 
  private:
-  // Maximum range of indices in which duplicates are removed.
+  // Maximum difference of two indices up to which duplicates are removed.
   static constexpr uint32_t kMaxRange = 65536;
 
   std::vector<uint32_t> vertices_;

@@ -1,8 +1,9 @@
 // Random access to the vertex positions of an instance of a primitive, in world space or snapped to
-// a grid, within a fixed amount of memory. Blocks of consecutive vertices are cached, each in the
-// slot given by its number. If all vertices of an instance fit in the cache, they are read once. If
-// they do not fit, they are read about once if the instance's indices are close together. A
-// primitive of up to 262144 vertices is decoded once for all its instances.
+// a grid, within a fixed amount of memory. Blocks of consecutive vertices are cached; block b can
+// only be in slot b modulo the number of slots. If all vertices of an instance fit in the cache,
+// each is read once. Otherwise each is read about once, if the instance's indices are close
+// together. A primitive of up to 262144 vertices is decoded once for all its instances, if the
+// memory suffices.
 #pragma once
 
 #include <bit>
@@ -23,8 +24,8 @@ class VertexCache {
   // The caches of all readers of a scene together take at most 1/kShareOfFree of the free budget.
   static constexpr uint64_t kShareOfFree = 4;
 
-  // Makes one of `caches` caches, with space for `vertices` vertices, or fewer if its part of the
-  // share is smaller.
+  // Makes one of `caches` caches that divide this share equally. It has space for `vertices`
+  // vertices, or for fewer if its part of the share is smaller.
   VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches);
 
   // Clears the cache and changes to `source`, which must outlive its use. place() must be called
@@ -55,7 +56,9 @@ class VertexCache {
   void read(uint64_t block, std::span<double> out);
 
   PageBuffer<double> positions_;  // transformed and snapped
-  // The untransformed blocks of a small source, and flags for the blocks that were read.
+  // The untransformed vertices of a source that fits in untransformed_, so that a vertex is not
+  // read again after place(). is_read_ has a flag for each block, and is empty for a source that
+  // does not fit.
   PageBuffer<double> untransformed_;
   std::vector<bool> is_read_;
   Transform world_;

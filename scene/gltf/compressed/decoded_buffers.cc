@@ -11,7 +11,7 @@
 namespace voxdag::gltf {
 namespace {
 
-// Memory that a decoder may leave in the heap without a trim.
+// If a decoder used more bytes than this, its freed memory is returned to the system.
 constexpr uint64_t kTrimBytes = uint64_t{4} << 20;
 
 std::string name_of(const BufferSource& buffer) {
@@ -104,7 +104,7 @@ void DecodedBuffers::decode(const BufferSource& buffer, uint64_t begin, const Re
   if (charged > kTrimBytes) trim_heap();
 }
 
-// Reserves `bytes` in the file, which the first call creates.
+// Reserves `bytes` in the temporary file, which the first call creates. Returns their offset.
 uint64_t DecodedBuffers::reserve(uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   if (!reader_) open_scratch();

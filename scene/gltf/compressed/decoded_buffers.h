@@ -57,8 +57,8 @@ class DecodedBuffers {
   size_t first_ = 0;  // the document's first buffer that is not stored in the file
   std::deque<Decoded> decoded_;
 
-  // Held shared by all decoding threads; held exclusively to repeat a decoding that did not fit in
-  // memory next to others.
+  // Held shared by all threads that decode. Held exclusively by a thread that decodes a buffer
+  // again, because the buffer did not fit in memory while others decoded.
   std::shared_mutex decoding_;
   std::mutex mutex_;  // guards all members below
   std::unique_ptr<WritableFile> writer_;

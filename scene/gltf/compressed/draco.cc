@@ -29,15 +29,17 @@ namespace voxdag::gltf {
 
 namespace {
 
-// Upper bounds of Draco 1.5's allocations, from its code; measurements give about half. They cover
-// the tables of corners and vertices, a smaller table for each attribute with its own connectivity,
-// and for each vertex of an attribute the value (as integers and final) and two map entries.
+// Upper bounds of Draco 1.5's allocations in bytes, derived from its code. The measured memory is
+// about half. They cover the tables of corners and vertices, a smaller table for each attribute
+// with its own connectivity, and for each vertex of an attribute the value (as integers and final)
+// and two map entries.
 constexpr uint64_t kBytesPerFace = 128;
 constexpr uint64_t kBytesPerFaceOfTable = 64;
 constexpr uint64_t kMapBytesPerValue = 16;
 constexpr uint64_t kBytesPerAttribute = 1024;  // objects of an attribute and its decoder
 
-// Triangles of a strip per Draco face. Degenerate triangles join the pieces of a strip.
+// Maximum number of a strip's declared triangles per Draco face. A strip declares more triangles,
+// because degenerate triangles join its pieces.
 constexpr uint64_t kMaxStripTrianglesPerFace = 8;
 
 constexpr size_t kWriteElements = 16384;
@@ -50,8 +52,8 @@ void charge_more(MemoryCharge& charge, uint64_t bytes) {
                                              "the memory budget leaves");
 }
 
-// A Draco decoder that checks its memory before each step. No exception passes through Draco: the
-// caller of Decode() throws `refusal`.
+// A Draco decoder that checks its memory before each step. No exception passes through Draco: a
+// failed check stores its exception in `refusal`, and the caller of Decode() throws it.
 template <class Decoder>
 class BoundedDecoder : public Decoder {
  public:

@@ -26,7 +26,7 @@ constexpr uint64_t kTypeBytes = 4;  // bytes per attribute: use, number type, co
 
 [[noreturn]] void refuse_damaged() { throw BrokenData{"its Draco data are damaged"}; }
 
-// Reads a copy of Draco's buffer.
+// Reads the data through a copy of Draco's buffer, so that Draco's position does not change.
 class Walker {
  public:
   Walker(const draco::DecoderBuffer& at, const AdmitTable& admit) : buffer_(at), admit_(admit) {}
@@ -69,7 +69,8 @@ class Walker {
     return static_cast<uint64_t>(std::max<int64_t>(buffer_.remaining_size(), 0));
   }
 
-  // Builds a table and skips the symbols that it decodes.
+  // Builds the table of an alphabet, after admit_ has accepted its memory. Moves the position past
+  // the coded symbols, and returns a decoder of these symbols.
   template <int kBits>
   draco::RAnsSymbolDecoder<kBits> open_symbols() {
     draco::DecoderBuffer ahead = buffer_;
@@ -164,8 +165,7 @@ uint64_t count_entries(const Group& group, int first_attribute, draco::MeshDecod
   return count_vertices(*own);
 }
 
-// Skips the parameters of the transform that undoes a prediction. There are two kinds: for wrapped
-// differences, and for points of an octahedron.
+// Skips the parameters of the transform that undoes a prediction: one or two 32-bit numbers.
 void skip_transform(Walker& walker, int transform) {
   walker.skip(transform == draco::PREDICTION_TRANSFORM_NORMAL_OCTAHEDRON ? 4 : 8);
 }

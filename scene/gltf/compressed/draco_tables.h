@@ -17,8 +17,8 @@ class MeshDecoder;
 
 namespace voxdag::gltf {
 
-// Called with the memory of each table before it is built. Throws to refuse the table. Draco has
-// only one table in memory.
+// Called with the memory of each table before it is built. Throws to refuse the table. Draco never
+// has more than one table in memory.
 using AdmitTable = std::function<void(uint64_t bytes)>;
 
 // Checks the table of a sequential mesh's indices. `at` is the start of its connectivity.

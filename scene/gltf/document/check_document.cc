@@ -81,8 +81,9 @@ void choose_scene(Document& d) {
   }
 }
 
-// Indices have 32 bits, so a primitive cannot use more vertices than this. The limit also bounds
-// accessors without bytes (all zeros), which could claim any count.
+// Maximum number of elements of an accessor. Indices have 32 bits, so a primitive cannot use more
+// vertices than this. The limit also bounds accessors without bytes (all zeros), which could claim
+// any count.
 constexpr uint64_t kMaxElements = uint64_t{1} << 32;
 
 // `count` elements of `bytes` bytes each; the first is at `offset` of a view.
@@ -212,7 +213,7 @@ std::vector<int> buffers_of(const Document& d, const Accessor& accessor) {
 
 namespace {
 
-// Checks an accessor of the geometry, unless it is -1, and marks its buffers as read.
+// If `index` is not -1, checks this accessor of the geometry and marks its buffers as read.
 void check_geometry(Document& d, int index, const AccessorUse& use) {
   if (index < 0) return;
   check_accessor(d, index, use);

@@ -11,15 +11,15 @@ namespace voxdag::gltf {
 
 // Checks nodes, scenes, meshes, skins, instancing and accessors. Afterwards the invariants of
 // Document hold, except that buffers may be shorter than declared. Throws Error{kInvalidInput} with
-// the node, mesh and primitive, skin or accessor that violates one.
+// the node, mesh and primitive, skin or accessor that violates an invariant.
 void check_document(Document& document);
 
 // A use of an accessor, which determines the accessor's type.
 struct AccessorUse {
-  std::string where;  // "mesh 0: primitive 2: POSITION"
-  int components;
-  std::vector<int> types;
-  std::vector<int> may_be_normalized = {};
+  std::string where;                        // "mesh 0: primitive 2: POSITION"
+  int components;                           // 3 for VEC3
+  std::vector<int> types;                   // allowed component types
+  std::vector<int> may_be_normalized = {};  // component types that may be normalized
 };
 
 // If `index` is not -1, checks that this accessor exists and has a type that the use allows. Checks

@@ -73,8 +73,8 @@ const Accessor& at(const Document& d, int accessor) {
   return d.accessors[static_cast<size_t>(accessor)];
 }
 
-// Replaces `accessor` by a copy whose elements begin at `offset` of a buffer. Returns the size of
-// the elements in bytes.
+// Adds a copy of accessor `accessor` whose packed elements begin at `offset` of buffer `buffer`,
+// and sets `accessor` to the index of the copy. Returns the bytes of all its elements.
 uint64_t move_accessor(Document& d, int& accessor, int buffer, uint64_t offset) {
   Accessor copy = at(d, accessor);
   if (copy.same_as < 0) copy.same_as = accessor;
@@ -120,7 +120,7 @@ CompressedBytes bytes_of_view(const Document& d, int view, const std::string& wh
   return {v.buffer, v.byte_offset, v.byte_length};
 }
 
-// Checks that the view describes the decoded bytes.
+// Checks that the view's length and stride fit the decoded bytes.
 void check_parent(const Document& d, const BufferView& view, size_t index) {
   const std::string where = "bufferView " + std::to_string(index);
   const MeshoptView& meshopt = *view.meshopt;

@@ -92,8 +92,8 @@ void place_draco_primitive(Document& document, Primitive& primitive, const std::
 // Adds a buffer for the accessors of the primitive's surface, if place_draco_primitive() placed its
 // positions. `set` is the n of the surface's TEXCOORD_n, if it has one.
 void place_draco_surface(Document& document, Primitive& primitive, int set);
-// Checks a buffer made by one of these functions. Throws Error{kInvalidInput}, also if voxdag was
-// built without the needed library.
+// Checks a buffer made by one of the functions above. Throws Error{kInvalidInput} if its compressed
+// bytes do not exist, or if voxdag was built without the library that decodes them.
 void check_compressed(const Document& document, const BufferSource& buffer,
                       const std::string& where);
 

@@ -1,6 +1,7 @@
 // A glTF 2.0 file without its geometry. Arrays that can have an element per node or mesh of a large
-// scene are compact structs, each charged to the memory budget; tinygltf's model holds the rest.
-// read_document() fills a document and check_document() checks it once. After that:
+// scene are compact structs, each charged to the memory budget. Asset, extensions, materials,
+// textures, samplers and images are in tinygltf's model. read_document() fills a document and
+// check_document() checks it once. After that:
 //   1. every index is in range, or -1 if the file gives none;
 //   2. every accessor that is read has the type its use requires. Its bytes are inside its buffer
 //      view, the view is inside its buffer, and the buffer is inside the existing bytes;
@@ -85,7 +86,7 @@ struct Accessor {
   bool normalized = false;
   bool is_sparse = false;
   Sparse sparse;
-  int same_as = -1;  // original accessor if this is a copy
+  int same_as = -1;  // index of the original accessor; -1: this is not a copy
 };
 
 // The accessors JOINTS_n and WEIGHTS_n for one n: four influences per vertex.
@@ -173,15 +174,15 @@ struct Document {
   std::deque<Node> nodes;
   std::deque<std::vector<int>> scenes;                 // root nodes of each scene
   std::shared_ptr<const DocumentMaterials> materials;  // set by resolve_materials()
-  int scene = -1;                                      // the default scene
+  int scene = -1;                                      // the default scene; -1: none
   std::vector<int> roots;             // roots of the scene to draw; set by check_document()
-  std::vector<std::string> warnings;  // only the first few
-  uint64_t further_warnings = 0;
+  std::vector<std::string> warnings;  // only the first 20
+  uint64_t further_warnings = 0;      // number of the others
 
-  // Adds "<path>: <what>" to the warnings.
+  // Adds "<path>: <what>" to the warnings or, if there are many, to their number.
   void warn(const std::string& what);
 
-  // "node 3 \"wheel\"", for messages.
+  // Return a kind, an index and a name for messages: node 3 "wheel".
   std::string name_node(int node) const;
   std::string name_mesh(int mesh) const;
   std::string name_accessor(int accessor) const;

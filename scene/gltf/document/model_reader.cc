@@ -1,4 +1,4 @@
-// Calls tinygltf; no other file does.
+// The only file that calls tinygltf's parser.
 #include "scene/gltf/document/model_reader.h"
 
 #include <algorithm>
@@ -18,12 +18,14 @@ constexpr size_t kMaxReasonBytes = 200;
 
 // Memory of an entry of a std::map, with the allocations of its key and value.
 constexpr uint64_t kBytesPerMember = 112;
-// The text grows by doubling, and the strings in tinygltf's JSON tree are copies of it.
+// Copies of the text in memory during parsing: text_ grows by doubling, and the strings in
+// tinygltf's JSON tree are copies of its parts.
 constexpr uint64_t kTextCopies = 4;
 constexpr uint64_t kTreeBytesPerValue = 128;
 
-// Returns the memory of the values below `value` in tinygltf's model: a Value for each value in an
-// extension, a Parameter for each member of a material.
+// Returns the bytes that `value` and the values in it take in tinygltf's model: a Value for each
+// value in an extension, a Parameter for each member of a material. Adds the number of these values
+// to `values`.
 uint64_t model_bytes(const Json& value, bool is_in_extensions, uint64_t& values) {
   ++values;
   uint64_t bytes = is_in_extensions ? 3 * sizeof(tinygltf::Value) : 3 * sizeof(double);
@@ -39,7 +41,8 @@ uint64_t model_bytes(const Json& value, bool is_in_extensions, uint64_t& values)
   return bytes;
 }
 
-// Returns the memory of an element in the model's arrays. A growing vector needs this memory twice.
+// Returns the bytes of an element in the model's array for `section`. A growing vector needs this
+// memory twice.
 uint64_t element_bytes(std::string_view section) {
   if (section == "materials") return 2 * sizeof(tinygltf::Material);
   if (section == "textures") return 2 * sizeof(tinygltf::Texture);

@@ -58,7 +58,8 @@ void place_bin_chunk(const Container& container, Document& d) {
 // Memory per node of check_document(), which follows the parents of all nodes.
 constexpr uint64_t kCheckBytesPerNode = 2 * sizeof(int);
 
-// Charges the elements of an array of the document and stores them.
+// Returns a function that converts an element by `read`, charges its memory and appends it to
+// `array`.
 template <class T>
 auto store(Document& document, std::deque<T>& array, T (*read)(const JsonElement&)) {
   return [&, read](const JsonElement& element) {
@@ -131,7 +132,7 @@ Document read_document(const ReadableFile& file, MemoryBudget& budget, const Can
   for (const std::string& name : d.model->extensionsUsed)
     if (may_change_geometry(name))
       d.warn("the optional extension " + printable(name) + " is ignored");
-  trim_heap();  // frees small blocks of the parser
+  trim_heap();  // returns the parser's freed blocks to the system
   return d;
 }
 

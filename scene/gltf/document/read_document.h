@@ -1,4 +1,4 @@
-// From the bytes of a scene file to its Document.
+// Makes a Document from the bytes of a scene file.
 #pragma once
 
 #include "core/base/memory_budget.h"

@@ -130,7 +130,8 @@ std::array<double, N> numbers_or(const std::vector<double>& given, std::array<do
   return absent;
 }
 
-// A quaternion far from unit length is not a rotation, and readers interpret it differently.
+// True if the quaternion has nearly unit length. Any other quaternion is not a rotation, and
+// readers of glTF interpret it differently.
 bool is_unit(const std::vector<double>& q) {
   const double norm = ((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3];
   return norm > 0.99 && norm < 1.01;
@@ -170,7 +171,8 @@ Instancing read_instancing(const JsonElement& node) {
 // Returns the characters of a data: URI from `begin`, without JSON escapes.
 std::string unescape(const ReadableFile& file, const RawString& uri, size_t begin,
                      MemoryBudget& budget) {
-  // Copies of the text: the quoted text, and the parser's copies, which grow by doubling.
+  // Number of copies of the text in memory: the quoted text, and the parser's copies, which grow by
+  // doubling.
   constexpr uint64_t kCopies = 6;
   const MemoryCharge charge(budget, kCopies * uri.characters.size,
                             "a data: URI with JSON escapes in " + file.path());

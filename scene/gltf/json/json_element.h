@@ -27,8 +27,8 @@ class JsonElement {
   using Json = nlohmann::json;
   static constexpr int64_t kNoIndex = -1;
 
-  // Element `index` of the root's array `section`, or the section itself. `uri` describes the
-  // member "uri" of this value if it is a string.
+  // Makes element `index` of the root's array `section`, or the section itself if `index` is
+  // kNoIndex. `uri` describes the member "uri" of this value if it is a string.
   JsonElement(const Json& value, std::string_view section, int64_t index, const RawString& uri)
       : value_(value), key_(section), index_(index), uri_(&uri) {}
 
@@ -42,7 +42,7 @@ class JsonElement {
 
   // Returns the member of an object; nullopt if it is absent.
   std::optional<JsonElement> find(const char* key) const;
-  // Returns the member of an object, which must exist.
+  // Returns the member of an object. Throws Violation if it is absent.
   JsonElement at(const char* key) const;
   // Calls `visit` with each element of an array.
   template <class Visit>

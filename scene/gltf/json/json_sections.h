@@ -24,9 +24,9 @@ struct JsonSection {
 
 // Passes the elements of `sections` to their readers in the order of the file. Returns the message
 // of the first Violation in a checked section, or "". Reading continues after a Violation, because
-// a file of another glTF version may violate anything before its version is read. Throws
-// Error{kInvalidInput} for a text that is not JSON, Error{kOutOfMemory} for an element that does
-// not fit the budget.
+// the file's glTF version may come later. If the version is unsupported, the caller reports this
+// instead of the Violation. Throws Error{kInvalidInput} for a text that is not JSON,
+// Error{kOutOfMemory} for an element that does not fit the budget.
 std::string read_sections(const ReadableFile& file, FileRange json,
                           const std::vector<JsonSection>& sections, MemoryBudget& budget,
                           const CancelToken& cancel);

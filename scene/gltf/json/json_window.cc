@@ -9,7 +9,8 @@ namespace voxdag::gltf {
 namespace {
 
 constexpr size_t kWindowBytes = size_t{64} << 10;
-// Enough for every name and every path in a file.
+// Number of characters of a string that always reach the parser: enough for every name and every
+// path.
 constexpr uint64_t kMaxShownCharacters = 4096;
 // The parser stores a string twice (raw and decoded), in buffers that grow by doubling, and passes
 // a copy.
@@ -111,7 +112,8 @@ void JsonWindow::track_in_string(char c) {
   string_.characters.size += in_string_;
 }
 
-// True if the character is withheld. Escapes and multi-byte characters are never withheld partly.
+// True if the parser does not receive the character. Escapes and multi-byte characters always reach
+// the parser, which would refuse a part of one.
 bool JsonWindow::is_withheld(char c) {
   if (!in_string_) return is_second_blank_;
   if (string_.characters.size <= kMaxShownCharacters || in_escape_ || !is_plain(c)) return false;

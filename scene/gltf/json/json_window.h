@@ -6,7 +6,7 @@
 // first few thousand, and records the string's position in the file. The readers of buffers and
 // images later decode the string from there, in windows. If there are several blanks between two
 // values, the parser receives one. A number with more digits than any value needs is refused. The
-// parser's characters are charged to the budget. Not thread-safe.
+// memory for the characters that the parser collects is charged to the budget. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -53,7 +53,7 @@ class JsonWindow : public std::streambuf {
   int hex_digits_left_ = 0;       // remaining digits of an escape \uXXXX
   bool in_escape_ = false;        // the last character is part of an escape
   bool after_blank_ = false;      // the last character outside of strings is blank
-  bool is_second_blank_ = false;  // the character before that one is also blank
+  bool is_second_blank_ = false;  // the last two such characters are blank
   uint64_t word_ = 0;             // characters of the number or literal so far
   // Characters passed to the parser for the current string or number.
   uint64_t collected_ = 0;

@@ -117,7 +117,7 @@ class MaterialResolver {
             {kByte, kUnsignedByte, kShort, kUnsignedShort}};
   }
 
-  // Leaves out an accessor that cannot be read.
+  // If the accessor cannot be read, adds a warning and sets `index` to -1.
   void check(int& index, const AccessorUse& use, uint64_t vertices) {
     try {
       check_accessor(document_, index, use);
@@ -153,7 +153,7 @@ class MaterialResolver {
 
   Document& document_;
   DocumentMaterials result_;
-  std::vector<int> texcoords_;  // TEXCOORD_n of the file's materials
+  std::vector<int> texcoords_;  // for each of the file's materials, the n of its TEXCOORD_n
   std::optional<uint32_t> plain_;
   std::map<uint32_t, uint32_t> without_image_;
   std::string where_;

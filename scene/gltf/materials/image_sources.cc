@@ -25,7 +25,7 @@ void set_external(FileSystem& files, const std::string& scene_path, const std::s
   set_file(*file, {0, file->size()}, out);
 }
 
-// Sets the source to bytes [begin, begin + bytes) of a buffer.
+// Sets the source to the bytes of a buffer view.
 void set_buffer(FileSystem& files, const ReadableFile& scene_file, const Document& d,
                 const BufferView& view, ImageSource& out) {
   const BufferSource& buffer = d.buffers[static_cast<size_t>(view.buffer)];

@@ -72,7 +72,8 @@ Wrap wrap_of(int mode) {
   return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::kMirroredRepeat : Wrap::kRepeat;
 }
 
-// Returns the texture's image or, if it has none, the image of an extension in another file format.
+// Returns the texture's image. If it has none, returns the image that an extension gives in a file
+// format such as WebP, or -1.
 int image_of(const tinygltf::Texture& texture) {
   if (texture.source >= 0) return texture.source;
   for (const char* name :

@@ -1,6 +1,5 @@
 // Reads the material, texture coordinates and colors of a primitive's triangles, within a fixed
-// amount of memory. Blocks of consecutive vertices are cached, each in the slot given by its
-// number, as in VertexCache. Not thread-safe.
+// amount of memory. Blocks of consecutive vertices are cached, as in VertexCache. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -19,16 +18,17 @@ class SurfaceReader {
   // The caches of all readers of a scene together take at most 1/kShareOfFree of the free budget.
   static constexpr uint64_t kShareOfFree = 8;
 
-  // Makes one of `readers` readers, with space for `vertices` vertices, or fewer if its part of the
-  // share is smaller. The document's materials must be resolved. The references must outlive the
-  // reader.
+  // Makes one of `readers` readers that divide this share equally. It has space for `vertices`
+  // vertices, or for fewer if its part of the share is smaller. The document's materials must be
+  // resolved. The references must outlive the reader.
   SurfaceReader(const Document& document, BufferReader& buffers, uint64_t vertices,
                 unsigned readers);
 
   // Changes to another primitive of the document. Throws Error{kInvalidInput} if a buffer of its
   // surface is shorter than declared.
   void bind(const Primitive& primitive);
-  // Sets material and corners of a triangle of this primitive. The triangle's vertices must exist.
+  // Sets the material and corners of `out`, a triangle of this primitive. `vertices` are its three
+  // vertex indices, which must exist.
   void read(const uint32_t* vertices, SurfaceTriangle& out) {
     out.material = material_;
     for (size_t k = 0; k < 3; ++k) out.corners[k] = is_plain_ ? SurfaceCorner{} : at(vertices[k]);

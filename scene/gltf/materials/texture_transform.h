@@ -9,8 +9,8 @@ namespace voxdag::gltf {
 struct SineCosine {
   double sine = 0, cosine = 1;
 };
-// Returns sine and cosine of an angle in radians, to about 2^-50. An angle that is not finite
-// counts as 0.
+// Returns sine and cosine of an angle in radians, with an error of about 2^-50. An angle that is
+// not finite counts as 0.
 SineCosine sine_and_cosine(double angle);
 
 // The rows of a 2x3 matrix.

@@ -14,7 +14,8 @@ namespace {
 // Maximum open files of all readers of a scene together; each reader may have at least one.
 constexpr unsigned kMaxOpenFiles = 32;
 constexpr uint64_t kMapNodeBytes = 48;
-// A window may begin inside a group of three bytes and end inside another.
+// Maximum number of base64 groups, which encode three bytes each, in a window. A window may begin
+// inside one group and end inside another.
 constexpr size_t kMaxGroups = BufferReader::kWindowBytes / 3 + 2;
 
 // Reads base64 characters [begin, begin + out.size()) of a buffer.

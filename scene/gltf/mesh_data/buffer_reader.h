@@ -51,8 +51,8 @@ class BufferReader {
                ExternalFiles& external_files, DecodedBuffers& decoded, MemoryBudget& budget,
                unsigned readers);
 
-  // Checks every buffer that is read. Throws Error{kInvalidInput} if it has fewer bytes than
-  // declared, Error{kNotFound} if an external file does not exist.
+  // Checks the length of every buffer that triangles use. Throws Error{kInvalidInput} if it has
+  // fewer bytes than declared, Error{kNotFound} if an external file does not exist.
   void check_lengths();
 
   // Returns bytes [offset, offset + size) of a buffer, which must contain them; at most
@@ -85,7 +85,8 @@ class BufferReader {
     int buffer;
     std::unique_ptr<ReadableFile> file;
   };
-  // A few external files; the oldest is closed when another one is opened.
+  // Up to max_open_ external files. Before another one is opened, the file that was opened first is
+  // closed.
   std::vector<OpenFile> open_;
 };
 

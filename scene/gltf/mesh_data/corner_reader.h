@@ -1,6 +1,6 @@
 // Reads the triangles of a primitive as three vertex indices each, from triangle lists, strips and
-// fans, indexed or not. Does not correct the winding of strips, because surfaces mark their flipped
-// triangles. Not thread-safe.
+// fans, indexed or not. Does not correct the winding of strips, because SurfaceTriangle::is_flipped
+// marks every second triangle. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,8 @@ class CornerReader {
  public:
   CornerReader(const Document& document, BufferReader& buffers, const Primitive& primitive);
 
-  // Reads the vertex indices of triangles [first, first + count). The vertex indices may be out of
-  // range.
+  // Writes the vertex indices of triangles [first, first + count) to `corners`, three per triangle.
+  // The vertex indices may be out of range.
   void read(uint64_t first, size_t count, uint32_t* corners);
 
  private:

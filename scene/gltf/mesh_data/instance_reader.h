@@ -15,8 +15,8 @@ class InstanceReader {
   InstanceReader(const Document& document, BufferReader& buffers, const Node& node);
 
   uint64_t count() const { return count_; }
-  // Returns T * R * S of an instance, relative to the node. Fast if called in the order of the
-  // instances.
+  // Returns the transform of an instance relative to the node: it scales first, then rotates, then
+  // translates. Fast if called in the order of the instances.
   Transform at(uint64_t instance);
 
  private:

@@ -1,5 +1,6 @@
-// The nodes of the scene that draw a mesh, parents before children, in the order of the file, with
-// their global transforms. Its memory grows with the depth of the hierarchy; it never recurses.
+// Visits the nodes of the scene that draw a mesh, with their global transforms: parents before
+// children, children in the order of the file. The memory of the walk grows with the depth of the
+// hierarchy. It never recurses.
 #pragma once
 
 #include <vector>

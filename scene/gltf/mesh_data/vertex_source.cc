@@ -12,8 +12,8 @@ namespace {
 
 constexpr size_t kInfluencesOfSet = 4;
 
-// Products of transforms from the root to a node. Joints share most of their ancestors, so each
-// node is multiplied once.
+// Computes the global transforms of nodes: the products of all transforms from the root to the
+// node. Stores them, because joints share most of their ancestors.
 class GlobalTransforms {
  public:
   GlobalTransforms(const Document& document, MemoryBudget& budget, const std::string& what)

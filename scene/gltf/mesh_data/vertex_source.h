@@ -3,6 +3,9 @@
 //
 //   morph   p = (p0 + w0 * d0) + w1 * d1 ...   targets of weight 0 are not read
 //   skin    M = (w0 * M0 + w1 * M1) + ...      entry by entry; p' = M p
+//
+// In the first line, p0 is the base position, and w and d are the weights and displacements of the
+// morph targets. In the second line, w and M are the weights and matrices of the vertex's joints.
 #pragma once
 
 #include <optional>
@@ -23,9 +26,9 @@ PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buf
 
 class VertexSource : public PositionSource {
  public:
-  // `weights` are the node's, else the mesh's; `joints` are empty for a node without a skin. All
-  // arguments must outlive the source. Throws Error{kOutOfMemory} if the targets and joint sets do
-  // not fit the budget of `buffers`.
+  // `weights` are the morph weights of the node or, if it has none, of the mesh. `joints` are the
+  // matrices of the node's skin, empty without a skin. All arguments must outlive the source.
+  // Throws Error{kOutOfMemory} if the targets and joint sets do not fit the budget of `buffers`.
   VertexSource(const Document& document, BufferReader& buffers, const Primitive& primitive,
                std::span<const double> weights, std::span<const Transform> joints);
 
