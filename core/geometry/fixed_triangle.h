@@ -11,7 +11,7 @@ namespace voxdag {
 // Lattice units along the edge of a voxel.
 inline constexpr int kUnitBits = 8;
 inline constexpr int64_t kUnitsPerVoxel = int64_t{1} << kUnitBits;
-// Limit of magnitudes, so that the products of the overlap test fit in 128 bits.
+// Limit of the coordinates' magnitudes, so that the products of the overlap test fit in 128 bits.
 inline constexpr int64_t kCoordinateLimit = int64_t{1} << 40;
 
 struct FixedTriangle {

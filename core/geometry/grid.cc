@@ -45,8 +45,9 @@ double largest_extent(const WorldBounds& bounds) {
 // Two numbers per vector register, available on every supported processor.
 using Pair = double __attribute__((vector_size(16)));
 
-// Returns floor(x); beyond 2^51, a whole number near x. Has no branch, because half of all numbers
-// are rounded up.
+// Returns floor(x); beyond 2^51, a whole number near x. Rounds to the nearest integer, and
+// subtracts 1 if this has rounded up. Has no branch, because half of all numbers are rounded up,
+// which the CPU cannot predict.
 Pair floor_of(Pair x) {
   constexpr Pair kNoFraction = {0x1.8p52, 0x1.8p52};
   const Pair nearest = (x + kNoFraction) - kNoFraction;

@@ -1,10 +1,12 @@
 // The voxel grid in world space and how world positions are snapped to its fixed-point lattice.
 //
 // All values are computed in IEEE doubles with only + - * /, and compiled without fused
-// multiply-add, so that every machine snaps to the same positions:
+// multiply-add, so that every machine snaps to the same positions. For a scene with the bounds lo
+// and hi, the default cube is
 //     edge   = max(hi - lo) * (1 + 2^-15)        origin = 0.5 * (lo + hi) - 0.5 * edge
+// It does not depend on R, the number of voxels along its edge. A world coordinate w is x voxels
+// from the origin and is snapped to the lattice coordinate u:
 //     x      = ((w - origin) / edge) * R         u      = 2 * floor(128 * x) + 1
-// The default cube does not depend on R.
 #pragma once
 
 #include <array>
@@ -47,10 +49,12 @@ struct Grid {
   // edge 1. Throws Error{kInvalidInput} for levels outside [2, 20], Error{kLimit} if the grid is
   // not finite.
   static Grid around(const WorldBounds& bounds, uint32_t levels);
-  // Returns the cube with this low corner and this edge, finite and > 0.
+  // Returns the grid with the low corner `origin` and the edge `edge`. Throws Error{kInvalidInput}
+  // unless all these numbers are finite, the edge is > 0 and the levels are in [2, 20].
   static Grid given(const std::array<double, 3>& origin, double edge, uint32_t levels);
-  // Returns a cube with voxels of edge `voxel_size`, centered on the scene. Throws
-  // Error{kInvalidInput} if the scene does not fit.
+  // Returns the grid whose voxels have the edge `voxel_size` and whose center is the scene's
+  // center. Throws Error{kInvalidInput} if the scene does not fit in this grid, or if the size or
+  // the levels are invalid, and Error{kLimit} if the grid is not finite.
   static Grid with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels);
 };
 

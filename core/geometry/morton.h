@@ -1,5 +1,6 @@
-// Morton codes: the bits of x, y and z interleaved, x highest. The order of sorted codes is the
-// order of a walk over the octree in child order (child index = 4x + 2y + z).
+// Morton codes: the bits of x, y and z interleaved. In each group of three bits, x is the highest.
+// The order of sorted codes is the order of a walk over the octree in child order (child index =
+// 4x + 2y + z).
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,7 @@ VOXDAG_HD inline uint64_t spread_bits3(uint64_t x) {
   return x;
 }
 
-// The inverse of spread_bits3. Ignores other bits.
+// The inverse of spread_bits3(): moves bit 3i to bit i. Ignores all other bits.
 VOXDAG_HD inline uint32_t gather_bits3(uint64_t x) {
   x &= 0x1249249249249249ull;
   x = (x | x >> 2) & 0x10c30c30c30c30c3ull;

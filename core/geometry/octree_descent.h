@@ -22,11 +22,11 @@ inline bool contains(const Cube& outer, const Cube& inner) {
   return inner.level >= outer.level && ancestor(inner, outer.level) == outer;
 }
 
-// The interior of a cube. Neighbors in a scene are usually in the same cube, so the last cube is
-// tested before descending the octree.
+// The interior of a cube. Consecutive triangles of a scene are usually in the same cube, so callers
+// test the last triangle's cube before they descend the octree.
 class CubeInside {
  public:
-  // An empty interior.
+  // Creates an empty interior, which contains no triangle.
   CubeInside() = default;
   CubeInside(const Cube& cube, uint32_t grid_levels)
       : shift_(kUnitBits + static_cast<int>(grid_levels - cube.level)) {
@@ -82,7 +82,7 @@ inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube
   uint32_t mask = 0xff;
   bool inside = true;
   int64_t low[3];
-  static constexpr uint32_t kLowHalf[3] = {0x0f, 0x33, 0x55};  // children with bit 0 on the axis
+  static constexpr uint32_t kLowHalf[3] = {0x0f, 0x33, 0x55};  // children at 0 along each axis
   for (int a = 0; a < 3; ++a) {
     low[a] = static_cast<int64_t>(cube.position[a]) * parent_units;
     const int64_t middle = low[a] + half;
@@ -92,8 +92,8 @@ inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube
     inside &= first >= low[a] && last <= low[a] + parent_units;
   }
   if ((mask & (mask - 1)) == 0) return mask;  // the triangle's box is inside one child
-  // A triangle inside the cube whose box crosses exactly one of the middle planes also crosses this
-  // plane.
+  // The triangle is inside the cube, and its box crosses exactly one of the cube's three middle
+  // planes. So the triangle crosses this plane and touches both children.
   if (inside && popcount64(mask) == 2) return mask;
   uint32_t touched = 0;
   for (uint32_t rest = mask; rest; rest &= rest - 1) {

@@ -27,7 +27,7 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
     normal[a] = static_cast<Int>(e[0][b]) * e[1][c] - static_cast<Int>(e[0][c]) * e[1][b];
   }
 
-  // Plane: n.(p - v0) changes sign, or vanishes, over the cube's corners.
+  // Plane: n.(p - v0) changes sign over the cube's corners p, or is 0 at one of them.
   Int lowest = 0, highest = 0;
   for (int a = 0; a < 3; ++a) {
     const Int near = normal[a] * (low[a] - t.v[0][a]);
@@ -37,8 +37,8 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
   }
   if (lowest > 0 || highest < 0) return false;
 
-  // Edges in the projection along axis c onto (a, b): the triangle's inside is where all three edge
-  // functions are >= 0, once oriented by the sign of the normal (a sign of 0 counts as +).
+  // Edges in the projection along axis c onto (a, b). The edge functions are multiplied by the sign
+  // of the normal (+ for 0), so that all three are >= 0 inside the triangle.
   for (int c = 0; c < 3; ++c) {
     const int a = (c + 1) % 3, b = (c + 2) % 3;
     const int64_t sign = normal[c] < 0 ? -1 : 1;
