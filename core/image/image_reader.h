@@ -19,11 +19,13 @@ namespace voxdag {
 class EncodedBytes {
  public:
   virtual ~EncodedBytes() = default;
-  // Fills `out` and returns its size, or less at the end of the bytes.
+  // Fills the front of `out`. Returns the number of bytes read, which is less than out.size() only
+  // at the end.
   virtual size_t read(std::span<std::byte> out) = 0;
 };
 
-// The message completes "<image> ...", for example "is a WebP image, expected PNG or JPEG".
+// Thrown for an image that cannot be decoded. The message completes "<image> ...", for example "is
+// a WebP image, expected PNG or JPEG".
 struct BrokenImage {
   std::string message;
 };
@@ -41,22 +43,24 @@ class ImageReader {
   uint32_t height() const { return height_; }
   // Bits of a channel, 8 or 16.
   int bits() const { return bits_; }
-  // Reads the next row: red, green, blue, alpha of each pixel, bits() each, in the machine's byte
-  // order. Throws BrokenImage and the source's errors.
+  // Reads the next row: red, green, blue and alpha of each pixel, bits() bits each, in the
+  // machine's byte order. `row` has exactly the size of a row. Throws BrokenImage and the source's
+  // errors.
   virtual void read_row(std::span<std::byte> row) = 0;
 
  protected:
+  // Sets width_ and height_. Throws BrokenImage if they are 0 or exceed the limits.
   void check_size(uint64_t width, uint64_t height);
 
   uint32_t width_ = 0, height_ = 0;
   int bits_ = 8;
 };
 
-// With kSize no rows can be read, and no memory is allocated for them.
+// With kSize, only the image's size can be read. No memory for rows is allocated.
 enum class ImageUse { kPixels, kSize };
 
-// The source must outlive the reader. Throws BrokenImage, Error{kOutOfMemory} if decoding does not
-// fit the budget, and the source's errors.
+// Opens an image and reads its header. The source must outlive the reader. Throws BrokenImage,
+// Error{kOutOfMemory} if decoding does not fit the budget, and the source's errors.
 std::unique_ptr<ImageReader> open_image(EncodedBytes& source, MemoryBudget& budget,
                                         ImageUse use = ImageUse::kPixels);
 

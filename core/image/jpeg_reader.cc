@@ -1,5 +1,5 @@
-// Calls libjpeg-turbo; no other file does. Its errors are jumps, so functions that call it must
-// have nothing to destroy.
+// The only file that calls libjpeg-turbo. The library reports errors by longjmp() to this file,
+// which skips destructors. So functions that call the library must have no objects to destroy.
 #include <cstdio>
 // <jpeglib.h> needs FILE.
 #include <jerror.h>
@@ -16,8 +16,8 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kJpegStateBytes = uint64_t{1} << 20;
-// Limits the work for small files, because a file needs only a few bytes to repeat the scan of a
-// large image.
+// Max scans of an image. A file needs only a few bytes to repeat the scan of a large image, so
+// without this limit a small file could cause much work.
 constexpr int kMaxScans = 500;
 
 class JpegReader : public ImageReader {
@@ -41,9 +41,9 @@ class JpegReader : public ImageReader {
       if (space != JCS_GRAYSCALE && space != JCS_YCbCr && space != JCS_RGB)
         throw BrokenImage{
             "is a JPEG image that is neither gray nor YCbCr nor RGB (for example CMYK)"};
-      // Refuses images that not every version and build of the library decodes. In the first scan
-      // of a lossless image, Ss is its predictor. In other images the first scan has the mean of
-      // each block, so Ss is 0.
+      // Refuses images that not every version and build of the library decodes. Ss (in the header
+      // of the first scan) is the predictor of a lossless image. In all other images, the first
+      // scan has the mean of each block, so Ss is 0.
       if (jpeg_.arith_code || jpeg_.data_precision != 8 || jpeg_.Ss != 0)
         throw BrokenImage{
             "is a JPEG image that is lossless, has arithmetic coding, or does not have 8 bits"};
@@ -72,7 +72,8 @@ class JpegReader : public ImageReader {
     (*jpeg->err->format_message)(jpeg, self(jpeg).message_);
     std::longjmp(self(jpeg).jump_, 1);
   }
-  // All warnings are about damaged data, except for some harmless ones.
+  // Treats warnings (level < 0) as errors, because they report damaged data. Ignores three harmless
+  // warnings.
   static void on_message(j_common_ptr jpeg, int level) {
     const int code = jpeg->err->msg_code;
     if (level >= 0 || code == JWRN_EXTRANEOUS_DATA || code == JWRN_ADOBE_XFORM ||
@@ -88,7 +89,8 @@ class JpegReader : public ImageReader {
   static boolean fill(j_decompress_ptr jpeg) {
     JpegReader& reader = self(reinterpret_cast<j_common_ptr>(jpeg));
     size_t size = reader.source_->read(reader.buffer_, sizeof reader.buffer_);
-    // Acts as if the end were marked; if more is missing, the image is reported as damaged.
+    // At the end of the bytes, supplies an end marker, which some files lack. If other data is also
+    // missing, the library reports the image as damaged.
     if (size == 0) {
       reader.has_ended_ = true;
       reader.buffer_[0] = std::byte{0xff};
@@ -119,8 +121,8 @@ class JpegReader : public ImageReader {
     jpeg_read_header(&jpeg_, TRUE);
     return true;
   }
-  // Charges the decoder's allocations: rows of blocks before and after upsampling and, if there are
-  // several scans, the coefficients of the complete image.
+  // Charges the memory that the decoder allocates: rows of blocks before and after upsampling and,
+  // if there are several scans, the coefficients of the complete image.
   void charge_decoder(MemoryBudget& budget) {
     uint64_t bytes = kJpegStateBytes, coefficients = 0;
     for (int i = 0; i < jpeg_.num_components; ++i) {

@@ -1,4 +1,5 @@
-// Reads with libpng. Its errors are jumps, so functions that call it must have nothing to destroy.
+// Reads PNG images with libpng. The library reports errors by longjmp() to this file, which skips
+// destructors. So functions that call the library must have no objects to destroy.
 #include <png.h>
 
 #include <bit>
@@ -15,7 +16,7 @@
 namespace voxdag {
 namespace {
 
-// libpng's allocations: zlib's window and states, and buffers.
+// Memory that libpng allocates: zlib's window and states, and buffers.
 constexpr uint64_t kPngStateBytes = uint64_t{1} << 20;
 
 class PngReader : public ImageReader {
@@ -36,7 +37,8 @@ class PngReader : public ImageReader {
       bits_ = png_get_bit_depth(png_, info_);
       const uint64_t row = png_get_rowbytes(png_, info_);
       if (row != uint64_t{4} * width_ * static_cast<uint64_t>(bits_) / 8)
-        throw BrokenImage{"has rows of an unexpected format"};
+        throw BrokenImage{"has decoded rows of " + std::to_string(row) + " bytes, expected " +
+                          std::to_string(uint64_t{4} * width_ * static_cast<uint64_t>(bits_) / 8)};
       row_charge_ = MemoryCharge(budget, 4 * row, "rows of a PNG image");
       if (is_interlaced_ && use == ImageUse::kPixels) read_all(row, budget);
     } catch (...) {
@@ -52,7 +54,7 @@ class PngReader : public ImageReader {
     else if (!read_one(row.data()))
       fail();
     ++next_row_;
-    // Checks the checksum after the last row.
+    // After the last row, reads to the end of the file, so that libpng verifies the checksums.
     if (next_row_ == height_ && !read_end()) fail();
   }
 
@@ -78,7 +80,7 @@ class PngReader : public ImageReader {
   bool read_header() {
     if (setjmp(png_jmpbuf(png_))) return false;
     png_set_read_fn(png_, this, on_read);
-    png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);  // this reader checks them
+    png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);  // check_size() has the limits
     // Skips texts, profiles and similar chunks of any size.
     png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_set_chunk_malloc_max(png_, 0);
@@ -107,7 +109,10 @@ class PngReader : public ImageReader {
     return true;
   }
   void read_all(uint64_t row, MemoryBudget& budget) {
-    if (row * height_ > kMaxDecoderBytes) throw BrokenImage{"is interlaced and too large"};
+    if (row * height_ > kMaxDecoderBytes)
+      throw BrokenImage{"is an interlaced PNG image that takes " +
+                        std::to_string((row * height_) >> 20) +
+                        " MiB to decode, the limit is 2048"};
     all_ = PageBuffer<std::byte>(budget, static_cast<size_t>(row * height_),
                                  "an interlaced PNG image");
     for (int pass = 0; pass < passes_; ++pass)

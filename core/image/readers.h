@@ -10,8 +10,9 @@
 
 namespace voxdag {
 
-// A source whose first bytes were inspected. The source stores exceptions instead of throwing them,
-// because they must not pass through a decoder written in C.
+// A source of bytes. head() returns its first bytes, up to 16, which read() also returns. read()
+// stores an exception of the source instead of throwing it, because exceptions must not pass
+// through a decoder written in C. It then returns fewer bytes, and rethrow() throws the exception.
 class PeekedSource {
  public:
   explicit PeekedSource(EncodedBytes& source) : source_(source) {
