@@ -8,7 +8,7 @@ namespace voxdag {
 namespace cuda {
 namespace {
 
-constexpr int kMinMajor = 8;  // compute capability of the oldest code in this build
+constexpr int kMinMajor = 8;  // min compute capability (major number) that this build has code for
 
 // Returns the runtime's numbers of the devices that can run this build. If there are no such
 // devices, sets `problem` to the reason.

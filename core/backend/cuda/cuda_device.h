@@ -25,14 +25,15 @@ class CudaDevice {
   // Throws Error{kDevice} with the reason if there is no such device.
   explicit CudaDevice(int device);
 
-  // Makes this the thread's current device.
+  // Returns the space of one build, and makes this device the thread's current CUDA device.
   CudaSpace open(const SubvolumeTask& task, MemoryBudget& budget, const CancelToken& cancel);
 
   cudaStream_t stream() const { return stream_.get(); }
   // A pinned word that single values are copied to.
   void* mailbox() { return mailbox_.get(); }
 
-  // Returns a pinned area. Waits until the last copy from this area is complete.
+  // Returns a pinned staging area of kStagingTriangles triangles. Waits until the last copy from
+  // this area is complete. For `where`, see check_call().
   std::span<FixedTriangle> free_staging(const std::string& where);
   // Copies the first `count` triangles of the area that free_staging() returned most recently, in
   // stream order.

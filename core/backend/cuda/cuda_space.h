@@ -104,8 +104,9 @@ class CudaSpace {
     if (n == 0) return;
     check(cudaMemcpyAsync(to, from, n * sizeof(T), kind, stream()), "cudaMemcpyAsync");
   }
-  // CUB's two phases: call(nullptr, bytes) returns the size of the temporary storage, call(storage,
-  // bytes) does the work. The storage is retained for the next call.
+  // Runs the two phases of a function of CUB: call(nullptr, bytes) sets `bytes` to the size of the
+  // temporary storage, and call(storage, bytes) does the work. The storage is retained for the next
+  // call.
   template <class Call>
   void with_storage(const char* name, Call call) {
     cancel_.check();

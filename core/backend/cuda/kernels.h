@@ -14,7 +14,7 @@
 namespace voxdag::cuda {
 
 inline constexpr unsigned kThreadsPerBlock = 256;
-// Shared memory that every device has without a special request.
+// Bytes of shared memory that a thread block can use on every device without a special request.
 inline constexpr size_t kMaxSharedBytes = size_t{48} << 10;
 
 template <class F>
@@ -39,7 +39,7 @@ __global__ void __launch_bounds__(Kernel::kThreads, Kernel::kMinResidentBlocks)
   }
 }
 
-// Computes output i of an expansion. Finds its source by bisection.
+// Computes output i of CudaSpace::expand(). Finds the output's source by bisection.
 template <class F>
 struct ExpandOne {
   const uint32_t* offsets;

@@ -21,7 +21,8 @@ struct Popcount {
 }  // namespace
 
 void CudaSpace::scan(uint32_t* counts, uint32_t n) {
-  // CUB also reads counts[n]. The sum that it writes there does not include this value.
+  // CUB also reads counts[n], so it must be initialized. The total that CUB writes there does not
+  // include this value.
   check(cudaMemsetAsync(counts + n, 0, sizeof(uint32_t), stream()), "cudaMemsetAsync");
   with_storage("cub::DeviceScan::ExclusiveSum", [&](void* storage, size_t& bytes) {
     return cub::DeviceScan::ExclusiveSum(storage, bytes, counts, counts, n + 1, stream());

@@ -1,9 +1,10 @@
-// A Backend over any space, which runs the parallel pipeline:
+// A Backend that runs the parallel pipeline on any space (space.h):
 //
 //     triangles -> bricks (tiles.h, or the reference voxel_list.h) -> octree -> DAG (by hashes or
 //     by pointers) -> level arrays on the host -> sink
 //
-// `Device` outlives the builds; device.open(task, budget, cancel) opens a space for one build.
+// The backend owns a `Device` for all its builds. device.open(task, budget, cancel) returns the
+// space of one build.
 #pragma once
 
 #include <optional>
@@ -31,7 +32,8 @@ BrickList<Space> voxelize(Space& space, Method method, const SubvolumeTask& task
       voxelize_by_tiles(space, task, triangles, bricks);
       return bricks;
     } catch (const OutOfBudget&) {
-      // A larger cube can be split, but the smallest must fit for any number of triangles.
+      // A larger cube can be split. The smallest cube must fit for any number of triangles, so it
+      // is voxelized by list below.
       if (cube_levels > kTileLevels) throw;
     }
   }

@@ -6,11 +6,11 @@
 //
 // A verification sweep makes the result exact. On every level it compares every octree node,
 // removed or not, with the remaining node of the same hash. It compares the masks of bricks, and
-// the child masks and lists of child hashes of the nodes above the bricks. If all agree on all
-// levels, nodes with equal hashes have equal subtrees. This follows by induction from the bricks:
-// the children of the two nodes have equal hashes, so the children are equal. Then all hashes of a
-// level are different, and their order is the total order. After any mismatch, the DAG is made by
-// pointers instead.
+// the child masks and lists of child hashes of the nodes above the bricks. If all compared nodes
+// agree, octree nodes with equal hashes have equal subtrees. This follows by induction from the
+// bricks: the children of two such nodes have equal hashes, so the children have equal subtrees.
+// Then the remaining nodes of a level have different hashes, and the order of the hashes is the
+// total order. After any mismatch, the DAG is made by pointers instead.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct HashOctreeNode {
   }
 };
 
-// Lists the octree nodes that are children of the survivors above, with their hashes.
+// Lists the candidates of a level, with their hashes: the octree nodes whose parents survive.
 struct EmitCandidates {
   OctreeNodes nodes;
   const uint32_t* parents;  // octree nodes
@@ -49,10 +49,11 @@ struct EmitCandidates {
   }
 };
 
-// original index (item) -> sorted index (i) -> compact index (marked[i + 1] - 1): survivors are
-// copied, and the entries of all candidates in their parents' child lists are rewired.
+// Copies the survivors among the candidates, and sets the entry of each candidate in its parent's
+// child list to the position of its survivor. The candidate at sorted index i has the original
+// index items[i] and the compact index marked[i + 1] - 1, which is its survivor's position.
 struct RemoveDuplicates {
-  const uint32_t* marked;
+  const uint32_t* marked;  // prefix sums of the marks of MarkFirstOfEquals
   const uint32_t* items;
   const uint32_t* candidates;
   const uint64_t* candidate_hashes;

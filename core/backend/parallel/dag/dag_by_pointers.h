@@ -5,8 +5,9 @@
 //
 //     original index -> sorted index -> compact index
 //
-// This is exact without hashes. A child pointer here is a position in the total order of the level
-// below. So nodes that are sorted by child pointers, and then stably by hash, are in total order.
+// This is exact without hashes. A child pointer is a position in the total order of the level
+// below. So nodes that are sorted by child pointers, then stably by mask, and then stably by hash
+// are in the total order.
 #pragma once
 
 #include <algorithm>
@@ -26,13 +27,13 @@ struct Reduced {
   uint32_t count = 0;
   SpaceArray<Space, uint32_t> survivors;  // octree nodes, in the total order
   SpaceArray<Space, uint64_t> hashes;     // hashes of the survivors
-  SpaceArray<Space, uint32_t> index_of;   // position of the survivor of each octree node
+  SpaceArray<Space, uint32_t> index_of;   // by octree node: position of its survivor
 };
 
 // The nodes of a level, as lists of their children in the level below, which is already reduced.
 struct LinkedNodes {
   OctreeNodes nodes;
-  const uint32_t* index_of;  // by octree node below: position of its survivor
+  const uint32_t* index_of;  // by octree node of the level below: position of its survivor
 
   VOXDAG_HD uint32_t child(uint32_t node, uint32_t rank) const {
     return index_of[nodes.first_child[node] + rank];
@@ -75,9 +76,10 @@ struct SameNode {
   }
 };
 
-// With scanned marks, sorted position i belongs to group marked[i + 1] - 1.
+// Copies the first item of each group of equal items. The item at sorted position i is in group
+// marked[i + 1] - 1.
 struct TakeFirstOfEquals {
-  const uint32_t* marked;
+  const uint32_t* marked;  // prefix sums of the marks of MarkFirstOfEquals
   const uint32_t* items;
   uint32_t* firsts;
   VOXDAG_HD void operator()(uint32_t i) const {
@@ -85,6 +87,7 @@ struct TakeFirstOfEquals {
   }
 };
 
+// Sets the survivor's position of each item to the place of the item's group.
 struct RewireThroughGroups {
   const uint32_t* marked;
   const uint32_t* items;
@@ -130,8 +133,9 @@ struct EmitChildren {
   }
 };
 
-// `order` is ascending in the total order without the hash, so equal items are neighbors. `hash`
-// makes a functor that hashes survivors: hash(survivors, hashes).
+// Removes duplicates from a level. `order` has the level's octree nodes in the total order but for
+// the hash, so equal nodes are neighbors. hash(survivors, hashes) returns a functor that sets
+// hashes[i] to the hash of octree node survivors[i].
 template <class Space, class Same, class MakeHash>
 Reduced<Space> reduce_sorted(Space& space, const Order<Space>& order, Same same, uint32_t hash_bits,
                              MakeHash hash) {
@@ -168,7 +172,7 @@ Reduced<Space> reduce_bricks(Space& space, const Octree<Space>& tree, uint32_t h
                        });
 }
 
-// `child_hashes`: the hashes of the `child_count` nodes of the level below.
+// `child_hashes`: the hashes of the `child_count` survivors of the level below.
 template <class Space>
 Reduced<Space> reduce_nodes(Space& space, uint32_t node_count, const LinkedNodes& links,
                             const uint64_t* child_hashes, uint32_t child_count,

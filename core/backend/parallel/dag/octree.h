@@ -45,7 +45,7 @@ struct Octree {
 // Computes the child mask and code of the node whose children begin at first_child[i].
 struct MakeParent {
   const uint64_t* codes;
-  uint32_t child_count, parent_count;  // numbers of nodes of the complete levels
+  uint32_t child_count, parent_count;  // numbers of nodes in the level below and in this level
   const uint32_t* first_child;
   uint8_t* masks;
   uint64_t* parent_codes;
@@ -59,8 +59,8 @@ struct MakeParent {
   }
 };
 
-// Creates `level_count` levels above the bricks. `bricks` must be merged and not empty; this
-// function consumes them.
+// Creates `level_count` levels above the bricks. `bricks` must be merged and not empty; its arrays
+// are moved out.
 template <class Space>
 Octree<Space> make_octree(Space& space, BrickList<Space>& bricks, uint32_t level_count) {
   Octree<Space> tree;

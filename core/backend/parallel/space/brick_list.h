@@ -1,4 +1,5 @@
-// The bricks of a subvolume: Morton codes within it and voxel masks, collected in parts.
+// The bricks of a subvolume, collected in parts. A brick is stored as its Morton code within the
+// subvolume and its voxel mask.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +11,8 @@
 
 namespace voxdag::parallel {
 
-// Flags the first code in each larger cube. Codes are sorted; the codes of a cube have equal bits
-// from bit `shift`.
+// Flags the first code in each larger cube. Codes are sorted. The codes in one larger cube have
+// equal bits from bit `shift` up.
 struct MarkFirstOfCube {
   const uint64_t* codes;
   int shift;
@@ -31,9 +32,9 @@ class BrickList {
   uint64_t* codes() { return codes_.data(); }
   uint64_t* masks() { return masks_.data(); }
 
-  // Reserves `count` places after the last brick and returns the position of the first; commit()
-  // adds the bricks written there. If there is no space, merges duplicate bricks. If this frees too
-  // little, the list grows.
+  // Reserves `count` places after the last brick and returns the position of the first place;
+  // commit() adds the bricks written there. If the arrays are full, merges duplicate bricks. If
+  // this frees too little, the list grows.
   uint32_t reserve(uint32_t count) {
     if (size_ + uint64_t{count} <= codes_.size()) return size_;
     merge();
@@ -41,6 +42,8 @@ class BrickList {
     if (needed > codes_.size() / 4 * 3) grow(std::max(2 * needed, kMinSize));
     return size_;
   }
+  // `sorted`: the added bricks have ascending codes without duplicates, all above the codes of
+  // earlier bricks.
   void commit(uint32_t count, bool sorted) {
     sorted_ = sorted_ && sorted;
     size_ += count;

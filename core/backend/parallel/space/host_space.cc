@@ -86,7 +86,8 @@ uint64_t HostSpace::count_bits(const uint64_t* masks, uint32_t n) {
   return std::accumulate(sums.begin(), sums.end(), uint64_t{0});
 }
 
-// Least significant digit first, 8 bits per pass; each part scatters to its own positions.
+// Sorts by digits of 8 bits, the least significant digit first. In each pass, every part of the
+// keys writes to separate positions, so the parts can run concurrently.
 template <bool kWithValues>
 void HostSpace::radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch,
                            Array<uint32_t>* values, Array<uint32_t>* value_scratch, uint32_t n,

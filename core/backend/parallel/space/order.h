@@ -30,7 +30,7 @@ struct Gather {
   VOXDAG_HD void operator()(uint32_t i) const { to[i] = from[items[i]]; }
 };
 
-// Returns the elements items[0, count) of `from`.
+// Returns an array of the elements from[items[i]] for i < count.
 template <class T, class Space>
 SpaceArray<Space, T> gather(Space& space, uint32_t count, const uint32_t* items, const T* from) {
   SpaceArray<Space, T> out(space, count);
@@ -55,7 +55,8 @@ class Order {
   uint32_t count() const { return count_; }
   const uint32_t* items() const { return items_.data(); }
 
-  // Sorts stably by some bits of key(item), a host+device functor.
+  // Sorts the items stably by a range of the bits of key(item). Both host and device can call the
+  // functor `key`.
   template <class Key>
   void sort_by(Key key, BitRange bits) {
     SpaceArray<Space, uint64_t> key_scratch(space_, count_);

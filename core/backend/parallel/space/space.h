@@ -27,9 +27,9 @@
 //   available()                         estimates the bytes that can be allocated now
 //   allocate, release, budget           memory; use SpaceArray instead
 //
-// Calls take effect in their order. kWindow items, or kMaxTiles tiles, are enough to occupy a
-// space. kOnHost is true if the space uses host memory. A space belongs to one build and one
-// thread. Any call throws when the build is canceled.
+// Calls take effect in their order. kWindow items, or kMaxTiles tiles, are enough to keep all
+// threads of a space busy. kOnHost is true if the space uses host memory. A space belongs to one
+// build and one thread. Any call throws when the build is canceled.
 #pragma once
 
 #include <cstddef>
@@ -46,7 +46,7 @@ struct BitRange {
   int end = 64;
 };
 
-// Elements of one array: positions are 32-bit.
+// Max elements of one array, because positions in arrays have 32 bits.
 inline constexpr uint64_t kMaxElements = uint64_t{1} << 31;
 
 // An uninitialized array in a space, charged to the build's budget. Throws OutOfBudget.
@@ -78,7 +78,7 @@ class SpaceArray {
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
   }
-  // Makes the size `size` and preserves the first `used` elements.
+  // Changes the size to `size`. Preserves the first `used` elements; all others are uninitialized.
   void grow(Space& space, uint64_t size, uint64_t used) {
     SpaceArray larger(space, size);
     space.copy(data_, larger.data_, used);

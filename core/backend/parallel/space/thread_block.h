@@ -3,7 +3,8 @@
 // A kernel K has
 //   K::kThreads                  number of threads of a block
 //   K::kPhases                   number of phases; between phases the threads wait for each other
-//   K::kMinResidentBlocks        thread blocks that a multiprocessor should have registers for
+//   K::kMinResidentBlocks        number of thread blocks whose registers must fit in one
+//                                multiprocessor of a GPU at the same time
 //   K::Shared                    the thread block's memory: plain data, uninitialized
 //   operator()(phase, block, thread, Shared&)
 //

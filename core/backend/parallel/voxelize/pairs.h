@@ -1,9 +1,10 @@
 // Voxelization by work expansion (Sintorn, "DAG Construction", 2018). Level by level, every
-// (triangle, cube) pair is replaced by pairs of the triangle and each child of the cube that it
-// touches: count the children, scan the counts, emit the pairs.
+// (triangle, cube) pair is replaced by pairs of the triangle and the cube's children that the
+// triangle touches. There are three steps: count the children, scan the counts, emit the pairs.
 //
-// Each level has a frame of fixed size. A full frame is expanded depth first, in slices whose pairs
-// fit the next frame, so that memory is bounded for any triangles.
+// Each level has a frame, which is a buffer for a fixed number of pairs. The pairs of a frame are
+// expanded in slices whose new pairs fit in the next frame. The new pairs are expanded completely
+// before the next slice (depth first). So memory is bounded for any number of triangles.
 #pragma once
 
 #include <algorithm>
@@ -31,8 +32,8 @@ VOXDAG_HD inline int select_bit(uint64_t mask, uint32_t rank) {
   return at;
 }
 
-// Positions of cubes in a subvolume. A cube has an edge of 2^shift units. Its low corner is the
-// subvolume's origin plus its decoded code times 2^shift.
+// Positions of cubes in a subvolume. A cube has an edge of 2^shift lattice units. Its low corner is
+// the subvolume's origin plus its decoded Morton code times 2^shift.
 struct CubePlace {
   int64_t origin[3];
 
@@ -47,12 +48,12 @@ struct CubePlace {
   }
 };
 
-// The count step: finds the parts of each pair's cube that the pair's triangle touches. N = 2:
-// children, 4: a brick's voxels.
+// The count step: finds the parts of each pair's cube that the pair's triangle touches. The parts
+// are the cube's children (N = 2) or, if the cube is a brick, its voxels (N = 4).
 template <int N>
 struct CountParts {
   CubePlace place;
-  int shift;  // of a part
+  int shift;  // log2 of a part's edge in lattice units
   const FixedTriangle* triangles;
   const uint64_t* codes;
   const uint32_t* pair_triangles;
@@ -66,7 +67,8 @@ struct CountParts {
   }
 };
 
-// The emit step: one new pair for each part. `out_triangles` is null if only codes are needed.
+// The emit step: makes a new pair for each part that CountParts found. `out_triangles` is null if
+// only codes are needed.
 struct EmitParts {
   int code_bits;  // 3 for children, 6 for voxels of a brick
   const uint64_t* codes;
@@ -119,9 +121,9 @@ struct PairSpan {
 template <class Space>
 class PairExpansion {
  public:
-  // Pairs descend `depths` levels from the subvolume. If `to_voxels` is set, this is the level of
-  // bricks, and one more step turns the pairs into voxels. `window`: capacity of a frame in pairs,
-  // at least 64.
+  // Pairs descend `depths` levels from the subvolume. If `to_voxels` is set, the last of these
+  // levels is the level of bricks, and one more step turns its pairs into voxels. `window`:
+  // capacity of a frame in pairs, at least 64.
   PairExpansion(Space& space, const SubvolumeTask& task, int depths, bool to_voxels,
                 uint32_t window)
       : space_(space),
@@ -136,9 +138,9 @@ class PairExpansion {
   static constexpr uint64_t kBytesPerPair = sizeof(uint64_t) * 2 + sizeof(uint32_t) * 2;
   uint32_t window() const { return window_; }
 
-  // Expands triangles [first, last) of `triangles`, at most a window of them. `out` receives the
-  // pairs: they are written to PairSpan out.span(), then counted by out.commit(n). out.flush()
-  // makes space if not even the pairs of one source fit.
+  // Expands triangles [first, last) of `triangles`, at most window() of them. The pairs of the last
+  // level are written to out.span(), a PairSpan, and then counted by out.commit(n). out.flush() is
+  // called to make space if the new pairs of one pair do not fit in the span.
   template <class Out>
   void run(const FixedTriangle* triangles, uint32_t first, uint32_t last, Out& out) {
     triangles_ = triangles;

@@ -44,7 +44,8 @@ struct DrawTile {
   const uint32_t* tile_starts;  // first pair of each tile
   uint32_t tile_count, pair_count, first_tile;
 
-  // Space for kTileBricks per thread block, and the number of bricks written.
+  // The output. Each thread block has space for kTileBricks bricks, and writes the number of its
+  // bricks to `brick_counts`.
   uint64_t* brick_codes;
   uint64_t* brick_masks;
   uint32_t* brick_counts;

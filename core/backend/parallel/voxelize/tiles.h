@@ -1,6 +1,7 @@
-// The fast voxelization. Pairs are expanded only down to (triangle, 16^3 cell), and grouped by
-// tile. One thread block draws the bricks of a tile in shared memory (tile_kernel.h). There is no
-// list of voxels, nothing smaller than a cell is sorted, and bricks are made in Morton order.
+// The fast voxelization. Pairs (pairs.h) are expanded only down to pairs of a triangle and a cell
+// of 16^3 voxels, and then grouped by tile. One thread block draws the bricks of a tile in shared
+// memory (tile_kernel.h). There is no list of voxels, nothing smaller than a cell is sorted, and
+// bricks are made in Morton order.
 //
 // All triangles of the subvolume and their pairs are in memory at the same time. If they do not
 // fit, the subvolume is split. The smallest subvolume cannot be split. voxel_list.h voxelizes it
@@ -17,7 +18,7 @@
 
 namespace voxdag::parallel {
 
-// All (triangle, cell) pairs of a subvolume.
+// All (triangle, cell) pairs of a subvolume, as the output of PairExpansion::run().
 template <class Space>
 class CellPairs {
  public:
@@ -43,7 +44,8 @@ class CellPairs {
     space_.sort_pairs(codes_, code_scratch, triangles_, triangle_scratch, size_,
                       {.begin = kTileCodeBits, .end = code_bits});
   }
-  // Returns the first pair of each tile.
+  // Returns the position of the first pair of each tile, and sets `tile_count` to the number of
+  // tiles. Requires sort().
   SpaceArray<Space, uint32_t> tile_starts(uint32_t& tile_count) {
     SpaceArray<Space, uint8_t> flags(space_, size_);
     SpaceArray<Space, uint32_t> starts(space_, size_);
@@ -92,7 +94,7 @@ void draw_tiles(Space& space, const SubvolumeTask& task, const FixedTriangle* tr
 }
 
 // Fills `bricks` with all bricks that the triangles touch. The subvolume must be at least as large
-// as a tile. Throws OutOfBudget if it does not fit; `bricks` is then undefined.
+// as a tile. Throws OutOfBudget if the budget is too small; `bricks` is then undefined.
 template <class Space>
 void voxelize_by_tiles(Space& space, const SubvolumeTask& task, TriangleStream& stream,
                        BrickList<Space>& bricks) {

@@ -1,6 +1,6 @@
-// Finds the cells of a group of N x N x N cubes that a triangle touches, in one step: the exact
-// test of core/geometry/overlap.h (Schwarz and Seidel 2010, section 4.1). Terms shared by the cells
-// are computed once.
+// Finds the cubes that a triangle touches in a group of N x N x N equal cubes ("cells"), in one
+// step. This is the exact test of core/geometry/overlap.h (Schwarz and Seidel 2010, section 4.1).
+// Terms that the cells share are computed once.
 //
 // Let `low` be a corner of the lattice of cells, which are 2^shift units wide, and k the position
 // of a cell in this lattice. For an integer vector g and a constant c, every test is the sign of
@@ -46,21 +46,21 @@ VOXDAG_HD inline Int clamp_to(int128 x, Int bound) {
   return x > bound ? bound : x < -bound ? static_cast<Int>(-bound) : static_cast<Int>(x);
 }
 
-// A narrow triangle on a lattice of cells, starting with the first group that its bounding box
-// touches.
+// A narrow triangle, prepared for tests on a lattice of cells. The first cell has its low corner at
+// `low`, and a cell's edge is 2^shift lattice units.
 struct TriangleOnLattice {
-  // In the projection along one axis, a cell is on the inner side of an edge iff
-  // a k_a + b k_b + constant >= 0, along the two axes that follow.
+  // An edge in the projection along one axis. A cell with coordinates p and q along the next two
+  // axes (modulo 3) touches the inner side of the edge iff a p + b q + constant >= 0.
   struct Edge {
     int32_t a, b;
     int64_t constant;
   };
   int32_t first[3], last[3];  // cells of the bounding box
-  int64_t n[3];
-  int128 plane;       // n . (low - v) / 2^shift, floored
-  int32_t remainder;  // 1 if the division left a remainder
-  bool short_normal;  // the plane test needs only 32 bits
-  Edge edges[3][3];   // [projection][edge]
+  int64_t n[3];               // quarter normal
+  int128 plane;               // n . (low - v) / 2^shift, floored; v is vertex 0
+  int32_t remainder;          // 1 if the division left a remainder
+  bool short_normal;          // the plane test needs only 32 bits
+  Edge edges[3][3];           // [projection][edge]
 
   VOXDAG_HD TriangleOnLattice(const FixedTriangle& t, const int64_t (&low)[3], int shift) {
     int64_t half[3][3];
@@ -90,7 +90,8 @@ struct TriangleOnLattice {
     }
   }
 
-  // Returns the cells that the triangle touches, in the group at position `at`.
+  // Returns the cells that the triangle touches, in the group whose first cell has position `at` in
+  // the lattice. Cells are bits numbered by cell_bit().
   template <int N>
   VOXDAG_HD uint64_t touched(const int (&at)[3]) const {
     uint64_t cells = ~uint64_t{0};
@@ -187,8 +188,9 @@ VOXDAG_HD inline bool is_narrow(const FixedTriangle& t) {
   return true;
 }
 
-// Returns the cells that the triangle touches, in a group of cells with an edge of 2^shift units.
-// The low corner of the first cell is `low`.
+// Returns the cells that the triangle touches, as bits numbered by cell_bit(), in a group of
+// N x N x N cells. A cell has an edge of 2^shift lattice units. The low corner of the first cell is
+// `low`.
 template <int N>
 VOXDAG_HD inline uint64_t touched_cells(const FixedTriangle& t, const int64_t (&low)[3],
                                         int shift) {

@@ -1,6 +1,6 @@
-// Voxelization as in Sintorn, "DAG Construction" (2018). It makes a list of the voxels of all
-// triangles, as Morton codes within the subvolume, which is sorted and packed into bricks. tiles.h
-// makes the same bricks faster.
+// Voxelization as in Sintorn, "DAG Construction" (2018). The voxels of all triangles are listed as
+// Morton codes within the subvolume. The list is sorted and packed into bricks. tiles.h makes the
+// same bricks faster.
 //
 // The list has a fixed capacity and is packed whenever it is full, so that the memory needed
 // depends on the bricks, not on the triangles.
