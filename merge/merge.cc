@@ -11,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-// Rows of an artifact are counted in 32 bits.
+// Maximum number of rows of an artifact, which counts rows in 32 bits.
 constexpr uint64_t kMaxArtifactRows = uint64_t{1} << 32;
 
 // Merges in passes until all artifacts fit in one pass, then into the global file or an artifact.
@@ -60,7 +60,7 @@ class Merger {
     return context_.report.input_nodes + (fit_at_once() ? 1 : 2) * pending_.rows();
   }
 
-  // Runs until all artifacts fit in one pass.
+  // Runs passes until all artifacts fit in one pass.
   void run_passes() {
     while (!fit_at_once()) {
       run_pass();

@@ -18,7 +18,7 @@ namespace voxdag {
 
 class MergeRecovery {
  public:
-  // Without a checkpoint nothing is resumed or saved.
+  // If `checkpoint` is null, nothing is resumed or saved.
   MergeRecovery(const MergeInputs& inputs, const MergeContext& context, PendingArtifacts& pending,
                 Checkpoint* checkpoint)
       : context_(context),
@@ -60,7 +60,8 @@ class MergeRecovery {
   const uint32_t grid_levels_;
   PendingArtifacts& pending_;
   StateSaver saver_;
-  std::vector<uint64_t> merged_ends_;  // by artifact: end of the ranges of newly_merged()
+  // For each artifact: the end of the ranges that newly_merged() has returned.
+  std::vector<uint64_t> merged_ends_;
 };
 
 }  // namespace voxdag

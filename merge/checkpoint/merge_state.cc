@@ -73,7 +73,8 @@ namespace {
 constexpr uint64_t kMagic = 0x0a4752454d474456;  // "VDGMERG\n"
 constexpr uint32_t kVersion = 3;
 
-// Encodes or decodes the members of a description. `Derived` handles words, counts and texts.
+// Encodes or decodes the members that fields() lists. `Derived` handles words, counts, flags and
+// texts.
 template <class Derived>
 class Coder {
  public:

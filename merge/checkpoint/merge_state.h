@@ -26,14 +26,14 @@ struct FinalPassState {
   std::string output;         // path of the global file
   uint64_t narrow_words = 0;  // GlobalFileWriter::narrow_words()
   GlobalFileProgress file;
-  std::vector<uint64_t> map_rows;
-  ScratchFileState map;
+  std::vector<uint64_t> map_rows;  // rows of each run's position map
+  ScratchFileState map;            // the file with all position maps
   std::vector<PlacedNode> placed;
   std::vector<ArtifactRoot> roots;
 };
 
 struct MergeState {
-  uint64_t inputs_checksum = 0;
+  uint64_t inputs_checksum = 0;  // PendingArtifacts::inputs_checksum()
   uint32_t next_scratch_id = 0;
   MergeReport report;
   // Artifacts written by passes, in segments of the scratch folder. They replace the inputs that

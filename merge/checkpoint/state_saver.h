@@ -39,8 +39,10 @@ class StateSaver {
   // True if the last save has finished and enough CPU time has passed since it began. Rethrows the
   // exception of that save.
   bool is_due();
-  // Saves a state in the background. `named` are the scratch files that the state names; `sync`
-  // makes them durable. Then removes the files of the previous state and releases `merged`.
+  // Saves a state in the background, with `level` as in Checkpoint::save(). `named` are the scratch
+  // files that the state names. `sync` is called first and makes these files and the output
+  // durable. Once the state is durable, removes the files that only the previous state names, and
+  // releases the input ranges `merged`.
   void save(uint32_t level, MergeState state, std::vector<std::shared_ptr<ScratchPath>> named,
             std::function<void()> sync, std::vector<SegmentRange> merged);
   // Waits for the running save and rethrows its error.
@@ -53,7 +55,8 @@ class StateSaver {
   Checkpoint* const checkpoint_;
   const double interval_s_;
   double saved_s_ = process_cpu_seconds();
-  std::vector<std::shared_ptr<ScratchPath>> named_;  // files of the running save, if any
+  std::vector<std::shared_ptr<ScratchPath>>
+      named_;  // files of the durable state and of the running save
   std::atomic<bool> finishing_ = false;
   std::future<void> save_;
 };

@@ -146,7 +146,8 @@ class GroupCursor {
   PositionMaps& maps_;
   const uint64_t hash_;
   std::span<uint32_t> buffer_;  // encoded rows
-  // Buffer for an even number of positions. Its first `pending_` words are not stored in maps_ yet.
+  // Buffer for positions, of an even number of words. Its first `pending_` words are not stored in
+  // maps_ yet.
   std::span<uint32_t> positions_;
   uint64_t next_word_;  // first word of the file that is not read yet
   uint64_t rows_left_;
@@ -165,7 +166,8 @@ LevelExtent merge_hash_group(const MergeContext& context, const LevelTask& task,
   const auto runs = group.runs();
 
   OrderedRowWriter out(task.output, task.format, first_position, context.budget);
-  // A multiple of 8, so that a quarter has complete positions.
+  // Words of buffer per run: a quarter for positions, the other words for rows. A multiple of 8, so
+  // that the quarter is even and holds complete positions.
   const size_t each =
       std::clamp<uint64_t>(bytes / 2 / sizeof(uint32_t) / runs.size(), 128, 16384) / 8 * 8;
   PageBuffer<uint32_t> buffers(context.budget, each * runs.size() + kMaxRowWords,

@@ -24,7 +24,8 @@ class OrderedRowWriter {
         buffer_(budget, format, kBuffered),
         flushed_(first_position) {}
 
-  // Returns the position of the row in the merged level.
+  // Adds a row, which must not be before the previous row. Returns its position in the merged
+  // level.
   uint64_t add(const RowKey& row) {
     if (!any_ || compare_rows(format_, last_, row) != 0) push(row);
     return last_position_;

@@ -6,8 +6,9 @@
 namespace voxdag {
 namespace {
 
-// Returns the smallest number of bits for which buckets of evenly spread hashes have about
-// `bucket_rows` rows. The table of bucket begins then takes at most one or two bytes per row.
+// Returns the number of bits b for buckets of 2^b hashes each. If the hashes are spread evenly, a
+// bucket has about `bucket_rows` rows, or more if there are many slices: the table of bucket begins
+// must not take more than about four bytes per row.
 unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_t bucket_rows,
                             size_t slices) {
   const uint64_t max_buckets = std::max<uint64_t>(

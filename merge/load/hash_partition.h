@@ -32,7 +32,7 @@ struct RunSlice {
   FrameSpan frames;
   uint64_t first_row = 0;  // index of the first row in the run
   RowCount size{};
-  uint64_t row_base = 0, word_base = 0;
+  uint64_t row_base = 0, word_base = 0;  // first row and word in the columns
 };
 
 // The offset of a row in a slice: the number of rows before it, and the number of their words.
@@ -80,13 +80,13 @@ class HashPartition {
   static std::optional<HashInterval> widest_interval(std::span<const LevelRun* const> runs,
                                                      uint64_t first, uint64_t bytes,
                                                      uint32_t position_words);
-  // Returns one slice for each run that has frames within the interval. The constructor sets their
-  // bases.
+  // Returns one slice for each run that has frames within the interval. The constructor of
+  // HashPartition sets their other members.
   static std::vector<RunSlice> slices_within(std::span<const LevelRun* const> runs,
                                              const HashInterval& interval);
 
-  // Buckets get about `bucket_rows` rows if hashes are spread evenly. Only one partition uses
-  // `memory`.
+  // Buckets get about `bucket_rows` rows if hashes are spread evenly. Two partitions must not use
+  // the same `memory` at the same time.
   HashPartition(std::span<const LevelRun* const> runs, std::vector<RunSlice> slices,
                 const HashInterval& interval, uint64_t bucket_rows, uint32_t position_words,
                 PartitionMemory& memory, MemoryBudget& budget);

@@ -26,7 +26,7 @@ class LevelRun {
  public:
   virtual ~LevelRun() = default;
   // Decodes a frame. Several threads may call it concurrently, each with a separate `out`. Children
-  // are indices, or words of positions if is_rewired().
+  // are row indices in the run's level below, or words of positions if is_rewired().
   virtual void read_frame(size_t index, Frame& out) const = 0;
 
   std::span<const FrameInfo> frames() const { return frames_; }

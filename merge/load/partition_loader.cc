@@ -13,8 +13,9 @@ namespace {
 // cache.
 constexpr size_t kFramesPerItem = 16;
 
-// Replaces children by their positions in the map. The map may be wide even if its level, and so
-// the words of its parents, turned out not to be wide.
+// Writes the positions of `children`, which `map` gives, to `out`. The map may be wide although
+// `wide` is false: the width of a map is chosen before its level is merged, and the width of
+// references to the level afterwards.
 void replace_all(std::span<const uint32_t> children, const uint32_t* map, bool wide_map, bool wide,
                  uint32_t* out) {
   if (!wide_map) {
@@ -93,7 +94,7 @@ class HashPartition::Loader {
     std::vector<bool> replaced;  // one flag per child of a slice; see HashPartition::bytes_for()
   };
 
-  // Copies a frame into the columns; without a map its children are unchanged.
+  // Copies a frame into the columns. If `map` is null, the children are not replaced.
   void place(const RunSlice& slice, const LevelRun& run, size_t f, const Frame& frame,
              const uint32_t* map) {
     const uint64_t row = slice.row_base + run.rows_before(f) - slice.first_row;
@@ -134,8 +135,9 @@ class HashPartition::Loader {
     return (hash >> partition_.bucket_bits_) - (interval.first >> partition_.bucket_bits_) + 1;
   }
 
-  // Sets the begins of all buckets from the first row of this frame up to the first row of the next
-  // frame.
+  // Sets the begins of the buckets that begin after the first hash of this frame and not after the
+  // first hash of the next frame. The slice's first frame also sets all earlier begins, and its
+  // last frame all later ones.
   void mark_bucket_begins(size_t slice_index, const LevelRun& run, size_t f, const Frame& frame) {
     const RunSlice& slice = partition_.slices_[slice_index];
     size_t next = f == slice.frames.begin ? 0 : begins_up_to(frame.hashes.front());

@@ -12,8 +12,8 @@
 // half first. A brick is represented as a node of mask 3 whose two words are the high and the low
 // half of its voxel mask. So (hash, mask, words lexicographically) is the total order of both.
 //
-// kMaxRowWords words are readable from the first word of any row. So a row is copied without a
-// branch on its number of words, which would be mispredicted.
+// kMaxRowWords words are readable from the first word of any row, also of a shorter row. So a row
+// is copied without a branch on its number of words, which would be mispredicted.
 #pragma once
 
 #include <algorithm>
@@ -37,7 +37,8 @@ struct RowFormat {
   uint32_t max_words() const { return uint32_t{8} << wide; }
 };
 
-// Appends a position in the format of a child reference. Returns the end.
+// Writes a position to `to`: as one word or, if `wide` is set, as two words, the high half first.
+// Returns the end of the written words.
 inline uint32_t* put_position(uint32_t* to, uint64_t position, bool wide) {
   if (wide) *to++ = static_cast<uint32_t>(position >> 32);
   *to++ = static_cast<uint32_t>(position);

@@ -1,7 +1,7 @@
 // Files in the merge's folder, for data that does not fit in memory or must survive a crash.
 //
-// A file is removed with the last object that refers to its path, unless it is retained for a later
-// run that resumes the merge. Reading returns the words that were written, or throws
+// A file is removed when the last reference to its ScratchPath ends, unless it is retained for a
+// later run that resumes the merge. Reading returns the words that were written, or throws
 // Error{kCorrupt}.
 #pragma once
 
@@ -73,12 +73,12 @@ struct ScratchFileState {
   std::vector<uint64_t> checksums;  // one for each checksum block
 };
 
-// One file of 32-bit words without gaps, written and read by offset. Each word is written once, by
-// one thread. Several threads may read words written earlier.
+// One file of 32-bit words without gaps, written and read at word offsets. Each word is written
+// once, by one thread. Several threads may read words written earlier.
 class ScratchFile {
  public:
   explicit ScratchFile(ScratchFolder& folder);
-  // Opens a file left by an earlier merge.
+  // Opens a file left by an earlier merge, for reading.
   ScratchFile(ScratchFolder& folder, ScratchFileState state);
 
   void write(uint64_t first_word, std::span<const uint32_t> words);

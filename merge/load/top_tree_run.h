@@ -13,7 +13,7 @@ namespace voxdag {
 // A node with its cube in the grid and its position in the merged level.
 struct PlacedNode {
   Cube cube;
-  uint64_t hash = 0;  // truncated
+  uint64_t hash = 0;  // truncated to hash_bits
   uint64_t position = 0;
 };
 

@@ -14,7 +14,7 @@
 namespace voxdag {
 namespace {
 
-// Rows that fit in a core's cache while they are sorted.
+// Rows per bucket: as many as fit in a core's cache while they are sorted.
 constexpr uint64_t kBucketRows = 8192;
 // With many runs buckets are larger, so that each run has enough rows per bucket.
 constexpr uint64_t kMinBucketRowsPerRun = 16;
@@ -133,7 +133,7 @@ class PartitionMerge {
     end_turn({out.nodes(), out.end_position() - position_});
   }
 
-  // Called in the turn of the bucket with this extent.
+  // Adds the extent of the bucket whose turn it is, and ends the turn.
   void end_turn(const LevelExtent& bucket) {
     extent_.nodes += bucket.nodes;
     extent_.positions += bucket.positions;
@@ -192,9 +192,9 @@ LevelExtent merge_partition(const MergeContext& context, const LevelTask& task,
   return PartitionMerge(context, task, partition, first_position).run();
 }
 
-// The plan has space for two frames of every run. So a group of rows with equal hashes can fail to
-// fit only if it is longer than two frames in some run. Throws Error{kOutOfMemory} if no run has
-// such a group.
+// Called if the rows with this hash do not fit in a partition. Throws Error{kOutOfMemory} unless
+// they are in more than two frames of some run. The memory plan has space for two frames of every
+// run, so any smaller group should have fit.
 void check_group_is_large(const LevelTask& task, uint64_t hash) {
   for (const LevelRun* run : task.runs) {
     const FrameSpan frames = run->frames_within({hash, hash});

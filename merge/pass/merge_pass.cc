@@ -85,7 +85,8 @@ class Pass {
     return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }
 
-  // Reserves memory for the largest level from the start if the budget allows it.
+  // Reserves memory for the largest level from the start if the budget allows it, so that the
+  // memory is never replaced by a larger one.
   void reserve_memory() {
     std::vector<RowCount> levels(task_.shape.grid_levels);
     for (const ArtifactReader& artifact : task_.artifacts)
@@ -118,7 +119,8 @@ class Pass {
         if (root.cube.level != level) continue;
         const uint64_t position = maps.at(run, root.index);
         done_.placed.push_back({root.cube, root.hash, position});
-        // The index of a root in the global file is never used.
+        // The cast can truncate a position in the global file, but an index into this file is never
+        // used.
         root.index = static_cast<uint32_t>(position);
         done_.roots.push_back(root);
       }

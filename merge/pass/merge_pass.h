@@ -25,7 +25,7 @@ struct PassTask {
 struct PassProgress {
   std::optional<uint32_t> level;     // the last merged level; none before the bricks
   std::optional<PositionMaps> maps;  // maps of this level
-  bool wide = false;                 // true if children in this level are wide
+  bool wide = false;                 // true if references to rows of this level are wide
   std::vector<PlacedNode> placed;    // nodes of this level
   // Roots of subvolumes in this level and below; `index` is their position in the output.
   std::vector<ArtifactRoot> roots;

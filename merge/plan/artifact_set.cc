@@ -86,8 +86,8 @@ uint64_t min_partition_bytes(const ArtifactReader& reader, bool wide) {
   return max;
 }
 
-// Size in bytes that a smaller artifact counts as, so that the budget also limits the number of
-// open runs.
+// Lower limit of SurveyedArtifact::min_bytes, so that the budget also limits the number of open
+// runs.
 constexpr uint64_t kMinRunBytes = uint64_t{64} << 10;
 
 // Returns the Morton code of the cube's low corner, in bricks of the largest grid.

@@ -13,6 +13,7 @@
 
 namespace voxdag {
 
+// Opens the segment file with this id.
 using OpenSegment = std::function<std::shared_ptr<ReadableFile>(uint32_t)>;
 
 struct SurveyedArtifact {

@@ -6,8 +6,9 @@
 //   workers          frames, windows of spilled maps, memory for sorting a bucket
 //   hash partition   all remaining memory, at least partition_bytes
 //
-// The hash partition limits the fan-in: it must hold two frames of every run. Then the rows of any
-// single hash fit, unless there are very many of them.
+// The hash partition limits the number of runs that one pass merges, because it must hold two
+// frames of every run. Then the rows of any single hash fit, unless some run has more of them than
+// two frames.
 #pragma once
 
 #include <algorithm>

@@ -82,8 +82,8 @@ void PendingArtifacts::reset() {
 }
 
 void PendingArtifacts::survey(std::span<const ArtifactRef> refs) {
-  // The division by 10 is safe: a row has at most nine words, and the top tree adds only a few
-  // rows.
+  // Assumes narrow levels if all rows together have at most narrow_words_ words. A row has at most
+  // nine words; the division by 10 also covers the few rows of the top tree.
   ArtifactSurvey found = survey_artifacts(refs, open_, inputs_.shape, false);
   if (found.rows > narrow_words_ / 10) found = survey_artifacts(refs, open_, inputs_.shape, true);
   artifacts_ = std::move(found.in_morton_order);

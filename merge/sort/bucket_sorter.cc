@@ -6,7 +6,8 @@
 namespace voxdag {
 namespace {
 
-// A digit with more rows is sorted by comparison before the insertion sort runs over all rows.
+// Maximum number of rows with equal digits (see distribute()) that only the insertion sort orders.
+// More rows are first sorted by comparison.
 constexpr uint32_t kMaxInsertionRows = 32;
 // In a bucket every slice has a few rows, and the slices are at scattered addresses. Rows are
 // prefetched this many slices ahead.
@@ -48,8 +49,9 @@ void BucketSorter::sort(const HashPartition& partition, size_t bucket, bool in_w
   emit_unique(in_words);
 }
 
-// Fills entries_ in the order of the hash. The digit is the highest bits of the hash below the bits
-// that all rows of the bucket share.
+// Fills entries_ in the order of the hash: distributes the rows by a digit of their hashes, then
+// sorts the rows within each digit. The digit is the highest bits of the hash below the bits that
+// all rows of the bucket share.
 void BucketSorter::distribute(const HashPartition& partition, size_t bucket) {
   const auto slices = partition.slices();
   size_t rows = 0;
@@ -117,7 +119,8 @@ bool BucketSorter::same_row(const Entry& a, const Entry& b) const {
   return true;
 }
 
-// A hash usually occurs in a single row, or in equal rows of several runs.
+// Collects the unique rows and the position of every row. A hash usually occurs in a single row, or
+// in equal rows of several runs; only other groups of equal hashes are sorted.
 void BucketSorter::emit_unique(bool in_words) {
   unique_.clear();
   extent_ = 0;
