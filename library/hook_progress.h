@@ -1,4 +1,4 @@
-// Progress for the functions of BuildHooks. Thread-safe.
+// Forwards progress and warnings to the functions of BuildHooks. Thread-safe.
 #pragma once
 
 #include <chrono>

@@ -30,8 +30,8 @@
 namespace voxdag {
 
 // The device and the algorithm that voxelize a part of the scene. kAuto uses a GPU if one is
-// present; kDefault is the backend's fastest method. All backends and methods produce the same
-// bytes.
+// present; kDefault is the backend's fastest method. docs/cli.md, "--method", lists the methods of
+// each backend. All backends and methods produce the same bytes.
 enum class BackendName { kAuto, kCpu, kCuda, kParallelHost };
 enum class MethodName { kDefault, kConsing, kPointers, kHashes };
 
@@ -43,8 +43,9 @@ struct BuildOptions {
 
   // Geometry options.
   uint64_t resolution = 0;  // voxels per edge of the grid, a power of two from 4 to 2^20
-  // The cube of the grid, in the units of the scene: its low corner, and its edge. At most one of
-  // `bounds` and `voxel_size` can be given; without both, the cube encloses the scene.
+  // The cube of the grid, in the units of the scene. `bounds` gives its low corner (x, y, z) and
+  // its edge. `voxel_size` gives the edge of a voxel; the cube is then centered on the scene. At
+  // most one of them can be given. If neither is given, the cube encloses the scene.
   std::optional<std::array<double, 4>> bounds;
   std::optional<double> voxel_size;
   bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
@@ -63,7 +64,7 @@ struct BuildOptions {
   bool restart = false;      // discard the job in the work folder and start over
   bool force = false;        // build although the estimate predicts a lack of memory or disk space
   std::string cache_folder;  // folder for subvolumes shared between builds; "": no cache
-  uint64_t cache_bytes = uint64_t{16} << 30;
+  uint64_t cache_bytes = uint64_t{16} << 30;  // limit of the cache folder
 
   // Resources. Resident memory, without `mesh`, exceeds memory_bytes by at most 64 MiB if the
   // allocator returns freed memory to the system (docs/library.md).

@@ -1,5 +1,6 @@
-// Cells of a file's grids. In the grid of 2^grid_levels cells per edge, a cell is set if any voxel
-// in it is set. With the file's own grid_levels, cells are voxels.
+// Cells of a file's grids. A file has a grid of 2^grid_levels cells per edge for each grid_levels
+// from 0 to the file's own value. A cell is set if any voxel in it is set. In the finest grid,
+// cells are voxels.
 #pragma once
 
 #include <algorithm>

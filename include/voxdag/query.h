@@ -33,10 +33,10 @@ class File;
 
 namespace voxdag::query {
 
-// Three coordinates in voxels; the grid is the cube [0, R]^3.
+// Three coordinates in voxels. The grid is the cube [0, R]^3, with R = DagFile::resolution().
 using Coordinates = std::array<double, 3>;
 
-// sRGB and alpha. Alpha is 255 for a color, 0 if the cell has no color.
+// Red, green and blue in sRGB, and alpha. Alpha is 255 for a color, 0 if the cell has no color.
 using Rgba = std::array<uint8_t, 4>;
 
 // A unit vector, or zeros.
@@ -96,7 +96,8 @@ class DagFile {
   uint64_t dag_nodes() const;  // nodes of the DAG, including bricks
   uint64_t file_bytes() const;
 
-  // Sets set[i] to 1 if cell points[i] is set; to 0 if it is not set or outside the grid.
+  // Sets set[i] to 1 if cell points[i] in the grid of 2^grid_levels cells per edge is set; to 0 if
+  // it is not set or outside the grid. All functions below use `grid_levels` in the same way.
   void lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
               unsigned threads = 1) const;
 
@@ -126,15 +127,16 @@ class DagFile {
   // list is empty if the file does not have the attribute.
   const std::vector<std::string>& material_names() const;
 
-  // Finds the first set cell on each ray. Directions may have any length except 0. All numbers must
-  // be finite, and limits must not be negative. A cell includes its faces, so no ray passes between
-  // two cells that share a face. A ray is faster if it is close to the previous ray, such as the
-  // ray of a neighboring pixel.
+  // Finds the first set cell on each ray. Directions may have any length except 0. Origins and
+  // directions must be finite, and limits must not be negative. A cell includes its faces, so no
+  // ray passes between two cells that share a face. A ray is faster if it is close to the previous
+  // ray, such as the ray of a neighboring pixel.
   void rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
             const RayLimits& limits, std::span<RayHit> hits, unsigned threads = 1) const;
 
-  // Writes the region as a dense array, with 1 for each set cell. Position p is at ((p.x - low.x) *
-  // ny + p.y - low.y) * nz + p.z - low.z. `cells` has the region's size.
+  // Writes the region as a dense array, with 1 for each set cell and 0 for all others. Cell p is at
+  // index ((p.x - low.x) * ny + p.y - low.y) * nz + p.z - low.z, where ny and nz are the region's
+  // numbers of cells along y and z. The size of `cells` must be the region's number of cells.
   void box(const Selection& selection, std::span<uint8_t> cells) const;
 
   // Stores the set cells of the region, in Morton order, up to the size of `positions`. Returns the
