@@ -38,7 +38,7 @@ std::optional<EncodedRegion> RegionRecords::next() {
   const auto prefix = in_.take(prefixes * sizeof(uint32_t));
   if (!in_.ok())
     throw Error(ErrorCode::kCorrupt,
-                "stored colors have a record that ends too early: expected what was written there");
+                "the stored colors end within a record: expected a complete last record");
   region.blocks.assign(blocks.begin(), blocks.end());
   region.prefix.resize(prefixes);
   std::ranges::copy(prefix, std::as_writable_bytes(std::span(region.prefix)).begin());

@@ -12,8 +12,8 @@ namespace {
 constexpr uint32_t kGridLevels = 9;
 constexpr uint64_t kBudgetBytes = uint64_t{256} << 20;
 
-// Triangles in the complete grid, from a quarter of a voxel to a quarter of the grid in size. Every
-// eighth is a sliver.
+// Returns `count` pseudorandom triangles in the complete grid. Their sizes range from a quarter of
+// a voxel to a quarter of the grid. Every eighth triangle is a sliver.
 std::vector<FixedTriangle> check_triangles(int count) {
   uint64_t state = 0x9e3779b97f4a7c15ull;
   const auto random = [&](int64_t below) {
@@ -72,7 +72,8 @@ std::string difference_from_cpu(Backend& backend) {
       return "it built " + std::to_string(found.summary.voxels) + " voxels and " +
              std::to_string(found.summary.dag_nodes) + " nodes where the CPU built " +
              std::to_string(expected.summary.voxels) + " and " +
-             std::to_string(expected.summary.dag_nodes) + ", or as many, but different ones";
+             std::to_string(expected.summary.dag_nodes) +
+             ": expected the same DAG (if the numbers are equal, the nodes differ)";
     }
   return "";
 }

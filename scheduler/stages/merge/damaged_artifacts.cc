@@ -80,8 +80,8 @@ size_t replan_damaged(BuildJob& job) {
     job.store->mark_for_rebuild(d.subvolume);
   }
   if (warnings > kMaxWarnings)
-    job.context.progress.warn("... and so are " + std::to_string(warnings - kMaxWarnings) +
-                              " more");
+    job.context.progress.warn(std::to_string(warnings - kMaxWarnings) +
+                              " more subvolumes are built again: their artifacts are damaged");
   return damaged.size();
 }
 

@@ -44,7 +44,7 @@ std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> sub
     else if (first->second != artifact)
       throw Error(ErrorCode::kCorrupt, "job.db: two artifacts are at byte " +
                                            std::to_string(artifact.offset) + " of segment " +
-                                           std::to_string(artifact.segment));
+                                           std::to_string(artifact.segment) + ": expected one");
   }
   return artifacts;
 }
