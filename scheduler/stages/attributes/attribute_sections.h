@@ -1,4 +1,5 @@
-// The attributes stage of one build: the sections that follow the levels of its global file.
+// The attributes stage of a build. It writes the attribute sections, which follow the levels in the
+// global file.
 #pragma once
 
 #include <string>

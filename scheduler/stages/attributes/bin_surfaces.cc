@@ -62,8 +62,8 @@ class SurfacePiece {
     uint32_t bin, record;
   };
   static constexpr size_t kNone = ~size_t{0};
-  // If all triangles of a piece cross the complete grid, the piece has more places. Bins of the
-  // records beyond this limit are found in a second step.
+  // Maximum number of places in memory. A piece of triangles that touch many bins has more places.
+  // copy() finds the bins of records from late_ on, whose places were not added.
   static constexpr size_t kMaxPlaces = 4 * kPieceTriangles;
 
   std::span<const std::byte> bytes_of(const Record& record) const {

@@ -1,5 +1,5 @@
-// Reads the surfaces of a scene's triangles and puts each into the bins of all cubes of the color
-// grid that it touches.
+// Reads the surfaces of a scene (triangles with their materials) and puts each surface into the
+// bins of all cubes that it touches. The cubes divide the color grid; each cube has one bin.
 #pragma once
 
 #include <cstdint>

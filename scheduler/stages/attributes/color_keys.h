@@ -1,6 +1,6 @@
-// A key for the colors, or for another attribute, of a cube: a digest of all inputs from which they
-// are computed. Equal keys mean equal colors. A key does not depend on the order of the scene's
-// triangles or on parts of the scene outside the cube.
+// A key for one attribute of a cube of the color grid: a digest of all inputs from which the
+// attribute's values in the cube are computed. Equal keys mean equal values. A key does not depend
+// on the order of the scene's triangles or on parts of the scene outside the cube.
 #pragma once
 
 #include <bitset>
@@ -34,8 +34,8 @@ struct StoredAttribute {
   uint32_t value_bytes = 0;  // per cell; 0 for colors
 };
 
-// Returns for each material a digest of everything that it contributes to the attributes. The
-// material's name is not included. `images` are digests of the image contents.
+// Returns the look of each material: a digest of all properties of the material that influence the
+// attributes. The material's name is not included. `images` are digests of the image contents.
 std::vector<Checksum128> look_digests(std::span<const Material> materials,
                                       std::span<const std::string> images,
                                       const AttributeSet& attributes);

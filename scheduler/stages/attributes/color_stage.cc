@@ -31,7 +31,7 @@
 namespace voxdag {
 namespace {
 
-// Max level of the cubes that are bins: 16^3 bins.
+// Maximum level of the cubes that have bins. Level 4 has 16^3 cubes.
 constexpr uint32_t kMaxBinLevel = 4;
 
 std::vector<Cube> bins_of(const ColorGrid& grid) {
@@ -76,10 +76,11 @@ struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;
   CubeBaker::Records records;  // the cube's last parts
-  bool is_baked = false;       // baked in this run; otherwise the records are stored
+  bool is_baked = false;       // baked in this run; otherwise its records are in the ColorStore
 };
 
-// Adds the regions of records to a section. Returns the number of their cells in the color grid.
+// Adds the regions in `records` to a section. Returns the number of their cells on the finest
+// level.
 uint64_t add_regions(std::span<const std::byte> records, AttributeSectionWriter& section) {
   RegionRecords regions(records);
   uint64_t cells = 0;
@@ -172,7 +173,7 @@ void ColorStage::State::read_surfaces() {
   parts.resize(attributes.size(), std::vector<std::vector<ColorStore::Place>>(cubes.size()));
 }
 
-// Decodes the images that the missing cubes show.
+// Decodes the images that are needed to bake the cubes whose records are not stored.
 std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& artifacts) {
   ImageClasses needed;
   for (size_t i = 0; i < cubes.size(); ++i)
@@ -212,7 +213,8 @@ void ColorStage::State::store_parts(ColorStore& artifacts, size_t cube,
   }
 }
 
-// Bakes all attributes, and adds the section of the first one.
+// Bakes all attributes of the cubes whose records are not stored, and adds the first attribute's
+// section to `out`.
 void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, GlobalFileWriter& out,
                              ColorReport& report) {
   const BuildContext& build = context.build;

@@ -19,7 +19,7 @@ constexpr size_t kHeaderBytes = 56;
 constexpr size_t kReadBytes = 256 << 10;
 // Flag in `part` of a header: this part is the last part of its artifact.
 constexpr uint64_t kLastPart = uint64_t{1} << 63;
-// The artifacts in use are copied to a new file only if the garbage takes more than this.
+// keep_only() tolerates garbage up to this size plus the size of the artifacts in use.
 constexpr uint64_t kTolerableBytes = 64 << 10;
 
 struct Header {
@@ -155,7 +155,7 @@ void ColorStore::keep_only(std::span<const Checksum128> keys, const CancelToken&
     for (const Place& place : found->second) retained_bytes += kHeaderBytes + place.bytes;
   }
   if (end_ <= 2 * retained_bytes + kTolerableBytes) return;
-  // A later run removes files with this ending.
+  // If this run is killed, a later run removes the copy because of its ending.
   const std::string copy_path = path_ + ".vdspill";
   uint64_t end = 0;
   try {

@@ -192,8 +192,9 @@ bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfac
   return is_complete;
 }
 
-// Returns false if the sums of normals and materials do not fit. The allocation is kept for the
-// next region, except for large lists of materials.
+// Charges the memory of the sums of normals and materials, `bytes` in all. Returns false if the
+// sums do not fit. The charge is kept for the next region unless it exceeds the need by over
+// kSlackBytes.
 bool CubeBaker::charge_sums(uint64_t bytes) {
   constexpr uint64_t kSlackBytes = uint64_t{4} << 20;
   const uint64_t more = bytes - std::min(bytes, ColorMemory::kValueSumBytes);

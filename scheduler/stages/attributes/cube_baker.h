@@ -30,7 +30,7 @@ class CubeBaker {
             uint64_t region_bytes, uint64_t surface_bytes, MemoryBudget& budget,
             const CancelToken& cancel);
 
-  // Receives and empties the complete records when they exceed the memory limit.
+  // Receives the records collected so far, all of them complete, and empties the vectors.
   using TakeRecords = std::function<void(Records& records)>;
   // Bakes the regions of the cube that have surfaces, and appends their records in Morton order.
   // `bin` must contain all surfaces that touch the cube, and is cleared. `records` has one element

@@ -1,5 +1,6 @@
-// Records of the colors of regions, one after another, as stored in the artifacts of the color
-// stage (docs/format.md, "Stored colors").
+// Records of regions, one after another, as stored in the artifacts of the color stage
+// (docs/format.md, "Stored colors"). A record has the encoded colors, or the values of another
+// attribute, of one region of the color grid.
 #pragma once
 
 #include <cstddef>
@@ -14,13 +15,13 @@ namespace voxdag {
 
 void append_region(const EncodedRegion& region, std::vector<std::byte>& out);
 
-// Reads records from the front of `bytes`, in the form that append_region() writes. The bytes must
-// have passed a checksum; remaining defects throw.
+// Reads the records in `bytes`, in the form that append_region() writes. The caller has verified
+// the checksum of the bytes.
 class RegionRecords {
  public:
   explicit RegionRecords(std::span<const std::byte> bytes) : in_(bytes) {}
-  // Returns the next region; nullopt after the last one. Throws Error{kCorrupt} for bytes that are
-  // not a record.
+  // Returns the next region; nullopt after the last one. Throws Error{kCorrupt} if the bytes end
+  // within a record.
   std::optional<EncodedRegion> next();
 
  private:
