@@ -12,7 +12,8 @@ namespace {
 // Workers per GPU: enough to overlap transfers and host work of some workers with kernels of
 // others.
 constexpr unsigned kWorkersPerDevice = 4;
-// A CUDA context has several hundred MiB of resident memory that no budget contains.
+// Minimum memory budget with which `auto` uses a GPU. A CUDA context has several hundred MiB of
+// resident memory that no budget contains.
 constexpr uint64_t kMinMemoryForGpu = uint64_t{2} << 30;
 
 [[noreturn]] void refuse_backend(const std::string& what) {

@@ -18,12 +18,12 @@ struct BackendChoice {
   unsigned max_workers = 256;  // more workers gain nothing
 };
 
-// Throws Error{kInvalidInput} for a method that the backend lacks, Error{kDevice} for `cuda` on a
-// machine without a GPU.
+// Throws Error{kInvalidInput} for a method that the backend does not have, or Error{kDevice} for
+// `cuda` on a machine without a usable GPU.
 void check_backend(const RunOptions& options);
 
-// Returns the backend for options that passed check_backend() and have their memory filled in.
-// `auto` uses the GPUs if there are any, the budget is large enough for them, and each builds a few
+// Returns the backend for options that passed check_backend() and whose memory_bytes is set. `auto`
+// uses the GPUs if there are any, the budget is large enough for them, and each builds a few
 // subvolumes exactly like the CPU backend. Otherwise it uses the CPU, with a warning if there is a
 // GPU.
 BackendChoice choose_backend(const RunOptions& options, Progress& progress);
@@ -37,8 +37,8 @@ struct Gpus {
 BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress);
 
 // Compares a backend with the CPU backend on this machine, because a faulty driver or device could
-// produce wrong voxels unnoticed. Builds a few small subvolumes, with a thousand triangles of all
-// sizes and several hash lengths. Returns "" if all level arrays and counts are equal, else a
+// produce wrong voxels unnoticed. Builds a few small subvolumes, with 1200 triangles of all sizes
+// and with several hash lengths. Returns "" if all level arrays and counts are equal, else a
 // sentence with the difference. Propagates the backend's exceptions. The CPU's part takes about 30
 // ms.
 std::string difference_from_cpu(Backend& backend);

@@ -95,7 +95,8 @@ class Worker {
         segment_(commits_->segment()),
         backend_(options.open_backend()) {}
 
-  // Builds one subvolume and returns {}, or returns up to eight parts that replace it.
+  // Builds one subvolume and returns {}, or splits it and returns the parts, at most eight, that
+  // replace it.
   std::vector<QueuedSubvolume> build(const QueuedSubvolume& queued) {
     cancel_.check();
     const StoredSubvolume& subvolume = queued.subvolume;

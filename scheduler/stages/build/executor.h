@@ -1,7 +1,7 @@
 // Builds subvolumes on worker threads. Each worker repeatedly takes the heaviest remaining
 // subvolume, builds it with its own backend, appends the artifact to its own segment file and
-// commits it. If a subvolume needs more memory than the worker's share, it is split in eight, which
-// are queued in its place.
+// commits it. If a subvolume needs more memory than the worker's share, the worker splits it into
+// octants, which are queued in its place.
 #pragma once
 
 #include <cstdint>
@@ -44,9 +44,9 @@ struct ExecutorCounts {
 };
 
 // Builds `subvolumes` and releases their bins. Records the results in `jobs` in groups
-// (CommitQueue). Moves the workers' queues to `unfinished`; their last groups are recorded only
-// when the caller commits it. Throws the first Error of any worker after all workers have stopped
-// and finished subvolumes are recorded.
+// (CommitQueue). Moves the workers' commit queues to `unfinished`. The last group of each queue is
+// recorded only when the caller calls unfinished.commit(). Throws the first Error of any worker
+// after all workers have stopped and finished subvolumes are recorded.
 ExecutorCounts build_subvolumes(const ExecutorOptions& options,
                                 std::vector<QueuedSubvolume> subvolumes, TriangleStore& triangles,
                                 JobStore& jobs, CommitQueues& unfinished, MemoryBudget& budget,

@@ -1,5 +1,5 @@
-// Replaces a subvolume by its octants, if it does not fit a worker's memory or takes a cluster task
-// too long.
+// Replaces a subvolume by its octants, because it does not fit a worker's memory or a cluster task
+// ran out of time.
 #pragma once
 
 #include <cstdint>

@@ -45,7 +45,8 @@ class SnappedPiece {
   }
 
   const IngestCounts& counts() const { return counts_; }
-  // Number of triangles before the first one that extends too far; nullopt if none does.
+  // Number of valid triangles in this piece before the first triangle beyond the coordinate limit;
+  // nullopt if there is no such triangle.
   const std::optional<uint64_t>& too_far() const { return too_far_; }
   std::span<const std::byte> records() const {
     return {records_.data(), counts_.triangles * record_bytes_};

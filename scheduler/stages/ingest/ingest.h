@@ -26,8 +26,9 @@ void scan(TriangleSource& scene, IngestState& state, const StageContext& context
 // Returns the grid for these geometry options and a scene with these bounds.
 Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds);
 
-// Streams the scene into the scene's bin of `store` and counts it in `top`. Throws Error{kLimit}
-// for a triangle that touches the grid and extends beyond the coordinate limit.
+// Stores the scene's snapped triangles in the scene's bin of `store` and counts them in `top`.
+// Throws Error{kLimit} for a triangle that reaches into the grid and has a vertex beyond
+// kCoordinateLimit.
 void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, TopTree& top,
             const StageContext& context, const AfterPiece& after_piece);
 

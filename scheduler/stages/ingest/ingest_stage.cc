@@ -16,8 +16,8 @@ namespace {
 // Maximum expected bricks per subvolume: a fraction of a second of work, with tables that fit in
 // the processor's caches.
 constexpr double kMaxBricksPerSubvolume = 4e6;
-// A small build has at least about this many subvolumes, if each has at least this many expected
-// bricks.
+// A small build has about kMinSubvolumes subvolumes, or fewer if each would have less than
+// kMinBricksPerSubvolume expected bricks.
 constexpr double kMinSubvolumes = 64;
 constexpr double kMinBricksPerSubvolume = 131072;
 // Maximum wait until the file times of the scene can be trusted.

@@ -18,14 +18,16 @@ namespace voxdag {
 // Number of declared triangles per piece. The digest and the plan depend on this number.
 inline constexpr uint64_t kPieceTriangles = 16384;
 
-// Thrown if the budget has no room for all readers of the scene.
+// Thrown if the budget has no room for all readers of the scene. read_pieces() then continues with
+// one reader.
 class TooManyReaders : public Error {
  public:
   explicit TooManyReaders(const Error& error) : Error(error) {}
 };
 
-// Reads the scene from triangle `position` to its end, piece by piece. Each piece is read with
-// Piece::read() and then passed to `commit`, which moves `position` to the end of the piece.
+// Reads the scene from triangle `position` to its end, piece by piece. make_piece(optional) makes
+// the Piece that a reader uses for all its pieces. Each piece is read with Piece::read() and then
+// passed to commit(piece, end), which sets `position` to `end`.
 template <class Piece, class MakePiece, class Commit>
 void read_pieces(TriangleSource& scene, const uint64_t& position, const StageContext& context,
                  MakePiece make_piece, Commit commit) {

@@ -55,8 +55,8 @@ void TopTree::Tally::clear() {
   last_cell_ = {};
 }
 
-// Neighbors in the scene usually touch the same few cells. The slots find the entries of these
-// cells again.
+// Consecutive triangles of a scene usually touch the same few cells. last_entry_ finds the entries
+// of these cells, so that few triangles need new entries.
 void TopTree::Tally::add(const FixedTriangle& triangle, double weight) {
   if (last_cell_.contains(triangle)) {
     entries_[entry_of_last_cell_].weight += static_cast<float>(weight);
@@ -77,7 +77,8 @@ void TopTree::Tally::add(const FixedTriangle& triangle, double weight) {
   if (touched_.size() == 1) remember_cell(triangle);
 }
 
-// The triangle touches one cell, and is inside it unless it extends beyond the grid.
+// Called for a triangle that touches one cell. Makes this cell last_cell_ if the triangle is inside
+// the cell, which is true unless the triangle extends beyond the grid.
 void TopTree::Tally::remember_cell(const FixedTriangle& triangle) {
   const CellBox box(triangle, grid_levels_, depth_);
   Cube cell{depth_, {}};
@@ -155,8 +156,8 @@ bool TopTree::is_empty(uint64_t code) const {
   return any == 0;
 }
 
-// Appends the subvolumes of a cube to `out`, bottom-up: a cube that `is_small_enough` replaces its
-// parts.
+// Appends the subvolumes of a cube to `out`, bottom-up: a cube for which is_small_enough() is true
+// replaces its parts. Returns the cube with its total weight and triangles.
 template <class IsSmallEnough>
 SubvolumePlan TopTree::gather(const Cube& cube, uint64_t code, const IsSmallEnough& is_small_enough,
                               std::vector<SubvolumePlan>& out) const {

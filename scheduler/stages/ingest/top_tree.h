@@ -1,6 +1,6 @@
 // The dense top tree. It stores for every cell of a coarse level the number of triangles that touch
-// it and their expected work. These counters decide which cubes of the grid become subvolumes.
-// Threads fill separate tallies, which are added to the tree serially.
+// the cell and their expected work. These counters decide which cubes of the grid become
+// subvolumes. Threads fill separate tallies, which are added to the tree serially.
 #pragma once
 
 #include <array>
@@ -20,7 +20,8 @@ namespace voxdag {
 
 // Expected number of voxels and bricks that a triangle touches. The number of bricks is the volume,
 // in bricks, of the Minkowski sum of the triangle and a brick: area * (|nx| + |ny| + |nz|) + the
-// extents along the axes + 1.
+// extents along the axes + 1, where n is the unit normal, and lengths are in bricks. The number of
+// voxels is the same sum with lengths in voxels.
 struct ExpectedWork {
   double voxels, bricks;
 };
@@ -73,18 +74,19 @@ class TopTree {
     const uint32_t depth_;
     std::vector<Entry> entries_;                 // a cell can have several entries
     std::vector<LargeTriangle> large_;           // triangles that touch more than kMaxTouched cells
-    std::array<uint32_t, kSlots> last_entry_{};  // index of the last entry for any cell of the slot
+    std::array<uint32_t, kSlots> last_entry_{};  // index of the last entry with code % kSlots
     std::vector<uint64_t> touched_;              // cells that the last triangle touches
     CubeInside last_cell_;                       // a cell that contains a complete triangle
     size_t entry_of_last_cell_ = 0;
   };
   void add(Tally& tally);
   double total_weight() const { return total_weight_; }
-  // The counters as plain bytes, which can fill another top tree of the same depth. The total is
-  // not included.
+  // Returns the counters as plain bytes, without the total weight.
   std::span<const std::byte> cells() const {
     return std::as_bytes(std::span(cells_.data(), cells_.size()));
   }
+  // Sets the total weight and returns the memory of the counters. The caller fills it with the
+  // cells() of a tree of the same depth.
   std::span<std::byte> fill(double total_weight) {
     total_weight_ = total_weight;
     return std::as_writable_bytes(std::span(cells_.data(), cells_.size()));

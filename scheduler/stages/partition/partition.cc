@@ -30,10 +30,12 @@ void partition(TriangleStream& triangles, const CubeTree& tree, BinWriter& write
 constexpr size_t kPartitionPiece = 16384;
 constexpr size_t kBatchTriangles = 256;
 
-// Consecutive triangles of the scene, encoded for each leaf that they touch, in order.
+// A piece of the scene: consecutive triangles, each encoded once for every leaf that it touches, in
+// the order of the scene.
 class TouchedPiece {
  public:
-  // Allocates space for kPartitionPiece records, plus the records of one more triangle.
+  // Allocates space for kPartitionPiece records, plus the records of one more triangle, which may
+  // touch all leaves.
   TouchedPiece(const CubeTree& tree, size_t leaves, size_t record_bytes, MemoryBudget& budget)
       : tree_(tree),
         leaves_(leaves),
@@ -47,7 +49,8 @@ class TouchedPiece {
     batch_size_ = next_ = 0;
     fill();
   }
-  // Finds the leaves of the next triangles that fit the buffer. Returns false at the end.
+  // Replaces the records by the records of the next triangles, as many as fit in the buffer.
+  // Returns false at the end of the piece.
   bool fill() {
     runs_.clear();
     used_ = 0;
@@ -218,7 +221,8 @@ std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
     partition(store, by_cube.at(whole).bin, CubeTree(grid_levels, whole, leaves), targets,
               buffer_bytes / threads, context.build.cancel);
   });
-  // The artifacts of the other bins may already be durable.
+  // Releases the reference with which each cube bin was created. This frees the bins of subvolumes
+  // whose artifacts are already recorded.
   for (const CubeBin& bin : store.cube_bins()) store.release(bin.bin);
   return assigned;
 }

@@ -30,7 +30,8 @@ class CubeTree {
     if (hint.inside.contains(triangle)) return visit(hint.leaf);
     int32_t node = 0;
     Cube cube = root_;
-    // A triangle inside one cube touches no other, so no overlap test is needed down to that cube.
+    // A triangle inside a cube touches no other cube of that level, so the descent to the smallest
+    // cube around the triangle needs no overlap test.
     const CellBox box(triangle, grid_levels_, deepest_);
     if (const Cube around = box.is_inside_grid() ? box.cube_around() : Cube{};
         contains(root_, around))
@@ -78,7 +79,7 @@ void partition(TriangleStore& store, BinId from, const CubeTree& tree,
 // These triangles are in the bins after writer.flush().
 using AfterPartitionPiece = std::function<void(uint64_t copied, BinWriter& writer)>;
 
-// Copies the scene's triangles, starting at number `first`, to the store's cube bins. Creates the
+// Copies the scene's triangles, starting at index `first`, to the store's cube bins. Creates the
 // bins for `cubes` unless an earlier run has created them. Several threads find the cubes that
 // pieces of the scene touch; the pieces are copied in order. Drops the scene's bin.
 void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const Cube> cubes,
@@ -86,9 +87,9 @@ void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const
                      const AfterPartitionPiece& after_piece);
 
 // Returns one bin for each of `cubes`, in the same order, with the triangles that touch this cube.
-// It is the cube's own bin if there is one, and otherwise a part that is filled from the bin of the
-// smallest enclosing cube. Each returned bin has one reference. Releases the other cube bins.
-// Throws DamagedTriangles for a cube without an enclosing cube bin.
+// This is the cube's own bin if the store has one, and otherwise a part that is filled from the bin
+// of the smallest enclosing cube. Each returned bin has one reference. Releases the other cube
+// bins. Throws DamagedTriangles for a cube without an enclosing cube bin.
 std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
                                std::span<const Cube> cubes, size_t buffer_bytes,
                                const StageContext& context);
