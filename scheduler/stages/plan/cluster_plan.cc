@@ -13,13 +13,15 @@ namespace {
 // CPU time per expected brick: measured from 3 ns (the scene repeats itself) to 150 ns (no
 // repetition).
 constexpr double kSecondsPerBrick = 30e-9;
-constexpr double kTaskSeconds = 120;
+constexpr double kTaskSeconds = 120;  // wanted CPU time per task
 constexpr uint64_t kMaxDefaultTasks = 1000;
 // The merge's share of a build's CPU time, as measured (docs/performance.md).
 constexpr double kMergeShare = 0.2;
-// A task also reads its batch and merges its artifacts. The final merge repeats both.
+// CPU time of the tasks relative to the same work in one process. A task also reads its batch and
+// merges its artifacts; the final merge reads and merges the tasks' artifacts again.
 constexpr double kTaskOverhead = 1.15;
-// Records per triangle: triangles near borders are in several subvolumes.
+// Triangle records in all batches per triangle of the scene: a triangle at a border between
+// subvolumes is in several subvolumes.
 constexpr double kTaskCopies = 1.2;
 // Enough for the largest planned subvolumes on two threads.
 constexpr uint64_t kTaskMemory = uint64_t{2} << 30;

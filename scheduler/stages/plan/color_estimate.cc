@@ -9,10 +9,12 @@
 namespace voxdag {
 namespace {
 
-// Measured on Sponza at 4096: 4 bits for each cell, a third of that for the coarser levels, and
-// prefixes. Does not include the padding of regions with few cells.
+// Bytes of colors in the file per cell of the finest level, measured on Sponza at a color
+// resolution of 4096: 4 bits for the cell, a third of that for the coarser levels, and prefixes
+// (core/color/blocks/region.h). Does not include the padding of regions with few cells.
 constexpr double kColorBytesPerCell = 0.69;
-// Values are not compressed. The coarser levels add a third, and there are prefixes.
+// Values of other attributes are not compressed. Per cell of the finest level, the file has this
+// number of values, because the coarser levels add about a third, and these bytes of prefixes.
 constexpr double kCellsOfAllLevels = 1.36;
 constexpr double kPrefixBytesPerCell = 0.03;
 constexpr EstimateRange kFileSpread = {0.95, 1, 1.25};
@@ -20,12 +22,13 @@ constexpr EstimateRange kFileSpread = {0.95, 1, 1.25};
 constexpr EstimateRange kFixedFileBytes = {0, 4096, 12288};
 // An artifact also has checksums and lengths of regions.
 constexpr double kArtifactOverFile = 1.02;
-// Bytes of a surface with an image and without vertex colors, added up over all its cubes.
+// Bytes of the record of a surface with an image and without vertex colors.
 constexpr double kExpectedSurfaceBytes = 65;
+// Records of a surface: one in the bin of each cube that it touches.
 constexpr EstimateRange kSurfaceCopies = {1, 1.5, 3};
-constexpr double kSecondsPerCell = 1.2e-7;
-constexpr double kSecondsPerValue = 2e-8;  // per cell, for each attribute after the first
-// Time to decode, filter and store a page of an image.
+constexpr double kSecondsPerCell = 1.2e-7;  // CPU time for the first attribute
+constexpr double kSecondsPerValue = 2e-8;   // per cell, for each attribute after the first
+// CPU time to decode, filter and store a page (kPageBytes) of an image pyramid.
 constexpr double kSecondsPerPage = 3e-5;
 
 // Bytes per cell in the file, without the padding of regions with few cells.

@@ -13,28 +13,31 @@
 namespace voxdag {
 namespace {
 
-// Growth of the DAG per doubling of R. Its excess over kLateGrowth falls by the factor kGrowthDecay
-// with each doubling. Measured from 8192 on: Sponza's growth falls from 2.72 to 2.52 at 524288, the
-// dragon's from 3.17 to 2.75 at 32768 and to 2.65 on average up to 262144. At coarser resolutions
-// the growth falls and rises again while triangles become larger than bricks, so pilots must be
-// fine.
+// The growth of a DAG is the factor by which its number of nodes increases when R doubles. The
+// growth's excess over kLateGrowth is multiplied by kGrowthDecay with each doubling. Measured from
+// R = 8192 up: Sponza's growth falls from 2.72 to 2.52 at 524288, the dragon's from 3.17 to 2.75 at
+// 32768 and to 2.65 on average up to 262144. At coarser resolutions the growth falls and rises
+// again while triangles become larger than bricks, so pilots must be fine.
 constexpr double kLateGrowth = 2.5;
 constexpr double kGrowthDecay = 0.75;
 // Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
 constexpr double kSpreadPerDoubling = 1.12;
-// Bytes per node of the global file. A pilot has fewer, because coarse levels repeat more.
+// Bytes of the global file per node. A pilot's file has fewer, because coarse levels repeat more.
+// Each doubling of R multiplies the bytes per node by kBytesGrowthPerDoubling, up to
+// kMaxBytesPerNode.
 constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;
-// Measured on real scenes: artifact nodes per unique node, compressed bytes per node, and the CPU
-// time of a build relative to its pilot.
+// Measured on real scenes: nodes of all artifacts per node of the global DAG, and compressed bytes
+// of an artifact per node.
 constexpr double kArtifactNodesPerUnique = 1.5;
 constexpr double kArtifactBytesPerNode = 16;
 // More bytes than an uncompressed node takes, in an artifact or in the global file.
 constexpr double kMaxDiskBytesPerNode = 40;
+// CPU time per DAG node of a build, relative to its pilot. Measured on real scenes.
 constexpr double kBuildOverPilotTime = 1.5;
-// A surface that crosses a brick sets about 16 of its voxels.
+// Upper bound of the cells per brick. A surface that crosses a brick sets about 16 of its voxels.
 constexpr double kMaxCellsPerBrick = 32;
-// Peak memory of the merge per unique node, and memory of a process without a scene.
+// Peak memory of the merge per node of the global DAG, and memory of a process without a scene.
 constexpr double kMemoryBytesPerNode = 26;
 constexpr double kBaseMemoryBytes = 24e6;
 
@@ -86,7 +89,8 @@ std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t
 }
 
 // Runs pilots at two consecutive resolutions, the finest whose triangles and tables fit the budget.
-// Returns them with the coarser first, or fewer if several resolutions do not fit.
+// Returns the coarser pilot first. Returns fewer than two pilots if too many resolutions do not
+// fit.
 std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
                                       const StageContext& context) {
   const auto backend = make_cpu_backend();
@@ -111,8 +115,9 @@ std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot
   return pilots;
 }
 
-// Returns a R^2 + b R at the resolution `doublings` above the last pilot (below it if negative). a
-// and b are fitted to the values of the last two pilots, `coarse` and `fine`.
+// Extrapolates a count that grows as a R^2 + b R by a number of doublings of R from the finer pilot
+// (halvings if negative). `coarse` and `fine` are the counts of the two pilots, which determine a
+// and b.
 double grow_as_surface(double coarse, double fine, int doublings) {
   const double ratio = std::exp2(doublings);
   const double square = 2 * (fine - 2 * coarse),
@@ -122,9 +127,9 @@ double grow_as_surface(double coarse, double fine, int doublings) {
   return doublings < 0 ? std::max(grown, 1.0) : std::max(grown, fine);
 }
 
-// Returns the number of DAG nodes at the resolution `doublings` above the last pilot. Starts from
-// the growth between the last two pilots, and reduces its excess over kLateGrowth with each
-// doubling.
+// Extrapolates the number of DAG nodes by a number of doublings of R from the last pilot. Starts
+// with the growth between the last two pilots, and reduces the growth's excess over kLateGrowth
+// with each doubling.
 double grow_as_dag(const std::vector<PilotCounts>& pilots, int doublings) {
   const double nodes = pilots.back().dag_nodes;
   if (pilots.size() < 2 || nodes == 0) return nodes * std::exp2(1.5 * doublings);

@@ -1,10 +1,11 @@
 // Estimates the resources of a build: pilot builds of the same scene at coarser resolutions,
 // extrapolated to the requested one.
 //
-// Voxels and octree nodes grow as a R^2 + b R (surfaces and their borders): two pilots give a and
-// b. The number of DAG nodes grows by a factor whenever R doubles. Two pilots give the first
-// factor. A surface looks flatter within smaller voxels, so the factor falls with each further
-// doubling, at a rate measured on real scenes. The spread widens with the distance from the pilots.
+// The numbers of voxels and octree nodes grow with the resolution R as a R^2 + b R: a R^2 for the
+// area of surfaces, b R for the length of their borders. Two pilots give a and b. The number of DAG
+// nodes grows by a factor whenever R doubles. Two pilots give the first factor. A surface looks
+// flatter within smaller voxels, so the factor falls with each further doubling, at a rate measured
+// on real scenes. The range of an estimate widens with the number of doublings from the pilots.
 #pragma once
 
 #include <cstdint>
@@ -42,9 +43,9 @@ struct Estimate {
 Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
                         BuildScene& source, uint32_t pilot_levels, const StageContext& context);
 
-// Checks before a build that the disk has space for it. Throws Error{kNoSpace} if it cannot fit,
-// unless forced; warns if it may not fit. Returns true if this required an estimate, which runs a
-// pilot build.
+// Checks before a build that the disk has space for it. Throws Error{kNoSpace} if the build cannot
+// fit; warns if it may not fit. Does nothing if RunOptions::force is set. Returns true if this
+// required an estimate, which runs a pilot build.
 bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
                       const std::string& work_folder, MemoryBudget& budget,
                       const BuildContext& context);

@@ -10,7 +10,8 @@
 
 namespace voxdag {
 
-// True if an earlier run was stopped after publishing the file. Fills in the report.
+// True if an earlier run published the output file, and the file and the inputs of its attribute
+// sections are unchanged. Then fills in the report.
 bool is_published(BuildJob& job, AttributeSections& attributes);
 
 // Writes checksums, syncs and renames the file, and fills in the report.
