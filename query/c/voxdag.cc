@@ -22,7 +22,8 @@ struct voxdag_file {
 
 namespace {
 
-// Has a fixed size, so that reporting a lack of memory allocates nothing.
+// The message that voxdag_error() returns. The array has a fixed size, so that set_error()
+// allocates nothing and also works after a lack of memory.
 thread_local std::array<char, 1024> last_error;
 
 void set_error(const char* text) {
@@ -50,7 +51,7 @@ voxdag_status status_of(voxdag::ErrorCode code) {
   }
 }
 
-// Runs `ask`. Catches all exceptions, because none may pass into C.
+// Runs `ask` and returns the status for C. Catches all exceptions, because none may pass into C.
 template <class Ask>
 voxdag_status answer(const Ask& ask) {
   try {
@@ -89,11 +90,12 @@ voxdag::query::Selection selection_of(uint32_t grid_levels, const voxdag_region*
   return selection;
 }
 
-// Maximum plausible struct_size, above the size in any later header. A larger number means that the
-// caller left struct_size uninitialized.
+// Maximum accepted struct_size, in bytes. No struct of a later voxdag.h will exceed it, so a larger
+// number means that the caller left struct_size uninitialized.
 constexpr size_t kMaxStructBytes = 4096;
 
-// `first_bytes`: the size of the struct in the first header that contained the struct.
+// Throws Error{kInvalidInput} if a caller's struct_size is impossible. `name` is the name of the
+// struct. `first_bytes` is its size in the oldest voxdag.h that has the struct, the minimum.
 void check_struct_size(const char* name, size_t struct_size, size_t first_bytes) {
   if (struct_size < first_bytes || struct_size > kMaxStructBytes)
     refuse(std::string(name) + " has the struct_size " + std::to_string(struct_size) +
@@ -111,7 +113,8 @@ voxdag::query::RayLimits ray_limits_of(const voxdag_ray_limits* limits) {
   return {limits->max_distance, limits->stop_size};
 }
 
-// Number of items per allocation.
+// Number of rays or voxels that are converted and queried together. It limits the size of the
+// temporary arrays.
 constexpr size_t kBatch = 4096;
 
 template <class Work>
@@ -168,7 +171,8 @@ voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts) {
     known.svo_nodes = dag.svo_nodes();
     known.dag_nodes = dag.dag_nodes();
     known.bytes = dag.file_bytes();
-    // A caller's later header may have more members than this library knows. This sets them to 0.
+    // If the caller's header is newer than this library, the caller's struct has additional
+    // members. They are set to 0.
     std::memset(facts, 0, known.struct_size);
     std::memcpy(facts, &known, std::min(known.struct_size, sizeof known));
   });

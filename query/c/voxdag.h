@@ -1,15 +1,17 @@
 /* Queries of finished .vdag files, for C and every language that can call C. A .vdag file of any
- * size is mapped, not read.
+ * size is mapped into memory instead of being read completely.
  *
  *     voxdag_file* file;
  *     if (voxdag_open("scene.vdag", &file) != VOXDAG_OK) { puts(voxdag_error()); exit(1); }
  *     voxdag_lookup(file, 13, positions, count, set);
  *     voxdag_close(file);
  *
- * Positions are voxels, or cells of the coarser grid with 2^grid_levels cells per edge. A cell is
- * set if any voxel in it is set. Every function that can fail returns a status; voxdag_error()
- * returns the message of the last failure on the calling thread. A file is immutable: any number of
- * threads may query it concurrently. docs/library.md describes conventions and units.
+ * A position has three integers, x, y and z. It names a cell of the grid with 2^grid_levels cells
+ * per edge: a voxel if `grid_levels` is the file's number of levels, or a larger cell if it is
+ * less. A cell is set if any voxel in it is set. Every function that can fail returns a status;
+ * voxdag_error() returns the message of the last failure on the calling thread. A file is
+ * immutable: any number of threads may query it concurrently. docs/library.md describes conventions
+ * and units.
  *
  * A struct that may grow begins with `struct_size`: set it to its sizeof. Programs compiled with
  * this header run with every later libvoxdag.so of the same soname. */
@@ -31,7 +33,7 @@ extern "C" {
 
 typedef enum voxdag_status {
   VOXDAG_OK = 0,
-  VOXDAG_INVALID_INPUT,       /* an argument that breaks its rules */
+  VOXDAG_INVALID_INPUT,       /* a wrong argument, or an attribute that the file does not have */
   VOXDAG_NOT_FOUND,           /* no such file */
   VOXDAG_CORRUPT,             /* the file is damaged, or not a .vdag file */
   VOXDAG_UNSUPPORTED_VERSION, /* the file has a later format version */
@@ -63,11 +65,11 @@ typedef struct voxdag_facts {
   double edge;           /* the edge of the grid in the units of the scene */
   uint64_t voxels;       /* the number of set voxels */
   uint64_t svo_nodes;    /* the number of octree nodes without sharing */
-  uint64_t dag_nodes;
-  uint64_t bytes; /* the size of the file */
+  uint64_t dag_nodes;    /* the number of nodes of the DAG, including bricks */
+  uint64_t bytes;        /* the size of the file */
 } voxdag_facts;
 
-/* The half-open box low <= p < high. It may extend beyond the grid. */
+/* The cells p with low <= p < high on every axis. The region may extend beyond the grid. */
 typedef struct voxdag_region {
   int64_t low[3];
   int64_t high[3];
@@ -81,7 +83,7 @@ typedef struct voxdag_ray {
 typedef struct voxdag_ray_limits {
   size_t struct_size;  /* sizeof(voxdag_ray_limits), set by the caller */
   double max_distance; /* in voxels; INFINITY for no limit */
-  double stop_size;    /* in voxels; set cells with at most this edge count as solid */
+  double stop_size;    /* in voxels; a ray ends at a set cell with at most this edge */
 } voxdag_ray_limits;
 
 typedef struct voxdag_hit {
@@ -94,8 +96,8 @@ typedef struct voxdag_hit {
 /* The version of the library, such as "0.1.0". */
 VOXDAG_API const char* voxdag_version(void);
 
-/* Returns the message of the last function that failed on this thread. The result is never null. It
- * is valid until the next call on this thread. */
+/* Returns the message of the last function that failed on this thread; "" if none has failed. The
+ * result is never null. It is valid until the next call on this thread. */
 VOXDAG_API const char* voxdag_error(void);
 
 VOXDAG_API voxdag_status voxdag_open(const char* path, voxdag_file** file);
@@ -107,13 +109,14 @@ VOXDAG_API voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts*
  * stands for triangles without a material. The result is valid while the file is open. */
 VOXDAG_API const char* voxdag_material_name(const voxdag_file* file, uint32_t material);
 
-/* set[i] = 1 if cell i is set, else 0. Cells outside the grid are not set. */
+/* Sets set[i] to 1 if cells[i] is set, else to 0. Cells outside the grid are not set. `count` is
+ * the number of cells, here and below. */
 VOXDAG_API voxdag_status voxdag_lookup(const voxdag_file* file, uint32_t grid_levels,
                                        const int64_t (*cells)[3], size_t count, uint8_t* set);
 
-/* Get an attribute of each cell. A cell that is finer than the color grid has the value of the
- * color grid's cell that contains it. Returns VOXDAG_INVALID_INPUT if the file does not have the
- * attribute.
+/* The next four functions write one attribute of each cell. The color grid is the finest grid with
+ * attributes; a smaller cell has the value of the color grid's cell that contains it. The functions
+ * return VOXDAG_INVALID_INPUT if the file does not have the attribute.
  *   colors      red, green and blue in sRGB, and 255; zeros for a cell that is not set
  *   alphas      0 to 255, linear; 0 for a cell that is not set
  *   normals     unit vectors; zeros for a cell that is not set
@@ -129,8 +132,8 @@ VOXDAG_API voxdag_status voxdag_materials(const voxdag_file* file, uint32_t grid
                                           const int64_t (*cells)[3], size_t count,
                                           uint32_t* materials);
 
-/* Finds the first set cell on each ray. If `limits` is null, the rays have no maximum distance and
- * hit single voxels. */
+/* Finds the first set cell on each ray. `count` is the number of rays and of hits. If `limits` is
+ * null, the rays have no maximum distance and hit single voxels. */
 VOXDAG_API voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_ray* rays,
                                           size_t count, const voxdag_ray_limits* limits,
                                           voxdag_hit* hits);
@@ -150,9 +153,10 @@ VOXDAG_API voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_leve
                                      const voxdag_region* region, size_t capacity,
                                      int64_t (*cells)[3]);
 
-/* Finds the nearest set voxel for each voxel, by the distance between the centers. Of equally near
- * voxels, the first in Morton order is taken. If none is within max_distance, the result is -1 on
- * each axis and an infinite distance. `distances` may be null. */
+/* Finds the nearest set voxel for each of `count` voxels, by the distance between the centers, in
+ * voxels. If several set voxels are equally near, the result is the first of them in Morton order.
+ * If no set voxel is within max_distance, the result is -1 on each axis and an infinite distance.
+ * `distances` may be null. */
 VOXDAG_API voxdag_status voxdag_nearest(const voxdag_file* file, const int64_t (*voxels)[3],
                                         size_t count, double max_distance, int64_t (*nearest)[3],
                                         double* distances);

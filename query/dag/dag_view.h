@@ -1,11 +1,12 @@
-// A finished DAG as cells of any size, from the complete grid down to a voxel. The view reads the
-// words of each level in place, in the layout of the global file. The part of the DAG below a cell
-// is called the cell's `content`:
-//     cell          content
-//     a node        the node's word offset in its level
-//     a brick       the brick's 64-bit mask          (edge 4)
-//     half a brick  the 8 bits of its 2x2x2 voxels   (edge 2)
-//     a voxel       1                                (edge 1)
+// Presents a finished DAG as cells of any size, from the complete grid down to a voxel. The view
+// reads the words of each level in place, in the layout of the global file. `depth` is a cell's
+// number of levels below the root, and L is the grid's number of levels. `content` is a number that
+// identifies the part of the DAG below a cell:
+//     cell                           depth        content
+//     a node                         0 to L - 3   the node's word offset in its level
+//     a brick (4x4x4 voxels)         L - 2        the brick's 64-bit mask
+//     an octant of a brick (2x2x2)   L - 1        the mask of the octant's 8 voxels
+//     a voxel                        L            1
 // The file may be damaged, so every offset is checked. A bad offset throws Error{kCorrupt}.
 // Immutable; any number of threads may read concurrently.
 #pragma once
@@ -35,7 +36,7 @@ class DagView {
 
   bool empty() const { return levels_.empty(); }
   uint32_t grid_levels() const { return grid_levels_; }
-  // Returns the level at `depth`, 0 to L - 2, in its memory layout. The DAG must not be empty.
+  // Returns the words of the level at `depth`, 0 to L - 2. The DAG must not be empty.
   const Level& level(uint32_t depth) const { return levels_[depth]; }
   // Prefetches the node or brick at this word offset of the level at `depth`. Does nothing if the
   // level has no such word.
@@ -46,8 +47,9 @@ class DagView {
   [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
 
-  // The occupied children of a cell that is larger than a voxel. `depth` is the cell's number of
-  // levels below the root, 0 to L - 1.
+  // The occupied children of a cell that is larger than a voxel. Bit i of `mask` is set if child i
+  // is occupied. A child's index is 4x + 2y + z, where x, y and z are 1 in the upper half of the
+  // cell on that axis.
   class Children {
    public:
     uint32_t mask = 0;
@@ -62,7 +64,7 @@ class DagView {
   uint64_t brick(uint64_t offset) const;
   uint64_t root() const { return grid_levels_ == kBrickLevels ? brick(0) : 0; }
   Children children(uint32_t depth, uint64_t content) const;
-  // Returns the children of a node at a depth above the bricks.
+  // Returns the children of a node, by its word offset. `depth` is less than L - 2.
   Children children_of_node(uint32_t depth, uint64_t offset) const;
   // Returns the word offset of a node's child `index`, which must be occupied.
   uint64_t offset(const Children& children, int index) const {
@@ -80,7 +82,7 @@ class DagView {
 
   struct Cell {
     uint32_t depth = 0;  // below the root
-    double edge = 0;     // R / 2^depth voxels
+    double edge = 0;     // resolution() / 2^depth voxels
     Vec low;             // low corner, in voxels
   };
   // Calls `visit` with each occupied cell at `depth` (0 to L). On the way down, calls `select` with
@@ -124,8 +126,8 @@ inline DagView::Children DagView::children(uint32_t depth, uint64_t content) con
   return c;
 }
 
-// Returns the occupied cells two levels below a node or brick at `depth`, in the form of a brick's
-// mask.
+// Returns the 4x4x4 cells two levels below a node or brick at `depth` as a mask: a bit is set if
+// the cell is occupied. The bits have the same order as in a brick's mask.
 inline uint64_t brick_of_cells(const DagView& dag, uint32_t depth,
                                const DagView::Children& children) {
   uint64_t mask = 0;

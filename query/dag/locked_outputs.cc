@@ -35,9 +35,10 @@ void refuse_replacing(FileSystem& files, const Outputs& outputs) {
     }
 }
 
-// True if a writer of this output was killed and its temporary files can be removed. A lock file
-// that is not empty was not created by voxdag. The files of a killed build are kept, because the
-// build can resume from them.
+// True if a writer of `output` was killed and its temporary files can be removed. This is the case
+// if there is an empty lock file, but no work folder of a build. A lock file that is not empty was
+// not created by voxdag. The files of a killed build are kept, because the build can resume from
+// them.
 bool is_left_behind(FileSystem& files, const std::string& output) {
   const auto lock = open_if_there(files, OutputLock::path_of(output));
   return lock && lock->size() == 0 && !files.exists(output + ".work");
@@ -57,9 +58,10 @@ void remove_leftovers(FileSystem& files, const Outputs& outputs) {
       remove_tree(files, folder + "/" + entry.name);
 }
 
-// Checks the outputs before this process creates the lock file. If the lock file came first and the
-// process were killed before the check, the lock file would remain next to another program's
-// temporary file. Returns true if a killed process left its files.
+// Checks the outputs before this process creates the lock file. Otherwise, if the process were
+// killed between the lock and the check, its lock file could remain next to a file PATH.partial of
+// another program, and the next run would remove that file. Returns true if a killed process left
+// its files.
 bool check_outputs(FileSystem& files, const Outputs& outputs) {
   refuse_impossible(files, outputs);
   const bool left_behind = is_left_behind(files, outputs.paths[0]);

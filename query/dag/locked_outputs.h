@@ -1,7 +1,7 @@
-// Locks the outputs of a command. Without a lock, two writers of the same output would use the same
-// temporary files. An output must also not destroy a file that the user wants to keep. The lock is
-// taken before any temporary file is touched, because only the lock's holder knows if a temporary
-// file was left by a killed process.
+// Locks the outputs of a command, and checks that they do not destroy a file that the user wants to
+// keep. Without a lock, two writers of the same output would use the same temporary files. The lock
+// is taken before any temporary file is changed, because only the lock's holder can know that no
+// running process uses the file.
 #pragma once
 
 #include <string>
@@ -18,8 +18,8 @@ struct Outputs {
   bool replace = false;            // replace existing files
 };
 
-// Holds the OutputLock of the first output. If a lock file exists that no process holds, a process
-// was killed; its temporary files are removed.
+// Holds the OutputLock of the first output. A lock file that no process holds was left by a killed
+// process. In this case, the constructor removes that process's temporary files.
 class LockedOutputs {
  public:
   // Throws Error: kIo if another process holds the lock; kInvalidInput if an output has no name, is

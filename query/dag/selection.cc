@@ -12,8 +12,9 @@ namespace voxdag::query {
 
 namespace {
 
-// A build moves vertices to multiples of 1/256 voxel, so a difference of less than half of that has
-// no meaning.
+// Maximum distance, in cells, at which a coordinate counts as on a cell boundary. A build moves
+// vertices to multiples of 1/256 voxel, so a difference of less than half of this step has no
+// meaning.
 constexpr double kMaxSnapCells = 1.0 / 512;
 constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
 

@@ -1,4 +1,4 @@
-// Checks of a selection, and selections given in world space.
+// Checks selections, and converts coordinates and boxes of world space to cells.
 #pragma once
 
 #include <array>
@@ -9,18 +9,19 @@
 
 namespace voxdag::query {
 
-// Converts a coordinate of world space to cells, along one axis of the grid of 2^grid_levels cells
-// per edge. If the distance to a cell boundary is within the rounding error of a few double
-// operations, the coordinate counts as on the boundary. So the corner of a cell, computed as origin
-// + cell * edge, is in this cell, and a box with such corners has no extra layer of cells.
+// Converts the coordinate `world` of world space to cells, along one axis of the grid of
+// 2^grid_levels cells per edge. If the distance to a cell boundary is within the rounding error of
+// a few double operations, returns the boundary. So a corner that was computed as
+// `origin + cell * edge` is in this cell, and a box with such corners has no extra layer of cells.
 double world_to_cells(const voxdag_reader::File& file, uint32_t grid_levels, size_t axis,
                       double world);
-// Returns the cell that contains a coordinate. The cell may be outside the grid; its magnitude is
-// at most 2^62.
+// Returns the cell that contains the coordinate `world`. The cell may be outside the grid. The
+// result is limited to the range from -2^62 to 2^62.
 int64_t world_to_cell(const voxdag_reader::File& file, uint32_t grid_levels, size_t axis,
                       double world);
-// Returns the cells that the half-open box x0, y0, z0, x1, y1, z1 of world space touches. The box
-// must not contain NaN. A box that extends to infinity ends at the border of the grid.
+// Returns the cells that `box` overlaps. The box is half-open and in world space: its low corner
+// x0, y0, z0, then its high corner x1, y1, z1. No number may be NaN. An infinite number stands for
+// the border of the grid.
 Region world_to_region(const voxdag_reader::File& file, uint32_t grid_levels,
                        const std::array<double, 6>& box);
 

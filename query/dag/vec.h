@@ -1,4 +1,5 @@
-// Points and directions in voxel units: the grid is the cube [0, R]^3, y is up.
+// Points and directions in voxels. The grid is the cube [0, R]^3, where R is its resolution. y is
+// up.
 #pragma once
 
 #include <cmath>

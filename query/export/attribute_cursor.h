@@ -23,7 +23,8 @@ class AttributeCursor {
   const AttributeTraits& traits() const { return traits_; }
   const EncodingTraits& encoding() const { return traits_of(traits_.encoding); }
 
-  // Calls put(number) for each component of the value. Throws Error{kCorrupt}.
+  // Calls put(number) for each component of the value of `cell`, a set cell of the selection's
+  // grid. Throws Error{kCorrupt}.
   template <class Put>
   void put(const std::array<int64_t, 3>& cell, const Put& put) {
     uint64_t i = 0;
@@ -49,7 +50,7 @@ inline std::vector<AttributeCursor> exported_attributes(const ExportJob& job) {
   return cursors;
 }
 
-// Returns the bytes of the numbers of one cell.
+// Returns the number of bytes of one cell's numbers, the values of all these attributes.
 inline uint64_t decoded_bytes(std::span<const AttributeCursor> attributes) {
   uint64_t bytes = 0;
   for (const AttributeCursor& attribute : attributes) bytes += attribute.encoding().decoded_bytes();

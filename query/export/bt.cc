@@ -1,7 +1,7 @@
-// OctoMap's binary octree (Hornung et al. 2013): a text header, then two bytes for each inner node,
-// depth first. Bits 2i and 2i + 1 of these bytes describe child i: 01 (the first bit set) free, 10
-// occupied, 11 an inner node, 00 unknown. The child at (x, y, z) has the index x + 2y + 4z. This
-// code writes the format without the OctoMap library, because the library would store all nodes in
+// Writes OctoMap's binary octree (Hornung et al. 2013): a text header, then two bytes for each
+// inner node, depth first. Bits 2i and 2i + 1 of these bytes describe child i: 01 (only bit 2i is
+// set) is free, 10 occupied, 11 an inner node, 00 unknown. The child at (x, y, z) has the index x +
+// 2y + 4z. This code does not use the OctoMap library, because the library would store all nodes in
 // memory.
 //
 // The octree has 16 levels, and the origin of its coordinates is in its middle. The low corner of

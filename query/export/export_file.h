@@ -1,4 +1,4 @@
-// A buffered output file of an export. It has the name "<path>.partial" until publish(). The
+// A buffered output file of an export. The file has the name "<path>.partial" until publish(). The
 // destructor removes a file that was not published. Used by one thread.
 #pragma once
 

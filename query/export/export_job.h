@@ -1,4 +1,4 @@
-// The inputs of the writer of each format, and functions shared by the writers.
+// ExportJob, the inputs that every format's writer gets, and functions that the writers share.
 #pragma once
 
 #include <array>
@@ -43,7 +43,7 @@ struct ExportJob {
   }
 };
 
-// A stage of the progress that also checks for cancellation. The destructor ends the stage.
+// Reports a stage of the progress, and checks for cancellation. The destructor ends the stage.
 class ExportStage {
  public:
   ExportStage(const ExportJob& job, std::string_view name, uint64_t total, std::string_view unit)
@@ -102,17 +102,20 @@ inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> writt
 // Throws Error{kNoSpace} if the disk of the output has less than `bytes` free.
 void require_space(const ExportJob& job, uint64_t bytes);
 
-// Throws Error{code} with the message "OUTPUT: PROBLEM. --level 11 fits", or "Expected a smaller
-// --region" if no coarser level fits. `fits` must return true for a level that fits.
+// Throws Error{code} with a message such as "OUTPUT: PROBLEM. --level 11 fits", where 11 is the
+// finest coarser level that fits. If no coarser level fits, the message ends with "Expected a
+// smaller --region". `fits` must return true for a grid that fits.
 [[noreturn]] void refuse_size(const ExportJob& job, const std::string& problem,
                               const std::function<bool(uint32_t grid_levels)>& fits,
                               ErrorCode code = ErrorCode::kLimit);
 
-// Returns the number of selected voxels, or any number over `limit` if there are more.
+// Returns the number of set cells of `selection`. If this number is over `limit`, the result is an
+// arbitrary number over `limit`.
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);
-// Determines on which coarser grids the job's selection has at most `limit` cells. Query the
-// coarsest grid first. Equal subtrees are counted once if the memory can hold their counts. For a
-// complete file, each level is read once for all grids together; for a region, once per grid.
+// Determines on which coarser grids the job's selection has at most `limit` set cells. Call fits()
+// for the coarsest grid first. If the memory can hold a count per node, equal subtrees are counted
+// once. If also the complete grid is selected, each level is read once for all coarser grids
+// together; otherwise, once per grid.
 class CellLimit {
  public:
   CellLimit(const ExportJob& job, uint64_t limit);

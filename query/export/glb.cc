@@ -1,8 +1,9 @@
 // Writes the surface as binary glTF 2.0. The surface consists of the faces between set and empty
 // voxels. Coplanar faces are merged to rectangles. If the file has colors, each rectangle has one
-// color. Positions are numbers of cells from the low corner of the region; floats represent these
-// integers exactly. The transform of the glTF node scales and places them. COLOR_0 is linear light,
-// as glTF requires, in 16 bits, because dark sRGB bytes need this precision.
+// color. Positions are integers, in cells from the low corner of the region, which floats represent
+// exactly. The transform of the glTF node converts them to world space. The vertex colors (COLOR_0)
+// are linear light, as glTF requires. They have 16 bits, because dark sRGB bytes need this
+// precision.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -24,7 +25,7 @@ constexpr uint64_t kMaxGlbJsonBytes = 4096;                 // including chunk h
 constexpr uint64_t kQuadBytes = 4 * 3 * sizeof(float) + 6 * sizeof(uint32_t);
 constexpr uint64_t kQuadColorBytes = 4 * 4 * sizeof(uint16_t);
 
-// Returns the bytes of a rectangle.
+// Returns the number of bytes of a rectangle in the file.
 uint64_t quad_bytes(const ExportJob& job) {
   return kQuadBytes + (job.has_colors ? kQuadColorBytes : 0);
 }
@@ -106,7 +107,8 @@ class GlbSurface {
     return found != bricks_.end() && found->morton == morton ? found->mask : 0;
   }
 
-  // Returns the faces of a brick that are next to empty cells.
+  // Returns the mask of a brick's cells that have a face on the surface: a face perpendicular to
+  // `axis`, on the cell's upper side if `upward` is true, otherwise on its lower side.
   uint64_t exposed(const Position& corner, uint64_t mask, uint8_t axis, bool upward) const {
     Position next_to = corner;
     next_to[axis] += upward ? kBrickEdge : -kBrickEdge;

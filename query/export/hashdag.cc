@@ -1,11 +1,11 @@
 // The files of HashDAG (Careil, Billeter, Eisemann 2020) and of the viewers derived from it:
 //     NAME.basic_dag.dag.bin                   f64 x 6 bounds | u32 levels | u64 words | u32 ...
 //     NAME.basic_dag.uncompressed_colors.bin   u32 top levels | u64 n, u64 ... | u64 m, u32 ...
-// A node is one word (its child mask in the low byte, and in the bits above the number of voxels
-// that the node encloses) and the absolute word index of each child. A leaf is two words, like a
-// brick. In the top levels the bits above the mask are instead an index into the 64-bit numbers of
-// the color file. The colors are bytes R, G, B and 255 for each voxel in Morton order, or a single
-// gray for a file without colors.
+// A node is one word, then the absolute word index of each child. The low byte of the first word is
+// the child mask; its other 24 bits are the number of voxels that the node encloses. In the top
+// levels, whose counts can be larger, these 24 bits are an index into the n voxel counts of the
+// color file. A leaf is two words, like a brick. The m colors are bytes R, G, B and 255 for each
+// voxel in Morton order, or a single gray for a file without colors.
 #include <algorithm>
 #include <array>
 #include <bit>

@@ -23,14 +23,14 @@ class LevelCells {
       : file_(file), dag_(dag), budget_(budget), cancel_(cancel) {}
 
   // Returns the number of set cells in the grid of 2^grid_levels cells per edge. If this number is
-  // over `limit`, the returned number is an arbitrary number over `limit`. The grid must be a brick
-  // or larger, coarser than the file's grid, and not coarser than in the previous call. Takes 8
-  // bytes for each node that is two or three levels above the cells, and 2 bits for each word of
-  // these nodes. Throws Error{kOutOfMemory} if this is over the budget, and Error{kCorrupt}.
+  // over `limit`, the result is an arbitrary number over `limit`. `grid_levels` must be at least 2,
+  // less than the file's, and not less than in the previous call. Takes 8 bytes for each node that
+  // is two or three levels above the cells, and 2 bits for each word of these nodes. Throws
+  // Error{kOutOfMemory} if this is over the budget, and Error{kCorrupt}.
   uint64_t count(uint32_t grid_levels, uint64_t limit);
 
  private:
-  // The nodes of a level, and the number of occurrences of each.
+  // The nodes of a level. `places` has the number of occurrences of each node in the octree.
   struct Level {
     NodeIndex index;
     PageBuffer<uint64_t> places;

@@ -1,5 +1,5 @@
-// .npz: a ZIP archive of arrays in the format .npy 1.0, stored without compression, as numpy.load()
-// reads it. Sizes are always in ZIP64 fields, so that all headers have the same form.
+// Writes .npz, which numpy.load() reads: a ZIP archive of arrays in the format .npy 1.0, stored
+// without compression. Sizes are always in ZIP64 fields, so that all headers have the same form.
 #include <array>
 #include <bit>
 #include <vector>
@@ -160,7 +160,7 @@ class NpzWriter {
     flush();
     require_written(job_, written / row_bytes, rows);
     member.crc = crc.value();
-    // The checksum is known only at this point.
+    // Writes the local header again, because the checksum is known only at this point.
     const uint64_t end = file_.size();
     file_.seek(member.offset);
     file_.write(local_header(member));

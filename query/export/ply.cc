@@ -1,6 +1,6 @@
-// Binary PLY: the centers of the voxels, and the attributes of the file. The centers are doubles,
-// because floats cannot distinguish the voxels of a large grid. Format: Greg Turk, "The PLY Polygon
-// File Format", 1994.
+// Writes binary PLY: the centers of the voxels, and the attributes of the file. The centers are
+// doubles, because floats cannot distinguish the voxels of a large grid. Format: Greg Turk, "The
+// PLY Polygon File Format", 1994.
 #include <bit>
 #include <string>
 #include <vector>

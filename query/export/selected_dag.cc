@@ -24,8 +24,8 @@ template <class Slot>
 class SlotTable {
  public:
   explicit SlotTable(MemoryBudget& budget) : budget_(budget) {}
-  // Returns the slot for which is_it(slot) is true. If there is no such slot, returns the free slot
-  // where it belongs, and counts this slot as used.
+  // Returns the slot for which is_it(slot) is true. If there is no such slot, returns a free slot,
+  // which the caller must fill, and counts this slot as used.
   template <class IsIt>
   Slot& find(uint64_t hash, const IsIt& is_it) {
     if (4 * (used_ + 1) > 3 * slots_.size()) grow();
@@ -135,9 +135,9 @@ class DagBuilder {
   BuiltNode build(uint32_t depth, uint64_t content, const Position& corner) {
     const int64_t edge = int64_t{1} << (job_.selection.grid_levels - depth);
     if (!job_.selection.region.intersects(corner, edge)) return {};
-    // Results are remembered only for nodes completely inside the region, because only such nodes
-    // are the same wherever they occur. Bricks of the file are not remembered: they have no offset
-    // here, and are as easy to build again.
+    // Results are remembered only for nodes completely inside the region, because only for such
+    // nodes the result is the same wherever they occur. Bricks of the file are not remembered:
+    // `content` is their mask, not an offset, and they are as easy to build again.
     const bool is_brick = depth + kBrickLevels == job_.dag.grid_levels();
     if (is_brick || !job_.selection.region.contains(corner, edge))
       return build_node(depth, content, corner, edge);

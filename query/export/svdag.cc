@@ -2,8 +2,8 @@
 //     f32 x 3 low corner | f32 x 3 high corner | f32 edge | u32 levels | u32 nodes
 //     | u32 first leaf | u32 words | u32 ...
 // Nodes are stored level by level, the root first: a child mask, then the word index of each child,
-// the last child first. A node of the last level is one word with 2^3 voxels, so a brick is an
-// inner node here.
+// the last child first. A node of the last level is one word with 2^3 voxels. So voxdag's bricks of
+// 4^3 voxels are inner nodes in this format.
 #include <array>
 
 #include "core/base/text.h"
@@ -20,9 +20,9 @@ constexpr uint64_t kMaxViewedWords = (uint64_t{1} << 31) - 1;
 constexpr uint32_t kLeafWords = 255;  // one word for each nonzero mask of 8 voxels
 constexpr uint64_t kSvdagHeaderBytes = 7 * sizeof(float) + 4 * sizeof(uint32_t);
 
-// The word index at which each brick begins in the output. A brick takes one word, plus one word
-// per child. Only the beginning of every 16th brick is stored; the beginnings of the others are
-// counted from there.
+// Finds the word index at which a brick begins in the output. A brick takes one word, plus one word
+// per child. Only the index of every 16th brick is stored; the others are computed from the sizes
+// of the bricks in between.
 class BrickOffsets {
  public:
   BrickOffsets(const ExportJob& job, const SelectedDag& dag)

@@ -1,9 +1,9 @@
-// MagicaVoxel .vox, version 150. Models have an edge of at most 256 voxels: the file has one model
-// for each different DAG node with this edge, and one instance of the model for each place where
-// the node occurs. With colors, each place has a separate model, because equal nodes can have
-// different colors.
+// Writes MagicaVoxel's .vox, version 150. A model has an edge of at most 256 voxels. So the file
+// has one model for each different DAG node with this edge, and one instance of the model for each
+// place where the node occurs. With colors, each place has a separate model, because equal nodes
+// can have different colors.
 //     "VOX " | 150 | MAIN { (SIZE XYZI)... nTRN nGRP (nTRN nSHP)... RGBA }
-// MagicaVoxel's z is up: (x, y, z) of the file is (x, -z, y) in voxdag.
+// MagicaVoxel's z axis points up: voxdag's position (x, y, z) is (x, -z, y) in the file.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -22,7 +22,7 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint32_t kModelLevels = 8;  // 256^3 voxels
-// Maximum size of a chunk, which is an int32.
+// Maximum size of a chunk in bytes, because the file stores the size as an int32.
 constexpr uint64_t kMaxVoxBytes = (uint64_t{1} << 31) - 1;
 constexpr uint64_t kMaxVoxModels = (uint64_t{1} << 31) / 4;  // node ids are also int32
 constexpr uint32_t kMagicaVoxelEdge = 2048;                  // maximum of its editor
@@ -72,7 +72,7 @@ VoxChunk shape_node(int32_t id, int32_t model) {
   return chunk;
 }
 
-// A voxel with index i has color i - 1.
+// Returns the chunk with the palette. A voxel with the palette index i has colors[i - 1].
 VoxChunk palette_chunk(std::span<const voxdag_reader::Rgb> colors) {
   VoxChunk chunk("RGBA");
   for (size_t i = 0; i < 256; ++i) {

@@ -1,5 +1,5 @@
-// PlayCanvas voxels, version 1.1: NAME.voxel.json describes NAME.voxel.bin, which is node words,
-// then two words for each leaf of 4^3 voxels:
+// Writes PlayCanvas voxels, version 1.1: NAME.voxel.json describes NAME.voxel.bin, which has the
+// words of the nodes, then two words for each leaf of 4^3 voxels. A node is one word:
 //     interior node   child mask << 24 | index of the first of its children's words
 //     mixed leaf      index of the leaf                         (bit = 16z + 4y + x)
 //     all solid       0xff000000                                (index 0 is never a child)

@@ -28,18 +28,18 @@
 namespace voxdag::query {
 namespace {
 
-// Minimum share of the memory for a worker, enough for every cube of a few bricks.
-// kOutsideShareBytes is memory that a worker needs in addition to its share: for the segment that
-// it writes, for a window of the file, and for the pages that it retains for its next cube.
+// Minimum memory share of a worker, enough for any cube of a few bricks. kOutsideShareBytes is the
+// memory that a worker needs in addition to its share: for the segment that it writes, for the
+// words that it has read from the file, and for the pages that it retains for its next cube.
 constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
 constexpr uint64_t kOutsideShareBytes =
     kSegmentWriterBytes + NodeReader::kMemoryBytes + ConsingMemory::kMinPageBytes;
 constexpr unsigned kMaxWorkers = 256;  // each has a file open
-// Memory for a node while the node's cube is reduced. Used for a first estimate of the number of
-// cubes.
+// Estimated memory per node while the DAG of a cube is built. It gives the initial number of cubes.
 constexpr uint64_t kBytesPerNode = 128;
-// Up to this number of nodes, one thread is faster than several threads, because threads share none
-// of their work with each other.
+// Up to this number of nodes in the file's levels, the grid is one cube and one thread builds it.
+// This is faster than several threads, because they do not share the subtrees that occur in several
+// cubes.
 constexpr uint64_t kFewNodes = uint64_t{1} << 17;
 constexpr uint64_t kPartsPerWorker = 4;
 constexpr uint64_t kMaxFirstParts = 4096;
@@ -81,7 +81,8 @@ class Extraction {
     shape_ = {.grid_levels = report_.grid.levels, .hash_bits = file.hash_bits()};
   }
 
-  // Writes the output. before_publish() may throw to prevent that the output gets its final name.
+  // Writes the output. Calls before_publish() before the output gets its final name; if it throws,
+  // the output is discarded.
   ExtractReport run(const std::function<void()>& before_publish) {
     if (spec_.crop && crop_.level == 0 &&
         spec_.selection.region != whole_grid(spec_.selection.grid_levels))
@@ -118,7 +119,7 @@ class Extraction {
   }
 
  private:
-  // Data of one thread, for all cubes that it reduces.
+  // Data of one thread, reused for all cubes that the thread builds.
   struct Worker {
     Worker(Extraction& all, unsigned id, uint64_t share_bytes)
         : share(share_bytes, &all.budget_),
@@ -179,7 +180,8 @@ uint64_t Extraction::wanted_parts(unsigned workers, uint64_t share_bytes) const 
                     workers * kPartsPerWorker, kMaxFirstParts);
 }
 
-// Divides the cube of the new grid into parts until there are about `wanted` of them.
+// Divides the cube of the new grid, level by level, into cubes with selected cells. Stops when
+// there are at least `wanted` of them or when they are bricks.
 std::vector<SelectedPart> Extraction::first_parts(Worker& worker, uint64_t wanted) const {
   if (file_.empty()) return {};
   std::vector<SelectedPart> parts{{}};
@@ -202,7 +204,8 @@ std::vector<SelectedPart> Extraction::first_parts(Worker& worker, uint64_t wante
   return parts;
 }
 
-// Returns the parts that replace a part that does not fit.
+// Builds the artifact of a part and adds it to `built`. If the part does not fit in the worker's
+// memory, returns its children, which must be built instead.
 std::vector<SelectedPart> Extraction::build_part(Worker& worker, const SelectedPart& part,
                                                  std::vector<ArtifactRef>& built) {
   const Cube cube = in_new_grid(part.cube);

@@ -1,12 +1,13 @@
-// Writes a part of a global file as a new global file. The part is the grid of a coarser level, a
-// region, or both. The levels of the new file are canonical: they depend only on the voxels.
+// Writes a part of a global file as a new global file. The part is a coarser grid of the octree, a
+// region, or a region of a coarser grid. The levels of the new file are canonical: they depend only
+// on the voxels.
 //
 // The grid is divided into octree-aligned cubes. For each cube, one of several threads reads the
-// necessary part of the DAG, reduces it in memory (part_builder.h), and writes it as an artifact. A
-// cube that does not fit in the thread's share of the budget is divided into its children. The
-// merge then makes the file from the artifacts, as in a build. So memory is bounded by the budget,
-// not by the size of the file. If the file has colors or other attributes, they are written last
-// (part_colors.h).
+// necessary part of the DAG, builds the DAG of the selected cells in memory (part_builder.h), and
+// writes it as an artifact. A cube that does not fit in the thread's share of the memory is divided
+// into its children. The merge then makes the file from the artifacts, as in a build. So the memory
+// budget limits the memory, whatever the size of the file. If the file has colors or other
+// attributes, they are written last (part_colors.h).
 #pragma once
 
 #include <cstdint>
@@ -32,8 +33,8 @@ struct ExtractSpec {
   bool replace = false;  // replace an existing file
   uint64_t memory_bytes = uint64_t{1} << 30;
   unsigned threads = 1;
-  // Maximum number of words in a narrow level. A level with more words is wide. Tests use a smaller
-  // limit.
+  // Maximum number of words in a narrow level. A level with more words is wide: pointers into it
+  // have 64 bits instead of 32. Tests use a smaller limit.
   uint64_t narrow_words = global_layout::kNarrowLevelWords;
 };
 
@@ -50,8 +51,8 @@ struct ExtractReport {
   uint64_t work_bytes = 0;  // bytes written to temporary files
 };
 
-// Returns the smallest octree cube that contains the selection's region, in the selection's grid.
-// The cube has at least 4 cells per edge.
+// Returns the smallest octree-aligned cube that contains the selection's region, in the selection's
+// grid. The cube has at least 4 cells per edge.
 Cube crop_cube(const Selection& selection);
 
 // Writes spec.output, which gets its final name when it is complete. Temporary files are in a

@@ -1,6 +1,6 @@
-// Reads nodes of a global file with bounded read calls, never through a mapping, so that resident
-// memory does not grow with the file. Only the necessary checksum blocks are read, and each block
-// is verified when it is read for the first time.
+// Reads nodes of a global file with read calls of limited size, not through a mapping, so that
+// resident memory does not grow with the file. The checksum blocks that contain the nodes are
+// verified when they are read for the first time.
 #pragma once
 
 #include <cstdint>
@@ -21,11 +21,12 @@ namespace voxdag::query {
 // Thread-safe.
 class CheckedReader {
  public:
-  // `header`: the same file, already opened. Only its header is read through `header`.
+  // `header` is the opened file to read. Only its header is read through `header`; everything else
+  // is read with read calls.
   CheckedReader(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget);
 
   const voxdag_reader::File& header() const { return header_; }
-  // Fills `words` with the words of the level from word `first` on. `block` is a buffer of
+  // Fills `words` with the words of the level from word `first` on. `block` is scratch memory of
   // kBlockBytes bytes. Throws Error{kCorrupt} for a block that fails its checksum.
   void read(uint32_t level, uint64_t first, std::span<uint32_t> words, std::span<std::byte> block);
 
@@ -43,14 +44,15 @@ class CheckedReader {
   const CheckedBlocks blocks_;
 };
 
-// An entry of a list of wanted nodes: the node's offset, and the node's number in the caller's
-// order.
+// An entry of a list of nodes to read. `offset` is the node's word offset in its level. `index` is
+// the caller's number of the node.
 struct WantedNode {
   uint64_t offset = 0;
   uint64_t index = 0;
 };
 
-// Reads nodes one by one, or many nodes in the order of their offsets. Not thread-safe.
+// Reads nodes one by one, or many nodes in the order of their offsets, into a buffer called the
+// window. Not thread-safe.
 class NodeReader {
  public:
   static constexpr uint64_t kBufferBytes = uint64_t{1} << 19;
@@ -72,8 +74,8 @@ class NodeReader {
     for_each(
         level, wanted, [](std::span<const uint32_t>) {}, visit);
   }
-  // Like the function above, but also calls ahead(words) for most nodes some time before visit(),
-  // so that ahead() can prefetch.
+  // Like the function above, but also calls ahead(words) for most nodes, eight nodes before the
+  // call of visit(), so that ahead() can prefetch what visit() needs.
   template <class Ahead, class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Ahead&& ahead, Visit&& visit);
 

@@ -13,7 +13,7 @@ constexpr uint64_t kNodesBetweenChecks = 4096;  // checks of the cancel token
 constexpr uint64_t kExpectedChildren = 2;
 constexpr uint64_t kPrefetchAhead = 8;  // nodes
 
-// Returns a mask: bit c is set if byte c of `mask` is not 0.
+// Returns the occupied octants of a brick: bit c is set if byte c of the brick's `mask` is not 0.
 uint8_t coarser_cells(uint64_t mask) {
   uint8_t cells = 0;
   for (int c = 0; c < 8; ++c)
@@ -68,7 +68,8 @@ void PartBuilder::read(uint32_t level, PartLevel& nodes, PartLevel& below, Child
                    });
 }
 
-// Reads nodes above the bricks of the selected grid.
+// Reads the nodes of a level above the bricks of the selected grid, and adds their children that
+// have selected cells to `below`.
 void PartBuilder::read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below,
                              Children& children) {
   const int64_t child_edge = edge(level + 1);
@@ -227,8 +228,8 @@ SubDagSummary PartBuilder::build(const SelectedPart& part, const SubDagShape& sh
     built = build_nodes(l, levels[l - top].size(), children[l - top], built, tables);
     children[l - top] = {};
   }
-  // The tables would count a shared node only once, because they count nodes when they are added.
-  // So the counts that build_nodes() has added up are used.
+  // Replaces the tables' counts by the sums that build_nodes() has computed. The tables count a
+  // node when it is added, so they count a node with several parents only once.
   tables.counts() = built[0].counts;
   built = {};
   return emit_levels(tables, shape, sink);

@@ -1,16 +1,17 @@
 // Builds the sub-DAG for one part of the grid: the selected cells in one octree-aligned cube.
 //
 // From the cube's root down, the nodes of every level are collected (part_level.h) and then read in
-// the order of their offsets. On a coarser grid, a cell is set where the octree has a node. So the
-// bricks of the selected grid are made from the nodes two levels above the grid's cells and from
-// the children of these nodes:
+// the order of their offsets. On a grid coarser than the file's, a cell is set where the octree has
+// a node. So the bricks of the selected grid, which has l levels, are made from the file's nodes
+// two levels above the grid's cells and from the children of these nodes:
 //
 //     selected grid   nodes   ...   bricks          cells
 //     file            nodes   ...   nodes at l-2    their children's masks, at l-1
 //
 // Then, from these bricks up, nodes that have become equal are merged (hash-consing), with the same
 // tables that are used to build subvolumes. Cells outside the region are left out on the way down.
-// A node that the region cuts is added once per position, any other node only once.
+// The region cuts a node if only a part of the node's cube is in the region. Such a node is added
+// once per position; any other node is added only once.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +27,7 @@
 
 namespace voxdag::query {
 
-// A cube of the selected grid that has voxels of the file.
+// A cube of the selected grid in which the file has voxels.
 struct SelectedPart {
   Cube cube;
   uint64_t offset = 0;  // word offset of the cube's root in level cube.level of the file
@@ -50,7 +51,9 @@ class PartBuilder {
     NodeRef ref;
     OctreeCounts counts;
   };
-  // The children of the nodes of one level. A child is identified by its number in the level below.
+  // The children of the nodes of one level. Each element of `all` is the number of a child in the
+  // level below. The children of node i begin at all[first[i]]; masks[i] is the node's child mask,
+  // without children outside the region.
   struct Children {
     PooledArray<uint8_t> masks;   // by node number; children outside the region are left out
     PooledArray<uint32_t> first;  // by node number
@@ -66,7 +69,8 @@ class PartBuilder {
   }
   int64_t edge(uint32_t level) const { return int64_t{1} << (selection_.grid_levels - level); }
 
-  // Reads the nodes of a level, and adds their children to `below`.
+  // Reads the nodes of a level. Calls visit(number, node) for each, which must add the node's
+  // children to `below` and `children`.
   template <class Visit>
   void read(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children, Visit visit);
   void read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);

@@ -30,14 +30,13 @@ constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
 constexpr uint64_t kWorkerBytes =
     kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) +
     CheckedReader::kBlockBytes;
-// Returns the encoded bytes of a region: of its colors, or of its values including the coarser
-// levels.
+// Returns the maximum size of an encoded region, in bytes.
 uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
   if (traits_of(attribute).is_color()) return kMaxRegionCells * 3 / 4;
   return kMaxRegionCells * 5 / 4 *
          value_bytes(attribute, section_of(file, attribute).names().size());
 }
-// Regions encoded per batch.
+// Number of regions that are encoded together before they are written.
 constexpr size_t kBatchRegions = 32;
 
 // A cube of the file that has set voxels. `code` is its Morton code among the cubes of its level.
@@ -46,7 +45,7 @@ struct PlacedCube {
   uint64_t content = 0;  // see DagView
 };
 
-// Returns the sum of n cells with this color.
+// Returns the sum of the colors of `n` cells that all have the color `rgb`.
 ColorSum sum_of(const voxdag_reader::Rgb& rgb, uint64_t n) {
   ColorSum sum;
   const uint8_t channels[3] = {rgb.r, rgb.g, rgb.b};
@@ -103,7 +102,7 @@ class PartColors {
   }
 
   uint32_t levels() const { return levels_; }
-  // Returns the level of the file on which the cubes are the regions of the part's tier `tier`.
+  // Returns the file's level whose cubes are the regions of the part's tier `tier`.
   uint32_t region_level(uint32_t tier) const { return finest_of(tier) - depth_of(tier); }
 
   // Verifies the checksums of all data that is needed to find nodes and colors.
@@ -180,7 +179,7 @@ class PartColors {
   }
 
   // Encodes a region of a tier above the finest tier. `morton` is the region's Morton code in the
-  // part.
+  // part. `cells` are the sums of the region's finest cells.
   EncodedRegion encode_coarse(uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
     const uint32_t level = region_level(tier);
     const uint64_t code = crop_code_ << 3 * (level - part_.crop.level) | morton;
@@ -227,7 +226,8 @@ class PartColors {
                    int index) const {
     return {cube.code << 3 | static_cast<uint64_t>(index), dag_.content(level, children, index)};
   }
-  // Calls visit(cube) for the cubes of a level that have selected cells.
+  // Calls visit(cube) for all cubes with selected cells on the level `target`, inside `cube` on
+  // `level`.
   template <class Visit>
   void walk(uint32_t level, const PlacedCube& cube, uint32_t target, const Visit& visit) const {
     if (!is_selected(level, cube)) return;
@@ -272,8 +272,8 @@ class PartColors {
       const ColorTier& tier = section_.tier(t);
       const bool is_coarser = t > 0 && tier.finest_level < level;
       if (is_coarser || tier.region_level > finest) continue;
-      // `begin` and `end` limit the regions with colors of the cube: the first such region, and the
-      // first region after them.
+      // The regions with colors of the cube are the ones with Morton codes from `begin` to `end` -
+      // 1.
       const bool within = tier.region_level < level;
       const uint32_t between = within ? level - tier.region_level : tier.region_level - level;
       const uint64_t begin = within ? code >> 3 * between : code << 3 * between;

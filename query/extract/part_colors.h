@@ -1,17 +1,19 @@
 // Writes the colors of a part of a global file, or another attribute of its cells, behind the
-// levels of the part's file.
+// levels of the new file.
 //
-// The color grid of the part has the cell size of the file's color grid, or of the selected level
-// if that is coarser. If the part has fewer than 4 color cells per edge, its color grid gets 4
-// cells per edge, with the colors of the cells around the part. A cell of the part has
+// The color grid of the part has the cell size of the file's color grid, or of the selected grid if
+// that is coarser. If this would give fewer than 4 cells per edge, the color grid of the part has
+// smaller cells, 4 per edge. They have the colors of the file's cells that contain them. A cell of
+// the part has
 //
 //   1. the color stored in the file, on the finest level of the color grid and if the region does
 //      not cut the cell;
 //   2. otherwise the mean of its finest cells that are inside the region, in linear light.
 //
-// A region of colors is copied byte for byte if it is inside the selection and the part has a tier
-// with the same levels; whether it has depends only on the finest and the coarsest level. Other
-// regions are decoded and encoded again, so their colors are close to the file's colors. The
+// Colors are stored in regions of up to 64^3 cells; all regions with the same levels are a tier
+// (docs/format.md). A region of the file is copied byte for byte if it is completely inside the
+// selection, and if the part has a tier with the same finest level and the same level of regions.
+// Other regions are decoded and encoded again, so their colors are close to the file's colors. The
 // written bytes depend only on the file and the selection.
 //
 // For the other attributes, the finest cells have the file's values. The values of coarser cells

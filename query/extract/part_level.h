@@ -1,11 +1,13 @@
-// The nodes of one level below a cube of the input, as far as they have selected cells. A node that
-// the region does not cut is added once, for any number of parents. A node that the region cuts is
-// added once per position. Nodes are numbered in the order in which they are added.
+// The nodes of one level of the file that are below the root of a part and have selected cells. A
+// node that the region does not cut (part_builder.h) is added once, for any number of parents. A
+// node that the region cuts is added once per position. Nodes are numbered in the order in which
+// they are added.
 //
 //   slots     [tag | number + 1] ...    open addressing by the offset, for nodes that are not cut
 //
-// The tag is the lower half of the product of the offset and an odd number. It determines the lower
-// half of the offset. So two different offsets can have the same tag only in a wide level.
+// A slot is 64 bits, or 0 if it is free. The tag is the lower half of the product of the offset and
+// an odd number, so it determines the lower half of the offset. Two different offsets can have the
+// same tag only in a wide level. In such a level, the complete offsets are compared.
 //
 // Not thread-safe. Throws OutOfBudget when a node does not fit in the budget, or when there would
 // be more than 2^32 - 1 nodes.
@@ -36,7 +38,7 @@ class PartLevel {
             static_cast<uint32_t>(place >> 2 * kAxisBits)};
   }
 
-  // Reserves memory for about `count` nodes.
+  // Makes room in the hash table for at least `count` nodes.
   void reserve(uint64_t count) {
     if (2 * count >= slots_size_) grow_slots(2 * count + 1);
   }
@@ -71,7 +73,8 @@ class PartLevel {
     std::span<const WantedNode> span() const { return {nodes.data(), count}; }
   };
   Sorted sort();
-  // Forgets offsets and positions.
+  // Frees the memory for offsets and positions. is_cut() and position() must not be called
+  // afterwards.
   void release_entries() { entries_ = {}; }
 
  private:

@@ -1,6 +1,7 @@
-// Iterates over the bricks of a part of a file, in the grid of any level of the octree. Box
-// queries, lists of positions and exporters use this iteration. Its memory does not grow with the
-// part; its time grows with the number of the part's bricks.
+// Iterates over the bricks of a selection. The selection's grid is the file's grid or a coarser
+// grid; a brick of a coarser grid has 4x4x4 cells of that grid. Box queries, lists of positions and
+// exporters use this iteration. Its memory does not depend on the size of the selection; its time
+// grows with the number of bricks in the selection.
 #pragma once
 
 #include <bit>
@@ -13,7 +14,7 @@
 
 namespace voxdag::query {
 
-// Returns the cell of a bit of a brick's mask.
+// Returns the position of the cell that bit `bit` of a brick's mask stands for.
 inline Position brick_cell(const Brick& brick, int bit) {
   return {brick.low[0] + brick_coordinate(bit, 0), brick.low[1] + brick_coordinate(bit, 1),
           brick.low[2] + brick_coordinate(bit, 2)};
@@ -33,7 +34,7 @@ inline Position child_corner(const Position& corner, int index, int64_t edge) {
           corner[2] + (index & 1 ? edge : 0)};
 }
 
-// Returns the mask of the cells that are in the region, for a brick with the low corner `low`.
+// Returns a mask of the cells of a brick that are in the region. `low` is the brick's low corner.
 uint64_t mask_within(const Region& region, const Position& low);
 
 // Throws Error{kInvalidInput} unless 0 <= grid_levels <= the file's levels.
@@ -89,9 +90,9 @@ class BrickWalk {
 };
 
 // Calls visit(const Brick&) for every brick that has set cells in the region, in Morton order. If
-// visit() returns a bool, the iteration ends when it returns false. The brick's mask is clipped to
-// the region. Cells outside the region or the grid are not visited. Each node above a visited brick
-// is read only once for this brick. Throws Error{kInvalidInput} if the selection's grid has more
+// visit() returns a bool, the iteration ends when it returns false. The brick's mask has only the
+// cells in the region; the region may extend beyond the grid. A node is read once for each place
+// where it occurs in the selection. Throws Error{kInvalidInput} if the selection's grid has more
 // levels than the file, and Error{kCorrupt} for a damaged DAG.
 template <class Visit>
 void for_each_brick(const DagView& dag, const Selection& selection, Visit&& visit) {

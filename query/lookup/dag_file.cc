@@ -26,7 +26,8 @@
 namespace voxdag::query {
 namespace {
 
-// Number of items in a thread's batch. It is a multiple of the number of rays in a packet.
+// Number of points or rays that a thread processes as one batch. It is a multiple of the number of
+// rays in a packet, so only the last packet of a call can be incomplete.
 constexpr size_t kBatch = 4096;
 
 [[noreturn]] void refuse(const char* expected) {
@@ -36,7 +37,8 @@ inline void require(bool right, const char* expected) {
   if (!right) refuse(expected);
 }
 
-// Calls body(first, count) for batches of `items`.
+// Divides the numbers 0 to items - 1 into batches, and calls body(first, count) for each batch on
+// one of `threads` threads.
 template <class Body>
 void for_each_batch(unsigned threads, size_t items, const Body& body) {
   parallel_for(std::max(1u, threads), (items + kBatch - 1) / kBatch, [&](unsigned, size_t batch) {
@@ -57,7 +59,7 @@ void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates
       alignas(16) const double o[2] = {origins[first][axis], origins[second][axis]};
       alignas(16) const double two[2] = {directions[first][axis], directions[second][axis]};
       d[axis] = DoublePair::load(two);
-      // For infinity and NaN, the sum is not 0.
+      // `nothing` remains 0 only for finite numbers: infinity times 0 and NaN times 0 are NaN.
       nothing = nothing + DoublePair::load(o) * zero + d[axis] * zero;
       largest = max(largest, absolute(d[axis]));
     }
@@ -89,8 +91,9 @@ RayHit as_ray_hit(const Hit& hit, const Ray& ray) {
   return out;
 }
 
-// Returns the largest squared distance whose root, as a double, is at most `distance`. Distances
-// between voxels are never over 2^31.
+// Returns the largest integer whose square root, as a double, is at most `distance`. Returns 2^62
+// for 2^31 and more: no distance between a point and a voxel, of at most kMaxCoordinate each,
+// exceeds this.
 uint64_t largest_square(double distance) {
   if (distance >= 0x1p31) return uint64_t{1} << 62;
   auto square = static_cast<uint64_t>(distance * distance);
@@ -101,7 +104,7 @@ uint64_t largest_square(double distance) {
 
 }  // namespace
 
-// The file, and additional tables that are worthwhile only for many queries.
+// The file, and tables that make queries faster but pay off only for many queries.
 struct DagFile::State {
   State(const std::string& path, uint64_t memory_bytes)
       : file(open_global_file(path)), view(*file), budget(memory_bytes) {}
@@ -121,12 +124,13 @@ struct DagFile::State {
 };
 
 // A call with at least this number of queries requests huge pages. The table of the top cells is
-// created after this number of queries in total: so many queries together reach most of the nodes
-// that later queries need.
+// created after this number of lookups in total: so many lookups have read most of the nodes that
+// the table and later lookups need.
 constexpr size_t kManyQueries = size_t{1} << 14;
 
-// Requests huge pages for the file, except where this would be slow: for a few queries, because
-// each node would then require a read of 2 MiB, and for a file that is larger than memory.
+// Requests huge pages for the mapped file, because they make many queries faster. Does nothing in
+// two cases in which they would be slow: for a few queries, because each node would require a read
+// of 2 MiB, and for a file that is larger than memory.
 void DagFile::State::prepare_for_queries(size_t count) {
   if (count < kManyQueries || file->file_bytes() > default_memory()) return;
   // This is only a request: pages already in memory keep their size, and not every system supports
@@ -201,15 +205,17 @@ const std::vector<std::string>& DagFile::material_names() const {
 
 namespace {
 
-// The section of the file that stores an attribute, and the build option that adds this section.
+// A file, the section of the file that stores an attribute, and the text of the error if the file
+// does not have the attribute.
 struct AttributeSource {
   const voxdag_reader::File& file;
   const voxdag_reader::ColorSection& section;
   const char* expected;
 };
 
-// Sets values[i] to value_of(region, number), where `number` is the cell's number in its region, or
-// to `none` if the cell is not set.
+// Sets values[i] to the attribute of the cell points[i], or to `none` if the cell is not set.
+// value_of(region, number) must return the attribute of the cell with this number in a region of
+// the section.
 template <class Value, class ValueOf>
 void read_attribute(const AttributeSource& source, std::span<const Position> points,
                     uint32_t grid_levels, Value none, std::span<Value> values, unsigned threads,

@@ -29,7 +29,7 @@ class NearestSearch {
     Position low;
   };
 
-  // Returns the squared distance from the query point to the nearest cell of a cube. It is exact,
+  // Returns the squared distance from the cell `from_` to the nearest cell of a cube. It is exact,
   // because the coordinates are integers.
   uint64_t distance_to(const Position& low, int64_t edge) const {
     uint64_t squared = 0;

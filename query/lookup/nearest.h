@@ -9,10 +9,11 @@
 namespace voxdag::query {
 
 // Finds the set cell whose center is nearest to the center of the cell `from`, in the grid of
-// 2^grid_levels cells per edge. On ties, the lowest Morton code wins. Finds nothing if the distance
-// exceeds the root of max_squared. Descends into near children first, and never into children that
-// are farther than the best cell so far. grid_levels must be at most the file's, coordinates at
-// most kMaxCoordinate. Throws Error{kCorrupt} for a damaged DAG.
+// 2^grid_levels cells per edge. If several cells are equally near, the result is the cell with the
+// lowest Morton code. Finds nothing if the squared distance, in cells, exceeds max_squared.
+// Descends into near children first, and never into children that are farther than the best cell so
+// far. grid_levels must be at most the file's. The coordinates of `from` must be from
+// -kMaxCoordinate to kMaxCoordinate. Throws Error{kCorrupt} for a damaged DAG.
 Nearest find_nearest(const DagView& dag, uint32_t grid_levels, const Position& from,
                      uint64_t max_squared);
 

@@ -1,5 +1,5 @@
-// The number of set cells below each node, for exact counts of regions: one 64-bit number per node,
-// computed from the bricks up.
+// Counts the set cells in regions. For speed, the number of set cells below each node is stored:
+// one 64-bit number per node, computed from the bricks up.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,10 @@ namespace voxdag::query {
 // Counts the cells of one grid. Immutable after construction; safe to use from several threads.
 class NodeCounts {
  public:
-  // Takes 8 bytes per node above the bricks, and 2 bits per word of these nodes. If this does not
-  // fit in the budget, stores no counts: count() then visits all nodes below its region. `dag` is
-  // the view of `file`; both must outlive this object. Throws Error{kCorrupt}, Error{kCanceled}.
+  // Stores the counts, which take 8 bytes per node above the bricks, and 2 bits per word of these
+  // nodes. If this does not fit in the budget, stores no counts: count() then visits all nodes in
+  // its region. `dag` is the view of `file`; both must outlive this object. Throws Error{kCorrupt},
+  // Error{kCanceled}.
   NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint32_t grid_levels,
              MemoryBudget& budget, const CancelToken& cancel = {});
 

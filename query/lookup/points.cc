@@ -45,8 +45,8 @@ class Descents {
     }
   };
 
-  // Starts a descent at its cell of the top. Returns true if the descent continues in a child of
-  // this cell.
+  // Moves a new descent to the node of TopCells that contains its point. Returns false if the
+  // descent ends there, because the node or its child at the point does not exist.
   bool begin_at_top(Descent& d) const {
     const uint32_t shift = grid_levels_ - TopCells::kLevels;
     const TopCells::Cell cell = top_->at(d.x >> shift, d.y >> shift, d.z >> shift);

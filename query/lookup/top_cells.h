@@ -1,5 +1,6 @@
 // The nodes of the level with 32^3 cells, in a dense array of 256 KiB. Lookups of many points begin
-// at these nodes instead of at the root. In the grid of a surface, most points also end there.
+// at these nodes instead of at the root. If the scene consists of surfaces, most lookups also end
+// there, in empty cells.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +15,8 @@ class TopCells {
  public:
   static constexpr uint32_t kLevels = 5;
 
-  // True if the DAG has nodes on the level of 32^3 cells, and these nodes have children in the grid
-  // of `grid_levels`.
+  // True if the DAG has nodes on the level of 32^3 cells, and the grid of 2^grid_levels cells per
+  // edge is finer than this level.
   static bool serve(const DagView& dag, uint32_t grid_levels) {
     return !dag.empty() && dag.grid_levels() > kLevels + kBrickLevels && grid_levels > kLevels;
   }

@@ -1,6 +1,7 @@
-// The planes of a cell as two vectors of four doubles, and a test of which children a ray crosses.
-// Each source file that includes this header is compiled for a different instruction set, so
-// everything here has internal linkage.
+// Computes which children of a cell a ray crosses, from the planes that bound the children. The
+// planes are two vectors of four doubles. Each source file that includes this header is compiled
+// for a different instruction set. So all functions of this header have internal linkage: the
+// linker must not replace a function by a version for another instruction set.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +13,18 @@
 namespace voxdag::query {
 namespace {
 
-// Masks of a cell's mirrored children. `inside`: children in which the ray has a nonempty interval.
-// `touching`: children in which this interval has length 0.
+// Masks of a cell's children, mirrored like the ray (packet_job.h). A ray's interval in a child is
+// the range of the ray's parameters t in the child. `inside`: children in which this interval has a
+// positive length. `touching`: children in which its length is 0.
 struct Crossed {
   uint32_t inside, touching;
 };
 
-// Four numbers per set of planes: for the planes on the axes x, y and z; the fourth number has no
-// meaning. `lower` is for the planes of a cell's lower children, `upper` for those of its upper
-// children. An object holds either the planes by which rays enter the children or the planes by
-// which they leave them, as coordinates or as the rays' parameters at these planes.
+// The planes at which rays enter a cell's children, or the planes at which they leave the children.
+// On each axis, a cell has lower and upper children; `lower` has the planes of the lower children,
+// and `upper` the planes of the upper children. Each has one number for the x, y and z axis; the
+// fourth number has no meaning. The numbers are coordinates of planes, or a ray's parameters at the
+// planes.
 template <class Four>
 struct FourPlanes {
   Four lower, upper;
@@ -56,8 +59,10 @@ VOXDAG_INLINE FourPlanes<Four> min(FourPlanes<Four> x, FourPlanes<Four> y) {
   return {min(x.lower, y.lower), min(x.upper, y.upper)};
 }
 
-// Returns the children that a ray with these parameters crosses. For a test of many rays, `in` may
-// be lower bounds of the parameters, and `out` upper bounds.
+// Returns the children that a ray crosses between t_min and t_max. `in` and `out` are the ray's
+// parameters at the planes at which it enters and leaves the children. To test many rays together,
+// pass bounds of their parameters: lower bounds of `in` with upper bounds of `out` give all
+// children that any ray may cross, and the opposite bounds give the children that all rays cross.
 template <class Four>
 VOXDAG_INLINE Crossed cross(FourPlanes<Four> in, FourPlanes<Four> out, double t_min, double t_max) {
   const Four first = Four::of(t_min), last = Four::of(t_max);

@@ -1,5 +1,9 @@
-// The data of a packet of rays that is being cast, and the descent of each ray. RayPacket prepares
-// this data, and a walk (packet_walk.h) processes it.
+// The data of a packet of rays that are cast together. RayPacket prepares this data, and a walk
+// (packet_walk.h) processes it.
+//
+// The rays of a packet are mirrored: on each axis on which their directions are negative, the
+// coordinate x is replaced by R - x, where R is the resolution. So all directions are positive, and
+// positions and child masks in this data are mirrored like the rays.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +18,8 @@ inline constexpr int kPacketRays = 64;
 // A position in voxels, mirrored like the rays. The fourth number has no meaning.
 using Int4 = int32_t __attribute__((vector_size(16)));
 
-// A node or brick that a ray may cross. The ray enters this cell after it has left all earlier
-// cells of its list without a hit.
+// A node or brick that a ray may cross, in a linked list for each ray. The ray enters this cell
+// after it has left all earlier cells of its list without a hit.
 struct WaitingCell {
   Int4 low;         // low corner
   uint64_t offset;  // word offset in its level
@@ -23,7 +27,8 @@ struct WaitingCell {
   int32_t next;  // next cell of the same ray, or -1
 };
 
-// The descent of one ray.
+// The descent of one ray that has left the packet and continues separately. Its path has the nodes
+// from the cell in which the descent began to the current cell.
 struct RayDescent {
   static constexpr int kMaxLevels = 20;
   Int4 low;  // low corner of the cell that the ray enters next
@@ -37,7 +42,8 @@ struct RayDescent {
   const uint32_t* children[kMaxLevels];  // words after the mask of the path's nodes; by depth
 };
 
-// A ray's origin and the inverse of its direction. The fourth number of each has no meaning.
+// A ray's origin, and the inverse of each component of its direction. The fourth number of each
+// array has no meaning.
 struct alignas(64) PacketRay {
   double origin[4], inverse[4];
 };
@@ -51,7 +57,8 @@ struct PacketJob {
     bool wide_children;
   };
 
-  // The DAG, and its grid. Cells at `leaf_depth`, which is at least 1, count as solid.
+  // The DAG and its levels. Occupied cells at `leaf_depth`, which is at least 1, count as solid:
+  // rays end there.
   const DagView* dag = nullptr;
   Level levels[kMaxLevels];
   uint32_t grid_levels = 0, leaf_depth = 0;
@@ -66,19 +73,19 @@ struct PacketJob {
   uint64_t found = 0;   // rays with a hit; hits[ray] is the ray's first cell
   uint64_t single = 0;  // rays that must be cast separately
 
-  // A round begins when this number of cells is loading or waiting. It is the number that memory
-  // can load concurrently (measured). The cells of one more packet may be added before the round
-  // begins.
+  // Rays that descend separately are collected and then advanced together in a round. A round
+  // begins when this number of cells is loading or waiting: the number of cells that memory can
+  // load concurrently (measured). Up to one more cell per ray may be added before the round begins.
   static constexpr int kRoundCells = 24, kMaxWaiting = kRoundCells + kPacketRays;
   WaitingCell waiting[kMaxWaiting];
   RayDescent descents[kPacketRays];
 };
 
-// Casts the job's rays selected by `rays`.
+// Casts the job's rays whose bits are set in `rays`.
 void walk_packet_portable(PacketJob& job, uint64_t rays);
 using WalkPacket = void (*)(PacketJob& job, uint64_t rays);
-// Returns the same walk for AVX2, which has the same results. Null if it was not compiled or this
-// machine cannot run it.
+// Returns a version of walk_packet_portable() for AVX2, with the same results. Returns null if this
+// version was not compiled or this machine cannot run it.
 WalkPacket walk_packet_avx2();
 
 }  // namespace voxdag::query

@@ -1,17 +1,17 @@
-// The walk of a packet of rays, for any implementation of vectors of four doubles. Each source file
-// that includes this header is compiled for a different instruction set, so everything here has
-// internal linkage.
+// The walk of a packet of rays through the DAG. The template parameter `Four` is a vector of four
+// doubles. Each source file that includes this header is compiled for a different instruction set,
+// so all functions of this header have internal linkage (four_planes.h).
 //
-// The walk visits large cells depth first, once for all rays that may cross them. Common bounds of
-// all rays exclude most children. If several children remain, each ray is tested with each of them.
-// If only few rays remain, each of them descends separately through its cells in order, and so
-// loads no cells behind its hit. The separate rays take turns, one step each. While the other rays
-// take their steps, memory loads the next cell of a ray.
+// The walk visits large cells depth first, once for all rays that may cross them. Bounds of the
+// origins and directions of all rays exclude most children. If several children remain, each ray is
+// tested with each of them. If only few rays remain in a cell, each of them descends separately
+// through its cells in order, and so loads no cells behind its hit. The separate rays take turns,
+// one step each. While the other rays take their steps, memory loads the next cell of a ray.
 //
-// A ray crosses a cell if its interval in the cell is not empty. In two cases the result depends on
-// the path from the root: if the ray has an interval of length 0 in an occupied cell, and if it
-// passes two planes at the parameter of its hit. In both cases the ray is removed from the packet
-// and is cast separately.
+// A ray crosses a cell if its interval in the cell, a range of its parameter t, is not empty. In
+// two cases the result depends on the path from the root: if the ray has an interval of length 0 in
+// an occupied cell, and if it passes two planes at the parameter of its hit. In these cases the
+// walk gives the ray up: the ray is removed from the packet, and RayPacket casts it with RayCaster.
 #pragma once
 
 #include <limits>
@@ -36,8 +36,8 @@ struct MirroredMasks {
 };
 constexpr MirroredMasks kMirroredMasks;
 
-// For each child index, a vector with all ones on the axes on which the child is an upper child
-// (the axis's bit is set in the index), and 0 on the others.
+// kUpperOn[index] has all bits set on the axes on which child `index` is an upper child, and 0 on
+// the other axes. A child index has bit 2 for x, bit 1 for y and bit 0 for z.
 constexpr Int4 kUpperOn[8] = {{0, 0, 0, 0},  {0, 0, -1, 0},  {0, -1, 0, 0},  {0, -1, -1, 0},
                               {-1, 0, 0, 0}, {-1, 0, -1, 0}, {-1, -1, 0, 0}, {-1, -1, -1, 0}};
 
@@ -61,8 +61,8 @@ class PacketWalk {
   }
 
  private:
-  // In a cell with at most this number of rays, the rays continue separately. In bricks, all rays
-  // do. Measured.
+  // In a cell with at most this number of rays, the rays continue separately. In bricks, any number
+  // of rays continue separately. The number was chosen by measurement.
   static constexpr int kFewRays = 8;
 
   using Planes = FourPlanes<Four>;
@@ -161,7 +161,8 @@ class PacketWalk {
     if (mask == 0) job_.dag->corrupt(brick_depth_, offset);
     return mask;
   }
-  // Does nothing if the level has no such word.
+  // Prefetches a node or brick. An offset outside the level is harmless, because a prefetch never
+  // faults.
   VOXDAG_INLINE void prefetch(uint32_t depth, uint64_t offset) const {
     __builtin_prefetch(reinterpret_cast<const void*>(
         reinterpret_cast<uintptr_t>(job_.levels[depth].words) + 4 * offset));
@@ -186,7 +187,8 @@ class PacketWalk {
         cross(min(in * i0, in * i1), max(out * i0, out * i1), job_.t_min, job_.t_max);
     return crossed.inside | crossed.touching;
   }
-  // Returns the children of a cell that all rays cross with certainty.
+  // Returns children of a cell that all rays cross. Because the bounds are not tight, the mask may
+  // lack some of these children.
   VOXDAG_INLINE uint32_t cross_all(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);
@@ -216,7 +218,8 @@ class PacketWalk {
     }
     return crossing & rays;
   }
-  // Returns the first bit of each group of lanes that contains a ray.
+  // Divides the 64 bits of `rays` into groups of four. Returns the lowest bit of each group that
+  // contains a ray.
   VOXDAG_INLINE static uint64_t groups_of(uint64_t rays) {
     rays |= rays >> 1;
     return (rays | rays >> 2) & 0x1111111111111111;
@@ -232,7 +235,8 @@ class PacketWalk {
     const int32_t half = edge / 2;
     uint32_t candidates = mirrored_[n.mask] & cross_any(low, half);
     const bool only = (candidates & (candidates - 1)) == 0;
-    // The children that all rays cross. They need no separate test per ray.
+    // Children into which all rays go without a test per ray: children that all rays cross, or the
+    // only candidate.
     const uint32_t by_all = only ? candidates : cross_all(low, half);
     Child children[8];
     int count = 0;
@@ -258,8 +262,9 @@ class PacketWalk {
     }
   }
 
-  // Separates the rays in a cell: from here on, each ray continues alone. Cells must be pushed in
-  // the order in which a ray crosses them.
+  // Adds a cell to the separate descent of each of `rays`. A ray without a descent begins one in
+  // this cell; for other rays, the cell waits. Cells must be pushed in the order in which a ray
+  // crosses them.
   void push(uint32_t depth, Int4 low, uint64_t offset, uint64_t rays) {
     for (; rays != 0; rays &= rays - 1) {
       const int ray = first_of(rays);
@@ -288,7 +293,8 @@ class PacketWalk {
     descent.first_waiting = cell.next;
   }
 
-  // Advances all rays by one step each, in turn, until all have ended or left their cells.
+  // Advances all separate rays by one step each, in turn, until each ray has ended or has left the
+  // last of its waiting cells.
   void finish_descents() {
     while (count_ > 0)
       for (int i = 0; i < count_;)
@@ -301,7 +307,8 @@ class PacketWalk {
   }
 
   // Advances a ray into the cell that its descent enters next. Returns true if the ray continues;
-  // its descent then has the next cell.
+  // its descent then refers to the next cell. Returns false if the ray has a hit, was given up, or
+  // has no more cells.
   VOXDAG_INLINE bool step(int ray) {
     RayDescent& descent = job_.descents[ray];
     const uint32_t depth = descent.depth;
@@ -325,8 +332,8 @@ class PacketWalk {
     return enter_next(descent);
   }
 
-  // Enters the first of the children `in` of the path's node at `depth`. The other children in `in`
-  // remain to be visited.
+  // Enters a child of `n`, the path's node at `depth`. `in` is a mask of the children to visit: the
+  // ray enters the first of them, and the others remain in `descent.left`.
   VOXDAG_INLINE void enter_first(RayDescent& descent, uint32_t depth, uint32_t in, const Node& n) {
     const int index = first_of(in);
     descent.low = corner(descent.low, index, int32_t{1} << (job_.grid_levels - depth - 1));
@@ -339,7 +346,8 @@ class PacketWalk {
     prefetch(depth + 1, descent.offset);
   }
 
-  // Moves a descent from a cell without a hit to its next cell. Returns false without one.
+  // Moves a descent from a cell without a hit to its next cell. Returns false if there is no next
+  // cell.
   VOXDAG_INLINE bool enter_next(RayDescent& descent) {
     if (descent.open == 0) {
       if (descent.first_waiting < 0) return false;
@@ -355,7 +363,8 @@ class PacketWalk {
     return true;
   }
 
-  // True if the ray ends in this brick.
+  // Casts the ray in a brick. Returns true if the ray ends there, with a hit or because it was
+  // given up.
   VOXDAG_INLINE bool cast_in_brick(const RayDescent& cell, int ray) {
     const uint64_t mask = brick(cell.offset);
     const uint32_t occupied = mirrored_[octants(mask)];
@@ -372,7 +381,9 @@ class PacketWalk {
     return false;
   }
 
-  // True if the ray ends in a cell of these children.
+  // Casts the ray in the children of a cell that all count as solid. `occupied` is the mask of the
+  // existing children, `half` their edge and `depth` their depth. Returns true if the ray ends
+  // there, with a hit or because it was given up.
   VOXDAG_INLINE bool cast_in(Int4 low, int32_t half, int ray, uint32_t occupied, uint32_t depth) {
     const Crossed crossed = cross_one(low, ray, half);
     if (crossed.touching & occupied) return give_up(ray);
@@ -381,14 +392,14 @@ class PacketWalk {
     return report(corner(low, first_of(in), half), half, ray, depth);
   }
 
-  // Removes the ray from the walk; the ray is cast separately later. Returns true.
+  // Removes the ray from the walk. RayPacket casts it with RayCaster later. Returns true.
   bool give_up(int ray) {
     job_.single |= uint64_t{1} << ray;
     return true;
   }
 
-  // Reports this cell as the ray's hit. Gives the ray up instead if it enters the cell through two
-  // faces at the same parameter.
+  // Reports this cell as the ray's hit. If the ray enters the cell through two faces at the same
+  // parameter, gives the ray up instead. Returns true.
   VOXDAG_INLINE bool report(Int4 low, int32_t edge, int ray, uint32_t depth) {
     const PacketRay& r = job_.rays[ray];
     double t = job_.t_min;

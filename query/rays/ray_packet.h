@@ -26,7 +26,7 @@ class RayPacket {
             WalkPacket walk = fastest_packet_walk());
 
   // Casts up to kRays rays. Returns a mask: bit i is set if ray i has a hit, which is then in
-  // hits[i]. Throws Error{kCorrupt} for a damaged DAG.
+  // hits[i]. `hits` must have room for one hit per ray. Throws Error{kCorrupt} for a damaged DAG.
   uint64_t cast(std::span<const Ray> rays, Hit* hits);
 
  private:

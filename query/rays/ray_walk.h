@@ -1,10 +1,10 @@
 // The descent of one ray through the DAG.
 //
-// The ray is mirrored so that its direction is positive on every axis. `out` are the ray's
-// parameters at the three far planes of a cell; a ray that enters the cell at `t` leaves it at the
-// smallest of them. The parameter at a plane is always computed from the plane's integer coordinate
-// by the same formula. So a descent can begin in any cell that the ray enters, with the same result
-// as from the root.
+// The ray is mirrored so that its direction is positive on every axis. `out` has the ray's
+// parameters at the three planes at which it can leave a cell, by axis; a ray that enters the cell
+// at `t` leaves it at the smallest of them. The parameter at a plane is always computed from the
+// plane's integer coordinate by the same formula. So a descent can begin in any cell that the ray
+// enters, with the same result as from the root.
 #pragma once
 
 #include <algorithm>
@@ -19,8 +19,8 @@ namespace voxdag::query {
 
 // A ray whose direction is positive on every axis.
 struct MirroredRay {
-  // A component of a direction that is smaller than this counts as 0, because its inverse could be
-  // infinite.
+  // Components of a direction with a smaller magnitude are replaced by this number, because their
+  // inverse could be infinite.
   static constexpr double kMinComponent = 1e-18;
 
   static double component(double d) { return std::max(std::fabs(d), kMinComponent); }
@@ -44,15 +44,16 @@ struct MirroredRay {
 
 class RayWalk {
  public:
-  // `max_steps`: maximum number of nodes and bricks to read. After them, the walk ends as if the
-  // rest of the DAG were empty.
+  // `max_steps`: maximum number of nodes and bricks to read. After this number, the walk ends
+  // without a hit.
   RayWalk(const DagView& dag, const MirroredRay& ray, const Cone& cone, double t_max,
           uint64_t max_steps = ~uint64_t{0})
       : dag_(dag), ray_(ray), cone_(cone), t_max_(t_max), steps_left_(max_steps) {}
 
   uint64_t steps_left() const { return steps_left_; }
 
-  // Walks from the root. The DAG must not be empty. Throws Error{kCorrupt} for a damaged DAG.
+  // Walks from the root. Returns true and sets `hit` if the ray hits a cell. The DAG must not be
+  // empty. Throws Error{kCorrupt} for a damaged DAG.
   bool run(double t_min, Hit& hit);
   // Walks from a cell that has children. `low` is the cell's low corner, mirrored like the ray, and
   // `size` the cell's edge, both in voxels. `axis` is the axis of the face through which the ray
@@ -65,9 +66,9 @@ class RayWalk {
   }
 
  private:
-  // Visits the existing children of a cell, for which has(index) is true, nearest first. Calls
-  // enter_child(index, low corner, out, t) for each; the visit ends when it returns true, for a
-  // hit.
+  // Visits the children of a cell that the ray crosses and for which has(index) is true, nearest
+  // first. Calls enter_child(index, low corner, out, t) for each. If enter_child() returns true,
+  // which means a hit, ends and returns true.
   template <class Has, class EnterChild>
   bool cross(const double (&low)[3], double half, const double (&out)[3], double t, const Has& has,
              const EnterChild& enter_child);

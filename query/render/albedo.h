@@ -1,5 +1,5 @@
-// The share of light that a surface reflects: from the colors of a file, or of gray plaster. Refers
-// to the file. Not thread-safe.
+// The share of light that a surface reflects, from the colors of a file. Without colors, surfaces
+// are gray plaster. The file must outlive an Albedo. Not thread-safe.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace voxdag::query {
 
-// Albedo of a surface without a color.
+// Albedo of a surface without a color, linear.
 inline constexpr Vec kPlaster{{0.74, 0.70, 0.64}};
 
 class Albedo {

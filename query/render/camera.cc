@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "core/base/error.h"
 #include "query/render/sampling.h"
@@ -13,8 +14,8 @@ constexpr double kMargin = 1.06;  // enlarges the picture to leave free space ar
 
 double half_tangent(double fov_degrees) { return std::tan(fov_degrees * kPi / 360); }
 
-// Sets the axes that point right and up in the picture of a camera that looks along `forward`. If
-// the camera looks straight down, the up axis is -z.
+// Computes the directions `right` and `up` of the picture, for a camera that looks along `forward`.
+// If the camera looks straight down, up is -z.
 void picture_axes(const Vec& forward, Vec& right, Vec& up) {
   const bool vertical = std::fabs(forward[1]) > 1 - 1e-9;
   const Vec reference = vertical ? Vec{{0, 0, forward[1] < 0 ? -1.0 : 1.0}} : Vec{{0, 1, 0}};
@@ -37,12 +38,16 @@ double bound(const std::vector<Vec>& points, const Vec& axis) {
 Camera::Camera(const Placement& p, int width, int height)
     : eye_(p.eye), half_width_(width / 2.0), half_height_(height / 2.0) {
   if (!(p.fov_degrees > 0 && p.fov_degrees < 180))
-    throw Error(ErrorCode::kInvalidInput, "the field of view must be between 0 and 180 degrees");
+    throw Error(ErrorCode::kInvalidInput, "the field of view is " + std::to_string(p.fov_degrees) +
+                                              " degrees: expected more than 0 and less than 180");
   const double distance = length(p.target - p.eye);
   if (!(distance > 0))
-    throw Error(ErrorCode::kInvalidInput, "the camera must not be at its target");
+    throw Error(ErrorCode::kInvalidInput,
+                "the camera is at its target: expected two different points");
   if (!std::isfinite(distance))
-    throw Error(ErrorCode::kInvalidInput, "the camera is too far from its target");
+    throw Error(
+        ErrorCode::kInvalidInput,
+        "the camera is too far from its target: expected a distance that a double can hold");
   forward_ = normalized(p.target - p.eye);
   picture_axes(forward_, right_, up_);
   pixel_ = half_tangent(p.fov_degrees) / half_height_;
@@ -59,9 +64,10 @@ Placement fit_camera(const std::vector<Vec>& points, const Vec& toward_eye, doub
   Vec right, up;
   picture_axes(back * -1.0, right, up);
   const double tangent_up = half_tangent(fov_degrees) / kMargin;
+  // Below, p.right is the coordinate of p along the axis `right`, and likewise for `up` and `back`.
   // For an eye at e, the point p is in the picture if |p.right - e.right| <= tangent * (e.back -
-  // p.back), and likewise with up instead of right. Each of the two inequalities gives two linear
-  // bounds on e, and e is placed midway between the tightest bounds.
+  // p.back), and if the same is true with `up` instead of `right`. Each of the two inequalities
+  // gives two linear bounds on e, and e is placed midway between the tightest bounds.
   double e[2] = {0, 0}, distance = bound(points, back) + 1;
   const Vec axes[2] = {right, up};
   const double tangents[2] = {tangent_up * aspect, tangent_up};

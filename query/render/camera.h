@@ -16,8 +16,9 @@ struct Placement {
 
 class Camera {
  public:
-  // Throws Error{kInvalidInput} if the eye is at the target, if their distance exceeds the range of
-  // a double, or if the field of view is not in (0, 180).
+  // `width` and `height` are the picture's size in pixels. Throws Error{kInvalidInput} if the eye
+  // is at the target, if their distance exceeds the range of a double, or if the field of view is
+  // not more than 0 and less than 180 degrees.
   Camera(const Placement& placement, int width, int height);
 
   // Returns the ray through a point of the picture, in pixels from its upper left corner.
@@ -33,9 +34,10 @@ class Camera {
   double half_width_, half_height_;  // of the picture, in pixels
 };
 
-// Returns a placement from which all of `points` are centered in the picture and as large as
-// possible. The camera is in the direction `toward_eye` (of any length) from the points. A few
-// outliers among thousands of points may be outside the picture. Needs at least one point.
+// Returns a placement from which `points` are centered in the picture and as large as possible. The
+// camera is in the direction `toward_eye` (of any length) from the points. `aspect` is the
+// picture's width divided by its height. A few outliers among thousands of points may be outside
+// the picture. `points` must not be empty.
 Placement fit_camera(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
                      double aspect);
 

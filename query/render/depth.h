@@ -22,7 +22,7 @@ struct DepthMap {
 DepthMap render_depth(const DagView& dag, const Placement& placement, int width, int height,
                       unsigned threads, const CancelToken& cancel);
 
-// Bytes per pixel of a map and its file.
+// Memory per pixel, in bytes, for a map and the file that encode_npy() makes of it.
 inline constexpr uint64_t kDepthBytesPerPixel = 2 * sizeof(float);
 
 // Returns the bytes of a file for numpy.load(): an array of float32 with the shape (height, width).

@@ -1,5 +1,5 @@
-// The G-buffer: for each pixel the visible surface and its light before tone mapping. Also has a
-// filter that removes sampling noise.
+// The G-buffer: for each pixel, the visible surface and its light before tone mapping. The function
+// smoothed() is a filter that removes sampling noise.
 #pragma once
 
 #include <vector>
@@ -16,8 +16,8 @@ struct Float3 {
   operator Vec() const { return {{x, y, z}}; }
 };
 
-// Averages over the samples of a pixel. `floor` is an average over the samples that met no surface,
-// all other members (except `coverage`) over the samples that met one.
+// Averages over the samples of a pixel. `floor` is an average over the samples that met no surface.
+// All other members, except `coverage`, are averages over the samples that met a surface.
 struct GBufferPixel {
   float coverage = 0;  // share of the samples that met a surface
   Float3 offset;       // from the eye to the surface, in voxels
@@ -38,10 +38,10 @@ struct GBuffer {
     return pixels[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
   }
 
-  // Returns the pixel with smoothed light. The sky light is averaged over neighbor pixels on the
-  // same plane, the light of the floor over neighbors on the floor. Sun and normal have finer
-  // detail, so they are averaged over fewer neighbors. `pixel_spread` is the width of a pixel at
-  // distance 1. Does not modify the buffer.
+  // Returns the pixel with smoothed light. On a surface, `sky` is averaged over neighbor pixels
+  // near the surface's plane. `sun` and `normal` have finer detail, so nearer neighbors get more
+  // weight. In a pixel without a surface, `floor` is averaged over neighbors without a surface.
+  // `pixel_spread` is the width of a pixel at distance 1. Does not modify the buffer.
   GBufferPixel smoothed(int x, int y, double pixel_spread);
 };
 

@@ -91,9 +91,9 @@ double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
   return 1 - fade * (0.75 - 0.35 * open - 0.40 * (sees(s, sun_) ? 1 : 0));
 }
 
-// If the camera is outside the scene, the sun is behind the camera's left shoulder. If it is
-// inside, 48 positions are tried, in all directions and at three heights. The sun gets the position
-// from which it lights about a third of the visible surface.
+// With a floor, so from outside the scene, the sun is behind the camera's left shoulder. Without a
+// floor, tries 48 positions: 16 directions around the vertical, each at three heights. The best
+// position lights about a third of the visible surface.
 void Lighting::place_sun(const std::vector<SurfaceHit>& seen, const Vec& back) {
   constexpr int kTurns = 16, kHeights = 3;
   constexpr double kLitTarget = 0.35;

@@ -14,12 +14,13 @@ namespace voxdag::query {
 
 class Lighting {
  public:
-  // Places the sun for the visible surface, of which `seen` contains samples. If the camera is
-  // outside the scene, it also sees a floor below the scene, on which the scene casts its shadow.
+  // Places the sun for the visible surface. `seen` has samples of this surface, nearest first.
+  // `box` is the box of the occupied cells. If the camera is outside the box and above its lower
+  // side, there is also a floor below the scene, on which the scene casts its shadow.
   Lighting(const DagView& dag, const Box& box, const Camera& camera,
            const std::vector<SurfaceHit>& seen);
 
-  // Returns red, green and blue light from the sky. An open sky gives about 1.
+  // Returns red, green and blue light from the sky, with `rays` rays. An open sky gives about 1.
   Vec sky_light(const SurfaceHit& surface, int rays, const Sampler& sampler) const;
   // Returns 1 if the surface sees the sampled point of the sun, else 0.
   double sun_light(const SurfaceHit& surface, const Sampler& sampler) const;

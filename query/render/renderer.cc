@@ -16,7 +16,8 @@ namespace {
 constexpr Vec kTopColor{{0.46, 0.54, 0.65}}, kBottomColor{{0.86, 0.87, 0.88}};
 constexpr double kMaxHaze = 0.25;
 
-// `dither` in [0, 1) spreads the rounding error, so that gradients show no steps.
+// Returns the sRGB byte of a linear intensity. `dither`, in [0, 1), differs between neighbor
+// pixels. It decides whether the byte is rounded up or down, so that gradients show no steps.
 uint8_t srgb_byte(double linear, double dither) {
   const double v = std::clamp(linear, 0.0, 1.0);
   const double s = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
@@ -40,9 +41,9 @@ std::vector<SurfaceHit> probe_view(const DagView& dag, const Camera& camera, int
   return seen;
 }
 
-// Returns the exposure factor. It is chosen as if all probed surfaces were of plaster: their median
-// light would then be a middle tone, and their brightest tenth would be below white. So dark
-// surfaces remain dark.
+// Returns the factor by which all light is multiplied before tone mapping. It is chosen as if all
+// probed surfaces were of plaster: then their median light is a middle tone or darker, and 90% of
+// them are below white. The surfaces' own colors are ignored so that dark surfaces remain dark.
 double choose_exposure(const Lighting& lighting, const std::vector<SurfaceHit>& seen) {
   constexpr int kSkyRays = 8;
   if (seen.empty()) return 1;

@@ -1,5 +1,5 @@
-// Low-discrepancy sample points that depend only on the pixel. So a picture is the same for any
-// number of threads.
+// Low-discrepancy sample points that depend only on the pixel and the sample's number. So a picture
+// is the same for any number of threads.
 #pragma once
 
 #include "core/base/integers.h"
@@ -9,10 +9,10 @@ namespace voxdag::query {
 
 inline constexpr double kPi = 3.14159265358979323846;
 
-// Points in [0, 1)^2 that cover the square evenly (the R2 sequence). A sample has several
-// dimensions (its position in the pixel, its rays to the sky), and each dimension shifts the
-// sequence by a random amount. The sequences of neighboring pixels start far apart, so the
-// remaining noise is fine-grained.
+// Points in [0, 1)^2 that cover the square evenly (the R2 sequence). A sample of a pixel needs
+// points for several purposes, called dimensions: its position in the pixel, its rays to the sky.
+// Each dimension shifts the sequence by a random amount. The sequences of neighboring pixels start
+// far apart, so the remaining noise is fine-grained.
 class Sampler {
  public:
   struct Pair {
@@ -25,7 +25,8 @@ class Sampler {
                x * 0.4142135623730951 + y * 0.7320508075688772},
         sample_(sample) {}
 
-  // Returns point `i` of the `count` points that each sample of the pixel uses in this dimension.
+  // Returns point `i` of this sample. `count` is the number of points that each sample of the pixel
+  // uses in this dimension.
   Pair pair(uint64_t dimension, int i = 0, int count = 1) const {
     const double n = static_cast<double>(sample_) * count + i;
     return {wrap(start_[0] + random(dimension, 0) + 0.7548776662466927 * n),
@@ -43,7 +44,8 @@ class Sampler {
   int sample_ = 0;
 };
 
-// Returns a cosine-distributed direction around the unit vector `n`.
+// Converts a point of a Sampler to a direction around the unit vector `n`, with a density
+// proportional to the cosine of the angle to `n`.
 inline Vec cosine_direction(const Vec& n, const Sampler::Pair& p) {
   Vec a, b;
   basis_around(n, a, b);

@@ -14,7 +14,9 @@ Vec face_normal(const Hit& hit, const Vec& direction) {
   return normal;
 }
 
-// Weighted sums over the offsets of occupied cells from the hit cell.
+// Weighted sums over the occupied cells near the hit cell. d is a cell's offset from the hit cell,
+// in cells, and w its weight: `weight` is the sum of w, `first` of w d, and `second` of the matrix
+// w d d^T.
 struct Moments {
   double weight = 0;
   Vec first;
@@ -86,10 +88,11 @@ bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surfa
   const double cube = std::clamp((pixels - 5) / 8, 0.0, 1.0);
   const Vec face = face_normal(hit, ray.direction);
   s.normal = cube < 1 ? normalized(mix(plane_normal(dag, hit, ray.direction), face, cube)) : face;
-  // The offset from the surface is larger than the steps between neighboring cells of a slope.
+  // The start is moved from the surface by more than the steps between neighboring cells of a
+  // slope, so that these cells do not occlude it.
   s.start = ray.at(s.t) + s.normal * (s.size * 2.2 * (1 - cube)) + face * (s.size * 0.01);
-  // In a narrow place this point may be occupied. In this case, a point on the ray before the hit
-  // is used, which is certainly free.
+  // In a narrow place the start may be occupied. Then it is replaced by a point on the ray before
+  // the hit, which is certainly free.
   if (caster.cast({s.start, s.normal}, {s.size, 0}, 0, 0, hit))
     s.start = ray.at(s.t - 1.5 * s.size);
   return true;

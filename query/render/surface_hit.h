@@ -10,10 +10,10 @@
 
 namespace voxdag::query {
 
-// Distance at which the view of any ray ends.
+// Maximum distance, in voxels, at which a surface is seen.
 inline constexpr double kFarthest = 1e30;
-// The cone of a ray through a pixel that is `pixel_spread` wide at distance 1. Cells of up to three
-// quarters of a pixel are drawn as one cell: finer cells are not visited.
+// Returns the cone of a ray through a pixel that is `pixel_spread` wide at distance 1. A ray ends
+// at an occupied cell that is at most three quarters of a pixel wide; finer cells are not visited.
 inline Cone visible_cone(double pixel_spread) { return {0, 0.75 * pixel_spread}; }
 
 struct SurfaceHit {

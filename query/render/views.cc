@@ -24,23 +24,24 @@ const NamedDirection kDirections[] = {
     {"left", {{-1, 0, 0}}},     {"right", {{1, 0, 0}}}, {"top", {{0, 1, 0}}},
 };
 
-// Returns the width of the rays that choose a view of a large grid. Thinner rays would visit finer
-// cells, which give the same view, but are scattered over the file and may have to be read from
-// disk.
+// Returns the width, in voxels, of the rays that choose a view: 1/4096 of a large grid's edge.
+// Thinner rays would visit finer cells, which give the same view, but are scattered over the file
+// and may have to be read from disk.
 double finest_width(const DagView& dag) {
   constexpr int64_t kCells = 4096;
   return dag.resolution() > kCells ? static_cast<double>(dag.resolution() / kCells) : 0;
 }
 
-// Limits of the work for choosing a view, in nodes and bricks read. Without them, a scene of dust,
-// whose rays pass through thousands of cells, or a damaged scene could keep a service busy for
-// minutes. Sponza at 4096^3 takes 0.4, 3.6 and 1.4 million steps.
+// Limits of the work for choosing a view. A step is a node or brick that is read. Without limits, a
+// scene of dust, whose rays pass through thousands of cells, or a damaged scene could keep a
+// service busy for minutes. Sponza at 4096^3 takes 0.4 million steps for the enclosure, and 3.6 and
+// 1.4 million for the two passes of the search.
 constexpr uint64_t kMaxEnclosureSteps = uint64_t{1} << 22;
 constexpr uint64_t kMaxSearchSteps = uint64_t{1} << 25;  // for each of its two passes
 constexpr uint64_t kMaxBoxCells = uint64_t{1} << 25;
 
-// Casts rays that together may take a limited number of steps. Results that were computed with a
-// ray after the last step must be discarded.
+// Casts rays that together may take a limited number of steps. If used_up() is true, the last ray
+// may have ended early, and results that depend on it must be discarded.
 class LimitedRays {
  public:
   LimitedRays(const DagView& dag, uint64_t max_steps, const CancelToken& cancel)
@@ -58,10 +59,10 @@ class LimitedRays {
   uint64_t steps_left_, count_ = 0;
 };
 
-// Returns a measure of how enclosed the scene is. For each of some places on the surface, the
-// longest free distance from the place is found; a place from which a ray leaves the scene counts
-// as 0. The result is the mean of these distances, as a share of the scene's diagonal. It is near 0
-// for an object or for caves, and larger for interiors.
+// Returns a measure of how enclosed the scene is. Casts rays from up to 1000 places on the surface
+// to 26 directions, and takes the longest free distance at each place. A place from which a ray
+// leaves the scene counts as 0. The result is the mean of these distances, as a share of the
+// scene's diagonal. It is near 0 for an object or for caves, and larger for interiors.
 double enclosure(const DagView& dag, const OccupiedCells& cells, const Box& box,
                  const CancelToken& cancel) {
   constexpr size_t kPlaces = 1000;
@@ -92,15 +93,17 @@ double enclosure(const DagView& dag, const OccupiedCells& cells, const Box& box,
   return places == 0 ? 0 : sum / (static_cast<double>(places) * box.diagonal());
 }
 
-// Rates a view with a few rays. The score is higher for long views with much detail. It is lower if
-// the camera is close to a wall or looks out of the scene. Distances below `near` are too close.
+// Rates a view with kColumns * kRows rays of the width `width`. The score is higher for long views
+// with much detail. It is lower if the camera is close to a wall or looks out of the scene. A
+// distance below `near` counts as close to a wall.
 template <int kColumns, int kRows>
 double score(LimitedRays& rays, const Placement& placement, double width, double near) {
   constexpr double kRays = kColumns * kRows;
   const Camera camera(placement, kColumns, kRows);
   double depth[kRows][kColumns], sum = 0;
   int close = 0, out = 0, breaks = 0;
-  // 1 / depth is linear along a plane.
+  // True if three neighbor pixels with the depths a, b and c are not on one plane. Along a plane,
+  // the inverse of the depth is linear.
   const auto bends = [](double a, double b, double c) {
     return std::fabs(1 / a - 2 / b + 1 / c) * b > 0.03;
   };
@@ -124,8 +127,8 @@ struct Trials {
   std::vector<Placement> placements;
   std::vector<double> scores;
 };
-// Returns some hundred random places in the lower half of the scene, with rough scores. Returns
-// fewer if the steps are used up.
+// Returns views from 400 random places in the lower half of the scene, in eight directions each,
+// and their rough scores. Returns fewer views if the steps are used up.
 Trials rough_trials(const DagView& dag, const Box& box, double fov_degrees,
                     const CancelToken& cancel) {
   constexpr uint64_t kPlaces = 400;
@@ -152,11 +155,12 @@ Trials rough_trials(const DagView& dag, const Box& box, double fov_degrees,
   return trials;
 }
 
-// Returns the best of some random places; nullopt if the steps were used up before a place was
-// found. A quarter of the rays is used to preselect the candidates.
+// Returns the best of some random views; nullopt if the steps were used up before a view was rated.
+// To save time, all views are rated roughly first, with a quarter of the rays. Only views with good
+// rough scores are rated again with all rays.
 std::optional<Placement> inside_view(const DagView& dag, const Box& box, double fov_degrees,
                                      const CancelToken& cancel) {
-  // Places with less than this share of the best rough score cannot be the best.
+  // Views with less than this share of the best rough score are not rated again.
   constexpr double kRoughShare = 0.6;
   const auto [trials, rough] = rough_trials(dag, box, fov_degrees, cancel);
   if (trials.empty()) return std::nullopt;

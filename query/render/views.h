@@ -22,9 +22,9 @@ struct Box {
   double diagonal() const { return length(high - low); }
 };
 
-// Returns the bounding box of the occupied cells of 1/2048 of the grid's edge. If this would
-// require visiting more than some tens of millions of cells, returns a larger box. Throws the error
-// of `cancel`.
+// Returns the bounding box of the occupied cells whose edge is 1/2048 of the grid's edge, or of the
+// voxels if these are larger. If this would require visiting more than 2^25 cells, returns a larger
+// box. Throws the error of `cancel`.
 Box occupied_box(const DagView& dag, const CancelToken& cancel = {});
 
 // Occupied cells of one size.
@@ -35,28 +35,28 @@ struct OccupiedCells {
   // cells, or the corners of the cells if there are only few cells.
   std::vector<Vec> outline() const;
 };
-// Returns the occupied cells of 1/64 of the grid's edge. Only few such cells mean that the scene is
-// small in its grid; then finer cells are returned.
+// Returns the occupied cells whose edge is 1/64 of the grid's edge. If there are fewer than 256
+// such cells, the scene is small in its grid, and finer cells are returned.
 OccupiedCells occupied_cells(const DagView& dag);
 
 // Returns "auto", "iso", "front", "back", "left", "right", "top" and "inside".
 const std::vector<std::string>& view_names();
 
-// Returns the placement of a named view. "inside" is a position within the scene with a long view,
-// walls around and a floor below. "auto" is "inside" if most of the scene cannot be seen from
-// outside, otherwise "iso". `aspect` is the picture's width divided by its height. Without
-// `fov_degrees`, the view chooses the field of view.
+// Returns the placement of the view `name`. "inside" is a position within the scene with a long
+// view and much detail. "auto" is "inside" if most of the scene cannot be seen from outside,
+// otherwise "iso". `aspect` is the picture's width divided by its height. Without `fov_degrees`,
+// the field of view is 62 degrees for "inside" and 32 degrees for the other views.
 //
 // "inside" and "auto" cast rays for up to half a second, or one to two seconds if the scene is
-// dust. Their number of steps is limited. At the limit, the result is the best view so far, or
-// "iso".
+// dust: separate small particles between which rays pass through thousands of cells. The rays may
+// read a limited number of nodes. At the limit, the result is the best view so far, or "iso".
 //
 // Throws Error{kInvalidInput} for an unknown name, and the error of `cancel`.
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
                      std::optional<double> fov_degrees, const CancelToken& cancel = {});
 
 // Like named_view(), for several views of the same DAG. Computes data that the views share only
-// once. Refers to the DAG and the token.
+// once. The DAG and the token must outlive this object.
 class NamedViews {
  public:
   NamedViews(const DagView& dag, const CancelToken& cancel) : dag_(dag), cancel_(cancel) {}

@@ -12,7 +12,8 @@
 namespace voxdag::query {
 namespace {
 
-// Number of levels from a page's root to its cells. Pages of levels near the DAG's root have fewer.
+// Number of levels from a page's root to its cells. A page of level 0, 1 or 2 has fewer: its root
+// is the DAG's root.
 constexpr uint32_t kPageLevels = 3;
 constexpr size_t kMaskWords = 16, kHeadWords = 1 + kMaskWords;
 constexpr uint64_t kBlockCells = 32;
@@ -53,8 +54,8 @@ uint32_t first_bit(const uint32_t* mask) {
 
 }  // namespace
 
-// Returns the children of a node or brick. A node is read from the file only now; the content of a
-// brick is its mask.
+// Returns the children of a node or brick. Verifies a node, because this call reads it. A brick is
+// already verified: content() has read its mask, which is its content (dag_view.h).
 DagView::Children ColorPages::children(uint32_t depth, uint64_t content) const {
   if (depth < file_->brick_level()) checked_file_.expect_intact(depth, content);
   return dag_->children(depth, content);
@@ -66,8 +67,9 @@ uint64_t ColorPages::content(uint32_t depth, const DagView::Children& children, 
   return dag_->content(depth, children, index);
 }
 
-// Sets the bits of the set cells that are `below` levels under a cell at `depth`. The bits are in
-// Morton order, starting with bit `code`.
+// Sets the bits of the page's set cells in a cell at `depth`, which is `below` levels above the
+// page's cells. The bits of `mask` are in the Morton order of the page's cells. `code` is the
+// Morton code of the cell at `depth` within the page.
 void ColorPages::set_bits(uint32_t depth, uint64_t content, uint32_t below, uint32_t code,
                           uint32_t* mask) const {
   if (below == 0) {
@@ -96,8 +98,8 @@ void ColorPages::set_mask(const ColorPageAddress& page, uint32_t* mask) const {
   set_bits(root, content, below, 0, mask);
 }
 
-// Verifies all directory entries that are read by a search for the region that contains `cell`, and
-// all bytes of this region.
+// Verifies the checksums of all data that cursor_ will read to find the color of `cell`: the
+// directory entries that a binary search reads, and all bytes of the region that contains the cell.
 void ColorPages::check_region(const voxdag_reader::ColorTier& tier, uint32_t level,
                               const std::array<int64_t, 3>& cell) const {
   if (!blocks_) return;
@@ -135,8 +137,9 @@ std::vector<uint32_t> ColorPages::encode(const ColorPageAddress& address) {
   return words;
 }
 
-// The colors of a page's cells are consecutive in their region, unless the page is larger than a
-// region.
+// Appends the colors of the page's cells. If the page is in one region, its colors are consecutive
+// there, and their encoded blocks are copied. A page that is larger than a region gets one word per
+// color.
 void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_t>& words) {
   const uint32_t level = address.level;
   const uint64_t count = words[0];

@@ -1,6 +1,6 @@
-// Color pages: the colors of 8 x 8 x 8 cells of one level, for viewers that fetch only visible data
-// (docs/format.md, "Color pages"). Tiles are addressed by their nodes, but pages by their position,
-// because equal subtrees have different colors.
+// Color pages: a page has the colors of 8 x 8 x 8 cells of one level, for viewers that fetch only
+// visible data (docs/format.md, "Color pages"). Tiles (tile.h) are addressed by their nodes, but
+// pages by their position, because equal subtrees can have different colors.
 //
 // An address may come from an unknown client, and the colors from a damaged file. So the work for a
 // page is bounded.
@@ -21,10 +21,12 @@ struct ColorPageAddress {
   std::array<uint64_t, 3> position{};  // position of the low corner, in pages
 };
 
-// Pages of one file. Refers to the file. Each thread needs its own object.
+// Encodes pages of one file. The constructor's arguments must outlive this object. Each thread
+// needs its own object.
 class ColorPages {
  public:
-  // `dag` and, if given, `blocks` must belong to the file.
+  // `dag` and `blocks` must belong to the file. If `blocks` is not null, all data is verified by
+  // its checksums before it is read.
   ColorPages(const voxdag_reader::File& file, const DagView& dag,
              const CheckedBlocks* blocks = nullptr)
       : file_(&file),

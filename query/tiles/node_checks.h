@@ -1,5 +1,5 @@
-// Verifies the checksum blocks of nodes and bricks before they are read. Without a file, all nodes
-// and bricks count as intact.
+// Verifies the checksum blocks of nodes and bricks before they are read. If `blocks` is null, all
+// nodes and bricks count as intact.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,8 @@ class NodeChecks {
   }
 
   // Throws DamagedBlock if the node or brick at this word offset is damaged. The offset may have
-  // any value. Checks the maximum number of words that a node can have, because the node's first
-  // word, which determines its number of words, may itself be damaged.
+  // any value; outside the level, nothing is checked. The check covers the maximum size of a node,
+  // because the first word, which determines the node's size, may itself be damaged.
   void expect_intact(uint64_t offset) const {
     if (blocks_ && offset < words_) blocks_->expect_intact_at(place_ + 4 * offset, bytes_);
   }

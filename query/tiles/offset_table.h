@@ -10,7 +10,7 @@ namespace voxdag::query {
 
 class OffsetTable {
  public:
-  // Returns the number of the offset, which gets the next number if it is new.
+  // Returns the number of the offset. An offset that is new gets the next number.
   uint32_t add(uint64_t offset) {
     if (offsets_.size() * 2 >= slots_.size()) grow();
     uint32_t& slot = find(offset);

@@ -26,8 +26,9 @@ void check_address(const DagView& dag, const TileAddress& root, const CheckedBlo
                                           std::to_string(root.offset) + ": no node begins here");
 }
 
-// Appends the nodes of a level. Each node contains the numbers of its children instead of their
-// offsets; new children get new numbers. Returns the index of the first word of each node.
+// Appends the nodes of a level to `words`. Each appended node has the numbers of its children in
+// `children` instead of their offsets; children without a number get the next one. Returns the word
+// index, after the header, at which each node begins.
 std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
                                 const std::vector<uint64_t>& offsets, OffsetTable& children,
                                 std::vector<uint32_t>& words) {
@@ -46,8 +47,8 @@ std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks,
   return starts;
 }
 
-// Replaces the children's numbers, in the words from `begin` to `end`, by the children's word
-// offsets.
+// Replaces the children's numbers by the children's word indexes `child_starts`, in the nodes from
+// word `begin` to word `end`.
 void point_to(const std::vector<uint32_t>& child_starts, size_t begin, size_t end,
               std::vector<uint32_t>& words) {
   while (begin < end) {
@@ -73,8 +74,9 @@ void add_bricks(const DagView& dag, const CheckedBlocks* blocks,
   }
 }
 
-// The nodes from which coarse bricks are made are scattered over the file. So each of the loops
-// prefetches the words that the next loop reads.
+// Appends the offset and the coarse brick of each node at which the tile ends. The nodes from which
+// coarse bricks are made are scattered over the file. So each of the loops prefetches the words
+// that the next loop reads.
 void add_cut_off(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
                  const std::vector<uint64_t>& offsets, std::vector<uint32_t>& words) {
   const NodeChecks checks(dag, level, blocks), child_checks(dag, level + 1, blocks);

@@ -1,8 +1,8 @@
 // Tiles: a tile is a node of a finished DAG with a few levels below it, for viewers that fetch only
 // visible data (docs/format.md, "Tiles"). A tile is addressed by its root node, so equal subtrees
 // are one tile, wherever they occur. If a tile ends above the bricks, it contains two things for
-// each child of its last level: the address of the child's tile, and a coarse brick to draw until
-// that tile arrives.
+// each node at which it ends: the offset of that node, which is the root of another tile, and a
+// coarse brick to draw until the other tile arrives.
 //
 // Stateless; thread-safe. Offsets may come from unknown clients and damaged files. So each offset
 // is checked, and the work for a tile is bounded by its number of levels.
@@ -27,7 +27,8 @@ struct TileAddress {
 };
 
 // Returns the level at which a tile ends if its root is at `level`, which must be above the bricks.
-// This is the first level below the root that is a multiple of `tile_levels` above the bricks.
+// It is the first level below the root whose distance to the level of the bricks is a multiple of
+// `tile_levels`.
 uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level);
 
 // Returns the words of the tile. `tile_levels` is 1 to kMaxTileLevels. Throws Error{kNotFound} for

@@ -1,6 +1,6 @@
-// Compares a seeded sample of a file's colors and other attributes with the scene from which the
-// file was built. For the sample, some regions of 64^3 color cells are baked again from the scene's
-// triangles and images.
+// Compares a random sample of a file's colors and other attributes with the scene from which the
+// file was built. The sample consists of some regions of 64^3 color cells, which are baked again
+// from the scene's triangles and images. A seed determines the sample.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,9 @@
 namespace voxdag::query {
 
 inline constexpr size_t kSampleRegions = 16;
-// Minimum PSNR, in dB, between the colors of a region in the file and in the scene. In a file
-// written by a build, the colors and all other attributes are equal to the scene's. Regions that
-// `extract` had to encode again differ slightly.
+// Minimum PSNR, in dB, between a region's colors in the file and the colors baked from the scene.
+// In a file written by a build, the colors and all other attributes are equal to the baked ones.
+// Regions that `extract` had to encode again differ slightly.
 inline constexpr double kMinSamplePsnr = 30;
 
 struct ColorSampleReport {

@@ -153,7 +153,8 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
   Random random(seed);
   std::vector<SampleBox> boxes;
   for (const FixedTriangle& triangle : draw_triangles(scene, grid, random, progress, cancel)) {
-    // A triangle may be mostly outside the grid, so up to this number of points is tried.
+    // Maximum number of random points per triangle. The first ones may be outside the grid, because
+    // a triangle may be mostly outside the grid.
     constexpr int kTries = 16;
     std::optional<std::array<int64_t, 3>> voxel;
     for (int i = 0; i < kTries && !voxel; ++i) voxel = random_voxel(triangle, grid, random);

@@ -1,9 +1,10 @@
-// A seeded sample of the voxels near a scene's surface. The voxels are computed from the scene's
-// triangles without the code that builds DAGs. The sample consists of boxes of voxels around random
-// points of random triangles. Half of the triangles are drawn uniformly, and half with a
-// probability proportional to their area, so that the sample misses neither a floor of two
-// triangles nor a million leaves. Takes two passes over the scene. Memory depends only on the size
-// of the sample.
+// A random sample of the voxels near a scene's surface, to compare with a file. A seed determines
+// the sample. The voxels are computed from the scene's triangles without the code that builds DAGs.
+// The sample consists of boxes of voxels around random points of random triangles. Half of the
+// triangles are drawn uniformly, and half with a probability proportional to their area. So the
+// sample misses neither a floor that consists of two large triangles nor the million small
+// triangles of a tree's leaves. Takes two passes over the scene. Memory depends only on the size of
+// the sample.
 #pragma once
 
 #include <bitset>
@@ -27,7 +28,7 @@ struct SampleBox {
   std::bitset<kBoxEdge * kBoxEdge * kBoxEdge> set;  // bit (x * kBoxEdge + y) * kBoxEdge + z
 };
 
-// Returns no boxes if no triangle touches the grid.
+// Computes a sample. Returns at most kSampleBoxes boxes, and none if no triangle touches the grid.
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
                                       Progress& progress, const CancelToken& cancel);
 

@@ -11,9 +11,9 @@ namespace {
 using voxdag_reader::Rgb;
 using Lab = std::array<uint32_t, 3>;
 
-// A lab coordinate of 1 is stored as kLabScale. A step of a gray byte is then about 16, and sums of
-// squares over 2^32 voxels fit in 64 bits. kLabShift is added because the coordinates a and b can
-// be negative.
+// An Oklab coordinate x is stored as the integer (x + kLabShift) * kLabScale. The shift is
+// necessary because the coordinates a and b can be negative. With this scale, two neighbor gray
+// bytes differ by about 16, and sums of squares over 2^32 voxels fit in 64 bits.
 constexpr double kLabScale = 4096, kLabShift = 1;
 
 // Newton's method with a start value above the root. The fixed number of steps is enough for the
@@ -109,9 +109,9 @@ ColorPalette::PaletteBox ColorPalette::box_of(size_t begin, size_t end) const {
   return box;
 }
 
-// Moves the points below the mean of a box to the front. The box must have a spread. Returns the
-// index of the first of the other points. No sum depends on the order of the points within the two
-// parts.
+// Cuts a box, whose spread must not be 0, at its mean: moves the points below the mean to the
+// front, and returns the index of the first point of the second part. The order of the points
+// within the two parts does not matter, because only sums over them are computed.
 size_t ColorPalette::cut(const PaletteBox& box) {
   const auto first = points_.begin() + static_cast<ptrdiff_t>(box.begin);
   const auto last = points_.begin() + static_cast<ptrdiff_t>(box.end);

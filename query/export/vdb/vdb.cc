@@ -1,7 +1,7 @@
 // Exports OpenVDB's .vdb and NanoVDB's .nvdb with these two libraries. The file has a grid of
-// active voxels and, if the input has colors, a grid of linear light with the name that Houdini and
-// Blender use. The libraries build the grids completely in memory, so the size of the grids is
-// calculated first.
+// active voxels and, if the input has colors, a grid of the colors in linear light. The color grid
+// has the name "Cd", which Houdini and Blender use. The libraries build the grids completely in
+// memory, so the size of the grids is calculated first.
 //
 // Half floats are converted without Imath's lookup table, because a use of the table would require
 // linking Imath.
@@ -28,8 +28,8 @@
 namespace voxdag::query {
 namespace {
 
-// Bytes of memory for a leaf of 8^3 voxels, and for the nodes of 128^3 and of 4096^3 voxels, each
-// including all its pointers.
+// Bytes of memory for a leaf of 8^3 voxels, for a lower node of 128^3 voxels, and for an upper node
+// of 4096^3 voxels. The sizes include the pointers in the nodes.
 struct VdbNodeBytes {
   uint64_t leaf, lower, upper;
 };
@@ -121,9 +121,10 @@ class FileBuffer : public std::streambuf {
   std::exception_ptr failure_;
 };
 
-// Counts the voxels of a selection and the memory of its trees. Stops above `limit` bytes. Bricks
-// are visited in Morton order, so all bricks of a node come one after the other and the node is
-// counted once. `steps` advances by bricks.
+// Counts the voxels of a selection, and the bytes of memory for its trees, whose nodes have the
+// sizes `node`. Stops when there are more than `limit` bytes. Bricks are visited in Morton order,
+// so all bricks of a node come one after the other and the node is counted once. Calls
+// steps.advance() for each brick.
 struct VdbSize {
   uint64_t voxels = 0, bytes = 0;
 };

@@ -1,4 +1,6 @@
-// This file is compiled for AVX2. No function in it may be called before the CPU was checked.
+// This file is compiled for AVX2. walk_packet_avx2() returns walk() only if the CPU has all
+// instructions that the compiler may use in this file. No other function of this file may be called
+// without this check.
 #include <immintrin.h>
 
 #include "query/rays/packet_walk.h"
