@@ -46,7 +46,7 @@ class ConcurrencyLimiter {
       if (--found->second == 0) by_client.erase(found);
     }
 
-    std::mutex mutex;  // guards the next member
+    std::mutex mutex;  // guards in_use and by_client
     size_t in_use = 0;
     std::map<std::string, size_t> by_client;
   };

@@ -5,7 +5,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kDepthS = 2;
+constexpr double kDepthS = 2;  // capacity of a bucket, in seconds of requests
 // Above this number of buckets, full buckets are dropped. This changes no limit, because a client's
 // new bucket is also full.
 constexpr size_t kMaxBuckets = 10000;

@@ -3,7 +3,7 @@
 //     # role name sha256(token)
 //     admin  anna  9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08
 //
-// Tokens have 256 random bits, so that an unsalted SHA-256 is enough.
+// A token has 256 random bits and cannot be guessed, so the hash needs no salt.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@
 
 namespace voxdag::server {
 
-// Each role includes all roles before it.
+// Each role has the rights of all roles before it.
 enum class Role { kNone, kRead, kSubmit, kAdmin };
 
 // Parses "read", "submit" or "admin"; nullopt for anything else.
@@ -31,11 +31,12 @@ struct Caller {
 
 class Tokens {
  public:
-  // Throws Error{kInvalidInput} for a file without tokens, and with the line number for a malformed
-  // line.
+  // Reads a token file. Throws Error{kInvalidInput} if the file has no tokens or a malformed line;
+  // the message then has the number of the line.
   static Tokens read(FileSystem& files, const std::string& path);
 
-  // Runs in constant time for known and unknown tokens.
+  // Returns the caller with this token; nullopt for an unknown token. Takes the same time for known
+  // and unknown tokens, so that the time reveals nothing about the hashes.
   std::optional<Caller> find(std::string_view token) const;
 
  private:

@@ -10,11 +10,11 @@
 namespace voxdag::server {
 namespace {
 
-constexpr int kLevel = 1;             // higher levels take twice the time for a few percent
+constexpr int kLevel = 1;             // higher levels take twice the time to save a few percent
 constexpr int kGzipWindow = 15 + 16;  // window of 32 KiB, with gzip's header
 constexpr int kMemory = 8;
 
-// True if the parameters of an entry, "; q=0.5", exclude it.
+// True if the parameters of an entry of Accept-Encoding, such as "; q=0", exclude the entry.
 bool is_excluded(std::string_view parameters) {
   const size_t q = parameters.find("q=");
   if (q == std::string_view::npos) return false;

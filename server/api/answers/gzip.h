@@ -10,10 +10,10 @@ namespace voxdag::server {
 
 // True if the value of Accept-Encoding allows gzip.
 bool accepts_gzip(std::string_view accepted);
-// Throws Error{kOutOfMemory}.
+// Returns the compressed bytes. Throws Error{kOutOfMemory}.
 std::string gzip(std::string_view bytes);
 
-// Compresses the body of an answer if the client accepts it and this saves bytes.
+// Compresses the body of an answer if the client accepts gzip and the compressed body is smaller.
 void pack(const Request& request, Response& response);
 
 }  // namespace voxdag::server

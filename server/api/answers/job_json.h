@@ -1,4 +1,4 @@
-// A job in JSON (JOB of docs/api.md).
+// Converts a job to JSON (JOB in docs/api.md).
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace voxdag::server {
 
-// Returns a time such as "2026-11-21T07:00:00.123Z"; "" for the time 0.
+// Returns the text of a Unix time, such as "2026-11-21T07:00:00.123Z"; "" for the time 0.
 std::string time_text(double unix_s);
 
-// `live` may be null. `position` is the position in the queue, counted from 1; 0 if the job is not
-// queued.
+// Returns the job as JSON. `live` is null unless the job's process is running. `position` is the
+// position in the queue, counted from 1; 0 if the job is not queued.
 std::string job_json(const Job& job, const LiveJob* live, uint64_t position, unsigned max_attempts);
 
 }  // namespace voxdag::server

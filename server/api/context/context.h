@@ -30,7 +30,7 @@ struct Context {
   DiskSpace& disk;
   Dispatcher& dispatcher;
   Metrics& metrics;
-  const std::atomic<bool>& draining;
+  const std::atomic<bool>& draining;  // true once the service has begun to stop
 
   ConcurrencyLimiter event_streams{config.transfers.max_event_streams,
                                    config.transfers.max_event_streams_per_client};
@@ -42,9 +42,10 @@ struct Context {
   PartialViews partial{files, 16};
   // Canceled when the service stops.
   CancelToken stopping = {};
-  // Held while a job that uses scenes is added or retried, and while a scene is replaced or removed
-  // after a check that it is unused. So neither operation can run between the other's check and the
-  // other's change.
+  // Held while a job is added or retried, from the check that its scenes exist to the change of the
+  // queue. Also held while a scene is replaced or removed, from the check that no job uses it to
+  // the change of the store. So neither change can happen between the check and the change of the
+  // other operation.
   std::mutex scene_mutex = {};
   // Scenes that dry runs are reading, guarded by scene_mutex. These scenes must not be removed.
   // They may be replaced, because a reader keeps the old file open.

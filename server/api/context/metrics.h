@@ -22,16 +22,18 @@ struct Sample {
 
 class Metrics {
  public:
+  // Counts an answered request; `wall_s` is the time until its answer.
   void count_request(int status, double wall_s);
   void count_uploaded(uint64_t bytes) { uploaded_bytes_ += bytes; }
   void count_downloaded(uint64_t bytes) { downloaded_bytes_ += bytes; }
   // Counts the end of a job's run by the job's new state.
   void count_run(const Job& job);
 
-  // `jobs`: number of jobs by state.
+  // Returns all metrics as text: the counters, the number of jobs by state (`jobs`), and `samples`.
   std::string text(const std::map<JobState, uint64_t>& jobs, std::vector<Sample> samples) const;
 
  private:
+  // Upper bounds of the buckets of the request duration histogram; the last bucket has no bound.
   static constexpr std::array<double, 8> kBoundsS = {0.001, 0.005, 0.01, 0.05, 0.1, 0.5, 1, 10};
 
   mutable std::mutex mutex_;  // guards all members except the atomics

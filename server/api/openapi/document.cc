@@ -13,7 +13,7 @@
 namespace voxdag::server {
 namespace {
 
-// Returns the parameters for the {...} segments of patterns.
+// Returns the path parameters of all routes: one for each name of a {...} segment.
 std::vector<Parameter> path_parameters() {
   return {
       {"id", "id of the job, 16 hex digits", "^[0-9a-f]{16}$"},
@@ -83,7 +83,7 @@ Json describe(const Parameter& parameter, const char* place) {
   return json;
 }
 
-// Returns the names of the {...} segments.
+// Returns the names of the {...} segments of the route's pattern.
 std::vector<std::string> path_names(const Route& route) {
   std::vector<std::string> names;
   for (const std::string& segment : parse_target(route.pattern).segments)
@@ -132,7 +132,8 @@ bool has_only_id_parameter(const Route& route) {
          std::none_of(route.answers.begin(), route.answers.end(), streams);
 }
 
-// Returns the routes of one job, as links from the answer to the request that created the job.
+// Returns OpenAPI links for an answer that contains a new job. The links lead to the routes whose
+// only path parameter is the id of a job.
 Json job_links(const std::vector<Route>& routes) {
   Json links = Json::object();
   for (const Route& route : routes)

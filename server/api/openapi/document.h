@@ -7,7 +7,8 @@
 
 namespace voxdag::server {
 
-// Throws std::logic_error if a route uses an unknown schema, status or path parameter.
+// Returns the document as JSON. Throws std::logic_error if a route uses an unknown schema, status
+// or path parameter.
 std::string openapi_document(const Router& router);
 
 }  // namespace voxdag::server

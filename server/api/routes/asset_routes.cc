@@ -28,7 +28,7 @@ Response get_asset(Call& call, const Asset& asset) {
   return response;
 }
 
-// The document, which the first request creates: by then all routes are known.
+// The OpenAPI document. The first request creates it, because all routes are known only then.
 struct Document {
   std::once_flag is_created;
   Asset asset;

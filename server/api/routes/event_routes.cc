@@ -73,8 +73,8 @@ std::optional<std::string> EventFeed::next() {
 }
 
 void EventFeed::wait() {
-  // Wakes up as soon as progress may be sent that was held back because it came too soon after the
-  // last event.
+  // Progress events have a minimum interval. If progress may have been held back, this wait ends as
+  // soon as the interval has passed.
   const double left_s = last_progress_s_ + kProgressIntervalS - wall_seconds();
   context_.queue.wait_for_change(seen_version_, left_s > 0 ? left_s : kMaxWaitS);
 }
@@ -85,7 +85,8 @@ void EventFeed::add_changes(std::string& text) {
     ended_ = true;
     return;
   }
-  // A new stream begins with the job itself, so its past state changes are not needed.
+  // A new stream begins with the event "job", which has the current state. So the client does not
+  // need the state changes before it; only a resumed stream sends them.
   const bool resumed = last_number_ >= 0;
   for (const JobEvent& event : context_.queue.events_after(id_, last_number_)) {
     if (resumed) text += event_text("state", state_data(event), event.number);

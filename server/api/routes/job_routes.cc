@@ -84,7 +84,8 @@ class TemporaryTask {
   FileSystem& files_;
 };
 
-// The task of a dry run. The task's scenes cannot be removed during the lifetime of this object.
+// The task of a dry run. Requests cannot remove the task's scenes during the lifetime of this
+// object.
 class Plan {
  public:
   Plan(Context& context, const JobRequest& request)
@@ -114,7 +115,7 @@ Problem problem_of(const Failure& failure) {
 
 // Returns the estimate of a job without queuing it: runs the plan in a child process. Throws
 // Problem: the error of the scene or the request; 503 if too many plans are running, the service is
-// stopping, or the plan takes too long.
+// stopping, or the plan takes longer than plan_timeout_s.
 Response dry_run(Context& context, Call& call, const JobRequest& request) {
   const auto permit = context.plans.acquire(call.caller.client);
   if (!permit) throw busy("too many concurrent plans: " + context.plans.limits(), 5);
@@ -228,13 +229,15 @@ Response delete_job(Context& context, Call& call) {
   const std::string result = context.dispatcher.folder(call.names[0]).result();
   context.open_sources.close(result);
   context.dispatcher.remove(call.names[0]);
-  // A request for a tile may have opened the file again between the first close() and the removal.
+  // Closes the file again, because a request for a tile may have opened it between the first
+  // close() and the removal.
   context.open_sources.close(result);
   context.partial.close(call.names[0]);
   return no_content();
 }
 
-// Refuses to retry a job whose scenes were deleted, as for a new job.
+// Queues a failed or canceled job again. Refuses a job whose scenes were deleted, as post_job()
+// does.
 Response retry_job(Context& context, Call& call) {
   expect_no_body(call.request);
   std::lock_guard lock(context.scene_mutex);
@@ -242,7 +245,8 @@ Response retry_job(Context& context, Call& call) {
   if (job.state == JobState::kFailed || job.state == JobState::kCanceled)
     context.tasks.make(parse_job_request(job.request), JobTask::Kind::kBuild);
   const Job queued = context.dispatcher.retry(job.id);
-  // Forgets the partial view, because the retried job may build a different scene.
+  // Forgets the partial view, because the job's scene may have been replaced since the last
+  // attempt.
   if (has_ended(job.state)) context.partial.close(job.id);
   return json_response(202, to_json(context, queued));
 }
@@ -255,8 +259,8 @@ Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
   };
 }
 
-// Wraps a handler of requests that free disk space. The wrapped handler works even if the disk has
-// no space to record such a request.
+// Wraps a handler of requests that free disk space. If the queue cannot record the change because
+// the disk is full, the wrapped handler frees the ballast and tries again.
 Router::Handler freeing_space(Router::Handler handler) {
   return [handler = std::move(handler)](Context& context, Call& call) {
     return context.disk.with_ballast([&] { return handler(context, call); });

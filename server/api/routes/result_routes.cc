@@ -27,8 +27,8 @@ Job finished_job(Context& context, Call& call) {
   return job;
 }
 
-// Returns the name of the job or of its first scene, reduced to characters that are safe in headers
-// and shells.
+// Returns the file name of a download, NAME-RESOLUTION.vdag. NAME is the job's name, or its first
+// scene's if the job has none, reduced to characters that are safe in headers and shells.
 std::string file_name(const Job& job) {
   const auto request = nlohmann::json::parse(job.request);
   std::string base = job.name;
@@ -53,7 +53,7 @@ RangeAnswer requested_ranges(const Request& request, const std::string& tag, uin
   // If-Range may also contain a date or another entity tag. In both cases the answer is the
   // complete file.
   if (condition != request.headers.end() && trimmed(condition->second) != tag) return {};
-  // Only GET has ranges (RFC 9110, 14.2).
+  // Only GET requests can have ranges (RFC 9110, 14.2).
   return request.method == "GET" ? parse_ranges(request.header("Range"), size) : RangeAnswer{};
 }
 

@@ -46,7 +46,8 @@ std::string checked_name(const Call& call) {
   return call.names[0];
 }
 
-// Returns SCENE, with the headers that a client needs to resume an upload.
+// Returns the scene as JSON (SCENE in docs/api.md), with the headers that a client needs to resume
+// an upload.
 Response scene_response(Context& context, int status, const std::string& name) {
   const auto scene = context.scenes.find(name);
   if (!scene) throw not_found("no such scene: expected the name of an uploaded scene");
@@ -64,16 +65,17 @@ void check_unused(Context& context, const std::string& name) {
     throw conflict("the scene is in use by a job that has not ended");
 }
 
-// The part of a scene that a request contains.
+// The part of a scene in the body of a request: the bytes from `first` to `end`, exclusive.
 struct Part {
   uint64_t first = 0;
   std::optional<uint64_t> end;    // nullopt for a chunked body
   std::optional<uint64_t> total;  // size of the scene, if known
+  // True if a part that ends at `offset` completes the scene.
   bool is_last(uint64_t offset) const { return !total || offset == *total; }
 };
 
-// Returns N of "bytes */N", which finishes an upload that has all its bytes; nullopt for other
-// headers.
+// Returns TOTAL of the Content-Range "bytes */TOTAL", which finishes an upload that has all its
+// bytes; nullopt for a different form of the header.
 std::optional<uint64_t> total_of_empty_part(std::string_view header) {
   constexpr std::string_view kBegin = "bytes */";
   if (!header.starts_with(kBegin)) return {};
@@ -108,7 +110,7 @@ Part part_of(const Request& request) {
 }
 
 // Returns the number of bytes that the client has announced but not sent yet; 0 if the client has
-// not announced a total.
+// not announced a total. Throws Problem (413) if the total exceeds the limit for scenes.
 uint64_t announced_bytes(Context& context, const Part& part) {
   const uint64_t max_bytes = context.config.transfers.max_scene_bytes;
   const uint64_t size = part.total.value_or(0);
@@ -118,6 +120,8 @@ uint64_t announced_bytes(Context& context, const Part& part) {
   return size - std::min(size, part.first);
 }
 
+// Writes the request's body to `upload`. Stops at a body that is longer than the part; then returns
+// kStopped. Throws Problem (400) for a body that is shorter than the part.
 BodyEnd receive(Context& context, Call& call, const Part& part, DiskSpace::Reservation& space,
                 SceneUpload& upload) {
   const uint64_t end_offset = part.end.value_or(context.config.transfers.max_scene_bytes);
@@ -141,8 +145,8 @@ std::string digest_of(const Request& request, const char* name) {
   return found == request.headers.end() ? "" : parse_digest_field(found->second);
 }
 
-// Throws Problem while the service is stopping. The service then accepts no new parts and does not
-// finish reading a scene.
+// Throws Problem (503) while the service is stopping. A stopping service accepts no new parts. It
+// also stops to compute the digest of a received scene; the client can finish that upload later.
 void check_running(const Context& context) {
   if (context.draining) throw busy("the service is stopping; resume at Upload-Offset");
 }
@@ -158,8 +162,8 @@ Response put_scene(Context& context, Call& call) {
   const std::string part_digest = digest_of(call.request, "Content-Digest");
   const std::string whole_digest = digest_of(call.request, "Repr-Digest");
   SceneUpload upload(context.scenes, name, part.first, part.total);
-  // The space is reserved only after `upload` exists: an upload that starts over has then freed the
-  // space of its old bytes.
+  // Declared after `upload`: if the upload starts over, the constructor of `upload` frees the space
+  // of its old bytes before this line reserves space.
   DiskSpace::Reservation space(context.disk, announced);
   switch (receive(context, call, part, space, upload)) {
     case BodyEnd::kComplete:

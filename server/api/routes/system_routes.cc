@@ -14,10 +14,11 @@
 namespace voxdag::server {
 namespace {
 
-// True if the data folder is writable. Tested at most once per second. Thread-safe.
+// Tests whether the data folder is writable, at most once per second. Thread-safe.
 class WriteProbe {
  public:
-  // Creates and removes a file.
+  // Creates and removes a file in the data folder, unless this succeeded within the last second.
+  // Throws Error if it fails.
   void check(Context& context) {
     const std::lock_guard lock(mutex_);
     if (wall_seconds() < valid_until_s_) return;
@@ -32,17 +33,30 @@ class WriteProbe {
   double valid_until_s_ = 0;
 };
 
+// Calls `check`. Throws Problem (503) with the text `failure` if `check` throws Error.
+template <class Check>
+void expect_ready(const char* failure, const Check& check) {
+  try {
+    check();
+  } catch (const Error&) {
+    throw busy(failure, 60);
+  }
+}
+
 Response get_ready(Context& context, WriteProbe& probe) {
   if (context.draining) throw busy("the service is stopping");
-  try {
+  expect_ready("the free space of the data folder's disk cannot be determined", [&] {
     if (context.disk.is_low()) throw busy("the disk has less free space than min_free_disk", 60);
-    context.queue.check_file();
-    context.scenes.check_file();
-    context.queue.counts();
-    probe.check(context);
-  } catch (const Error&) {
-    throw busy("the data folder is not writable", 60);
-  }
+  });
+  expect_ready("queue.db in the data folder was removed or replaced while the service used it",
+               [&] { context.queue.check_file(); });
+  expect_ready(
+      "scenes/scenes.db in the data folder was removed or replaced while the service used it",
+      [&] { context.scenes.check_file(); });
+  expect_ready("the queue's database, queue.db in the data folder, cannot be read",
+               [&] { context.queue.counts(); });
+  expect_ready("the data folder is not writable: a new file could not be created in it",
+               [&] { probe.check(context); });
   return json_response(200, "{\"status\":\"ready\"}");
 }
 

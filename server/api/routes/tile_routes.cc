@@ -21,9 +21,10 @@ constexpr const char* kImmutable = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
 // Limits for the address of a node above the bricks (docs/format.md).
 constexpr uint64_t kMaxLevel = 17, kMaxOffset = (uint64_t{1} << 40) - 1;
-// Answers of at least this size hold their permit until they are sent. Permits bound the work for
-// tiles and the memory of large answers; the number of connections bounds the memory of small ones.
-// So a client with a slow link does not delay other clients with the same token.
+// An answer of at least this many bytes holds its permit until it is sent, so that the number of
+// permits bounds the memory of large answers. A smaller answer releases its permit before it is
+// sent, so that a client with a slow link does not delay other clients with the same token. The
+// number of connections bounds the memory of small answers.
 constexpr size_t kLargeAnswer = 512 << 10;
 // Limits for the level of a color page, and for its position.
 constexpr uint64_t kMaxColorLevel = 20, kMaxPage = (uint64_t{1} << 17) - 1;
@@ -55,7 +56,8 @@ std::vector<uint32_t> make_tile(const TileSource& dag, const query::TileAddress&
     throw;
   } catch (const Error& error) {
     if (!error.is_corruption()) throw;
-    // The file is intact. So the error means that no node is at this offset.
+    // Damage of the file is reported as DamagedBlock. So this error means that no node is at the
+    // offset.
     throw not_found(error.message());
   }
 }
@@ -79,7 +81,7 @@ query::TileAddress parse_address(const std::string& text, int status) {
   return {static_cast<uint32_t>((*numbers)[0]), (*numbers)[1]};
 }
 
-// Parses LEVEL.X.Y.Z of a color page.
+// Parses the address LEVEL.X.Y.Z of a color page.
 query::ColorPageAddress parse_page(const std::string& text) {
   const auto numbers = parse_numbers<uint64_t, 4>(text, '.');
   if (!numbers || (*numbers)[0] > kMaxColorLevel ||
@@ -89,7 +91,8 @@ query::ColorPageAddress parse_page(const std::string& text) {
   return {static_cast<uint32_t>(level), {x, y, z}};
 }
 
-// Parses the addresses in the list of the query parameter `name`.
+// Parses the comma-separated addresses in `list`, the value of the query parameter `name`. Throws
+// Problem (400) if there are more than `most`.
 template <class Parse>
 auto parse_batch(const std::string& name, std::string_view list, size_t most, const Parse& parse) {
   std::vector<decltype(parse(std::string()))> addresses;
@@ -114,7 +117,7 @@ void check_digest(const Call& call, const TileSource& dag) {
 }
 
 // Returns a response that clients may cache. `make` returns its bytes, which depend only on the
-// digest and `name`. The entity tag is a hash of both.
+// digest and `name`. The entity tag is a hash of the digest and `name`.
 template <class Make>
 Response immutable_response(const Call& call, const TileSource& dag, const std::string& name,
                             const Make& make) {
@@ -135,7 +138,8 @@ Response immutable_response(const Call& call, const TileSource& dag, const std::
 }
 
 // Returns the problem that is sent to clients. The problem's text omits the error's message,
-// because this message contains the name of the file.
+// because the message contains the name of the file. The service logs the message of the first
+// damage.
 Problem damaged(const TileSource& dag, const Error& error) {
   Problem result = problem(ErrorCode::kCorrupt,
                            "the requested part of the DAG or of its colors is damaged: "
@@ -190,8 +194,8 @@ Response get_tile(const Call& call, const TileSource& dag) {
 }
 
 // Calls `make` for each address and returns the resulting words, each result preceded by its length
-// in bytes. Disks may be slow, so the function throws as soon as the client has disconnected. This
-// also covers a stopping service, because it closes all connections.
+// in bytes. Disks may be slow, so the function throws as soon as the client has disconnected. A
+// stopping service closes all connections, so it also ends this function.
 template <class Addresses, class Make>
 std::string batch_of(const Call& call, const Addresses& addresses, const Make& make) {
   std::string bytes;

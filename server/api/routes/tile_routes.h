@@ -10,24 +10,26 @@
 
 namespace voxdag::server {
 
-// The DAG requested by a call, and a permit for it. The permit is null if none is needed.
+// The DAG that a call requests, and a permit for the work. The permit is null if none is needed.
 struct TileAccess {
   std::shared_ptr<const TileSource> dag;
   std::shared_ptr<void> permit;
 };
-// Throws Problem for an unknown job or file, or if no permit is free.
+// Opens the DAG that a call requests. Throws Problem for an unknown job or file, or if no permit is
+// free.
 using OpenTiles = std::function<TileAccess(const Call&)>;
 
-// kGzip compresses tiles for clients that accept it. This halves their bytes, at about 80 MB/s per
-// core: faster on a network, slower on the loopback.
+// kGzip compresses tiles for clients that accept gzip. Compression halves the bytes of tiles and
+// runs at about 80 MB/s per core. So clients on a network get tiles faster, and clients on the
+// loopback get them more slowly.
 enum class Packing { kNone, kGzip };
 
 enum class Colors { kNone, kServed };
 
 struct TileRoutes {
-  std::string base;     // "/api/v1/jobs/{id}"
-  std::string id;       // part of the operations' ids
-  std::string subject;  // start of the operations' summaries
+  std::string base;     // start of the paths, such as "/api/v1/jobs/{id}"
+  std::string id;       // part of the OpenAPI operation ids
+  std::string subject;  // start of the OpenAPI operation summaries
   std::string manifest_schema;
   Packing packing = Packing::kGzip;
   Colors colors = Colors::kServed;

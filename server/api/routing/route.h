@@ -35,7 +35,7 @@ struct Content {
 struct Answer {
   int status;
   std::string description;
-  std::vector<Content> contents = {};  // none: no body
+  std::vector<Content> contents = {};  // empty: no body
   std::vector<Parameter> headers = {};
 };
 

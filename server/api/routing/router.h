@@ -25,12 +25,13 @@ class Router {
 
   void add(Route route, Handler handler);
   void add(Route route, PlainHandler handler);
-  // Calls the handler of the request's route. Throws Problem: 404, 405 with Allow, and the problems
-  // of `access` and the handler.
+  // Calls the handler of the request's route. Throws Problem: 404 for an unknown path, 405 with
+  // Allow for a wrong method, 400 for an unknown query parameter, and the problems of `access` and
+  // the handler.
   Response route(Request& request, AccessControl& access) const;
 
   std::vector<Route> routes() const;
-  // Returns false if the request's route does not list this status.
+  // Returns false if the request's route is in the OpenAPI document but does not list this status.
   bool is_documented(const Request& request, int status) const;
 
  private:
@@ -44,10 +45,10 @@ class Router {
 };
 
 Response json_response(int status, std::string body);
-// 204
+// Returns a response with the status 204.
 Response no_content();
 // Reads the body of a request. Throws Problem: 413 if it is larger than `max_bytes`, 415 if its
-// content type is not JSON, 400 or 408 if it ends early.
+// content type is not JSON, 400 if the connection ends within it, 408 if it is sent too slowly.
 std::string read_json_body(Request& request, uint64_t max_bytes);
 // Throws Problem (400) if there is a body.
 void expect_no_body(const Request& request);
