@@ -1,6 +1,7 @@
-// A mesh in memory as a scene file: a file system with one additional path, a PLY file with the
-// mesh. Calls for all other paths are forwarded. The build reads the mesh in windows like every
-// scene file, and its contents are generated on the fly.
+// Presents a mesh in memory as a scene file. MeshFiles is a file system with one additional path,
+// under which it provides the mesh as a PLY file. It forwards calls for all other paths. The build
+// reads the PLY file in windows, like every scene file. Each read generates the requested bytes
+// from the mesh.
 #pragma once
 
 #include <memory>

@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// Converts a texture coordinate, with 1 for the edge of the image, to the units of
+// Converts a texture coordinate, in units of the image's width or height, to the units of
 // SurfaceCorner::texture. Rounds to nearest, and clamps to a magnitude of 2^40. Returns 0 for NaN.
 inline int64_t texture_lattice(double coordinate) {
   constexpr double kOne = int64_t{1} << kTextureBits;

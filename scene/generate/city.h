@@ -1,6 +1,6 @@
 // The pieces of a generated city, in meters, y up. The sizes and places of windows are small
-// multiples of 1/64, which floats represent exactly. So a window has exactly the same corners as
-// triangles and as an instance.
+// multiples of 1/64, which floats represent exactly. So a window has exactly the same corners
+// whether it is stored as triangles or as an instance.
 #pragma once
 
 #include <cstdint>

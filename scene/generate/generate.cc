@@ -26,7 +26,7 @@ constexpr SceneKindInfo kKinds[] = {
 
 constexpr const char* kGenerator = "voxdag generate ";
 constexpr uint32_t kMaxMengerLevel = 5;
-// Bytes per triangle of terrain, which is the most compact kind.
+// Bytes per triangle in a file of kind terrain, the most compact kind.
 constexpr uint64_t kMinBytesPerTriangle = 12;
 
 // Refuses, without counting, sizes that are obviously too large. GlbLayout refuses all other sizes

@@ -126,7 +126,8 @@ class HeaderParser {
 
   Type type_of(std::string_view name) const {
     if (const auto type = type_named(name)) return *type;
-    refuse("names the type " + printable(name) + ", expected one of PLY's eight");
+    refuse("names the type " + printable(name) +
+           ", expected char, uchar, short, ushort, int, uint, float or double");
   }
 
   [[noreturn]] void refuse(const std::string& what) const {

@@ -27,8 +27,9 @@ class PlyFile {
  public:
   static constexpr uint64_t kBlockRows = 1024;
 
-  // Throws Error{kInvalidInput} with the line, element or row of the damage, Error{kLimit} for 2^32
-  // or more vertices, Error{kOutOfMemory}.
+  // Throws Error{kInvalidInput} with the line, element or row of the damage, Error{kLimit} for more
+  // than 2^32 - 2 vertices, Error{kOutOfMemory} if the list of recorded rows does not fit the
+  // budget.
   PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
   // A block of kBlockRows faces: the offset of its first face in the file, and the number of its

@@ -1,8 +1,9 @@
 // The colors of the vertices of a PLY file, within a fixed amount of memory. Blocks of consecutive
 // vertices are cached; block b can only be in slot b modulo the number of slots. Not thread-safe.
 //
-// Red, green and blue are sRGB and become linear light; alpha is linear. Reals are from 0 to 1,
-// ushort numbers from 0 to 65535 and all other integers from 0 to 255. Values outside are clamped.
+// Red, green and blue are sRGB and become linear light; alpha is linear. Floats and doubles are
+// from 0 to 1, ushort numbers from 0 to 65535 and all other integers from 0 to 255. Values outside
+// these ranges are clamped.
 #pragma once
 
 #include <array>
@@ -18,7 +19,8 @@ class VertexColors {
  public:
   using Color = std::array<uint16_t, 4>;
 
-  // The caches of all readers together take at most 1/kShareOfFree of the free budget.
+  // The caches of all readers of a scene together take at most 1/kShareOfFree of the free bytes of
+  // the memory budget.
   static constexpr uint64_t kShareOfFree = 8;
 
   // The file must have colors. The file and the budget must outlive this object.

@@ -49,7 +49,8 @@ class TextureReader {
   TextureReader(const TextureLayout& layout, const uint64_t* pages)
       : layout_(layout), all_(pages) {}
   // Makes a reader of pyramids in a file. Caches pages in about `memory_bytes`, at least two.
-  // `checksums` has one value per page. The references must outlive the reader.
+  // `checksums` has one value per page. `layout`, `file`, `checksums` and `budget` must outlive the
+  // reader.
   TextureReader(const TextureLayout& layout, const ReadableFile& file, const uint32_t* checksums,
                 uint64_t memory_bytes, MemoryBudget& budget);
 

@@ -21,7 +21,8 @@ namespace voxdag {
 
 class VertexCache {
  public:
-  // The caches of all readers of a scene together take at most 1/kShareOfFree of the free budget.
+  // The caches of all readers of a scene together take at most 1/kShareOfFree of the free bytes of
+  // the memory budget.
   static constexpr uint64_t kShareOfFree = 4;
 
   // Makes one of `caches` caches that divide this share equally. It has space for `vertices`

@@ -16,13 +16,13 @@ struct BrokenData {
   std::string message;
 };
 
-// Decodes into `out`, which has view.decoded_bytes(). Throws BrokenData.
+// Decodes `compressed` into `out`, whose size is view.decoded_bytes(). Throws BrokenData.
 void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compressed,
                     std::span<std::byte> out);
 
 // Passes the decoded bytes of a part to `write`, from first to last. Charges the decoder's memory
-// to `charge` before it is allocated, and keeps the charge. Overwrites `compressed`. Throws
-// BrokenData, or Error{kOutOfMemory} for a part that does not fit the budget.
+// to `charge` before it is allocated, and does not reduce the charge afterwards. Overwrites
+// `compressed`. Throws BrokenData, or Error{kOutOfMemory} for a part that does not fit the budget.
 void decode_draco(const DracoPart& part, std::span<std::byte> compressed, MemoryCharge& charge,
                   const std::function<void(std::span<const std::byte>)>& write);
 

@@ -27,7 +27,7 @@ class DecodedBuffers {
   using ReadFile = std::function<void(int buffer, uint64_t offset, std::span<std::byte> out)>;
 
   // `scratch_path`: the temporary file, in an existing folder; "": a file in a new folder in
-  // temporary_parent(). The references must outlive this object.
+  // temporary_parent(). `files`, `document` and `budget` must outlive this object.
   DecodedBuffers(FileSystem& files, std::string scratch_path, const Document& document,
                  MemoryBudget& budget);
 

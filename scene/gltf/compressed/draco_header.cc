@@ -44,8 +44,8 @@ class Bytes {
   size_t at_;
 };
 
-// Skips the metadata blocks of the attributes, and the mesh's block. A block can have named blocks
-// inside; `open` of them remain to be read.
+// Skips the metadata blocks of the attributes, and the mesh's block. A block can contain named
+// blocks; `open` is the number of blocks that remain to be skipped.
 void skip_metadata(Bytes& bytes) {
   const auto skip_block = [&]() -> uint64_t {
     for (uint32_t entries = bytes.varint(); entries > 0; --entries) {

@@ -15,7 +15,8 @@ struct DracoHeader {
   // Number of attributes with a separate connectivity table, because fewer corners share a value
   // than share a position. Edgebreaker only.
   uint64_t attribute_tables = 0;
-  // First byte of the data without metadata. read_draco_header() moves the header there.
+  // Offset at which the header begins. If there are metadata, read_draco_header() overwrites their
+  // end with a copy of the header.
   size_t begin = 0;
 };
 

@@ -91,8 +91,9 @@ class Walker {
     ((bits == kBits + 1 ? static_cast<void>(open_symbols<kBits + 1>()) : void()), ...);
   }
 
-  // Skips symbols that give the size of each entry's numbers, and the bits of these numbers. At the
-  // end of the buffer Draco stops without an error.
+  // Skips entries that store the size of their numbers: one coded symbol per entry gives the bits
+  // of each of its numbers, and the bits of all numbers follow. Draco accepts data that end before
+  // the last bit, so this function accepts them as well.
   void skip_tagged(uint64_t entries, uint64_t components) {
     auto tags = open_symbols<kTagBits>();
     uint64_t bits = 0;

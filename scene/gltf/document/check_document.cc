@@ -25,8 +25,9 @@ void check_index(const Document& d, size_t size, int index, const std::string& w
                        " does not exist, there are " + std::to_string(size));
 }
 
-// Follows the parents of every node; a node that occurs twice in one chain is in a cycle. A chain
-// stops at a node of an earlier chain, so each node is visited once.
+// Refuses a node that is its own ancestor. Follows the chain of parents of every node; a node that
+// occurs twice in one chain is in a cycle. A chain stops at a node of an earlier chain, so each
+// node is visited once.
 void check_for_cycles(const Document& d) {
   std::vector<int> chain_of(d.nodes.size(), -1);
   for (int start = 0; start < static_cast<int>(d.nodes.size()); ++start) {
@@ -40,7 +41,7 @@ void check_for_cycles(const Document& d) {
   }
 }
 
-// Sets the parents. Every node has at most one parent, and none is its own ancestor.
+// Sets the parent of every node. Refuses a node that has two parents or is its own ancestor.
 void link_parents(Document& d) {
   for (int i = 0; i < static_cast<int>(d.nodes.size()); ++i) {
     for (int child : d.nodes[static_cast<size_t>(i)].children) {

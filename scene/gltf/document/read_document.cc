@@ -46,7 +46,7 @@ void check_version(const std::string& path, const tinygltf::Asset& asset) {
     refuse(path, "needs glTF version " + printable(asset.minVersion) + ", voxdag reads 2.0");
 }
 
-// The BIN chunk is the first buffer, if this buffer has no uri.
+// Makes the BIN chunk the source of the first buffer, if this buffer has no uri.
 void place_bin_chunk(const Container& container, Document& d) {
   if (!container.has_bin || d.buffers.empty()) return;
   BufferSource& first = d.buffers[0];

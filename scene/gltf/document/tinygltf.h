@@ -1,5 +1,5 @@
 // tinygltf without its image decoders, in a namespace of voxdag. Draco's archive contains another
-// version of tinygltf, and programs that link voxdag may do so as well. Two versions in one
+// version of tinygltf, and a program that links voxdag may contain one as well. Two versions in one
 // namespace would crash.
 #pragma once
 

@@ -33,7 +33,8 @@ struct Chunk {
 // Reads the chunk header at `offset` of a GLB that ends at `end`.
 Chunk read_chunk(const ReadableFile& file, uint64_t offset, uint64_t end) {
   if (end - offset < kChunkHeaderBytes)
-    refuse(file.path(), "the GLB ends inside the header of a chunk");
+    refuse(file.path(),
+           "the GLB ends inside the header of a chunk at byte " + std::to_string(offset));
   const uint64_t length = read_u32(file, offset);
   const uint64_t begin = offset + kChunkHeaderBytes;
   if (length > end - begin)
@@ -51,7 +52,9 @@ Container read_glb(const ReadableFile& file) {
   if (end > file.size())
     refuse(file.path(), "is cut off: the GLB has " + std::to_string(end) + " bytes, the file " +
                             std::to_string(file.size()));
-  if (end < kHeaderBytes) refuse(file.path(), "claims a GLB length shorter than its header");
+  if (end < kHeaderBytes)
+    refuse(file.path(), "claims a GLB length of " + std::to_string(end) +
+                            " bytes, shorter than its header of " + std::to_string(kHeaderBytes));
   const Chunk json = read_chunk(file, kHeaderBytes, end);
   if (json.type != kJsonChunk) refuse(file.path(), "the first chunk of the GLB is not JSON");
   Container container{json.content, false, {}};

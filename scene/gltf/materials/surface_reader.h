@@ -15,12 +15,13 @@ namespace voxdag::gltf {
 
 class SurfaceReader {
  public:
-  // The caches of all readers of a scene together take at most 1/kShareOfFree of the free budget.
+  // The caches of all readers of a scene together take at most 1/kShareOfFree of the free bytes of
+  // the memory budget.
   static constexpr uint64_t kShareOfFree = 8;
 
   // Makes one of `readers` readers that divide this share equally. It has space for `vertices`
   // vertices, or for fewer if its part of the share is smaller. The document's materials must be
-  // resolved. The references must outlive the reader.
+  // resolved. `document` and `buffers` must outlive the reader.
   SurfaceReader(const Document& document, BufferReader& buffers, uint64_t vertices,
                 unsigned readers);
 

@@ -11,7 +11,8 @@
 namespace voxdag::gltf {
 namespace {
 
-// Maximum open files of all readers of a scene together; each reader may have at least one.
+// Maximum number of open files of all readers of a scene together. Each reader may open at least
+// one file, even if the sum is then larger.
 constexpr unsigned kMaxOpenFiles = 32;
 constexpr uint64_t kMapNodeBytes = 48;
 // Maximum number of base64 groups, which encode three bytes each, in a window. A window may begin

@@ -46,7 +46,7 @@ class BufferReader {
   static constexpr size_t kWindowBytes = size_t{256} << 10;
 
   // Makes one of `readers` readers of the document. Adds the files that it opens to
-  // `external_files`. The references must outlive the reader.
+  // `external_files`. All arguments passed by reference must outlive the reader.
   BufferReader(FileSystem& files, const ReadableFile& scene_file, const Document& document,
                ExternalFiles& external_files, DecodedBuffers& decoded, MemoryBudget& budget,
                unsigned readers);

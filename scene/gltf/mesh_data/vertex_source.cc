@@ -20,7 +20,7 @@ class GlobalTransforms {
       : document_(document), charge_(budget, what) {}
 
   const Transform& of(int node) {
-    std::vector<int> chain;  // nodes from the given one up to an ancestor whose product is known
+    std::vector<int> chain;  // the node and its ancestors without a known product
     for (int i = node; i >= 0 && !known_.contains(i); i = parent_of(i)) {
       charge_.add(kBytesPerNode);
       chain.push_back(i);
