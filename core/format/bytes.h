@@ -1,5 +1,5 @@
-// Reads and writes little-endian fields in byte buffers. Bytes are copied from and to memory
-// without conversion, so the host must be little-endian.
+// Writes and reads little-endian fields in byte buffers. The fields are copied without conversion,
+// so the host must be little-endian.
 #pragma once
 
 #include <bit>
@@ -32,7 +32,8 @@ class ByteSink {
   std::vector<std::byte>& out_;
 };
 
-// Takes fields from the front of a buffer. Missing bytes read as zeros and make ok() false.
+// Takes fields from the front of a buffer. If bytes are missing, the field is 0, and ok() is false
+// from then on.
 class ByteSource {
  public:
   explicit ByteSource(std::span<const std::byte> bytes) : bytes_(bytes) {}

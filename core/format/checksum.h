@@ -1,6 +1,10 @@
-// XXH64 detects damage and is simple enough for the header-only reader to have its own
-// implementation. XXH3 distinguishes large contents, SHA-256 identifies them. indexed_checksum() is
-// a checksum of words that can be computed in parts.
+// Checksums and digests:
+//
+//   - XXH64 detects damage in files. It is simple enough for the standalone reader
+//     (voxdag_reader.h) to have its own implementation.
+//   - XXH3 with 128 bits tells whether large contents are equal.
+//   - SHA-256 identifies contents, also against forgery.
+//   - indexed_checksum() can be computed in parts, in any order.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +20,11 @@
 
 namespace voxdag {
 
-// XXH64 with seed 0.
+// Returns the XXH64 of bytes, with seed 0.
 uint64_t checksum64(std::span<const std::byte> bytes);
 
-// XXH3 with 128 bits, several times as fast as SHA-256. Distinguishes contents, but does not
-// protect against forgery.
+// XXH3 with 128 bits, which is several times as fast as SHA-256. Different contents have different
+// checksums for all practical purposes, unless someone forges them.
 struct Checksum128 {
   uint64_t low = 0, high = 0;
   bool operator==(const Checksum128&) const = default;
@@ -45,9 +49,9 @@ class Checksum64 {
   std::unique_ptr<State> state_;
 };
 
-// A checksum of 32-bit words that can be computed in parts, in any order and by any number of
-// threads: the sum over all words, weighted by their indices, modulo 2^64. The checksum of all
-// words is the sum of the parts' checksums. `first` is the index of words[0].
+// Returns a checksum of 32-bit words that can be computed in parts, in any order and by any number
+// of threads. It is the sum of all words, weighted by their indices, modulo 2^64. So the checksum
+// of all words is the sum of the parts' checksums. `first` is the index of words[0].
 uint64_t indexed_checksum(uint64_t first, std::span<const uint32_t> words);
 
 // Computes SHA-256 over bytes that are added in parts.
@@ -65,12 +69,12 @@ class Sha256 {
 };
 // Returns the SHA-256 of a text as 64 lower-case hex digits.
 std::string sha256_hex(std::string_view text);
-// Returns the SHA-256 of a file, reading it once from beginning to end. Advances `progress` by its
-// bytes.
+// Returns the SHA-256 of a file, as 64 lower-case hex digits. Reads the file once from beginning to
+// end. Advances `progress` by the number of bytes read.
 std::string sha256_of_file(const ReadableFile& file, const CancelToken& cancel,
                            Progress* progress = nullptr);
-// Returns "sha-256=:BASE64:" for a SHA-256 in hex, the format of the header fields Content-Digest
-// and Repr-Digest (RFC 9530).
+// Returns "sha-256=:BASE64:" for a SHA-256 of 64 hex digits. This is the value of the HTTP header
+// fields Content-Digest and Repr-Digest (RFC 9530).
 std::string digest_field(const std::string& sha256);
 
 }  // namespace voxdag

@@ -1,17 +1,19 @@
-// The parts of an artifact: a sub-DAG on disk between the build and the merge, many of them in one
-// segment file. docs/format.md, "Segments and artifacts", documents the byte layout.
+// The parts of an artifact. An artifact is a sub-DAG on disk between the build and the merge; one
+// segment file contains many artifacts. docs/format.md, "Segments and artifacts", documents the
+// byte layout.
 //
 //   segment:   [header] [artifact] [artifact] ...
 //   artifact:  [frames of the bricks] [frames of level L-3] ... [frames of its top level] [index]
 //
-// A frame has kFrameRows consecutive rows of one level (the last frame of a level may have fewer)
-// as columns, compressed where that pays, with a checksum of its bytes as stored. The index lists
-// roots, levels and frames and has a separate checksum. An ArtifactRef points to the index, so that
-// a reader never scans a segment. An artifact of one subvolume has one root; a merge pass writes
-// artifacts with many.
+// A row is a node or a brick. A frame has kFrameRows consecutive rows of one level; the last frame
+// of a level may have fewer. Its columns are compressed where that saves enough. The index lists
+// the roots, levels and frames of the artifact, with the checksum of each frame's stored bytes. An
+// ArtifactRef has the position and the checksum of the index, so a reader never scans a segment.
+// The artifact of one subvolume has one root; a merge pass writes artifacts with many roots.
 //
-// Rows are checked before they are written and after they are read: total order, masks not 0,
-// children within the level below. Readers also verify checksums and counts.
+// Writers check rows before they write them, and readers check them again: rows are in the total
+// order, masks are not 0, and children are rows of the level below. Readers also verify checksums
+// and counts.
 #pragma once
 
 #include <cstddef>
@@ -24,8 +26,8 @@ namespace voxdag {
 
 inline constexpr uint32_t kFrameRows = 4096;
 
-// The position of an artifact. `checksum` covers its index, which contains the checksums of all
-// frames.
+// The position of an artifact in a segment, in bytes from the start of the file. `checksum` covers
+// the index, which contains the checksums of all frames.
 struct ArtifactRef {
   uint32_t segment = 0;       // id of the segment file
   uint64_t offset = 0;        // first byte of the artifact
@@ -35,14 +37,14 @@ struct ArtifactRef {
   bool operator==(const ArtifactRef&) const = default;
 };
 
-// Bytes of a segment.
+// A range of bytes in a segment.
 struct SegmentRange {
   uint32_t segment = 0;
   uint64_t offset = 0;
   uint64_t bytes = 0;
 };
 
-// The root of one subvolume: row `index` of level cube.level of the artifact.
+// The root of one subvolume's DAG: row `index` of the artifact's level cube.level.
 struct ArtifactRoot {
   Cube cube;
   uint32_t index = 0;
@@ -51,7 +53,7 @@ struct ArtifactRoot {
   uint64_t svo_nodes = 0;
 };
 
-// A frame in its level.
+// A frame: its position in its level and in the segment.
 struct FrameInfo {
   uint64_t first_row = 0;
   uint64_t first_child = 0;  // number of children of all earlier rows of the level
@@ -70,7 +72,7 @@ struct ArtifactLevel {
   std::vector<FrameInfo> frames;
 };
 
-// A decoded frame, and buffers that are reused by the next one.
+// A decoded frame, and buffers that are reused when the next frame is decoded.
 struct Frame {
   uint32_t rows = 0;
   std::vector<uint64_t> brick_masks;  // brick level only

@@ -18,7 +18,7 @@ constexpr uint64_t kChunkBytes = uint64_t{256} << 10;
   throw Error(ErrorCode::kCorrupt, where + ": " + what);
 }
 
-// Reads and checks the index of an artifact of one subvolume.
+// Reads and checks the index of an artifact, which must have exactly one subvolume.
 ArtifactIndex read_single_index(const ReadableFile& file, const ArtifactRef& ref) {
   if (ref.bytes > file.size() || ref.offset > file.size() - ref.bytes ||
       ref.index_offset < ref.offset || ref.index_offset - ref.offset > ref.bytes)

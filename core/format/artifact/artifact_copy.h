@@ -1,7 +1,7 @@
-// Copies artifacts between builds. A cache entry is a file of one artifact. An artifact of one
-// subvolume can be copied into a segment for another cube of the same size, since hashes and
-// indices depend neither on place nor on level. docs/format.md, "Cache entry", documents the byte
-// layout.
+// Copies artifacts between builds. A cache entry is a file with one artifact of one subvolume. The
+// artifact can be copied into a segment as the artifact of another cube of the same size, because
+// its hashes and indices do not depend on the cube's position or level. docs/format.md, "Cache
+// entry", documents the byte layout.
 #pragma once
 
 #include <memory>
@@ -17,22 +17,22 @@ namespace voxdag {
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
                           uint32_t grid_levels, SegmentWriter& to);
 
-// Writes the artifact at `ref` of `from` as a cache entry at `path`, atomically: writes to
-// `partial`, a name that only the caller uses, and renames it. The file is not synced. If a power
-// failure damages an entry, its checksums fail, and a lookup of the entry is a cache miss. Returns
-// the size of the file in bytes.
+// Writes the artifact at `ref` of `from` as a cache entry at `path`, atomically: writes the file
+// `partial`, a name that only the caller uses, and renames it to `path`. The file is not synced. If
+// a power failure damages an entry, its checksums fail, and a lookup of the entry is a cache miss.
+// Returns the size of the file in bytes.
 uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
                            const ReadableFile& from, const ArtifactRef& ref);
 
 struct CacheEntry {
   std::unique_ptr<ReadableFile> file;
   ArtifactRef ref;
-  ArtifactRoot root;       // as it was built
+  ArtifactRoot root;       // root, with the cube for which it was built
   uint64_t dag_nodes = 0;  // total of all levels
 };
 
-// Throws Error{kNotFound} if the file does not exist; Error{kCorrupt} or Error{kUnsupportedVersion}
-// if it is invalid.
+// Opens a cache entry and reads its artifact's index. Throws Error{kNotFound} if the file does not
+// exist; Error{kCorrupt} or Error{kUnsupportedVersion} if it is invalid.
 CacheEntry read_cache_entry(FileSystem& files, const std::string& path);
 
 }  // namespace voxdag

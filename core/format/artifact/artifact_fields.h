@@ -1,5 +1,5 @@
-// Descriptions (core/fields/field.h) of the structs that name a subvolume and its artifact, for the
-// job store, the checkpoint of the merge and the records of cluster tasks.
+// Functions fields() (core/fields/field.h) of the structs that name a subvolume and its artifact.
+// The job store, the checkpoint of the merge and the records of cluster tasks use them.
 #pragma once
 
 #include "core/dag/sub_dag.h"

@@ -55,7 +55,8 @@ void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std:
     corrupt(where, "a root's hash has bits beyond the hash bits");
 }
 
-// Reads the frames of one level. Advances `offset` from the level's first byte to past its last.
+// Reads the entries of one level's frames. `offset` is the segment offset of the level's first
+// byte, and is advanced to the end of its last frame.
 void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& level,
                 uint64_t& offset, const std::string& where) {
   const std::string here = where + ", level " + std::to_string(level.level);

@@ -1,5 +1,5 @@
-// The index at an artifact's end: its roots, its levels and their frames. docs/format.md, "Artifact
-// index", documents the byte layout.
+// The index at the end of an artifact: lists of its roots, its levels and their frames.
+// docs/format.md, "Artifact index", documents the byte layout.
 #pragma once
 
 #include <cstddef>
@@ -27,12 +27,15 @@ struct ArtifactIndex {
 
 std::vector<std::byte> encode_index(const ArtifactIndex& index);
 
-// Throws Error{kCorrupt} or Error{kUnsupportedVersion} beginning with `where` if any field violates
-// the rules of docs/format.md. So a decoded index needs no further check.
+// Decodes the index of the artifact at `ref`. Throws Error{kCorrupt} or Error{kUnsupportedVersion}
+// if any field violates the rules of docs/format.md, so a decoded index needs no further check. The
+// message begins with `where`.
 ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& ref,
                            const std::string& where);
 
 std::vector<std::byte> encode_segment_header(uint32_t id);
+// Throws Error{kCorrupt} or Error{kUnsupportedVersion} unless `bytes` are the header of segment
+// `id`. The message begins with `where`.
 void check_segment_header(std::span<const std::byte> bytes, uint32_t id, const std::string& where);
 
 }  // namespace voxdag

@@ -11,7 +11,7 @@
 namespace voxdag {
 namespace {
 
-// Reads the bytes of the index.
+// Reads the bytes of the index. Throws Error{kCorrupt} if the artifact is not within the file.
 std::vector<std::byte> read_index(const ReadableFile& file, const ArtifactRef& ref,
                                   const std::string& where) {
   const uint64_t size = file.size();

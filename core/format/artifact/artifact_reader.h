@@ -1,5 +1,6 @@
 // Reads one artifact. Immutable after construction: several threads may call read_frame(), each
-// with its own Frame. The index takes 56 bytes per frame, which are not charged to a budget.
+// with a different Frame. The index takes 56 bytes of memory per frame, which are not charged to a
+// budget.
 #pragma once
 
 #include <cstdint>
@@ -22,12 +23,12 @@ class ArtifactReader {
 
   const DagShape& shape() const { return shape_; }
   std::span<const ArtifactRoot> roots() const { return roots_; }
-  // Levels from the bricks upwards: level L-2 first.
+  // The levels of the artifact, from the bricks upwards: levels()[0] is level L-2.
   std::span<const ArtifactLevel> levels() const { return levels_; }
-  // Returns nullptr if the artifact has no such level.
+  // Returns the level with this number; nullptr if the artifact does not have it.
   const ArtifactLevel* level(uint32_t level) const;
-  // Decodes frame `index` of `level`, which must exist. Throws Error{kCorrupt} with segment, level
-  // and frame.
+  // Decodes frame `index` of `level`, which must exist, and checks its rows. Throws
+  // Error{kCorrupt}; the message names the segment, the level and the frame.
   void read_frame(uint32_t level, size_t index, Frame& out) const;
 
  private:

@@ -20,7 +20,7 @@ struct ArtifactWriter::State {
   bool level_open = false;
   uint64_t child_rows = 0;  // rows of the level below the open one
   LastRow last;
-  // Rows of the incomplete frame.
+  // Rows that do not yet fill a frame.
   std::vector<uint64_t> values;  // hashes of nodes, or masks of bricks
   std::vector<uint8_t> masks;
   std::vector<uint32_t> children;

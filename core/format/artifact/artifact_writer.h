@@ -1,6 +1,5 @@
-// Writes one artifact to a segment, level by level from the bricks upwards. Each call adds any
-// number of rows. Throws Error{kCorrupt} with segment and level if rows violate the rules of
-// artifact.h.
+// Writes one artifact to a segment, level by level from the bricks upwards. Throws Error{kCorrupt}
+// if rows violate the rules of artifact.h; the message names the segment and the level.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +14,14 @@ namespace voxdag {
 
 class ArtifactWriter : public SubDagSink {
  public:
-  // A segment has at most one ArtifactWriter at a time. A writer destroyed without finish() leaves
-  // unreferenced bytes in the segment.
+  // An ArtifactWriter must be finished or destroyed before the next one is created for the same
+  // segment. If a writer is destroyed without finish(), its bytes remain in the segment, but no
+  // ArtifactRef names them.
   ArtifactWriter(SegmentWriter& segment, const DagShape& shape);
   ~ArtifactWriter() override;
 
   void begin_level(uint32_t level);
+  // Append any number of rows to the level.
   void append_bricks(std::span<const uint64_t> masks);
   void append_nodes(const NodeLevelView& rows);
   void end_level();
@@ -29,7 +30,8 @@ class ArtifactWriter : public SubDagSink {
   void bricks(const BrickLevelView& level) override;
   void nodes(const NodeLevelView& level) override;
 
-  // Writes the index. The artifact can be read after the next flush of the segment.
+  // Writes the index and returns the position of the artifact. The artifact can be read after the
+  // next flush of the segment.
   ArtifactRef finish(std::span<const ArtifactRoot> roots);
 
  private:

@@ -12,15 +12,15 @@
 namespace voxdag {
 namespace {
 
-// Level 1 would make artifacts an eighth smaller and builds 5 % slower.
+// zstd's level. With level 1, artifacts would be an eighth smaller and builds 5 % slower.
 constexpr int kZstdLevel = -1;
 constexpr uint32_t kCompressedFlag = 0x80000000u;
-// Number of frames in which a column is not compressed after a frame in which the column shrank too
-// little.
+// When a column of a frame shrinks too little, the same column is not compressed in this many of
+// the following frames.
 constexpr uint32_t kFramesToSkip = 15;
 constexpr size_t kBrickColumn = 0, kMaskColumn = 1;
 
-// Returns byte `plane` of each value.
+// Writes byte `plane` of each value to `out`; byte 0 is the lowest.
 template <class T>
 void extract_plane(std::span<const T> values, unsigned plane, std::byte* out) {
   const unsigned shift = 8 * plane;
@@ -52,8 +52,9 @@ ZSTD_DCtx* decompression_context() {
   return context.get();
 }
 
-// Returns the `expected` bytes of a column, in `source` or decompressed into `buffer`. Empty if the
-// column has a different number of bytes.
+// Takes a column from `source` and returns its `expected` bytes: in place if they are stored
+// uncompressed, otherwise decompressed into `buffer`. Returns an empty span if the column does not
+// have `expected` bytes.
 std::span<const std::byte> take_column(ByteSource& source, size_t expected,
                                        std::vector<std::byte>& buffer) {
   const uint32_t head = source.get<uint32_t>();

@@ -5,11 +5,11 @@
 //   nodes:    plane count, hashes, column(masks), column(children, byte plane 0), ...
 //   column:   [stored size, high bit: zstd] [bytes]
 //
-// Hashes and the low byte plane of the children are random and are stored uncompressed. The other
-// columns are compressed if that saves enough. On real sub-DAGs, zstd level 1 reduces brick masks
-// to 50-60 %, child masks to 55-80 %, high child planes to almost nothing, and middle planes to
-// 60-90 %. Compression and decompression together take 10-25 ns per row. A column that shrinks by
-// less than a quarter is not compressed in the next frames.
+// Hashes and the lowest byte plane of the children are random, so they are stored uncompressed. The
+// other columns are compressed if that saves enough. On real sub-DAGs, zstd level 1 reduces brick
+// masks to 50-60 %, child masks to 55-80 %, the highest child planes to almost nothing, and the
+// middle planes to 60-90 %. Compression and decompression together take 10-25 ns per row. If a
+// column shrinks by less than a quarter, it is not compressed in the next 15 frames.
 #pragma once
 
 #include <array>
@@ -29,12 +29,12 @@ class FrameEncoder {
   FrameEncoder();
   ~FrameEncoder();
 
-  // Return the bytes of the frame, valid until the next call.
+  // Encode the rows of one frame. The returned bytes are valid until the next call.
   std::span<const std::byte> encode_bricks(std::span<const uint64_t> masks);
   std::span<const std::byte> encode_nodes(const NodeLevelView& rows);
 
  private:
-  // Columns that may be compressed: brick masks, child masks, child planes 1 to 3.
+  // Columns that may be compressed: the brick masks, the child masks, and the child planes 1 to 3.
   static constexpr size_t kColumns = 5;
   struct Context;
 
@@ -46,12 +46,12 @@ class FrameEncoder {
   std::vector<std::byte> out_;
 };
 
-// Decodes `bytes`, which may be in `out.stored`, and computes the hashes of the bricks, truncated
-// to `hash_bits`. Returns an error message, or nullptr if there is no error.
+// Decodes a frame of `rows` bricks, and computes their hashes, truncated to `hash_bits`. `bytes`
+// may be in `out.stored`. Returns an error message, or nullptr if there is no error.
 const char* decode_brick_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t hash_bits,
                                Frame& out);
-// Decodes `bytes`, which may be in `out.stored`. Returns an error message, or nullptr if there is
-// no error.
+// Decodes a frame of `rows` nodes with `children` children in total. `bytes` may be in
+// `out.stored`. Returns an error message, or nullptr if there is no error.
 const char* decode_node_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t children,
                               Frame& out);
 

@@ -11,8 +11,8 @@
 namespace voxdag {
 namespace {
 
-// Returns the number of children of all masks, counting eight masks per step. Sets `any_empty` if a
-// mask is 0.
+// Returns the number of children in all masks. Sets `any_empty` if a mask is 0. Processes eight
+// masks per step.
 uint64_t children_of(std::span<const uint8_t> masks, bool& any_empty) {
   constexpr uint64_t kOnes = 0x0101010101010101, kTops = 0x8080808080808080;
   uint64_t children = 0, empty = 0;
@@ -89,7 +89,7 @@ const char* check_node_order(const NodeLevelView& rows, uint64_t child_rows, uin
   if (rows.masks.size() != rows.hashes.size()) return "masks and hashes disagree in number";
   if (const char* wrong = check_counts(rows, child_rows, hash_bits)) return wrong;
   if (rows.masks.empty()) return nullptr;
-  // Usually the hashes alone are in order.
+  // Usually the hashes strictly increase, so masks and children need not be compared.
   const bool by_hash =
       (!last.present || last.hash < rows.hashes.front()) && strictly_increase(rows.hashes);
   if (!by_hash && !are_in_total_order(rows, last)) return "nodes are not in the total order";

@@ -1,4 +1,5 @@
-// Checks the invariants of consecutive rows of a level, before a write and after a read.
+// Checks the invariants of consecutive rows of a level, before a frame is written and after it is
+// read.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,7 @@
 
 namespace voxdag {
 
-// The row before the checked rows. `present` is false at the start of a level.
+// The row that precedes the checked rows. `present` is false at the start of a level.
 struct LastRow {
   bool present = false;
   uint64_t hash = 0;
@@ -16,13 +17,19 @@ struct LastRow {
   uint32_t children[8] = {};
 };
 
-// Checks bricks: masks not 0, strictly increasing by (hash, mask), where hashes[i] belongs to
-// masks[i]. Returns an error message, or nullptr if there is no error. Sets `last` to the last row.
+// Checks bricks: masks are not 0, and bricks strictly increase by (hash, mask). hashes[i] is the
+// truncated hash of masks[i]. Returns an error message, or nullptr if there is no error. Sets
+// `last` to the last row.
 const char* check_brick_order(std::span<const uint64_t> hashes, std::span<const uint64_t> masks,
                               LastRow& last);
-// Checks nodes: masks not 0, as many children as the masks have bits, each below `child_rows`,
-// hashes truncated to `hash_bits`, strictly increasing in the total order. Returns an error
-// message, or nullptr if there is no error. Sets `last` to the last row.
+// Checks nodes:
+//
+//   - masks are not 0, and there are as many children as the masks have bits;
+//   - child indices are below `child_rows`, the number of rows of the next level;
+//   - hashes are truncated to `hash_bits`;
+//   - nodes strictly increase in the total order.
+//
+// Returns an error message, or nullptr if there is no error. Sets `last` to the last row.
 const char* check_node_order(const NodeLevelView& rows, uint64_t child_rows, uint32_t hash_bits,
                              LastRow& last);
 

@@ -50,7 +50,7 @@ ArtifactRef SegmentWriter::append_index(uint64_t first, std::span<const std::byt
   ref.index_offset = size();
   ref.bytes = ref.index_offset + index.size() - first;
   ref.checksum = checksum64(index);
-  // No reference may point to an index that readers would refuse.
+  // Decodes the index once, so that no reference points to an index that readers would refuse.
   decode_index(index, ref, "artifact for segment " + std::to_string(id_));
   append(index);
   return ref;

@@ -1,6 +1,6 @@
-// Writes one segment file: a header, then the artifacts that are appended one after the other.
+// Writes one segment file: a header, then one artifact after another.
 //
-// One thread uses a writer, except for sync_written().
+// Only one thread may use a writer, except for sync_written().
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,11 @@
 
 namespace voxdag {
 
-// Memory that a SegmentWriter charges: a buffer of 1 MiB, the frame that an ArtifactWriter builds,
-// and zstd's tables.
+// Bytes of memory that a SegmentWriter charges: a buffer of 1 MiB, the frame that an ArtifactWriter
+// builds, and zstd's tables.
 inline constexpr uint64_t kSegmentWriterBytes = uint64_t{3} << 19;
 
-// "segment-<id>.vdseg" in `folder`.
+// Returns the path of the file: "segment-<id>.vdseg" in `folder`.
 std::string segment_path(const std::string& folder, uint32_t id);
 
 class FrameEncoder;
@@ -38,13 +38,14 @@ class SegmentWriter {
   void complete();
   // Flushes. Returns after all bytes so far and the file's directory entry are on the disk.
   void sync();
-  // Syncs the bytes flushed before the call. Another thread may call any function concurrently,
-  // except sync() and sync_written(). After one failure, every later call fails, because the system
-  // reports lost bytes only once.
+  // Syncs the bytes that were flushed before the call. Another thread may concurrently call any
+  // function except sync() and sync_written(). After one failure, every later call fails, because
+  // the system reports lost bytes only once.
   void sync_written();
-  // Returns the number of bytes that were flushed.
+  // Returns the number of bytes flushed to the file so far.
   uint64_t written() const { return written_; }
-  // Frees the disk space left by a flush that failed because the disk was full.
+  // Frees the disk space of the buffered bytes, which a failed flush may have written in part
+  // because the disk was full.
   void release_unwritten();
 
  private:
@@ -52,7 +53,8 @@ class SegmentWriter {
   friend ArtifactRef copy_artifact(const ReadableFile&, const ArtifactRef&, const Cube&, uint32_t,
                                    SegmentWriter&);
   void append(std::span<const std::byte> bytes);
-  // Ends the artifact whose first frame is at `first`.
+  // Appends the index of the artifact whose first frame is at offset `first`, and returns the
+  // artifact's position.
   ArtifactRef append_index(uint64_t first, std::span<const std::byte> index);
 
   FileSystem& files_;
