@@ -12,20 +12,26 @@
 namespace voxdag {
 namespace {
 
-// A region of a coarser tier, and its contribution to the cell of the next tier that contains it.
+// A region of a coarser tier, and its contribution to its parent. The parent is the cell of the
+// next coarser tier that contains the region.
 template <class Total>
 struct CoarseRegion {
   EncodedRegion region;
   Total total;
 };
 
-// Requirements of a rule: `Sum` adds the totals of the regions in a cell of a coarser tier; `Total`
-// is total_of() a region of tier 0, and the result of encode() for a region of a coarser tier.
+// The rule that computes the colors of coarser tiers. ValueRule is the rule of the other
+// attributes. A rule has these members:
+//
+//   - Total is the contribution of a region to its parent cell. total_of() computes it for a region
+//     of tier 0, and encode() for a region of a coarser tier.
+//   - Sum collects the Totals of the regions in a cell.
+//   - encode() encodes a region of a coarser tier from the Sums of its cells.
 class ColorRule {
  public:
   using Sum = WideSum;
   using Total = WideSum;
-  // Memory of encode(), including its arguments and its result.
+  // Bytes of memory that encode() needs per cell, including its arguments and its result.
   static constexpr uint64_t kBytesPerCell = 128 + sizeof(ColoredCell);
 
   explicit ColorRule(AttributeSectionWriter::EncodeColors encode) : encode_(std::move(encode)) {}
@@ -126,7 +132,7 @@ class AttributeSectionWriter::TiersOf : public Tiers {
     uint32_t code = 0;  // Morton code within the region
     typename Rule::Sum sum;
   };
-  // The open region of a tier; tier 0 has none.
+  // The region of a coarser tier whose cells are being collected. Tier 0 has none.
   struct Open {
     explicit Open(MemoryBudget& budget) : cells(budget, "cells of coarse levels") {}
     GrowingBuffer<Cell> cells;
@@ -137,7 +143,9 @@ class AttributeSectionWriter::TiersOf : public Tiers {
     section_.add(tier, region);
     if (tier + 1 < section_.tier_count()) add_to_cell(tier + 1, region.morton >> 3, total);
   }
-  // `cell` is a cell of the tier's finest level: the parent of a region of the previous tier.
+  // Adds the total of a region to the region's parent. `cell` is the Morton code of the parent, a
+  // cell of the finest level of `tier`. If the parent is not in the open region, closes the open
+  // region first.
   void add_to_cell(uint32_t tier, uint64_t cell, const typename Rule::Total& total) {
     Open& open = open_[tier];
     const uint32_t bits = 3 * section_.region_levels(tier);

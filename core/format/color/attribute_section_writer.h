@@ -1,10 +1,12 @@
-// Writes the section of an attribute after the levels of a global file. docs/format.md, "The color
-// section" and "The sections of alpha, normals and materials", documents the byte layout.
+// Writes the section of an attribute after the levels of a global file. A tier is up to seven
+// consecutive levels; tier 0 has the finest. A region is a part of a tier with up to 64^3 cells of
+// the tier's finest level. docs/format.md, "The color section" and "The sections of alpha, normals
+// and materials", documents the byte layout.
 //
-// The regions of tier 0 are written when they are added. The cells of the coarser tiers and the
-// directories are in memory until finish(). They take 32 bytes per region, plus the size of tier 1,
-// which is a ten-thousandth of tier 0. This memory is charged to the budget. One thread uses a
-// writer.
+// The regions of tier 0 are written when they are added. The cells of the coarser tiers, and the
+// directories of all tiers, are in memory until finish(). This memory is charged to the budget. It
+// takes 32 bytes per region, plus the size of tier 1, which is a ten-thousandth of the size of tier
+// 0. One thread uses a writer.
 #pragma once
 
 #include <cstdint>
@@ -22,15 +24,15 @@ namespace voxdag {
 
 class AttributeSectionWriter {
  public:
-  // Encodes a region of colors in a tier above tier 0. The sum of each cell is the sum of the
-  // totals of the regions in the cell.
+  // Encodes the colors of a region in a tier above tier 0. A cell's sum is the sum of the totals of
+  // the finer tier's regions in the cell.
   using EncodeColors = std::function<EncodedRegion(uint32_t tier, uint64_t morton,
                                                    std::span<const ColoredCell> cells)>;
 
-  // The levels of `file` must be complete and not empty. The set cells of level `cell_levels` (2 to
-  // 20, at most the grid's) and of all coarser levels have the attribute. `names`: the list of
-  // names that the values index, if the attribute has such a list. Without `encode_coarse`, coarser
-  // cells have the colors of their sums.
+  // The levels of `file` must be complete and not empty. The set cells of the levels 0 to
+  // `cell_levels` (2 to 20, at most the grid's) have the attribute. If the values are indices in a
+  // list of names, `names` is this list. Without `encode_coarse`, a cell of a coarser tier has the
+  // color of its sum.
   AttributeSectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
                          std::span<const std::string> names, MemoryBudget& budget,
                          EncodeColors encode_coarse = nullptr);
@@ -40,7 +42,7 @@ class AttributeSectionWriter {
   // increasing Morton order. Throws Error{kCorrupt} for a region out of order or with inconsistent
   // parts. Throws Error{kOutOfMemory} if the budget is too small.
   void add_region(const EncodedRegion& region);
-  // Writes the other tiers and ends the section. There must be at least one region.
+  // Writes the coarser tiers and ends the section. At least one region must have been added.
   void finish();
 
  private:

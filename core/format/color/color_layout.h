@@ -1,5 +1,5 @@
-// Offsets and sizes in the color section of the global file, as docs/format.md, "The color
-// section", describes it.
+// Offsets and sizes in the color section of the global file. docs/format.md, "The color section",
+// describes the section and defines tiers, regions and directories.
 //
 //   [tier 0] [tier 1] ... [tier table]            tier: [regions' data] [directory]
 //
@@ -17,25 +17,26 @@ namespace voxdag::color_layout {
 inline constexpr size_t kUnitBytes = 16;
 static_assert(kBlockBytes == kUnitBytes);
 
-// Offsets in an entry of a directory. An entry describes a region.
+// Offsets in an entry of a tier's directory, which has an entry for each region.
 inline constexpr size_t kRegionMortonAt = 0;
 inline constexpr size_t kRegionFirstUnitAt = 8;
 inline constexpr size_t kRegionCountsAt = 16;  // u32, u16, u16, u16, u8, u8, u8
 inline constexpr size_t kRegionReservedAt = 29;
 inline constexpr size_t kRegionEntryBytes = 32;
 
-// Offsets in an entry of the tier table. An entry describes a tier.
+// Offsets in an entry of the tier table, which has an entry for each tier.
 inline constexpr size_t kTierOffsetAt = 0;  // the data's offset from the start of the section
 inline constexpr size_t kTierUnitsAt = 8;   // the data's size in units; the directory follows
 inline constexpr size_t kTierRegionsAt = 16;
 inline constexpr size_t kTierCellsAt = 24;  // number of cells of all levels
 inline constexpr size_t kTierEntryBytes = 32;
 
-// Limits of the list of materials.
+// Maximum number of materials, and maximum size of their list in bytes.
 inline constexpr uint64_t kMaxMaterials = uint64_t{1} << 20;
 inline constexpr uint64_t kMaxNamesBytes = uint64_t{64} << 20;
 
-// Tier t has the levels from finest_level(c, t) up to region_level(c, t).
+// Number of levels of a tier. Tier t has the levels from finest_level(color_levels, t) to the level
+// of its regions, which is coarser by levels_in_region().
 inline constexpr uint32_t kTierLevels = kRegionLevels + 1;
 inline constexpr uint32_t tier_count(uint32_t color_levels) {
   return color_levels / kTierLevels + 1;
@@ -43,7 +44,7 @@ inline constexpr uint32_t tier_count(uint32_t color_levels) {
 inline constexpr uint32_t finest_level(uint32_t color_levels, uint32_t tier) {
   return color_levels - tier * kTierLevels;
 }
-// Number of levels from the finest level of a tier to its regions' level.
+// Returns how many levels the regions of a tier are above `finest`, the tier's finest level.
 inline constexpr uint32_t levels_in_region(uint32_t finest) {
   return finest < kRegionLevels ? finest : kRegionLevels;
 }

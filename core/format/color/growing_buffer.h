@@ -1,4 +1,5 @@
-// An array that grows, in pages that are charged to the budget.
+// An array that grows when elements are appended. Its pages are charged to a budget; `what` names
+// them in errors.
 #pragma once
 
 #include <algorithm>

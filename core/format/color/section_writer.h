@@ -1,6 +1,6 @@
-// Writes an attribute section after the levels of a global file: tiers of regions with their
-// directories. It is the same for all attributes. docs/format.md, "The color section", documents
-// the byte layout.
+// Writes an attribute section after the levels of a global file: tiers of regions, and the tiers'
+// directories. All attributes use this class. docs/format.md, "The color section", documents the
+// byte layout.
 //
 // The regions of tier 0 are written to the file when they are added. The regions of the coarser
 // tiers and the directories are in memory until finish(), charged to the budget. One thread uses a
@@ -23,21 +23,21 @@ namespace voxdag {
 class SectionWriter {
  public:
   // The levels of `file` must be complete and not empty. The set cells of the levels 0 to
-  // `cell_levels` (2 to 20, at most the grid's) have the attribute. The values of 32 cells take
-  // `block_bytes` bytes.
+  // `cell_levels` (2 to 20, at most the grid's) have the attribute. `block_bytes` is the size of
+  // the values of 32 cells.
   SectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
                 uint32_t block_bytes, MemoryBudget& budget);
 
   uint32_t tier_count() const { return static_cast<uint32_t>(tiers_.size()); }
-  // Returns the number of levels from the tier's finest level to the level of its regions.
+  // Returns how many levels the tier's regions are above the tier's finest level.
   uint32_t region_levels(uint32_t tier) const { return tiers_[tier].levels(); }
   uint64_t region_count(uint32_t tier) const { return tiers_[tier].regions; }
   // Adds a region. The regions of a tier must come in increasing Morton order. Throws
   // Error{kCorrupt} for a region out of order or with inconsistent parts. Throws
   // Error{kOutOfMemory} if the budget is too small.
   void add(uint32_t tier, const EncodedRegion& region);
-  // Ends the section, in which tier 0 must have a region. `list`: bytes that are written before the
-  // tier table.
+  // Writes the coarser tiers, the directories, `list` and the tier table, and ends the section.
+  // Tier 0 must have a region. `list` is the list of materials as it is stored, or empty.
   void finish(std::span<const std::byte> list = {});
 
  private:
@@ -51,7 +51,7 @@ class SectionWriter {
     uint32_t finest;
     GrowingBuffer<std::byte> directory;
     GrowingBuffer<std::byte> data;  // data of the regions; unused in tier 0
-    uint64_t last_morton = 0;       // code of the last region
+    uint64_t last_morton = 0;       // Morton code of the last region
     uint64_t regions = 0, units = 0, cell_count = 0, finest_cells = 0;
 
     uint32_t levels() const { return color_layout::levels_in_region(finest); }

@@ -1,5 +1,5 @@
-// Sums of colors that no scene can overflow. A ColorSum overflows after about 10^9 white cells, and
-// a cell near the root can contain that many.
+// Sums of colors that no scene can overflow. A ColorSum (64 bits) overflows after about 10^9 white
+// cells, and a cell near the root can contain that many.
 #pragma once
 
 #include <algorithm>
@@ -28,8 +28,8 @@ struct WideSum {
     weight += other.weight;
   }
 
-  // Returns the number of low bits to drop so that the sum fits a ColorSum, with space for the
-  // values that narrow() rounds up. Returns 0 if the sum already fits.
+  // Returns the number of low bits that narrow() must drop so that the sum fits a ColorSum.
+  // Includes space for values that narrow() rounds up. Returns 0 if the sum already fits.
   int excess_bits() const {
     uint128 all = seen_weight | weight;
     for (size_t c = 0; c < 3; ++c) all |= seen[c] | plain[c];
@@ -37,10 +37,10 @@ struct WideSum {
     return high == 0 ? 0 : static_cast<int>(std::bit_width(high)) + 1;
   }
 
-  // Returns the sum without its lowest `bits` bits. A small sum keeps its color, and a weight of at
-  // least 1.
+  // Returns the sum without its lowest `bits` bits. A small sum would lose its color by this. It
+  // keeps its mean color instead, with a weight of at least 1.
   ColorSum narrow(int bits) const {
-    constexpr uint64_t kPrecise = uint64_t{1} << 16;
+    constexpr uint64_t kPrecise = uint64_t{1} << 16;  // from this weight on, a sum is not small
     ColorSum sum;
     sum.weight = static_cast<uint64_t>(weight >> bits);
     sum.seen_weight = static_cast<uint64_t>(seen_weight >> bits);
