@@ -26,7 +26,7 @@ uint64_t CheckedBlocks::size_of(uint64_t block) const {
   return std::min(kBlockBytes, bytes_ - block * kBlockBytes);
 }
 
-// Bytes after the last block belong to no block.
+// Compares the blocks of a range of bytes. Bytes after the last block are ignored.
 void CheckedBlocks::compare_all(uint64_t place, uint64_t bytes) const {
   const uint64_t end = std::min(place + bytes, bytes_);
   for (uint64_t block = place / kBlockBytes; block * kBlockBytes < end; ++block)
@@ -41,7 +41,7 @@ void CheckedBlocks::compare(uint64_t block) const {
           expected);
 }
 
-// Several threads may compare the same block concurrently, with the same result.
+// Several threads may compare the same block concurrently. All get the same result.
 void CheckedBlocks::compare(uint64_t block, std::span<const std::byte> bytes,
                             uint64_t expected) const {
   if (checksum64(bytes) != expected)

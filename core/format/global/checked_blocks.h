@@ -1,9 +1,9 @@
-// Compares the checksum blocks of a global file with their checksums when they are first used, for
-// readers of a part of a file that cannot wait until all of it is verified (docs/format.md, "The
-// checksum table").
+// Compares the checksum blocks of a global file with their checksums, each block when it is first
+// used. This is for readers that use a part of a file and cannot wait until the complete file is
+// verified (docs/format.md, "Checksum table").
 //
-// An intact block is not compared again, so damage to the disk after its first use goes unnoticed.
-// Needs one bit of memory per 64 KiB of the file. Thread-safe.
+// An intact block is not compared again, so disk errors after its first use go unnoticed. Needs one
+// bit of memory per 64 KiB of the file. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,7 @@
 
 namespace voxdag {
 
-// Thrown if bytes of a file differ from the bytes that were written.
+// Thrown if a block fails its checksum: its bytes differ from the bytes that were written.
 class DamagedBlock : public Error {
  public:
   explicit DamagedBlock(const std::string& message) : Error(ErrorCode::kCorrupt, message) {}
@@ -26,22 +26,23 @@ class DamagedBlock : public Error {
 class CheckedBlocks {
  public:
   static constexpr uint64_t kBlockBytes = 65536;
-  // Returns the memory for a file whose checksum table begins at byte `table_offset`.
+  // Returns the bytes of memory for a file whose checksum table begins at byte `table_offset`.
   static constexpr uint64_t memory_bytes(uint64_t table_offset) {
     return sizeof(uint64_t) * (table_offset / kBlockBytes / 64 + 1);
   }
 
-  // `file` must outlive this object. Opening it has already checked its header page and its
-  // checksum table.
+  // `file` must outlive this object. The File has checked its header page and its checksum table
+  // when it was opened.
   explicit CheckedBlocks(const voxdag_reader::File& file);
 
-  // Compares the blocks of these bytes. Call it before the bytes are read. The bytes must be in the
-  // mapped file, after its header page and before its checksum table. Throws DamagedBlock.
+  // Compares the blocks that contain these bytes; blocks known to be intact are skipped. Call it
+  // before the bytes are read. The bytes must be in the mapped file, after its header page and
+  // before its checksum table. Throws DamagedBlock.
   void expect_intact(const void* begin, uint64_t bytes) const {
     expect_intact_at(place_of(begin), bytes);
   }
-  // place_of() returns the offset of a byte from the end of the header page. For callers that store
-  // this offset, expect_intact_at() is faster than expect_intact().
+  // Returns the offset of a byte of the mapped file from the end of the header page. A caller that
+  // stores this offset can call expect_intact_at(), which is faster than expect_intact().
   uint64_t place_of(const void* begin) const {
     return static_cast<uint64_t>(static_cast<const unsigned char*>(begin) - first_);
   }
@@ -55,9 +56,10 @@ class CheckedBlocks {
   bool is_intact(uint64_t block) const {
     return intact_[block / 64].load(std::memory_order_relaxed) >> block % 64 & 1;
   }
-  // Compares a block in the file's mapping with its checksum. Throws DamagedBlock.
+  // Reads a block in the file's mapping and compares it with its checksum. Throws DamagedBlock.
   void compare(uint64_t block) const;
-  // The same for a block that the caller has read, and its checksum in the table.
+  // Compares a block with `expected`, its checksum in the table. `bytes` are the block's bytes,
+  // which the caller has read. Throws DamagedBlock.
   void compare(uint64_t block, std::span<const std::byte> bytes, uint64_t expected) const;
   // Return the offset of a block in the file and the size of the block.
   uint64_t offset_of(uint64_t block) const;

@@ -24,7 +24,8 @@ namespace {
 
 constexpr uint64_t kAbsent = ~uint64_t{0};
 
-// Nodes of one level in the two files, by their word offsets.
+// A node of each file, on the same level, given by its word offset. kAbsent: the file has no node
+// at this place.
 struct NodePair {
   uint64_t a = kAbsent, b = kAbsent;
   friend auto operator<=>(const NodePair&, const NodePair&) = default;
@@ -35,7 +36,8 @@ DiffReport operator+(const DiffReport& a, const DiffReport& b) {
   return {a.only_a + b.only_a, a.only_b + b.only_b};
 }
 
-// Compared pairs of nodes, with their results. Open addressing, at most 3/4 full.
+// The pairs of nodes that were compared, with their results. A hash table with open addressing, at
+// most 3/4 full.
 class PairTable {
  public:
   explicit PairTable(MemoryBudget& budget) : budget_(&budget) { grow(64); }
@@ -79,7 +81,8 @@ class PairTable {
   size_t count_ = 0;
 };
 
-// The pairs of one level, for all threads. Parts of the table have separate locks.
+// The compared pairs of one level, for all threads. The table is divided into parts with separate
+// locks.
 class SharedPairTable {
  public:
   explicit SharedPairTable(MemoryBudget& budget) {
@@ -120,8 +123,8 @@ class Differ {
     for (uint32_t level = 0; level < a.brick_level(); ++level) compared_.emplace_back(budget);
   }
 
-  // All threads compare pairs of one level and their subtrees. The levels above only add up
-  // results.
+  // Divides the pairs of one level among the threads, which compare them and their subtrees. The
+  // levels above only add up these results.
   DiffReport run() {
     std::vector<NodePair> pairs{{a_.empty() ? kAbsent : 0, b_.empty() ? kAbsent : 0}};
     const NodePair root = pairs[0];
@@ -133,11 +136,13 @@ class Differ {
   }
 
  private:
-  // Enough for any number of threads. The value does not depend on the threads, so the first error
-  // found does not either.
+  // The first level with this many pairs is divided among the threads. This is enough for any
+  // number of threads. It does not depend on the number of threads, so the first error found does
+  // not depend on it either.
   static constexpr size_t kPairsToDivide = 16384;
 
-  // Children by index. Both are absent if neither node has this child.
+  // Returns the pairs of children, by child index. Both offsets of a pair are kAbsent if neither
+  // node has this child.
   std::array<NodePair, 8> children_of(uint32_t level, const NodePair& pair) const {
     const voxdag_reader::Node a = node(a_, level, pair.a), b = node(b_, level, pair.b);
     std::array<NodePair, 8> below;
@@ -146,7 +151,7 @@ class Differ {
     return below;
   }
 
-  // Returns the pairs of children, each once.
+  // Returns the pairs of children of all `pairs`. Each pair occurs once.
   std::vector<NodePair> pairs_below(uint32_t level, const std::vector<NodePair>& pairs) const {
     std::vector<NodePair> below;
     for (const NodePair& pair : pairs)
@@ -207,8 +212,8 @@ bool same_words(const voxdag_reader::Level& a, const voxdag_reader::Level& b, un
   return same;
 }
 
-// True if all words are equal, which means equal voxels. Files with the same voxels and hash bits
-// have equal words.
+// True if all levels of the two files have equal words. Then the files have equal voxels. Files
+// with equal voxels and hash bits always have equal words.
 bool same_words(const voxdag_reader::File& a, const voxdag_reader::File& b, unsigned threads,
                 const CancelToken& cancel) {
   for (uint32_t l = 0; l <= a.brick_level(); ++l)

@@ -1,7 +1,7 @@
-// Counts the voxels in which two global files differ by walking both DAGs together. A pair of nodes
-// is compared once, so the cost depends on the sizes of the DAGs, not on the number of voxels. The
-// files must have the same grid; hash bits and the order of the nodes may differ, and the result
-// does not depend on the number of threads.
+// Counts the voxels in which two global files differ, by walking both DAGs together. Each pair of
+// nodes is compared only once, so the cost depends on the sizes of the DAGs, not on the number of
+// voxels. The files must have the same grid; hash bits and the order of the nodes may differ. The
+// result does not depend on the number of threads.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ struct DiffReport {
   bool same() const { return only_a == 0 && only_b == 0; }
 };
 
-// Throws Error{kInvalidInput} for different resolutions or bounds, Error{kCorrupt} for a damaged
-// file. Memory: 43 to 86 bytes per pair of nodes, charged to the budget.
+// Throws Error{kInvalidInput} if the resolutions or bounds differ, Error{kCorrupt} for a damaged
+// file. Needs 43 to 86 bytes of memory per pair of nodes, charged to the budget.
 DiffReport diff_global_files(const voxdag_reader::File& a, const voxdag_reader::File& b,
                              unsigned threads, MemoryBudget& budget, const CancelToken& cancel);
 

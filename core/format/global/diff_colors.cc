@@ -23,7 +23,7 @@ using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 using voxdag_reader::File;
 
-// The threads share the cubes of this level. There are at most 2^18 of them.
+// The cubes of this level, at most 2^18, are divided among the threads.
 constexpr uint32_t kSharedLevel = 6;
 
 // A cube that both files have, with its places as in cell_places.h.

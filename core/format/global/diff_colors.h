@@ -1,4 +1,4 @@
-// Compares the colors of two global files of the same grid. Compares each cell that is set in both
+// Compares the colors of two global files of the same grid. Compares the cells that are set in both
 // files, on the finest level that has colors in both files. The result does not depend on the
 // number of threads.
 #pragma once
@@ -10,18 +10,18 @@
 
 namespace voxdag {
 
-// Differences of channels, in sRGB bytes.
+// Statistics of color differences. The difference of a channel is in sRGB steps, 0 to 255.
 struct ColorDiff {
-  uint32_t levels = 0;            // cells of the grid of 2^levels per edge were compared
+  uint32_t levels = 0;            // the compared cells are of level `levels`
   uint64_t cells = 0;             // cells that are set in both files
   uint64_t different_cells = 0;   // cells whose colors differ
-  uint32_t largest = 0;           // largest difference
-  uint64_t sum = 0, squares = 0;  // sums of all differences and of their squares
+  uint32_t largest = 0;           // largest difference of a channel
+  uint64_t sum = 0, squares = 0;  // sums of the channels' differences and their squares
   // Compares one more cell.
   void add(const voxdag_reader::Rgb& a, const voxdag_reader::Rgb& b);
-  // Returns the mean difference per channel of a cell; 0 if no cells were compared.
+  // Returns the mean difference of a channel; 0 if no cells were compared.
   double mean() const;
-  // The peak signal-to-noise ratio in dB; infinite if nothing differs.
+  // Returns the peak signal-to-noise ratio in dB; infinite if nothing differs.
   double psnr() const;
 };
 

@@ -4,8 +4,9 @@
 //
 //   [header page] [level L-2] [level L-3] ... [level 0] [attribute sections] [checksum table]
 //
-// Levels and sections begin at multiples of kPageBytes, with zeros between them. The table has one
-// XXH64 for each checksum block: 64 KiB of the bytes between the header page and the table.
+// Levels and sections begin at multiples of kPageBytes, with zeros between them. The bytes between
+// the header page and the checksum table are divided into checksum blocks of 64 KiB. The table has
+// one XXH64 for each block.
 #pragma once
 
 #include <cstddef>
@@ -22,8 +23,8 @@ inline constexpr uint32_t kNodeOrderByHash = 1;
 inline constexpr uint64_t kPageBytes = 4096;
 inline constexpr uint64_t kChecksumBlockBytes = uint64_t{1} << 16;
 inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 40;
-// Pointers into a level of more words than this are 64 bits wide, all other pointers 32. Tests
-// define a smaller limit.
+// Pointers into a level of more words than this are 64 bits wide; all other pointers have 32 bits.
+// Tests define a smaller limit.
 #ifndef VOXDAG_NARROW_LEVEL_WORDS
 #define VOXDAG_NARROW_LEVEL_WORDS (uint64_t{1} << 32)
 #endif

@@ -49,23 +49,23 @@ void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const 
   }
 }
 
-// Computes the checksums of the checksum blocks from the bytes of the file in order; see
-// global_layout.h.
+// Computes the checksums of the checksum blocks (global_layout.h). The bytes of the file are added
+// in order.
 class BlockChecksums {
  public:
   BlockChecksums() = default;
-  // Continues after complete blocks that have these checksums.
+  // Continues after complete blocks, whose checksums are `whole_blocks`.
   explicit BlockChecksums(std::span<const uint64_t> whole_blocks)
       : checksums_(whole_blocks.begin(), whole_blocks.end()) {}
 
   void add(std::span<const std::byte> bytes);
-  // Returns the checksums of all blocks. The last one covers its bytes so far.
+  // Returns the checksums of all blocks. The last checksum covers the bytes of its block so far.
   std::vector<uint64_t> values() const;
 
  private:
   std::vector<uint64_t> checksums_;  // checksums of complete blocks
-  Checksum64 block_;                 // checksum of the block after them
-  size_t filled_ = 0;                // bytes in that block so far
+  Checksum64 block_;                 // checksum of the incomplete block
+  size_t filled_ = 0;                // bytes in the incomplete block so far
 };
 
 void BlockChecksums::add(std::span<const std::byte> bytes) {
@@ -105,11 +105,11 @@ struct GlobalFileWriter::State {
   const Grid grid;
   const uint32_t hash_bits;
   const uint64_t narrow_words;
-  std::unique_ptr<WritableFile> file;  // none before the first level or the header
+  std::unique_ptr<WritableFile> file;  // null until the first level or the header is written
   std::vector<GlobalLevel> levels;     // complete levels, from the bricks upwards
   std::vector<Section> sections;       // complete sections
   BlockChecksums block_checksums;      // checksums of the complete and open levels and sections
-  uint64_t checksummed_words = 0;      // words of the open level
+  uint64_t checksummed_words = 0;      // words of the open level in block_checksums
   bool level_open = false;
   uint64_t section_bytes = 0;  // bytes of the open section
   bool section_open = false;
@@ -117,7 +117,7 @@ struct GlobalFileWriter::State {
   uint64_t end = kPageBytes;  // start of the open (or the next) level or section, or of the table
 
   uint32_t brick_level() const { return grid.levels - kBrickLevels; }
-  // The open level, or the next one to open.
+  // Returns the open level, or the next level to open.
   uint32_t current_level() const { return brick_level() - static_cast<uint32_t>(levels.size()); }
   bool complete() const { return levels.empty() || levels.size() == brick_level() + 1; }
   void create_file() {
@@ -321,7 +321,8 @@ HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
   return header;
 }
 
-// Returns the SHA-256 of the complete file. Throws if the file does not contain the written bytes.
+// Reads the complete file and returns its SHA-256. Throws Error{kCorrupt} if the bytes differ from
+// the written bytes.
 std::string GlobalFileWriter::State::digest(const HeaderPage& header,
                                             std::span<const uint64_t> checksums, unsigned threads,
                                             const CancelToken& cancel) const {
@@ -337,7 +338,8 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   };
   add_expected(0, header.bytes());
   BlockChecksums read_back;
-  // The digest takes longest. So a separate thread digests a chunk while the next chunk is read.
+  // The digest takes longer than reading and checksums. So with several threads, a background
+  // thread digests a chunk while the next chunk is read.
   std::vector<std::byte> chunk, digested_chunk;
   std::future<void> digested;
   for (uint64_t at = kPageBytes; at < end; at += kReadBytes) {
@@ -387,7 +389,7 @@ GlobalFileSummary GlobalFileWriter::seal(const VoxelCounts& counts, unsigned thr
   s.file->write_at(s.end, table);
   const HeaderPage header = s.header(counts, table);
   s.file->write_at(0, header.bytes());
-  // The file is read while the disk is still writing it.
+  // digest() reads the file while a background thread waits for the disk.
   std::future<void> synced = run_in_background([&s] { s.file->sync(); });
   const GlobalFileSummary summary{s.end + table.size(),
                                   s.digest(header, checksums, threads, cancel)};

@@ -1,17 +1,18 @@
-// Writes the global file: one SVDAG, levels contiguous, variable-size nodes, canonical bytes.
-// docs/format.md, "The global file", documents the byte layout. voxdag_reader.h reads the file.
+// Writes the global file: one SVDAG with contiguous levels and nodes of variable size. The scene
+// and the geometry options determine its bytes. docs/format.md, "The global file", documents the
+// byte layout. voxdag_reader.h reads the file.
 //
 // Levels are stored in the order in which the merge finishes them, from the bricks up to the root.
 // Within a level everything is addressed in 32-bit words from the level's start. A brick is two
 // words, the low half of the mask first. A node is its child mask, then the word offsets of its
-// children in the next level: one word each, or two (low half first) if that level is wide. Nothing
-// in the file depends on the time, the place or the machine.
+// children in the next level. An offset is one word, or two (low half first) if the next level is
+// wide. Nothing in the file depends on the time, the place or the machine.
 //
 // Checksums are computed from the words that the merge passes in, never from a file. seal() reads
-// the file again and compares it with these checksums. If the disk returns wrong bytes, it throws
-// Error{kCorrupt}.
+// the file back and compares it with these checksums. It throws Error{kCorrupt} if the disk returns
+// wrong bytes.
 //
-// One thread uses a writer, except for write_words() and sync().
+// Only one thread may use a writer, except for write_words() and sync().
 #pragma once
 
 #include <cstdint>
@@ -44,8 +45,7 @@ struct GlobalLevel {
   uint64_t words = 0;
 };
 
-// An attribute section of the file. It has a value for every set cell of the levels 0 to
-// `cell_levels`.
+// An attribute section. It has a value for every set cell of the levels 0 to `cell_levels`.
 struct GlobalAttribute {
   uint32_t kind = 0;
   uint32_t cell_levels = 0;
@@ -54,7 +54,7 @@ struct GlobalAttribute {
   uint64_t finest_cells = 0;  // cells of the finest level
 };
 
-// The contents of an unfinished file, so that a later run can resume it.
+// The contents of an unfinished file, from which a later run can resume.
 struct GlobalFileProgress {
   std::vector<GlobalLevel> levels;  // complete levels, from the bricks upwards
   std::vector<uint64_t> checksums;  // one for each checksum block; the last block may be partial
@@ -62,35 +62,38 @@ struct GlobalFileProgress {
 
 // True if the file begins with the magic of a global file.
 bool is_global_file(const ReadableFile& file);
-// True if `file` may be an incomplete global file. The first page of a global file is written last.
+// True if `file` may be an incomplete global file: if its first page, which is written last, is a
+// global file's or has only zeros so far.
 bool is_partial_global_file(const ReadableFile& file);
 
 class GlobalFileWriter {
  public:
-  // Writes to "<path>.partial", from the first level on, until publish(). Levels of over
-  // `narrow_words` words are wide: pointers into them have 64 bits. Throws Error.
+  // Writes to "<path>.partial", which is created with the first level; publish() renames it. Levels
+  // of more than `narrow_words` words are wide: pointers into them have 64 bits. Throws Error.
   GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid, uint32_t hash_bits,
                    uint64_t narrow_words = global_layout::kNarrowLevelWords);
-  // If publish() was not called, removes the partial file, unless sync() made it resumable.
+  // Removes the partial file, unless publish() renamed it or sync() or resume() made it resumable.
   ~GlobalFileWriter();
 
   const std::string& path() const;
   uint64_t narrow_words() const;
   bool is_wide(uint64_t level_words) const { return level_words > narrow_words(); }
-  // Continues after an earlier writer that wrote to the same path and synced. Throws
-  // Error{kNotFound} or Error{kCorrupt} if the partial file is missing or too short, or if its last
-  // checksum block, which is read here, is damaged; seal() checks the other blocks.
+  // Continues after an earlier writer that wrote to the same path and called sync(). Throws
+  // Error{kNotFound} if the partial file is missing. Throws Error{kCorrupt} if it is too short, or
+  // if its last checksum block, which this function reads, is damaged. seal() checks the other
+  // blocks.
   void resume(const GlobalFileProgress& progress);
-  // Call it while no level is open and before the first section.
+  // Returns the state that resume() needs. Call it while no level is open and before the first
+  // section.
   GlobalFileProgress progress() const;
-  // Makes all complete levels durable, and retains the partial file for resume(). It may run
-  // concurrently with the writing of the next levels.
+  // Makes all complete levels durable, and retains the partial file for resume(). Another thread
+  // may write the next levels concurrently.
   void sync();
 
   // Levels must come in the order L-2, L-3, ..., 0. A scene without voxels has no levels.
   void begin_level(uint32_t level);
-  // Adds the next words of the current level to the checksums without writing them. Called for all
-  // words in order, without overlapping calls.
+  // Adds the next words of the current level to the checksums without writing them. Call it for all
+  // words of the level, in order. Calls must not overlap.
   void checksum_words(std::span<const uint32_t> words);
   // Writes words [first, first + words.size()) of the current level. Disjoint ranges may be written
   // in any order and concurrently from several threads.
@@ -99,18 +102,21 @@ class GlobalFileWriter {
   // naming the level if it has over 2^40 words.
   void end_level(const GlobalLevel& level);
 
-  // Attribute sections follow the levels of a scene that has voxels, in increasing order of their
-  // kinds. The bytes of a section are appended in order. A run that resumes writes them again.
+  // Attribute sections follow the levels, in increasing order of their kinds, if the scene has
+  // voxels. The bytes of a section are appended in order. A run that resumes writes the sections
+  // again.
   void begin_section();
   void append(std::span<const std::byte> bytes);
   uint64_t section_bytes() const;  // bytes of the open section so far
   void end_section(const GlobalAttribute& attribute);
 
-  // Writes checksums and header, syncs the file, and reads it to verify and digest it.
+  // Writes checksums and header, syncs the file, and reads it back to verify it. Returns the size
+  // and the SHA-256 of the file.
   GlobalFileSummary seal(const VoxelCounts& counts, unsigned threads = 1,
                          const CancelToken& cancel = CancelToken());
   // Renames the sealed file to its final name and syncs the folder.
   void publish();
+  // Seals and publishes the file.
   GlobalFileSummary finish(const VoxelCounts& counts) {
     const GlobalFileSummary summary = seal(counts);
     publish();

@@ -8,19 +8,20 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMaxNodeWords = 17;
-// A chain of this many nodes is taken as real: words that look like nodes by chance never form such
-// a long chain.
+// A guessed beginning is accepted if this many consecutive nodes could follow from it. Other words
+// practically never look like such a long chain. If they do, join() corrects the guess.
 constexpr int kConvincingNodes = 32;
 
 }  // namespace
 
-// Returns 0 if no node can begin there.
+// Returns the number of words of the node at word `at`; 0 if no node can begin there.
 uint64_t NodeIndex::words_of_node(uint64_t at) const {
   const uint32_t mask = level_.words[at];
   if (mask == 0 || mask > 255) return 0;
   return 1 + (uint64_t{kPopcount8[mask]} << (pointers_ == Pointers::kWide));
 }
 
+// Returns the first word of the span at which a node seems to begin.
 uint64_t NodeIndex::guess_begin(uint64_t span) const {
   const uint64_t first = span * kSpanWords;
   const auto is_convincing = [&](uint64_t at) {
@@ -37,6 +38,7 @@ uint64_t NodeIndex::guess_begin(uint64_t span) const {
   return first;
 }
 
+// Walks the nodes of the span from word `begin` and marks in starts_ where they begin.
 NodeIndex::Span NodeIndex::walk(uint64_t span, uint64_t begin) {
   const uint64_t end = std::min(level_.word_count, (span + 1) * kSpanWords);
   for (uint64_t i = span * kSpanWords / 64; i * 64 < end; ++i) starts_[i] = 0;
@@ -52,8 +54,8 @@ NodeIndex::Span NodeIndex::walk(uint64_t span, uint64_t begin) {
   return walked;
 }
 
-// Adjusts the spans until each begins where the previous one ends, and returns the number of nodes.
-// Sets nodes_before_ at the begin of each span.
+// Walks spans again until each begins where the previous one ends. Returns the number of nodes of
+// the level. Sets nodes_before_ at the beginning of each span.
 uint64_t NodeIndex::join(std::span<Span> spans, const CancelToken& cancel,
                          const std::string& where) {
   uint64_t nodes = 0, at = 0;

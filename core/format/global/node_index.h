@@ -1,7 +1,8 @@
 // Finds the word offsets at which the nodes of a level of the global file begin. Nodes vary in
-// size, so this requires a walk over the level from its first word. The level is cut into spans for
-// several threads. Each span but the first is walked from a word that looks like the beginning of a
-// node. If the previous span does not end there, the span is walked again.
+// size, so this requires a walk over the level from its first word. To use several threads, the
+// level is cut into spans. Each span but the first is walked from a word that looks like the
+// beginning of a node. If the previous span turns out not to end at this word, the span is walked
+// again.
 #pragma once
 
 #include <algorithm>
@@ -21,16 +22,16 @@ namespace voxdag {
 // The kind of child pointers in the nodes of a level. Bricks have none.
 enum class Pointers { kNone, kNarrow, kWide };
 
-// Maps the word offset where a node of a level of the global file begins to its index in the level.
-// Takes 2 bits per word, nothing for bricks. Immutable after construction.
+// Maps the word offset at which a node begins to the node's index in its level. Takes 2 bits of
+// memory per word of the level, and nothing for bricks. Immutable after construction.
 class NodeIndex {
  public:
   static constexpr uint64_t kNone = ~uint64_t{0};
 
   NodeIndex() = default;
-  // Walks the words of the level on up to `threads` threads. Throws Error{kCorrupt} beginning with
-  // `where` unless every child mask is 1 to 255, the last node ends with the level, and there are
-  // as many nodes as the header says.
+  // Walks the words of the level on up to `threads` threads. Throws Error{kCorrupt} unless every
+  // child mask is 1 to 255, the last node ends with the level, and the level has as many nodes as
+  // the header says. The message begins with `where`.
   NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsigned threads,
             MemoryBudget& budget, const CancelToken& cancel, const std::string& where);
 
@@ -44,8 +45,8 @@ class NodeIndex {
                : kNone;
   }
 
-  // Each span is visited by one thread, which calls visit(index, offset) for the nodes that begin
-  // in the span, in order.
+  // To visit all nodes of the level, call visit_span() for the spans 0 to span_count() - 1, on any
+  // threads. It calls visit(index, offset) for the nodes that begin in the span, in order.
   uint64_t span_count() const { return (level_.word_count + kSpanWords - 1) / kSpanWords; }
   template <class Visit>
   void visit_span(uint64_t span, Visit&& visit) const {
@@ -80,8 +81,8 @@ class NodeIndex {
 
   voxdag_reader::Level level_;
   Pointers pointers_ = Pointers::kNone;
-  PageBuffer<uint64_t> starts_;        // one bit per word: a node begins here
-  PageBuffer<uint64_t> nodes_before_;  // one entry per 64 words
+  PageBuffer<uint64_t> starts_;        // one bit per word: set if a node begins there
+  PageBuffer<uint64_t> nodes_before_;  // one entry per 64 words: nodes before them
 };
 
 }  // namespace voxdag

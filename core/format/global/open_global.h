@@ -1,4 +1,5 @@
-// Opens global files with the standalone reader, and translates its errors to Error.
+// Opens global files with the standalone reader (voxdag_reader.h), and translates its errors to
+// Error.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +27,7 @@ inline Error as_error(const voxdag_reader::Error& error) {
   return Error(ErrorCode::kCorrupt, error.what());
 }
 
-// Returns the result of `use()`. Errors of the reader are thrown as Error.
+// Returns the result of `use()`. Converts errors of the reader to Error.
 template <class Use>
 auto with_reader_errors(Use use) {
   try {
@@ -36,7 +37,8 @@ auto with_reader_errors(Use use) {
   }
 }
 
-// Returns the result of `use()`. Adds the file's name to errors of damage that lack it.
+// Returns the result of `use()`. Adds `path` to an Error{kCorrupt} whose message does not begin
+// with it.
 template <class Use>
 auto naming_file(const std::string& path, const Use& use) {
   try {
@@ -47,7 +49,7 @@ auto naming_file(const std::string& path, const Use& use) {
   }
 }
 
-// The standalone reader repeats the table's numbers.
+// Checks that the kinds and block sizes that the standalone reader repeats equal kAttributeTable's.
 static_assert(std::ranges::all_of(kAttributeTable, [](const AttributeTraits& row) {
   const auto kind = static_cast<uint32_t>(row.attribute);
   return kind < voxdag_reader::kEndOfKinds &&
@@ -61,7 +63,7 @@ inline const voxdag_reader::ColorSection& section_of(const voxdag_reader::File& 
   return file.section(static_cast<uint32_t>(attribute));
 }
 
-// The attributes that a file has.
+// Returns the attributes that a file has.
 inline AttributeSet attributes_of(const voxdag_reader::File& file) {
   AttributeSet set;
   for (const AttributeTraits& row : kAttributeTable)
@@ -69,7 +71,8 @@ inline AttributeSet attributes_of(const voxdag_reader::File& file) {
   return set;
 }
 
-// Calls put(number) for each component of a stored value.
+// Calls put(number) for each component of the value of cell `i` of a region: three channels of a
+// color, three coordinates of a normal, otherwise one number.
 template <class Put>
 void put_value(Attribute attribute, const voxdag_reader::ColorRegion& region, uint64_t i,
                const Put& put) {
@@ -94,8 +97,8 @@ void put_value(Attribute attribute, const voxdag_reader::ColorRegion& region, ui
 }
 
 // map_global_file() maps the file's bytes, and open_global_bytes() opens the file in them. A caller
-// that watches the mapping for unreadable pages (WatchedMapping) starts watching between the two
-// calls.
+// that watches the mapping for unreadable pages creates a WatchedMapping between the two calls,
+// because opening already reads pages.
 inline std::shared_ptr<const voxdag_reader::Bytes> map_global_file(const std::string& path) {
   system_files().open_read(path);  // refuses a folder or a pipe like every other input
   return with_reader_errors([&] {

@@ -114,7 +114,8 @@ void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what
       broken(file_.path() + ": byte " + std::to_string(at), what + ", expected 0");
 }
 
-// The reader has checked the fields that it needs. All other fields must have fixed values.
+// The reader has checked the fields that it uses. This function checks all other fields, which must
+// have fixed values.
 void Verifier::check_header() const {
   uint32_t node_order;
   std::memcpy(&node_order, file_.data() + kNodeOrderAt, sizeof(node_order));
@@ -164,7 +165,8 @@ void Verifier::check_attributes(bool has_attributes) const {
   check_zeros(kAttributesAt + kinds.size() * kAttributeEntryBytes, kFeaturesAt, "reserved");
 }
 
-// `entry` is an index in the attribute table.
+// `entry` is the byte offset of the section's entry in the header page. Checks the entry, the
+// section's list of names, and its padding.
 void Verifier::check_section(size_t entry, Attribute attribute) const {
   const auto field = [&](size_t at) {
     uint64_t value;
@@ -184,7 +186,7 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
   if (field(kAttributeCellsAt) != cells || field(kAttributeFinestCellsAt) != finest_cells)
     broken(file_.path() + ": header", std::to_string(field(kAttributeCellsAt)) + " " + plural +
                                           ", the section has " + std::to_string(cells));
-  // End of the padding that follows the names.
+  // End of the section, without the padding up to the next page.
   const uint64_t end = field(kAttributeOffsetAt) + field(kAttributeBytesAt);
   if (traits_of(attribute).has_names()) {
     const voxdag_reader::ColorTier& last = section.tier(section.tier_count() - 1);
@@ -229,7 +231,7 @@ uint64_t Verifier::brick_hash(uint64_t at) const {
   return truncate_hash(hash_brick(file_.brick(at)), file_.hash_bits());
 }
 
-// Returns the node's hash. Checks its children and marks them as used.
+// Returns the hash of the node at word `at`. Also checks its children and marks them as used.
 uint64_t Verifier::node_hash(uint32_t level, uint64_t at) {
   const voxdag_reader::Node parent = node(level, at);
   const int children = kPopcount8[parent.child_mask];
@@ -247,7 +249,8 @@ uint64_t Verifier::node_hash(uint32_t level, uint64_t at) {
   return truncate_hash(hash_node(parent.child_mask, child_hashes), file_.hash_bits());
 }
 
-// The hash of the last node before the span is computed again, because another thread may be
+// Computes the hashes of the nodes in a span and checks their order. The first node is compared
+// with the last node before the span, whose hash is computed again, because another thread may be
 // checking that span.
 void Verifier::check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& hashes) {
   const NodeIndex& index = indexes_[level];

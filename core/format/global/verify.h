@@ -1,16 +1,18 @@
 // Checks every invariant of a global file:
 //
-//   1. Header, sizes, widths of pointers, checksums, zeros in all reserved fields and padding.
-//   2. Every node has a child mask of 1 to 255, and its children begin nodes of the next level. No
-//      brick is empty.
-//   3. Levels strictly increase in the total order (hash, mask, child indices), the hashes
-//      computed from the bricks up. So no two nodes of a level are equal.
-//   4. One root; every other node has a parent.
-//   5. The header's voxels and octree nodes equal the DAG's.
+//   1. The header, sizes, widths of pointers and checksums are valid. All reserved fields and all
+//      padding are 0.
+//   2. Every node has a child mask of 1 to 255, and its child offsets point to the beginnings of
+//      nodes of the next level. No brick is empty.
+//   3. The nodes of a level strictly increase in the total order (hash, mask, child indices), so no
+//      two of them are equal. The hashes are computed from the bricks up.
+//   4. There is one root, and every other node has a parent.
+//   5. The numbers of voxels and octree nodes in the header equal the DAG's.
 //   6. Colors and other attributes follow core/format/global/verify_colors.h.
 //
-// Memory: 2 bits per word of the file, and 9 bytes per node of two levels, charged to the budget.
-// All threads work on the same level; the result does not depend on their number.
+// Needs 2 bits of memory per word of the file, and 9 bytes per node of two consecutive levels,
+// charged to the budget. All threads work on the same level. The result does not depend on the
+// number of threads.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +26,8 @@
 
 namespace voxdag {
 
-// Throws Error{kCorrupt} with the problem, the place and the expectation. Works on up to `threads`
-// threads. A level must be wide if it has more than `narrow_words` words, and must not be wide
-// otherwise.
+// Throws Error{kCorrupt}; the message names the problem, the place and the expectation. Works on up
+// to `threads` threads. A level must be wide if and only if it has more than `narrow_words` words.
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
                         Progress& progress, const CancelToken& cancel,
                         uint64_t narrow_words = global_layout::kNarrowLevelWords);

@@ -24,8 +24,8 @@ class CellWalk {
  public:
   explicit CellWalk(const voxdag_reader::File& file) : file_(file) {}
 
-  // Calls visit(level, code) for all cells of the levels down to `finest`, each parent before its
-  // children. `code` is relative to the cube.
+  // Calls visit(level, code) for the cells of all levels from `level` to `finest`, each parent
+  // before its children. `code` is the cell's Morton code within the cube.
   template <class Visit>
   void walk(uint32_t level, uint64_t place, uint64_t code, uint32_t finest, Visit& visit) const {
     visit(level, code);
@@ -36,8 +36,8 @@ class CellWalk {
         walk(level + 1, child_place_at(file_, level, place, i), 8 * code + static_cast<uint64_t>(i),
              finest, visit);
   }
-  // Returns the number of cells of level `target` in a cube. Stops soon after `limit`, because a
-  // few nodes that are shared often can have 8^20 cells.
+  // Returns the number of set cells of level `target` in a cube. Stops soon after `limit`, because
+  // a few nodes that are shared often can stand for 8^20 cells.
   uint64_t count(uint32_t level, uint64_t place, uint32_t target, uint64_t limit) const {
     if (level == target) return 1;
     uint64_t cells = 0;
@@ -47,7 +47,8 @@ class CellWalk {
         cells += count(level + 1, child_place_at(file_, level, place, i), target, limit - cells);
     return cells;
   }
-  // Sets `place` to the place of a cube. Returns false if the cube is not set.
+  // Sets `place` to the place (cell_places.h) of the cube with Morton code `code`. Returns false if
+  // the cube is not set.
   bool find(uint32_t level, uint64_t code, uint64_t& place) const {
     place = 0;
     for (uint32_t l = 0; l < level; ++l) {
@@ -164,8 +165,8 @@ class ColorVerifier {
                "the last value");
   }
 
-  // Returns the value of a cell of a tier's finest level, computed from the regions of the previous
-  // tier in this cell.
+  // Returns the value that a cell of a tier's finest level must have. It is computed from the
+  // regions of the finer tier in this cell.
   uint32_t value_from_below(const ColorTier& tier, uint64_t code) const {
     const ColorTier& below = section_.tier_of(tier.finest_level + 1);
     uint32_t children[8];

@@ -3,10 +3,10 @@
 //   1. The tiers, sizes and counts of a section agree; padding and reserved fields are 0.
 //   2. Each tier has exactly the regions where the DAG has set cells, in Morton order, and each
 //      region has exactly the counts and prefixes of the DAG's cells.
-//   3. Each block of colors has the canonical form of its mode: the larger end first, 0 for missing
-//      cells.
-//   4. Values of other attributes are within their bounds. Values of coarser cells follow by the
-//      rule from the values of their children. The bytes of missing cells are 0.
+//   3. Each block of colors has the canonical form of its mode: the larger of its two end colors is
+//      first, and the weights of missing cells (after the last one of the region) are 0.
+//   4. Values of other attributes are within their bounds. The value of a coarser cell equals the
+//      value computed from its children. The bytes of missing cells are 0.
 #pragma once
 
 #include "core/base/progress.h"
@@ -15,8 +15,8 @@
 
 namespace voxdag {
 
-// Throws Error{kCorrupt} with the problem, the place and the expectation. Works on up to `threads`
-// threads. A file without attributes is valid.
+// Throws Error{kCorrupt}; the message names the problem, the place and the expectation. Works on up
+// to `threads` threads. A file without attributes is valid.
 void verify_colors(const voxdag_reader::File& file, unsigned threads, Progress& progress,
                    const CancelToken& cancel);
 

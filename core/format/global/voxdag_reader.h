@@ -9,18 +9,20 @@
 //     dag.alpha(x, y, z, level), dag.normal(...), dag.material(...), dag.material_names()
 //     const voxdag_reader::Level& level = dag.level(l);    // raw words, for an upload to the GPU
 //
-// Level l has cubes of edge R/2^l voxels, 0 is the root; bricks (4x4x4 voxels) are level
+// Level l has cubes of edge R/2^l voxels. Level 0 is the root. Bricks (4x4x4 voxels) are level
 // brick_level() = log2(R) - 2. Within a level everything is addressed by word offsets:
 //     brick:  [mask, low 32 bits] [mask, high 32 bits]     bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0
 //     node:   [child mask, 8 bits] [offset of each child in the next level, in child order]
-// An offset is one word. If the next level's pointer_bits are 64, it is two words, low half first.
+// An offset is one word; if the next level's pointer_bits are 64, it is two words, low half first.
 // Child index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
 //
-// Opening checks the header, and that the levels and the checksum table are within the file. Nodes
-// and bricks are checked when they are read: a bad offset in a damaged file is an Error, and no
-// access leaves the mapping. verify_checksums() compares all data with its checksums. The file is
-// mapped, or read into memory if mmap fails or Access::kRead is requested. A mapped file must not
-// be truncated while it is open. A File is immutable: any number of threads may use it.
+// Opening a file checks the header, and that the levels and the checksum table are within the file.
+// Nodes and bricks are checked when they are read: a bad offset in a damaged file is an Error, and
+// no access leaves the mapping. verify_checksums() compares all data with its checksums.
+//
+// The file is mapped, or read into memory if mmap fails or Access::kRead is requested. A mapped
+// file must not be truncated while it is open. A File is immutable: any number of threads may use
+// it.
 #pragma once
 
 #include <fcntl.h>
@@ -57,11 +59,12 @@ struct Level {
 // A node of a level above the bricks. The words belong to the File.
 struct Node {
   uint32_t child_mask = 0;
-  // Offsets in the next level, in child order: one word each, or, if `wide`, two, low half first.
+  // Word offsets of the children in the next level, in child order: one word each or, if `wide`,
+  // two words each, low half first.
   const uint32_t* child_words = nullptr;
   bool wide = false;
 
-  // Returns the word offset of the node's n-th existing child, in child order.
+  // Returns the word offset of the n-th existing child (from 0) in the next level.
   uint64_t child(int n) const {
     return wide ? child_words[2 * n] | static_cast<uint64_t>(child_words[2 * n + 1]) << 32
                 : child_words[n];
@@ -105,7 +108,7 @@ inline uint64_t xxh64(const unsigned char* bytes, size_t size) {
 // kMap maps the file; kRead reads all of it into memory.
 enum class Access { kMap, kRead };
 
-// The bytes of a file, mapped or in memory.
+// The bytes of a file, mapped or read into memory.
 class Bytes {
  public:
   Bytes(const std::string& path, Access access) {
@@ -128,7 +131,7 @@ class Bytes {
   ~Bytes() {
     if (map_) munmap(map_, size_);
   }
-  // The bytes of the file, aligned to 8 bytes.
+  // Returns the bytes of the file. They are aligned to 8 bytes.
   const unsigned char* data() const {
     return static_cast<const unsigned char*>(map_ ? map_ : copy_.data());
   }
@@ -139,7 +142,8 @@ class Bytes {
   }
 
  private:
-  // Does not wait for the writer of a pipe; for a regular file O_NONBLOCK means nothing.
+  // Opens the file. Without O_NONBLOCK, opening a pipe would wait for its writer. The flag has no
+  // effect on regular files.
   static int open_file(const std::string& path) {
     const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd >= 0) return fd;
@@ -171,20 +175,21 @@ class File {
   // has a damaged header.
   explicit File(const std::string& path, Access access = Access::kMap)
       : File(path, std::make_shared<const Bytes>(path, access)) {}
-  // Opens a file whose bytes are already loaded, for programs that prepare the mapping before they
-  // read it. `path` is for messages.
+  // Opens a file whose bytes are already mapped or in memory, for programs that prepare the mapping
+  // before it is read. `path` is for messages.
   File(const std::string& path, std::shared_ptr<const Bytes> bytes)
       : path_(path), bytes_(std::move(bytes)) {
     read_header();
   }
 
   const std::string& path() const { return path_; }
-  // The size of the file, and its bytes.
+  // Return the size of the file in bytes, and its bytes.
   uint64_t file_bytes() const { return bytes_->size(); }
   const unsigned char* data() const { return bytes_->data(); }
-  // Drops the resident pages of a mapped file, for programs with little memory.
+  // Drops the resident pages of a mapped file, for programs with little memory. They are loaded
+  // again when they are used.
   void release_pages() const { bytes_->release_pages(); }
-  // The low corner of the grid in world space.
+  // Returns the low corner of the grid in world space.
   const double (&origin() const)[3] { return origin_; }
   // Returns the edge length of the grid in world space. The edge length of a voxel is edge() /
   // resolution().
@@ -198,16 +203,17 @@ class File {
   // Returns the number of bits of the node hash, 4 to 64. The nodes of a level are ordered by this
   // hash.
   uint32_t hash_bits() const { return hash_bits_; }
-  // Set voxels, nodes of the octree that the DAG represents, and nodes of the DAG; bricks count as
-  // nodes.
+  // Return the numbers of set voxels, of nodes of the octree that the DAG represents, and of nodes
+  // of the DAG. Bricks count as nodes.
   uint64_t voxels() const { return voxels_; }
   uint64_t svo_nodes() const { return svo_nodes_; }
   uint64_t dag_nodes() const { return dag_nodes_; }
   bool empty() const { return dag_nodes_ == 0; }
   // `l` is 0 (the root) to brick_level().
   const Level& level(uint32_t l) const { return levels_[l]; }
-  // Byte offset of the checksum table, which has one XXH64 for each checksum block: 64 KiB of the
-  // bytes between the header page (4096 bytes) and the table.
+  // Returns the byte offset of the checksum table. The bytes between the header page (4096 bytes)
+  // and the table are divided into checksum blocks of 64 KiB. The table has one XXH64 for each
+  // block.
   uint64_t checksum_table_offset() const { return table_offset_; }
 
   // Returns the mask of the 64 voxels of the brick at word `offset` of level brick_level(). Throws
@@ -233,8 +239,8 @@ class File {
   static uint64_t child(const Node& node, int index) {
     return node.child(count_bits(node.child_mask & ((1u << index) - 1)));
   }
-  // Returns the bit of a voxel in the mask of its brick; only the two low bits of each coordinate
-  // count.
+  // Returns the number of a voxel's bit in the mask of its brick. Only the two low bits of each
+  // coordinate count.
   static int brick_bit(int64_t x, int64_t y, int64_t z) {
     return static_cast<int>((x & 2) << 4 | (y & 2) << 3 | (z & 2) << 2 | (x & 1) << 2 |
                             (y & 1) << 1 | (z & 1));
@@ -290,7 +296,7 @@ class File {
     return index;
   }
   const std::vector<std::string>& material_names() const { return materials().names(); }
-  // Throws the Error for colors, or other attributes, that do not fit the DAG.
+  // Throws an Error for attributes that do not fit the DAG. `what` is the end of its message.
   [[noreturn]] void broken_colors(const std::string& what) const { corrupt("colors: " + what); }
 
   // Walks the octree depth first, children in child order, and calls
@@ -405,7 +411,8 @@ class File {
     read_table(page);
   }
 
-  // Levels follow one another, the bricks first. Each begins at the start of a page.
+  // Reads the level entries of the header. Levels follow one another, the bricks first. Each begins
+  // at the start of a page.
   void read_levels(const unsigned char* page) {
     uint64_t end = kPageBytes, nodes = 0;
     for (uint32_t l = brick_level() + 1; l-- > 0;) {
@@ -442,7 +449,8 @@ class File {
     table_offset_ = end;
   }
 
-  // Sections follow the levels in the order of their kinds. Unknown kinds are skipped.
+  // Reads the attribute table of the header. Sections follow the levels, in the order of their
+  // kinds. Sections of unknown kinds are skipped.
   void read_attributes(const unsigned char* page) {
     const uint64_t count = get<uint64_t>(page + 120);
     expect(count >= 1 && count <= 16 && dag_nodes_ > 0, "expected 1 to 16 attribute sections");
@@ -485,7 +493,7 @@ class File {
   uint32_t version_ = 0, max_pointer_bits_ = 32, grid_levels_ = 0, hash_bits_ = 0;
   uint64_t voxels_ = 0, svo_nodes_ = 0, dag_nodes_ = 0, table_offset_ = 0;
   Level levels_[kMaxBrickLevel + 1];
-  ColorSection sections_[kEndOfKinds - 1];  // by kind
+  ColorSection sections_[kEndOfKinds - 1];  // the section of a kind is at index kind - 1
 };
 
 // Looks up colors; see voxdag_reader_colors.h.

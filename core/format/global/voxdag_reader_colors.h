@@ -1,12 +1,13 @@
 // The part of voxdag_reader.h that reads colors and the other attributes of cells (alpha, normals,
-// materials); copy both headers into your engine, and include voxdag_reader.h. docs/format.md, "The
+// materials). Copy both headers into your engine, and include voxdag_reader.h. docs/format.md, "The
 // color section" and "The sections of alpha, normals and materials", describes the bytes.
 //
-// All set cells of the levels from 0 to the finest level of a section have a color, or another
-// value. The values are stored by regions of up to 64^3 cells of a tier's finest level: first for
-// the region's cells of that level in Morton order, then for the next coarser level, and so on. The
-// position of a cell's value follows from the cell's rank: the number of set cells of the same
-// level that come before the cell in the region. The DAG determines this rank.
+// A section has a color, or another value, for all set cells of the levels from 0 to the section's
+// finest level. The levels are divided into tiers of up to seven levels, and a tier into regions of
+// up to 64^3 cells of the tier's finest level. A region first has the values of its cells of that
+// level in Morton order, then of the next coarser level, and so on. The position of a cell's value
+// follows from the cell's rank: the number of set cells of the same level that come before the cell
+// in the region. The DAG determines this rank.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +36,7 @@ class Error : public std::runtime_error {
   Problem problem_;
 };
 
-// sRGB, as it is shown.
+// A color in sRGB, with 8 bits per channel, ready for display.
 struct Rgb {
   unsigned char r = 0, g = 0, b = 0;
   friend bool operator==(const Rgb& x, const Rgb& y) {
@@ -49,7 +50,7 @@ struct Normal {
   float x = 0, y = 0, z = 0;
 };
 
-// A normal as two bytes, its octahedral projection. Any bytes are a valid normal.
+// Returns the normal that two bytes encode by octahedral projection. Any bytes are a valid normal.
 inline Normal octahedral_normal(const unsigned char* bytes) {
   const double across = bytes[0] - 127.0, along = bytes[1] - 127.0;
   const double width = across < 0 ? -across : across, height = along < 0 ? -along : along;
@@ -72,7 +73,7 @@ inline Rgb block_color(const unsigned char* block, unsigned i) {
   const auto mix = [](unsigned a, unsigned b, unsigned weight, unsigned top) {
     return static_cast<unsigned char>((a * (top - weight) + b * weight + top / 2) / top);
   };
-  if (u16(0) == 0) {  // ends of 24 bits, weights of 2
+  if (u16(0) == 0) {  // mode B: ends of 24 bits, weights of 2 bits
     const unsigned w = static_cast<unsigned>(block[8 + i / 4] >> 2 * (i % 4)) & 3;
     return {mix(block[4], block[7], w, 3), mix(block[3], block[6], w, 3),
             mix(block[2], block[5], w, 3)};
@@ -94,8 +95,8 @@ inline int count_set_bits(uint64_t x) {
   return static_cast<int>(((x + (x >> 4)) & 0x0f0f0f0f0f0f0f0fu) * 0x0101010101010101u >> 56);
 }
 
-// Returns the bits of x, y and z interleaved, x highest: the order of the cells of a level. Uses 21
-// bits of each coordinate.
+// Returns the Morton code of a cell: the bits of x, y and z interleaved, x highest. The cells of a
+// level are ordered by this code. Uses 21 bits of each coordinate.
 inline uint64_t morton_code(int64_t x, int64_t y, int64_t z) {
   const auto spread = [](int64_t coordinate) {
     uint64_t v = static_cast<uint64_t>(coordinate) & 0x1fffff;
@@ -115,23 +116,23 @@ struct ColorTier {
   uint64_t units = 0;                   // size of `data` in units of 16 bytes
   const unsigned char* directory = nullptr;
   uint64_t region_count = 0;
-  uint64_t cell_count = 0;  // cells of all levels
+  uint64_t cell_count = 0;  // set cells of all levels of the tier
   uint32_t finest_level = 0, region_level = 0;
   uint32_t block_bytes = 16;  // bytes for 32 cells
 };
 
 // The colors, or other values, of a region. Their memory belongs to the File.
 struct ColorRegion {
-  uint64_t morton = 0;      // code among the cubes of the tier's region level
-  uint64_t first_unit = 0;  // first unit of its data
+  uint64_t morton = 0;      // Morton code of the region among the cubes of the tier's region level
+  uint64_t first_unit = 0;  // where its data begin in ColorTier::data, in units of 16 bytes
   uint32_t level_count = 0;
   uint32_t counts[7] = {};  // cells of each level, the finest level first
   uint64_t cells = 0;       // cells of all levels
   const unsigned char* blocks = nullptr;
   uint32_t block_bytes = 16;
 
-  // Returns the value of the `i`-th of all cells: alpha, a material or the code of a normal. Not
-  // for colors.
+  // Returns the value of cell `i` of the region's cells, from 0, in stored order: alpha, a material
+  // or the code of a normal. Not for colors.
   uint32_t value(uint64_t i) const {
     const uint32_t bytes = block_bytes / 32;
     uint32_t value = 0;
@@ -139,12 +140,12 @@ struct ColorRegion {
     return value;
   }
   Normal normal(uint64_t i) const { return octahedral_normal(blocks + 2 * i); }
-  // Returns the color of the `i`-th of all cells. `i` must be below `cells`.
+  // Returns the color of cell `i` of the region's cells. `i` must be below `cells`.
   Rgb color(uint64_t i) const { return block_color(blocks + i / 32 * 16, unsigned(i % 32)); }
-  // Table 0 is for the cells of the finest level, table 1 for the cells of the next coarser level.
-  // A table has one entry for each ancestor four levels above these cells, in order. The entry is
-  // the number of cells that come before the cells below this ancestor. prefix_count() returns the
-  // number of entries of a table.
+  // The prefixes are two tables that help to compute ranks. Table 0 is for the cells of the finest
+  // level, table 1 for the cells of the next coarser level. A table has one entry for each ancestor
+  // four levels above these cells, in Morton order. The entry is the number of cells that come
+  // before the cells below this ancestor. prefix_count() returns the number of entries of a table.
   uint64_t prefix_count(uint32_t table) const {
     return table + 5 < level_count ? counts[table + 4] : 0;
   }
@@ -161,15 +162,16 @@ struct ColorRegion {
 };
 
 // The kinds of attribute sections, and the bytes that 32 values take in a section of each kind. 0
-// bytes means that the values are indexes in a list of names; the length of the list determines the
-// width of the values.
+// bytes means that the values are indices in a list of names. The length of the list then
+// determines the width of the values.
 enum Kind : uint32_t { kColors = 1, kAlphas, kNormals, kMaterials, kEndOfKinds };
 constexpr uint32_t kKindBlockBytes[kEndOfKinds] = {0, 16, 32, 64, 0};
 
-// The colors of a file, or another attribute of its cells.
+// The section of one attribute: the colors of a file, or other values of its cells.
 class ColorSection {
  public:
-  // Opens the section of a known kind. Returns an error message, or null if there is no error.
+  // Opens a section of a known kind. `section` is its first byte, and `bytes` its size. Returns an
+  // error message, or null if there is no error.
   const char* open(const unsigned char* section, uint64_t bytes, uint32_t color_levels,
                    uint32_t kind = kColors, uint32_t block_bytes = 16) {
     const bool has_names = kKindBlockBytes[kind] == 0;
@@ -202,8 +204,8 @@ class ColorSection {
     if (has_names) return read_names(section + end, tables - end, block_bytes / 32);
     return end == tables ? nullptr : "the color section is longer than its tiers";
   }
-  // Returns the names of the materials. A material is an index in this list. The last name is "",
-  // for triangles without a material.
+  // Returns the names of the materials. The value of a cell is an index in this list. The last name
+  // is "", for triangles without a material.
   const std::vector<std::string>& names() const { return names_; }
 
   uint32_t color_levels() const { return color_levels_; }
@@ -212,7 +214,7 @@ class ColorSection {
   // Returns the tier that has level `l`. The level is 0 to color_levels().
   const ColorTier& tier_of(uint32_t l) const { return tiers_[(color_levels_ - l) / 7]; }
 
-  // Sets `region` to the i-th region of a tier. All bytes of the region are then inside the tier.
+  // Sets `region` to the i-th region of a tier, all of whose bytes are then inside the tier.
   // Returns false if the directory entry is damaged.
   static bool region(const ColorTier& tier, uint64_t i, ColorRegion& region) {
     const unsigned char* const entry = tier.directory + 32 * i;
@@ -235,8 +237,8 @@ class ColorSection {
     region.blocks = tier.data + 16 * region.first_unit;
     return true;
   }
-  // Returns the index of the first region that is not before `morton`; region_count if there is
-  // none.
+  // Returns the index of the first region whose Morton code is not below `morton`; region_count if
+  // all are below it.
   static uint64_t lower_bound(const ColorTier& tier, uint64_t morton) {
     uint64_t low = 0, high = tier.region_count;
     while (low < high) {
@@ -282,13 +284,13 @@ class ColorSection {
   std::vector<std::string> names_;
 };
 
-// Looks up colors, or another attribute. Fast if each cell is near the previous one. Refers to the
-// File, which must outlive it. Each thread needs its own cursor.
+// Looks up colors, or another attribute. A lookup is fast if the cell is near the previous one. The
+// cursor refers to the File, which must outlive it. Each thread needs a separate cursor.
 template <class Dag>
 class BasicColorCursor {
  public:
   explicit BasicColorCursor(const Dag& dag) : BasicColorCursor(dag, dag.colors()) {}
-  // Creates a cursor for lookups with find() in another section, such as dag.normals().
+  // Creates a cursor for another section, such as dag.normals().
   BasicColorCursor(const Dag& dag, const ColorSection& section) : dag_(&dag), section_(&section) {
     path_[0] = 0;
   }
@@ -299,7 +301,7 @@ class BasicColorCursor {
     const ColorRegion* const region = find(x, y, z, level, i);
     return region ? std::optional(region->color(i)) : std::nullopt;
   }
-  // See File::alpha(), material() and normal(), for a cursor of their section.
+  // See File::alpha(), material() and normal(). The cursor must be for their section.
   std::optional<uint32_t> value(int64_t x, int64_t y, int64_t z, uint32_t level) {
     uint64_t i = 0;
     const ColorRegion* const region = find(x, y, z, level, i);
@@ -310,9 +312,9 @@ class BasicColorCursor {
     const ColorRegion* const region = find(x, y, z, level, i);
     return region ? std::optional(region->normal(i)) : std::nullopt;
   }
-  // Finds the place of a value: returns its region, and sets `i` to the number of the cell in the
-  // region. The region is valid until the next call. Returns null if the cell is not set or has no
-  // value.
+  // Finds the value of a cell: returns the region that has it, and sets `i` to the number of the
+  // cell in the region. The region is valid until the next call. Returns null if the cell is not
+  // set or has no value.
   const ColorRegion* find(int64_t x, int64_t y, int64_t z, uint32_t level, uint64_t& i) {
     if (section_->tier_count() == 0 || level > dag_->grid_levels()) return nullptr;
     const int64_t edge = int64_t{1} << level;
@@ -325,12 +327,13 @@ class BasicColorCursor {
   }
 
  private:
-  // A place in the DAG is a word offset or, below the bricks, the mask of the cell's children.
+  // The *place* of a cell in the DAG is the word offset of its node or brick. Below the bricks it
+  // is the mask of the cell's children.
   uint32_t brick_level() const { return dag_->brick_level(); }
   uint32_t mask(uint32_t level, uint64_t place) const {
     if (level < brick_level()) return dag_->node(level, place).child_mask;
     if (level > brick_level()) return static_cast<uint32_t>(place);
-    uint64_t any = dag_->brick(place);  // the lowest bit of each byte: whether there is one
+    uint64_t any = dag_->brick(place);  // collects each byte's bits in its lowest bit
     any |= any >> 4;
     any |= any >> 2;
     any |= any >> 1;
@@ -354,7 +357,8 @@ class BasicColorCursor {
       if (there >> i & 1) cells += count(level + 1, child(level, place, i), target);
     return cells;
   }
-  unsigned step(uint32_t level) const {  // the child of path_[level] that the path goes to
+  // Returns the index of the child of path_[level] that is on the path.
+  unsigned step(uint32_t level) const {
     return static_cast<unsigned>(path_code_ >> 3 * (depth_ - level - 1) & 7);
   }
   // Returns the number of set cells of level `target` in the cube path_[from] that come before
@@ -384,10 +388,14 @@ class BasicColorCursor {
     return true;
   }
 
-  // Returns the index in region_ of the value of a cell on the path.
+  // Makes region_ the region of a cell on the path, and returns the index of the cell's value in
+  // it. The cursor remembers a group for this: the cells below the ancestor `above` levels up (at
+  // most three). For each parent of the group's cells, it has the mask of the children, and the
+  // number of the region's cells before them.
   uint64_t stored_index(uint32_t level, uint64_t code) {
     const ColorTier& tier = section_->tier_of(level);
-    const uint32_t above = std::min<uint32_t>(3, level - tier.region_level);  // to the group
+    // Number of levels from the cell up to the group's cube.
+    const uint32_t above = std::min<uint32_t>(3, level - tier.region_level);
     if (group_level_ != level || group_code_ != code >> 3 * above) {
       group_level_ = kNone;
       enter_region(tier, code >> 3 * (level - tier.region_level));
@@ -417,7 +425,8 @@ class BasicColorCursor {
       dag_->broken_colors("a region is missing or damaged");
     region_tier_ = &tier;
   }
-  // Counts the cells before each parent in the cube `above` levels above the cell on the path.
+  // Enters the group whose cube is `above` levels above the cell on the path: sets starts_ and
+  // masks_.
   void enter_group(const ColorTier& tier, uint32_t level, uint32_t above) {
     const uint32_t table = tier.finest_level - level, group = level - above;
     uint32_t from = tier.region_level;
@@ -455,10 +464,11 @@ class BasicColorCursor {
   uint32_t depth_ = 0;      // level of that cell
   const ColorTier* region_tier_ = nullptr;
   ColorRegion region_;
-  uint32_t group_level_ = kNone;  // of the cells whose parents are below; a group is a cube
-  uint64_t group_code_ = 0;
-  uint64_t starts_[64] = {};  // by parent: number of the region's cells before the parent's
-  uint32_t masks_[64] = {};
+  // The current group; see stored_index().
+  uint32_t group_level_ = kNone;  // level of the group's cells
+  uint64_t group_code_ = 0;       // Morton code of the group's cube
+  uint64_t starts_[64] = {};      // by parent: number of the region's cells before its children
+  uint32_t masks_[64] = {};       // by parent: mask of its children
 };
 
 }  // namespace voxdag_reader

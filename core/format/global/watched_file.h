@@ -1,5 +1,6 @@
-// Protects work on a mapped file. A truncated file, or a failing disk, would end the process with
-// SIGBUS. While the file is watched, unreadable pages are zeros, and the work fails with an error.
+// Protects work on a mapped file. Without it, a truncated file or a failing disk would end the
+// process with SIGBUS. While the file is watched, unreadable pages read as zeros, and
+// check_readable() reports them as an error.
 #pragma once
 
 #include "core/base/error.h"
@@ -14,16 +15,17 @@ class WatchedFile {
   explicit WatchedFile(const voxdag_reader::File& file)
       : file_(file), mapping_(file.data(), file.file_bytes()) {}
 
-  // Throws Error{kIo} if a part of the file could not be read since construction. Results made from
-  // the file must then be discarded.
+  // Throws Error{kIo} if a part of the file could not be read since this object was created.
+  // Results made from the file must then be discarded.
   void check_readable() const {
     if (mapping_.is_damaged())
       throw Error(ErrorCode::kIo,
                   file_.path() + ": it became shorter, or its disk failed, while it was read");
   }
 
-  // Returns the result of work(), which must call check_readable() before it publishes a result.
-  // Errors of work() may be caused by pages of zeros.
+  // Returns the result of work(). If work() throws an Error, it may be caused by pages of zeros;
+  // run() then throws the error of check_readable() instead. work() must call check_readable()
+  // before it publishes a result.
   template <class Work>
   auto run(const Work& work) const {
     try {
