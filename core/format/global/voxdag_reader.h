@@ -21,8 +21,7 @@
 // no access leaves the mapping. verify_checksums() compares all data with its checksums.
 //
 // The file is mapped, or read into memory if mmap fails or Access::kRead is requested. A mapped
-// file must not be truncated while it is open. A File is immutable: any number of threads may use
-// it.
+// file must not be truncated while it is open. A File is immutable; any thread may use it.
 #pragma once
 
 #include <fcntl.h>
@@ -186,8 +185,7 @@ class File {
   // Return the size of the file in bytes, and its bytes.
   uint64_t file_bytes() const { return bytes_->size(); }
   const unsigned char* data() const { return bytes_->data(); }
-  // Drops the resident pages of a mapped file, for programs with little memory. They are loaded
-  // again when they are used.
+  // Drops the resident pages of a mapped file, for programs with little memory.
   void release_pages() const { bytes_->release_pages(); }
   // Returns the low corner of the grid in world space.
   const double (&origin() const)[3] { return origin_; }
@@ -200,8 +198,7 @@ class File {
   uint32_t brick_level() const { return grid_levels_ - 2; }
   // Returns the version of the format: 1, or 2 if the file has wide levels or attributes.
   uint32_t version() const { return version_; }
-  // Returns the number of bits of the node hash, 4 to 64. The nodes of a level are ordered by this
-  // hash.
+  // Returns the number of bits of the node hash, 4 to 64; the hash orders the nodes of a level.
   uint32_t hash_bits() const { return hash_bits_; }
   // Return the numbers of set voxels, of nodes of the octree that the DAG represents, and of nodes
   // of the DAG. Bricks count as nodes.
@@ -212,8 +209,7 @@ class File {
   // `l` is 0 (the root) to brick_level().
   const Level& level(uint32_t l) const { return levels_[l]; }
   // Returns the byte offset of the checksum table. The bytes between the header page (4096 bytes)
-  // and the table are divided into checksum blocks of 64 KiB. The table has one XXH64 for each
-  // block.
+  // and the table are cut into checksum blocks of 64 KiB. The table has the XXH64 of each block.
   uint64_t checksum_table_offset() const { return table_offset_; }
 
   // Returns the mask of the 64 voxels of the brick at word `offset` of level brick_level(). Throws
