@@ -1,13 +1,14 @@
 # voxdag in a container, on the CPU:
 #     docker build -t voxdag .
 #     docker run --rm -v "$PWD:/data" --user "$(id -u):$(id -g)" voxdag build scene.glb -r 4096 -o scene.vdag
-# or as the service, with tokens made by `voxdag token` (docs/operating.md):
+# The service, with tokens made by `voxdag token` (docs/operating.md):
 #     docker run -d -p 127.0.0.1:8080:8080 -v voxdag:/data -v "$PWD/tokens:/tokens:ro" voxdag
-# On a CUDA base (12 or later), which lets a build that finds nvcc use it:
+# With the CUDA backend, on base images that contain CUDA 12 or later (the build finds nvcc in
+# them):
 #     docker build --build-arg BUILD_BASE=nvidia/cuda:12.6.3-devel-ubuntu24.04 \
 #                  --build-arg RUN_BASE=nvidia/cuda:12.6.3-base-ubuntu24.04 -t voxdag:cuda .
-# Both bases must be the same distribution. `tools/check-image` builds and tries this file without a
-# registry, on a base made by debootstrap.
+# Both base images must have the same distribution. `tools/check-image` builds and tests this file
+# without a registry, on a base image made by debootstrap.
 ARG BUILD_BASE=debian:bookworm-slim@sha256:3783cc01769c7b2b1b83a5c5ad96c815348e28ed7da68e2e3687004faa906251
 ARG RUN_BASE=debian:bookworm-slim@sha256:3783cc01769c7b2b1b83a5c5ad96c815348e28ed7da68e2e3687004faa906251
 
@@ -30,8 +31,8 @@ LABEL org.opencontainers.image.title="voxdag" \
       org.opencontainers.image.version="${VERSION}" \
       org.opencontainers.image.licenses="Apache-2.0"
 COPY --from=build /out/packages /usr/share/voxdag/packages
-# The packages are those of the libraries the program was linked with: exactly as new as them. The
-# client commands verify certificates, which takes the authorities'.
+# Installs the packages of the libraries with which the program was linked. ca-certificates lets the
+# client commands verify a service's certificate.
 # hadolint ignore=DL3008
 RUN apt-get update \
     && xargs -a /usr/share/voxdag/packages apt-get install -y --no-install-recommends ca-certificates \
@@ -45,5 +46,5 @@ WORKDIR /data
 EXPOSE 8080
 HEALTHCHECK --interval=30s --timeout=10s CMD ["voxdag", "health"]
 ENTRYPOINT ["voxdag"]
-# The network is behind that address, so tokens are needed: docs/operating.md.
+# The service listens on all addresses of the container, so it requires tokens: docs/operating.md.
 CMD ["serve", "--listen", "0.0.0.0", "--data", "/data", "--tokens", "/tokens"]

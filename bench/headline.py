@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Whole builds: the release build of the program, default options, empty work folders.
+"""Measures complete builds: the release build of voxdag, default options, empty work folders.
 
-Each case is built several times, and medians are shown; cases that take more than a minute are
-built once. `plot` draws the values of --json.
+Each case is built several times, and medians are printed; cases that take more than a minute are
+built once. `tools/bench plot` draws the figures that --json prints.
 
 With --study FOLDER, an optional external reference program (see study.py) runs before every build.
 The ratio is CPU seconds of the whole `voxdag build` (reading, artifacts, merge, final file) divided
@@ -92,8 +92,9 @@ def summary(case, runs, reports, references):
 
 
 def growth(cases):
-    """By scene, over its smallest to its largest resolution: the factor of CPU time and of DAG
-    nodes per doubling, as geometric means."""
+    """Returns a row for each scene: the factors by which CPU time, voxels, DAG nodes and file bytes
+    grow when the resolution doubles, as geometric means from its smallest to its largest
+    resolution."""
     grown = []
     for scene in dict.fromkeys(case["scene"] for case in cases):
         own = sorted((c for c in cases if c["scene"] == scene), key=lambda c: c["resolution"])

@@ -1,7 +1,7 @@
-"""Shared by the benchmarks: running a command and measuring it, whole builds, tables.
+"""Functions for the benchmarks: measure a command or a complete build, and print tables.
 
-CPU time is user + system time of the whole process tree, wall time from start to exit, peak memory
-the largest resident set of any process of the tree.
+CPU time is the user and system time of the complete process tree. Wall time is the time from start
+to exit. Peak memory is the largest resident set of any process of the tree.
 """
 
 import contextlib

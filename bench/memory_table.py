@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Peak memory under a small budget, and the same bytes as with a large one.
+"""Checks that a small memory budget is kept, and that the file is the same as with a large budget.
 
 `--memory` guarantees that the resident set never exceeds the budget plus 64 MiB. Each case is built
 under its small budget and under 8 GiB; both peaks (VmHWM from the build's report and the system's

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Estimates of `plan` compared with what builds take, scene by scene.
+"""Compares the estimates of `plan` with the actual values of builds, scene by scene.
 
-Voxels should come within 25 %; disk at its peak, peak memory and the bytes of the DAG within a
-factor of 2. Peak disk use is sampled during the build. Exits 1 if an estimate is out of bounds.
+An estimate of the number of voxels may be wrong by a factor of 1.25, an estimate of peak disk use,
+peak memory or file size by a factor of 2. Peak disk use is sampled during the build. The exit
+status is 1 if an estimate is out of bounds.
 """
 
 import argparse

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Time and DAG size over the resolution, from the JSON of `headline`, as a PNG.
+"""Draws CPU time and DAG size over the resolution as a PNG, from the JSON of `headline`.
 
     tools/bench headline --json headline.json
     tools/bench plot headline.json headline.png

@@ -1,4 +1,4 @@
-"""The scenes of the benchmarks: files of a folder, and a hairball that is generated on demand."""
+"""The scenes of the benchmarks: files in a folder, and a hairball that is generated if needed."""
 
 import importlib.util
 import json
@@ -21,7 +21,8 @@ def can_make_hairball(options):
 
 
 def hairball(options, folder):
-    """A million slivers: --hairball, or generated in `folder` by a script next to the scenes."""
+    """Returns a scene of a million slivers: the file of --hairball, or a file that a script next to
+    the scenes generates in `folder`."""
     if options.hairball:
         return options.hairball
     path = folder / f"{HAIRBALL}.glb"

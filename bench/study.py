@@ -1,8 +1,8 @@
-"""An optional reference: an external program that builds a DAG in memory, given by --study FOLDER.
+"""Runs an optional reference program that builds a DAG in memory, given by --study FOLDER.
 
-The folder is not part of this repository; the benchmarks run without it. It contains C++ sources of
-one program, with main() in bench.cpp, that is called as `study MESH.obj LEVELS` and prints one
-line:
+The folder is not part of this repository; the benchmarks run without it. It contains the C++
+sources of one program, with main() in bench.cpp. The program is called as `study MESH.obj LEVELS`
+and prints one line:
 
     BUILD cpu SECONDS s (wall SECONDS) | voxels COUNT ... dag COUNT nodes
 
@@ -18,10 +18,11 @@ from pathlib import Path
 from measure import run
 from scenes import HAIRBALL, glb_to_obj
 
-# Scenes of which the folder has a mesh, with the name of the mesh.
+# Scenes whose mesh is in the folder, with the mesh's name.
 MESHES = {"sponza": "sponza", "dragon_100k": "dragon"}
 
-# The reference snaps vertices a little differently: its counts only show that the work was equal.
+# The reference program snaps vertices a little differently, so its counts may differ from voxdag's
+# by these fractions. The comparison only shows that both programs did the same work.
 VOXELS_WITHIN = 0.005
 NODES_WITHIN = 0.03
 

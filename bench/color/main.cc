@@ -1,10 +1,10 @@
-// Measures the cost of a color: the rule and the encoding, on one core, for a generated scene.
+// Measures the CPU time that colors cost: the rule and the encoding, on one core.
 //
 //     bench_color [K]
 //
-// A wavy, tilted sphere in a color grid of K^3 cells (default 1024), with an image of 1024^2
-// texels, is baked region by region as in a build. Prints the nanoseconds of CPU time per colored
-// cell, the least of three runs.
+// The scene is a generated wavy, tilted sphere with an image of 1024^2 texels, in a color grid of
+// K^3 cells (default 1024). It is baked region by region as in a build. Prints nanoseconds of CPU
+// time per colored cell, the minimum of three runs.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -62,7 +62,8 @@ struct Image {
   }
 };
 
-// Returns the point of the sphere at these fractions of its two circles.
+// Returns the point of the sphere at `along` (fraction of a parallel) and `up` (fraction of a
+// meridian).
 std::array<int64_t, 3> point_at(const ColorGrid& grid, double along, double up) {
   const double edge = static_cast<double>(uint64_t{kUnitsPerVoxel} << grid.levels);
   const double angle = 2 * M_PI * along, height = M_PI * up;
@@ -96,7 +97,8 @@ std::vector<FixedSurface> sphere(const ColorGrid& grid) {
   return surfaces;
 }
 
-// Returns the surfaces of each region that their boxes reach.
+// Returns the surfaces by region, in Morton order of the regions. A surface is listed for each
+// region that its bounding box touches.
 std::vector<std::vector<FixedSurface>> by_region(const ColorGrid& grid) {
   const uint32_t level = grid.region_level();
   std::vector<std::vector<FixedSurface>> regions(size_t{1} << 3 * level);

@@ -37,7 +37,7 @@ struct Arguments {
 // Cells with the triangles near them.
 struct Neighborhood {
   std::vector<FixedSurface> surfaces;
-  std::vector<std::vector<uint32_t>> near;  // of each cell: indices of surfaces
+  std::vector<std::vector<uint32_t>> near;  // per cell: indices of the surfaces near it
 };
 
 Neighborhood find_surfaces(TriangleSource& scene, const Grid& grid, const SampledCells& cells) {

@@ -1,5 +1,5 @@
 // The scene's appearance for the oracle: decoded images, materials and surfaces. It shares only the
-// scene readers and the image decoders with the product.
+// scene readers and the image decoders with voxdag's own code for colors.
 #pragma once
 
 #include <memory>

@@ -73,8 +73,8 @@ void test_octants(benchmark::State& state, const Kernels* k) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * kTriangles));
 }
 
-// Items are bricks. Arguments are the length and width of triangles in voxels: as in a scan, as in
-// a wall, and slivers.
+// Items are bricks. Arguments are the length and the width of the triangles in voxels: triangles of
+// a scan, triangles of a wall, and slivers.
 BENCHMARK_CAPTURE(draw, avx512, avx512_kernels())->Args({32, 32})->Args({512, 512})->Args({64, 1});
 BENCHMARK_CAPTURE(draw, avx2, avx2_kernels())->Args({32, 32})->Args({512, 512})->Args({64, 1});
 BENCHMARK_CAPTURE(draw, portable, &portable_kernels())

@@ -1,4 +1,4 @@
-// Speed of the merge and of its steps: rows of all runs per CPU second.
+// Measures the speed of the merge and of its steps, in rows (of all runs) per CPU second.
 #include <benchmark/benchmark.h>
 
 #include <filesystem>
@@ -45,7 +45,7 @@ Fixtures& fixtures() {
   return all;
 }
 
-// The whole merge, including the global file. Arguments: runs, memory in MiB.
+// The complete merge, including writing the global file. Arguments: number of runs, memory in MiB.
 void BM_Merge(benchmark::State& state) {
   const SyntheticRuns& runs = fixtures().of(static_cast<size_t>(state.range(0)));
   MergeInputs inputs;
@@ -97,7 +97,7 @@ class SliceRows {
   uint64_t row_, end_, word_;
 };
 
-// One level in memory: the steps of a merge without output files.
+// One level of all runs in memory, for the steps of a merge that write no file.
 class OneLevel {
  public:
   OneLevel(size_t runs, uint32_t levels_above_bricks)
@@ -207,7 +207,7 @@ class OneLevel {
   uint64_t total_ = 0;
 };
 
-// Arguments of the benchmarks below: runs, levels above the bricks.
+// Arguments of this benchmark and the next ones: number of runs, levels above the bricks.
 void BM_Decode(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
   for (auto _ : state) level.decode();
@@ -231,8 +231,7 @@ void BM_MergeLevel(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
 }
 
-// Sorting a loaded partition into the total order: by buckets, and by a k-way heap merge of the
-// runs.
+// Sorts a loaded partition into the total order: by buckets, or by a k-way heap merge of the runs.
 template <bool kByHeap>
 void BM_SortPartition(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));

@@ -1,5 +1,5 @@
 // Synthetic artifacts for the benchmarks of the merge: runs of random bricks and nodes in the total
-// order. Many runs have some of them in common, as neighboring subvolumes have.
+// order. Runs share some of their nodes, as neighboring subvolumes do.
 #pragma once
 
 #include <algorithm>
@@ -12,9 +12,9 @@
 
 namespace voxdag {
 
-// A block is a small DAG, and a run consists of blocks. Two runs that contain the same block have
-// its nodes in common. Children are random within the block, because real nodes are in the order of
-// their hashes.
+// A run consists of blocks; a block is a small DAG. Two runs that contain the same block share its
+// nodes. The children of a node are random nodes of its block, because real nodes are in the order
+// of their hashes.
 class SyntheticRuns {
  public:
   static constexpr uint32_t kLevels = 5;  // of nodes, above the bricks

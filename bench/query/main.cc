@@ -1,10 +1,11 @@
-// Measures the speed of queries on one core, with the file in memory: of this library, of a plain
-// loop over the reader, and, if they are installed, of OpenVDB and OctoMap on the same cells.
+// Measures the speed of queries on one core, with the file in memory. It compares this library, a
+// plain loop over the reader, and OpenVDB and OctoMap (if they are installed) on the same cells.
 //
 //     bench_query [--levels N] [--picture EDGE] FILE.vdag...
 //
-// --levels: queries the grid of 2^N cells per edge (default: the file's); rays stop at its cells.
-// --picture: casts rays through the pixels of a square picture of that edge (default: 1024).
+// --levels: the queries use the grid of 2^N cells per edge (default: the file's grid), and rays
+// stop at its cells. --picture: casts rays through the pixels of a square picture with this edge
+// (default: 1024).
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -25,7 +26,8 @@ constexpr size_t kReaderBoxes = 20;
 // OctoMap takes some 5 GB for Sponza on a grid of 2048^3.
 constexpr uint32_t kMaxOtherLevels = 11;
 
-// `expected` is the first library's result, if both libraries should have the same result.
+// `expected` is the first library's timing if both libraries should find the same; a different
+// result is reported. Otherwise it is null.
 void print(const char* who, const char* what, const Timing& timing,
            const Timing* expected = nullptr) {
   std::printf("  %-22s %-22s %10.4f M/s   found %llu%s\n", who, what, timing.per_second / 1e6,

@@ -20,19 +20,19 @@ inline constexpr size_t kBoxes = 2000;
 inline constexpr int64_t kBoxEdge = 64;
 Region box_around(const QuerySet& queries, size_t i);
 
-// Returns `points` points of each kind in the grid of 2^grid_levels, and the rays through the
-// pixels of a square picture, in cells of this grid. The camera is at the placement that `voxdag
-// render` would choose.
+// Returns `points` uniform points and `points` set cells of the grid of 2^grid_levels cells per
+// edge, and the rays through the pixels of a square picture, in cells of this grid. The camera has
+// the position that `voxdag render` would choose.
 QuerySet make_queries(const DagFile& dag, uint32_t grid_levels, size_t points, int picture_edge);
 
-// The result of a benchmark, so that libraries can be compared, and its speed.
+// The speed of a benchmark, and a count by which the results of libraries are compared.
 struct Timing {
   double per_second = 0;
   uint64_t found = 0;
 };
 
-// The measurements of one library. `found` is, for lookups and rays, the number of them with a set
-// cell, and for dense boxes and counts, the number of all set cells.
+// The measurements of one library. For lookups and rays, `found` is the number of points or rays
+// with a set cell. For dense boxes and counts, it is the total number of set cells.
 struct Timings {
   Timing uniform, set_cells, rays, boxes, counts;
 };
@@ -40,7 +40,8 @@ struct Timings {
 // CPU time of this thread.
 double thread_seconds();
 
-// Returns the best of three runs by CPU time of this thread, with the result of run().
+// Calls run() three times. Returns the highest speed, by CPU time of this thread, and run()'s
+// result.
 template <class Run>
 Timing best_of_three(size_t items, const Run& run) {
   Timing best;
@@ -53,7 +54,7 @@ Timing best_of_three(size_t items, const Run& run) {
   return best;
 }
 
-// Runs over kBoxes boxes: make_box(i) fills `cells` with box i, z fastest.
+// Measures make_box(i) for kBoxes boxes. It fills `cells` with box i, z fastest.
 template <class MakeBox>
 Timing measure_boxes(const std::vector<uint8_t>& cells, const MakeBox& make_box) {
   Timing timing = best_of_three(kBoxes, [&] {

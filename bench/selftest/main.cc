@@ -1,5 +1,5 @@
-// voxdag-gpu-selftest compares the GPU's results with the CPU's and measures both. It needs only a
-// compiler (and CUDA) to build. See docs/gpu.md.
+// voxdag-gpu-selftest compares the GPU backend's results with the CPU backend's, and measures the
+// speed of both. To build, it needs only a compiler (and CUDA). See docs/gpu.md.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

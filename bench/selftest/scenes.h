@@ -16,10 +16,10 @@ struct Scene {
   std::vector<FixedTriangle> triangles;
 };
 
-// Small scenes of every kind that is difficult to voxelize exactly, in and around `cube`: mixed and
-// degenerate triangles, slivers, triangles smaller than a voxel, walls, planes of 45 degrees
-// through voxel corners, triangles that span the cube, and vertices at the limit of the
-// coordinates.
+// Returns `count` small scenes in and around `cube`, of every kind that is difficult to voxelize
+// exactly: mixed and degenerate triangles, slivers, triangles smaller than a voxel, walls, planes
+// of 45 degrees through voxel corners, triangles that span the cube, and vertices at the limit of
+// the coordinates.
 std::vector<Scene> tricky_scenes(uint64_t seed, const Cube& cube, uint32_t grid_levels, int count);
 
 // A surface like a scanned one: about `triangles` small triangles on a bumpy ball that fills the

@@ -45,8 +45,8 @@ class Maker {
     for (auto& v : t.v) v[axis] = t.v[0][axis];
     return t;
   }
-  // The vertices are corners of voxels, all moved by the same unit, so planes and edges of 45
-  // degrees meet voxels in their corners.
+  // A triangle whose vertices are corners of voxels, all moved by the same number of units. So
+  // planes and edges of 45 degrees touch voxels exactly at their corners.
   FixedTriangle diagonal() {
     FixedTriangle t;
     for (int a = 0; a < 3; ++a) {

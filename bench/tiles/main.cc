@@ -1,5 +1,5 @@
-// Compares tiles of different depths: the number of tiles and bytes that five pictures need, and
-// how fast one core encodes the tiles.
+// Compares tiles of different depths (numbers of levels): how many tiles and bytes five pictures
+// need, and how fast one core encodes the tiles.
 //
 //     bench_tiles [--size WxH] [--pixels P --views VIEWS] FILE.vdag
 //
@@ -7,13 +7,14 @@
 // by tile) that are needed
 //   - until no cell of the view `auto` is wider than 16 pixels,
 //   - until no cell is wider than one pixel, for each of five views and for all five together.
-// Then it encodes the last of these sets of tiles in random order, and prints sizes and speed:
-// first after the file was dropped from memory (if no other process keeps it there), then from
-// memory, then with checksum blocks that are compared at their first use, and then with blocks that
-// are already compared.
+//
+// Then it encodes the tiles of all five views in random order, and prints sizes and speeds for four
+// cases: after the file was dropped from memory (if no other process keeps it there), from memory,
+// with checksum blocks that are compared at their first use, and with checksum blocks that are
+// already compared.
 //
 // VIEWS is a file whose lines have a name and the camera options of `voxdag render`. With it, only
-// these views are measured, until no cell is wider than P pixels. The viewer's P is 0.75.
+// these views are measured, until no cell is wider than P pixels. The viewer uses P = 0.75.
 #include <fcntl.h>
 #include <unistd.h>
 #include <zlib.h>

@@ -1,6 +1,7 @@
 // Finds the tiles needed for a picture. A tile is needed if, without it, the first cell of some ray
-// would be coarser than requested. A tile has its own cells. The tile above it has the coarse
-// brick, with the cells down to two levels below the tile's root.
+// would be coarser than requested. A tile contains cells from three levels below its root on. The
+// cells one and two levels below the root are known from the tile above, as the root's coarse
+// brick.
 #pragma once
 
 #include <algorithm>
@@ -21,8 +22,8 @@ class NeededTiles {
   // Cells of up to `pixels` pixels are drawn without finer cells.
   NeededTiles(const DagView& dag, double pixels) : dag_(dag), pixels_(pixels) {}
 
-  // Returns the tiles for a picture, for each number of levels per tile, from 1: kMaxTileLevels + 1
-  // sets.
+  // Returns kMaxTileLevels + 1 sets: element d has the tiles that a picture needs with d levels per
+  // tile. Element 0 has only the root.
   std::vector<Addresses> find(const Placement& placement, int width, int height) {
     tiles_.assign(kMaxTileLevels + 1, {});
     for (Addresses& tiles : tiles_) tiles.insert({0, 0});
@@ -58,7 +59,8 @@ class NeededTiles {
     return span;
   }
 
-  // Records the tiles that contain the children of the cell at `level` on the current path.
+  // Records, for each depth, the tile that is needed to know the children of the cell at `level` on
+  // the current path.
   void mark(uint32_t level) {
     if (level < 2) return;  // known with the first tile
     const uint32_t bricks = dag_.grid_levels() - 2;

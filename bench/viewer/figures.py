@@ -1,4 +1,5 @@
-"""Figures of the viewer's measurements: memory and time of processes, sums, differences."""
+"""Computes figures for the measurements of the viewer: memory and time of processes, sums of
+requests, and differences of pictures."""
 
 import contextlib
 import mmap
@@ -30,7 +31,7 @@ def resident(pid, which="VmRSS"):
 
 
 def descendants(kind):
-    """Those of this process that are of a kind of the browser's."""
+    """Returns the pids of this process's descendants that are browser processes of this kind."""
     parents, commands = {}, {}
     for folder in Path("/proc").iterdir():
         with contextlib.suppress(OSError, ValueError):
@@ -70,7 +71,8 @@ def row(done):
 
 
 def sums(requests):
-    """The nodes of the requested tiles, and the bytes of the page, the manifest and the tiles."""
+    """Returns the addresses of the requested tiles ("LEVEL.OFFSET"), and the received bytes of the
+    page, the manifest and the tiles."""
     tiles, bytes_of = set(), {"page": 0, "manifest": 0, "tiles": 0}
     for address, _, _, size in requests:
         if single := re.search(r"/tiles/(\d+)/(\d+)\?", address):
@@ -88,7 +90,8 @@ def sums(requests):
 
 
 def places_of(files, text):
-    """How many tiles, at how many places, the rays of a picture went through."""
+    """Returns how many different tiles the rays of a picture traversed, and at how many positions
+    in the grid. `text`: the finest cells of tiles that rays reached, as "LEVEL,X,Y,Z" words."""
     places = set()
     for place in text.split():
         level, *at = map(int, place.split(","))
@@ -120,7 +123,8 @@ def describe(histogram):
 
 
 def compared(depths, reference, ours, its):
-    """Brightness difference of the pixels that hit, in total and in regions of 8 x 8."""
+    """Returns the brightness difference of the pixels that hit the scene, for the complete picture
+    and for 8 x 8 regions of it."""
     ours_hit, its_hit = np.isfinite(depths), np.isfinite(reference)
     both, off = ours_hit & its_hit, (ours - its).mean(axis=2)
     regions = []

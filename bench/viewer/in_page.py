@@ -1,19 +1,20 @@
-"""What the measurement of the viewer runs in its page."""
+"""JavaScript functions that the measurement runs in the viewer's page."""
 
-# The browser keeps 250 entries otherwise.
+# By default the browser keeps only 250 entries.
 KEEP_ENTRIES = "performance.setResourceTimingBufferSize(200000);"
 
-# A slow and busy machine would draw a large picture in very many small parts. Ambient occlusion
-# needs no tiles.
+# Draws pictures in large parts; a slow, busy machine would otherwise draw very many small parts.
+# Switches ambient occlusion off, because it needs no tiles.
 IN_LARGE_PARTS = """() => {
   const {viewer, renderer} = window.voxdagViewer;
   Object.defineProperty(renderer.pace, "partPixels", {get: () => 1 << 19, set() {}});
   viewer.setOptions({occlusion: false});
 }"""
 
-# Seconds from the beginning of the view until it is complete: two pictures in a row lack no tile.
-# Within a scene the sun then moves to its final position; `done` waits for that. `camera`: null for
-# the camera in the address.
+# Returns the seconds from the beginning of the view until it is complete, that is, until no tile is
+# missing in two pictures in a row. In a view within the scene, the sun then moves to its final
+# position; with `done`, the function also waits for that. `camera` is null for the camera in the
+# page's address.
 UNTIL_COMPLETE = """async ([camera, done]) => {
   const {viewer, renderer} = window.voxdagViewer,
                  frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
@@ -39,7 +40,8 @@ UNTIL_COMPLETE = """async ([camera, done]) => {
   };
 }"""
 
-# [address, when it began and ended in ms, bytes as sent] of the requests from number `from` on.
+# Returns a list for each request from number `from` on: address, start and end in ms, bytes as
+# sent.
 REQUESTS = """(from) =>
     [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")]
         .slice(from)
@@ -47,8 +49,9 @@ REQUESTS = """(from) =>
             (e) => [e.name, e.startTime, e.responseEnd,
                     e.transferSize > 0 ? e.encodedBodySize : 0])"""
 
-# Statistics of all rays of the picture: a histogram of steps, the share that hits, the widest cell
-# in pixels, and the places of the finest tiles that they end in, as level and position.
+# Returns statistics of all rays of the picture: a histogram of their steps, the fraction of rays
+# that hit, the width in pixels of the widest cell, and the level and position of the finest tile in
+# which each ray ends.
 HITS = """async () => {
   const {renderer} = window.voxdagViewer, {info, view, context: {passes}} = renderer,
         {width, height} = renderer.size;
@@ -77,8 +80,8 @@ HITS = """async () => {
   return {steps, hits: hits / (width * height), widest, places: [...places].join(" ")};
 }"""
 
-# Histograms of the steps of the rays to the sun and to the sky, and the milliseconds of each pass,
-# all of one sample.
+# Returns, for one sample of the picture, histograms of the steps of the rays to the sun and to the
+# sky, and the milliseconds of each rendering pass.
 LIGHT_STEPS = """async () => {
   const {Program} = await import("/viewer/gl/gl_objects.js");
   const {kLight, kOcclusion} = await import("/viewer/gl/picture_shaders.js");
@@ -147,8 +150,8 @@ LIGHT_STEPS = """async () => {
   return {sun: histogram(sunRays), sky: histogram(skyRays), passMs};
 }"""
 
-# Draws `count` frames with all pixels of the canvas while the camera turns there and back. Returns
-# how long that took.
+# Draws `count` frames with all pixels of the canvas while the camera turns to one side and back.
+# Returns the duration in seconds and statistics.
 FRAMES = """async ([count, width, height]) => {
   const {viewer, renderer} = window.voxdagViewer,
                  frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
@@ -165,7 +168,8 @@ FRAMES = """async ([count, width, height]) => {
   return {wall_s, stepsMean, internalWidth, internalHeight, loading};
 }"""
 
-# A way through all cameras and back: each leg takes `leg_s`, a quarter of it at rest at its end.
+# Moves the camera through all cameras in turn, and then from the first again. Each leg takes `legS`
+# seconds; in the last quarter the camera does not move.
 FLIGHT = """([cameras, legS]) => {
   const {viewer} = window.voxdagViewer,
         numbers = cameras.map((text) => text.match(/-?[0-9.]+(?:e-?[0-9]+)?/g).map(Number));
@@ -183,7 +187,7 @@ FLIGHT = """([cameras, legS]) => {
   step();
 }"""
 
-# Milliseconds since the request for the page; null before the first picture.
+# Returns times in milliseconds since the request for the page; null before the first picture.
 FIRST = """() => {
   const {renderer} = window.voxdagViewer ?? {};
   if (renderer?.measured.firstPictureMs == null) return null;

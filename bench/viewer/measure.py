@@ -1,21 +1,23 @@
 #!/usr/bin/env python3
-"""What the viewer costs, in headless Chromium with WebGL on the CPU.
+"""Measures the cost of the viewer, in headless Chromium with WebGL on the CPU.
 
     bench/viewer/measure.py views FILE.vdag [--budget MIB]
+    bench/viewer/measure.py session FILE.vdag [--budget MIB]
     bench/viewer/measure.py pictures FILE.vdag
     bench/viewer/measure.py frames FILE.vdag --other WEB
     bench/viewer/measure.py first FILE.vdag
     bench/viewer/measure.py flight FILE.vdag --seconds 600
 
-- views: bytes, tiles, seconds, steps of the cameras, each in a separate browser; then all in one
-- pictures: compared with `voxdag render`
-- frames: CPU time of a frame, also of the server/web folder of another version
+- views: bytes, tiles, seconds and ray steps of each camera, in a separate browser; then `session`
+- session: the same figures for all cameras in one page, one after the other
+- pictures: differences from the pictures of `voxdag render`
+- frames: CPU time of a frame, also for another version of the viewer (WEB is its server/web folder)
 - first: the times of the first picture
-- flight: memory, sampled every ten seconds
+- flight: memory during a flight through the cameras, sampled every ten seconds
 
---cameras takes a file with lines of a name and the camera options of `voxdag render`, as sponza.txt
-here; without it, named views. Bytes, tiles and steps do not depend on the load of the machine; the
-other figures do, so the load is printed. Needs Playwright, numpy and Pillow.
+--cameras takes a file whose lines have a name and the camera options of `voxdag render`, such as
+sponza.txt in this folder. Without it, the script uses named views. Bytes, tiles and steps
+do not depend on the load of the machine; the other figures do, so the load is printed. Needs Playwright, numpy and Pillow.
 """
 
 import argparse
@@ -61,7 +63,7 @@ OPTIONS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
-WINDOW = (320, 50)  # of the window, beyond the canvas
+WINDOW = (320, 50)  # the window's width and height minus the canvas's
 NAMED_VIEWS = ("iso", "auto", "front", "top")
 STEP_MS = 600_000
 MIB = 1 << 20
@@ -156,7 +158,7 @@ class Measurement:
         self.session(asked)
 
     def session(self, asked):
-        """All cameras in one page, one after another."""
+        """Measures all cameras in one page, one after the other."""
         with self.server() as server, self.visitor() as visitor:
             before_s, seen, evicted = cpu_s(server.process.pid), 0, 0
             for i, (name, camera) in enumerate(self.cameras.items()):
@@ -223,7 +225,7 @@ class Measurement:
             )
 
     def frames(self):
-        """Measures both versions alternating, from files in a folder, with the tiles of one server.
+        """Measures both versions of the viewer alternately, with the tiles of one server.
         The cost of a frame is the CPU time of the browser's graphics process, which does not depend
         on the load."""
         own = Path(__file__).resolve().parent.parent.parent / "server" / "web"
@@ -349,7 +351,7 @@ class Measurement:
 
 @contextlib.contextmanager
 def served(folder, server_url):
-    """A server of the files of a version of the viewer, that asks another one for all else."""
+    """Serves the viewer's files from `folder`, and forwards all other requests to `server_url`."""
     kinds = {
         ".js": "text/javascript",
         ".css": "text/css",

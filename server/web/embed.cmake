@@ -1,6 +1,6 @@
-# cmake -DOUTPUT=embedded_files.cc -DROOT=server -DFILES="web/app.js;web/lib/dom.js" -P embed.cmake
-# Writes a source file with the bytes of the files. Their names are the paths without the first
-# folder: "app.js", "lib/dom.js".
+# Writes a source file that contains the bytes of FILES. Usage:
+#     cmake -DOUTPUT=embedded_files.cc -DROOT=server -DFILES="web/app.js;web/lib/dom.js" -P embed.cmake
+# The name of a file is its path without the first folder: "app.js", "lib/dom.js".
 set(arrays "")
 set(rows "")
 set(index 0)

@@ -11,7 +11,8 @@
 namespace voxdag {
 namespace {
 
-// Every subvolume has a separate schedule, and must leave no device memory behind.
+// Sets a separate schedule for every subvolume, and checks that its build releases all device
+// memory.
 class Checked : public Backend {
  public:
   explicit Checked(Method method) : backend_(make_cuda_backend(method)) {}

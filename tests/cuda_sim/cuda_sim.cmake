@@ -9,7 +9,7 @@ file(GLOB simulation_sources CONFIGURE_DEPENDS cuda_sim/sim/*.cc)
 set(program_sources cuda_sim/rules/programs.cc)
 set_source_files_properties(${cuda_sources} ${program_sources} PROPERTIES LANGUAGE CXX COMPILE_OPTIONS
   "-x;c++;-include;cuda_runtime.h;-fsanitize=thread;-D__CUDA_ARCH__=900;-Wno-unknown-pragmas")
-# Fibers jump to frames that a fortified longjmp() does not know.
+# A fortified longjmp() would reject jumps between the stacks of fibers.
 set_source_files_properties(cuda_sim/sim/thread_blocks.cc PROPERTIES COMPILE_OPTIONS
   "-U_FORTIFY_SOURCE")
 add_library(voxdag_cuda_sim STATIC ${cuda_sources} ${program_sources} ${simulation_sources})

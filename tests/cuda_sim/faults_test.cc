@@ -1,5 +1,5 @@
-// Each call of the runtime fails in turn, once: the outcome is right, or an error that names the
-// failure, and the backend is usable afterwards.
+// Failing calls of the CUDA runtime. Each call fails in turn, once. The build must then give the
+// right result, or an error that names the failure, and the backend must remain usable.
 #include "tests/cuda_sim/sim/faults.h"
 
 #include "core/base/error.h"
@@ -17,7 +17,8 @@ oracle::Triangles scene() {
   return oracle::make_scene(oracle::SceneKind::kSpanning, 5, oracle::region_of(kTask.cube, 6), 6);
 }
 
-// Builds with a failure of call number `skipped`; returns whether there is such a call.
+// Builds with a planned failure. Returns whether the failure happened, that is, whether the build
+// makes so many calls.
 bool build_with(Backend& backend, const cuda_sim::Fault& fault, const oracle::Dag& truth) {
   cuda_sim::plan_fault(fault);
   try {
@@ -47,7 +48,8 @@ oracle::Dag expected() {
   return oracle::build_dag(oracle::voxelize(scene(), oracle::region_of(kTask.cube, 6)), 64);
 }
 
-// A failure that passes is repaired by returning the pool's memory; a permanent one means a split.
+// If one allocation fails, the backend returns the pool's unused memory to the device and succeeds.
+// If all further allocations also fail, the backend requests a split.
 TEST_P(Faults, EveryAllocation) {
   const auto backend = open();
   const oracle::Dag truth = expected();
@@ -83,7 +85,8 @@ TEST_P(Faults, EveryRelease) {
   EXPECT_GT(n, 5u);
 }
 
-// A backend that cannot be opened says why, and the next one can.
+// If a call fails while a backend is opened, the error names the reason, and the next backend can
+// be opened.
 TEST_P(Faults, EveryCallOfOpening) {
   const oracle::Dag truth = expected();
   for (const cuda_sim::Fault& kind :

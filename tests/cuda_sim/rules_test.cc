@@ -16,7 +16,7 @@ TEST(SimulatedDevice, EndsProgramsThatBreakARule) {
     EXPECT_DEATH(program.run(), std::string("cuda_sim: .*") + program.violation) << program.name;
 }
 
-// Also by code that is not compiled as the backend's sources are.
+// The access is also found in code that is not instrumented, such as this test.
 TEST(SimulatedDevice, EndsAHostThatTouchesDeviceMemory) {
   testing::GTEST_FLAG(death_test_style) = "fast";
   EXPECT_DEATH(static_cast<void>(words_of_the_device()[0]), "the host touched device memory");
@@ -43,7 +43,7 @@ TEST(SimulatedDevice, CountsWhatIsNotReleased) {
   EXPECT_EQ(bytes_in_use(), 0u);
 }
 
-// What is uploaded may change, or be gone, when upload() has returned.
+// After upload() has returned, its source may change or be released.
 TEST(SimulatedDevice, UploadsAreWaitedFor) {
   set_schedule({true, 1});
   EXPECT_EQ(upload_then_change(0x0123456789abcdef), 0x0123456789abcdefu);

@@ -1,5 +1,5 @@
-# Enables the CUDA language if nvcc is found. Included by the root, so that every executable can link
-# the CUDA sources.
+# Enables the CUDA language if nvcc is found. The root CMakeLists.txt includes this file, so that
+# every executable can link the CUDA sources.
 option(VOXDAG_CUDA "Build the CUDA backend where nvcc is found" ON)
 set(VOXDAG_HAS_CUDA OFF CACHE INTERNAL "The CUDA backend is built")
 

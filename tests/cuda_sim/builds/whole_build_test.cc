@@ -1,5 +1,5 @@
-// Whole builds with --backend cuda on the simulated device: the scheduler's workers share it, and
-// the file is the CPU backend's, byte for byte, whatever fails on the way.
+// Complete builds with --backend cuda on the simulated device, which all workers of the scheduler
+// share. The file must equal the CPU backend's file, byte for byte, also after kills and failures.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -22,7 +22,8 @@ namespace {
 class SimulatedBuild : public testing::Test {
  protected:
   void SetUp() override {
-    // That these are called here makes the linker take all of the backend from the simulation.
+    // Because these functions are called here, the linker takes the complete backend from the
+    // simulation.
     ASSERT_EQ(cuda_device_count(), 1);
     ASSERT_EQ(make_cuda_backend()->name(), "cuda");
     GenerateOptions options;
@@ -73,7 +74,7 @@ TEST_F(SimulatedBuild, HasTheBytesOfTheCpuBackend) {
   }
 }
 
-// Killed at some operations on the disk, and resumed on the device or on the CPU.
+// A build is killed at some of its disk operations, and resumed on the device or on the CPU.
 TEST_F(SimulatedBuild, ResumesAfterAKill) {
   crash::FaultyFiles counting({});
   run(spec(BackendName::kCuda, MethodName::kDefault), counting);
@@ -104,8 +105,8 @@ TEST_F(SimulatedBuild, ResumesAfterAKill) {
   EXPECT_GT(kills, 0);
 }
 
-// A device that fails in the middle ends the build with an error that names it; the next build uses
-// the stored subvolumes.
+// If the device fails during the build, the build ends with an error that names the device. The
+// next build reuses the stored subvolumes.
 TEST_F(SimulatedBuild, SaysThatTheDeviceFailed) {
   cuda_sim::plan_fault({cuda_sim::Call::kOther, 2000, cudaErrorLaunchFailure, true});
   try {

@@ -1,4 +1,4 @@
-// What a CUDA compiler offers to kernels, for the simulated device.
+// The part of CUDA's language that kernels use, for the simulated device.
 #pragma once
 
 #include <cuda_runtime_api.h>

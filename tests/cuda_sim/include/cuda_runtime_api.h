@@ -1,5 +1,6 @@
-// The part of the CUDA runtime that core/backend/cuda calls, for the simulated device. The meaning
-// of each call is the runtime's; errors that hardware may tolerate are violations here.
+// The part of the CUDA runtime that core/backend/cuda calls, for the simulated device. Each call
+// has the same effect as in the CUDA runtime. Errors that hardware may tolerate are violations
+// here.
 #pragma once
 
 #include <cstddef>

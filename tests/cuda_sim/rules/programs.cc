@@ -11,7 +11,7 @@
 
 namespace voxdag::cuda {
 
-extern unsigned char block_memory[];  // the shared memory of the block that runs
+extern unsigned char block_memory[];  // the shared memory of the running block
 
 }  // namespace voxdag::cuda
 
@@ -24,7 +24,7 @@ namespace {
 
 constexpr uint32_t kWords = 1024, kBytes = kWords * sizeof(uint32_t);
 
-// A stream, and 4 KiB of device memory that are allocated in it.
+// A stream, and 4 KiB of device memory (the words) allocated in this stream.
 class Session {
  public:
   Session() {
@@ -204,7 +204,7 @@ void a_stream_is_used_after_its_end() {
   session.fill();
 }
 
-// 64 keys of 8 bytes are at the begin of the words, their second buffer behind them.
+// Sorts 64 keys of 8 bytes at the start of the session's words. The second buffer follows the keys.
 void sort(const Session& session, void* storage, size_t bytes) {
   auto* keys = reinterpret_cast<uint64_t*>(session.words());
   cub::DoubleBuffer<uint64_t> buffers(keys, keys + 64);
@@ -342,7 +342,7 @@ uint64_t upload_then_change(uint64_t value) {
 }
 
 const volatile uint32_t* words_of_the_device() {
-  static const Session session;  // for as long as the process runs
+  static const Session session;  // static, so that the memory is still allocated after the return
   session.fill();
   session.wait();
   device_memory().close_now();

@@ -1,6 +1,6 @@
-// Small programs for the simulated device: broken ones, each of which breaks one rule of CUDA, and
-// their sound counterparts. Compiled as the backend's sources are, so that what their kernels touch
-// is checked.
+// Small programs for the simulated device: broken programs, each of which breaks one rule of CUDA,
+// and correct programs. They are compiled like the backend's sources, so that the memory accesses
+// of their kernels are checked.
 #pragma once
 
 #include <cstdint>
@@ -16,11 +16,11 @@ struct BrokenProgram {
 };
 std::vector<BrokenProgram> broken_programs();
 
-// Every thread of some blocks writes a word of shared memory, passes a barrier and reads its
-// neighbor's word. Returns the words that were read: the neighbor's number in the block.
+// Every thread of the blocks writes its number in the block to a word of shared memory, passes a
+// barrier, and reads its neighbor's word. Returns the words that the threads read.
 std::vector<uint32_t> exchange_with_neighbors(uint32_t blocks, uint32_t threads);
 
-// The mailbox of a download as the host sees it: before and after the wait for the stream.
+// The host's target of a download, before and after the wait for the stream.
 struct DownloadedWord {
   uint32_t before = 0, after = 0;
 };
@@ -30,10 +30,10 @@ DownloadedWord download_word(uint32_t value);
 // arrived.
 uint64_t upload_then_change(uint64_t value);
 
-// Device memory, which has no access rights when this returns.
+// Returns device memory, after removing its access rights.
 const volatile uint32_t* words_of_the_device();
 
-// Allocates without a release, and returns the bytes that remain in use.
+// Allocates device memory and does not release it. Returns the bytes that remain in use.
 uint64_t forget_an_allocation();
 
 }  // namespace voxdag::cuda_sim

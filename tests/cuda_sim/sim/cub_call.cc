@@ -22,7 +22,7 @@ struct Range {
     return begin < at + other_bytes && at < begin + bytes;
   }
 };
-// State of the running call.
+// The storage of the running call, and the inputs that it has declared so far.
 Range g_storage;
 std::vector<Range> g_read;
 

@@ -14,7 +14,7 @@
 namespace voxdag::cuda_sim {
 namespace {
 
-// Zero-filled pages that cost nothing until they are touched.
+// Maps zero-filled pages. Each page uses memory only after its first access.
 void* map_pages(uint64_t bytes, int rights) {
   void* pages = mmap(nullptr, bytes, rights, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (pages == MAP_FAILED) {
@@ -85,7 +85,7 @@ void DeviceMemory::reset() {
   end_quarantine(0);
 }
 
-// Adjacent free ranges become one.
+// Frees the oldest ranges until `allowed` ranges are in quarantine. Joins adjacent free ranges.
 void DeviceMemory::end_quarantine(size_t allowed) {
   for (; quarantine_.size() > allowed; quarantine_.pop_front()) {
     auto [begin, count] = quarantine_.front();
@@ -118,7 +118,7 @@ void DeviceMemory::close_now() {
   closed_ = true;
 }
 
-// The allocation of the current device that contains the complete range.
+// Returns the current device's allocation that contains the complete range, or null.
 const DeviceMemory::Life* DeviceMemory::life_at(const void* p, uint64_t bytes) const {
   const uint64_t at = offset(p);
   if (at >= kBytes) return nullptr;
@@ -162,7 +162,7 @@ void DeviceMemory::mark_written(void* p, uint64_t bytes) {
   std::memset(written_ + offset(p), 1, bytes);
 }
 
-// Chunks that nobody wrote since they were spoiled have nothing to spoil.
+// Skips chunks that were not written since they were last spoiled, because they still contain junk.
 void DeviceMemory::spoil(void* p, uint64_t bytes) {
   const uint64_t begin = offset(p), end = begin + bytes;
   for (uint64_t chunk = begin / kChunk; chunk * kChunk < end; ++chunk) {
@@ -218,7 +218,7 @@ void DeviceMemory::kernel_atomic(void* p, uint64_t bytes, uint32_t first) {
 }
 
 DeviceMemory& device_memory() {
-  static DeviceMemory& memory = *new DeviceMemory;  // outlives all that may be released late
+  static DeviceMemory& memory = *new DeviceMemory;  // never deleted: static objects use it at exit
   return memory;
 }
 

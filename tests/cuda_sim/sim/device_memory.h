@@ -1,12 +1,14 @@
-// The memory of all simulated devices: one range of addresses that has no access rights while the
-// host runs, and in which every byte is known to be allocated or not, written or not.
+// The memory of all simulated devices: one range of addresses. The state of every byte is known:
+// whether it is allocated, and whether it was written. The range has no access rights while the
+// host runs.
 //
-//   1. Each allocation has separate pages. It lives from the moment its allocation executes in
-//      stream order until its release does, and can be used by its device only.
-//   2. Reading a byte that was never written is a violation, so what fresh memory contains does not
-//      matter. Released memory is junk immediately, and its addresses are reused late.
-//   3. Two threads of a launch that are not ordered write no byte twice, and read none that the
-//      other wrote, unless both use atomics.
+//   1. Each allocation has separate pages, and can be used only by its device. It exists from the
+//      moment its allocation runs in its stream until its release runs.
+//   2. Reading a byte that was never written is a violation, so the initial contents of an
+//      allocation do not matter. Released memory is filled with junk immediately. Its addresses are
+//      reused as late as possible.
+//   3. It is a violation if two threads of one launch write the same byte, or if one of them writes
+//      a byte and the other reads it afterwards, unless both use atomics.
 //
 // Not thread-safe: callers hold the lock of streams.h.
 #pragma once
@@ -36,27 +38,30 @@ class DeviceMemory {
   // Ends all lives.
   void reset();
 
-  // Gives access for operations of a device, and revokes it: for instrumented code of the backend's
-  // sources every time, for all code one time in kCloseOneOf, because that is slow.
+  // open() gives access to operations of a device, close() revokes it. The instrumented sources of
+  // the backend see this every time. For all other code, close() removes the access rights of the
+  // pages; it does so for only one of kCloseOneOf calls, chosen at random, because that is slow.
   void open(int device);
   void close();
   bool is_open() const { return open_; }
-  // Takes it away from all code.
+  // Removes the access rights immediately, for all code.
   void close_now();
 
-  // For operations other than kernels: ranges that they read and write. `what` begins the message.
+  // Checks and state changes for operations other than kernels, which read or write a range. `what`
+  // is the beginning of the message of a violation.
   void expect_allocated(const void* p, uint64_t bytes, const std::string& what) const;
   void expect_written(const void* p, uint64_t bytes, const std::string& what) const;
   void mark_written(void* p, uint64_t bytes);
-  // Overwrites a range with junk, never written from then on.
+  // Fills a range with junk, which counts as never written.
   void spoil(void* p, uint64_t bytes);
-  // What is known about the bytes of one range becomes known about another.
+  // Copies the state of the bytes of one range (whether each was written) to another range.
   void copy_state(const void* from, void* to, uint64_t bytes);
 
-  // For kernels. Thread `writer` of a launch; its threads' numbers begin with `first`.
+  // Checks an access by a kernel's thread. `writer` is the thread's number (thread_blocks.h),
+  // `first` the number of the first thread of its launch.
   void kernel_read(const void* p, uint64_t bytes, uint32_t first, uint32_t writer);
   void kernel_write(void* p, uint64_t bytes, uint32_t first, uint32_t writer);
-  // For a launch whose numbers begin at 1 again.
+  // Call it before a launch whose thread numbers begin at 1 again: forgets the threads that wrote.
   void forget_writers();
   void kernel_atomic(void* p, uint64_t bytes, uint32_t first);
 
@@ -67,8 +72,8 @@ class DeviceMemory {
   };
   static constexpr uint32_t kCloseOneOf = 2048;
   static constexpr uint64_t kGuardPages =
-      16;  // behind each allocation, plus the rest of its last page
-  static constexpr uint64_t kChunk = 16384;      // cleaned per step
+      16;  // unused pages behind each allocation; the rest of its last page is also unused
+  static constexpr uint64_t kChunk = 16384;      // bytes for which dirty_ has one entry
   static constexpr size_t kQuarantineSize = 64;  // released ranges that wait for their next use
   static constexpr uint8_t kJunk = 0xdb;
 
@@ -81,14 +86,14 @@ class DeviceMemory {
 
   uint64_t base_ = 0;
   bool open_ = false, closed_ = true;
-  int device_ = 0;                   // that operates now
-  std::vector<uint32_t> page_life_;  // of each page: position in lives_ + 1
+  int device_ = 0;                   // the device whose operation runs
+  std::vector<uint32_t> page_life_;  // per page: index in lives_ + 1; 0: not allocated
   std::vector<Life> lives_;
   std::vector<uint32_t> free_lives_;
-  std::vector<bool> dirty_;     // chunks that were written
-  uint8_t* written_ = nullptr;  // of each byte: whether it was
-  uint32_t* writer_ = nullptr;  // of each byte: the last thread that wrote it, without atomics
-  std::map<uint64_t, uint64_t> free_;  // pages: begin, count
+  std::vector<bool> dirty_;     // per chunk: true if it was written since it was spoiled
+  uint8_t* written_ = nullptr;  // per byte: 1 if it was written
+  uint32_t* writer_ = nullptr;  // per byte: number of the thread that wrote it last, not atomically
+  std::map<uint64_t, uint64_t> free_;  // ranges of free pages: first page, number of pages
   std::deque<std::pair<uint64_t, uint64_t>> quarantine_;
 };
 

@@ -1,4 +1,5 @@
-// Calls that fail because a test wants them to, and the last error of each thread.
+// Simulates failures: a test chooses a call of the runtime that fails. Also stores each thread's
+// last error, as the runtime does.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -7,30 +8,33 @@
 
 namespace voxdag::cuda_sim {
 
-// Releases are apart: nothing can be done about their failure.
+// The kinds of calls. Releases of memory are a separate kind, because the backend cannot react to a
+// failed release.
 enum class Call { kAllocation, kRelease, kOther };
 
 struct Fault {
   Call call = Call::kOther;
-  uint64_t skipped = 0;  // calls of this kind that succeed before
+  uint64_t skipped = 0;  // number of calls of this kind that succeed before the failure
   cudaError_t status = cudaErrorLaunchFailure;
-  // All later calls fail too, until the next plan; if an allocation failed, only allocations.
+  // True if all later calls also fail, until the next plan. If `call` is kAllocation or kRelease,
+  // only later allocations fail.
   bool sticky = false;
 };
 
-// Sets the next call to fail, replacing an earlier plan.
+// Plans a failure. Replaces an earlier plan, and clears the thread's last error.
 void plan_fault(const Fault& fault);
 void plan_no_fault();
-// True if the planned call was reached.
+// True if the planned failure has happened.
 bool fault_happened();
 
-// The status of a call that begins.
+// Every call of the runtime begins with this. Returns the status with which the call must fail, or
+// cudaSuccess.
 cudaError_t begin_call(Call call);
-// Sets the thread's last error, and returns it.
+// Sets the thread's last error to `status`, and returns `status`.
 cudaError_t fail(cudaError_t status);
 cudaError_t last_error();
 
-// Bytes of the device's pool in use, as the host sees it.
+// Bytes that the host has allocated from the device's pool and has not released.
 uint64_t bytes_in_use();
 
 }  // namespace voxdag::cuda_sim

@@ -1,6 +1,7 @@
-// The backend's sources are compiled with -fsanitize=thread, which calls a function before each
-// access to memory. These are those functions; the sanitizer's own are not linked. While a kernel
-// runs they check what its threads touch; otherwise that the host does not touch device memory.
+// The backend's sources are compiled with -fsanitize=thread, so the compiler inserts a function
+// call before each memory access. This file defines the called functions; the sanitizer's own
+// library is not linked. While a kernel runs, they check the accesses of its threads. While the
+// host runs, they check that it does not access device memory.
 #include <algorithm>
 #include <bit>
 #include <cstddef>
@@ -18,7 +19,8 @@ extern "C" char __executable_start, __data_start;
 namespace voxdag::cuda_sim {
 namespace {
 
-// A thread's own variables, the launch's arguments, and constants to be read.
+// True if a kernel's thread may access `p` without further checks: its own variables on the stack
+// of its fiber, the arguments of the launch, and (only reads) constants of the program.
 bool is_private(const void* p, Access access) {
   const char* at = static_cast<const char*>(p);
   const char* arguments = static_cast<const char*>(g_running.launch->arguments);
@@ -46,8 +48,8 @@ void check(void* p, size_t bytes, Access access, bool is_range) {
   }
 }
 
-// The simulation's own accesses do not count: it may share inline functions with the sources that
-// are watched.
+// Suspends the checks while the simulation itself runs. It may share inline functions with the
+// backend's sources, and these functions are instrumented.
 class Unwatched {
  public:
   Unwatched() { g_running.running = false; }

@@ -1,4 +1,4 @@
-// What kernels call.
+// The functions that kernels call.
 #include <cuda_runtime.h>
 
 #include "tests/cuda_sim/sim/shared_memory.h"

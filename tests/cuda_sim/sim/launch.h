@@ -1,5 +1,5 @@
-// What launches and kernels of the simulated device need: the part of it that is compiled into the
-// backend's sources.
+// The part of the simulation that is compiled into the backend's sources: indices of blocks and
+// threads, and launches of kernels.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -17,7 +17,7 @@ struct Index {
 Index block_index();
 Index thread_index();
 
-// `arguments` lives until the kernel has run.
+// Queues a launch. Keeps `arguments` alive until the kernel has run.
 cudaError_t queue_kernel(const KernelLaunch& launch, std::shared_ptr<void> arguments,
                          cudaStream_t stream);
 

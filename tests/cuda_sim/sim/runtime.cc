@@ -1,5 +1,5 @@
-// The runtime's calls. Each takes the lock, may fail as planned, and lets the schedule run some
-// work first.
+// The functions of the CUDA runtime. Each of them takes the lock, fails if a failure is planned,
+// and otherwise first lets the schedule run some of the queued operations.
 #include <sys/mman.h>
 
 #include <cstring>
@@ -19,11 +19,11 @@ namespace {
 
 constexpr size_t kDeviceBytes = size_t{256} << 20;
 
-std::map<const void*, size_t> g_allocated;  // on the device, as the host sees it
+std::map<const void*, size_t> g_allocated;  // device memory that the host has not released
 std::map<const void*, size_t> g_pinned;
 uint64_t g_in_use = 0;
 
-// The common begin of all calls; `if (Begin call; call.status) return call.status;`.
+// Begins a call of the runtime. Usage: `Begin call; if (call.status) return call.status;`.
 struct Begin {
   explicit Begin(Call kind = Call::kOther) : lock(device_lock()), status(begin_call(kind)) {
     static const bool watched = (catch_host_accesses(), true);
@@ -38,7 +38,8 @@ size_t hash_of(const void* memory, size_t bytes) {
   return std::hash<std::string_view>{}({static_cast<const char*>(memory), bytes});
 }
 
-// The allocation that the host knows, of which a copy uses a part.
+// Checks that the device range of a copy or memset is within one allocation that the host has not
+// released.
 void expect_known(const void* p, size_t bytes, const char* what) {
   const auto next = g_allocated.upper_bound(p);
   if (next != g_allocated.begin()) {
@@ -64,7 +65,7 @@ CUstream_st::Operation upload(void* to, const void* from, size_t bytes) {
 }
 
 CUstream_st::Operation download(void* to, const void* from, size_t bytes) {
-  std::memset(to, 0xe7, bytes);  // junk for a host that reads too early
+  std::memset(to, 0xe7, bytes);  // a host that reads too early gets junk
   return {"a download",
           [=] {
             device_memory().expect_written(from, bytes, "a download reads");

@@ -6,20 +6,21 @@
 namespace voxdag::cuda_sim {
 
 struct Schedule {
-  // Late: work runs at the last moment that synchronization allows. Otherwise some of it runs
-  // whenever a call is made.
+  // True: operations run at the last moment that synchronization allows. False: some of them also
+  // run earlier, at random calls of the runtime.
   bool late = true;
   uint64_t seed = 1;
 };
 
-// For all streams; restarts the random numbers.
+// Sets the schedule of all streams, and restarts the random numbers from its seed.
 void set_schedule(const Schedule& schedule);
 Schedule schedule();
 
 // The next random number below `end`.
 uint32_t random_below(uint32_t end);
 
-// Visits 0 to n - 1 in some order: steps of a random odd or coprime stride from a random start.
+// Visits each of 0 to n - 1 once: begins at a random number and adds a random stride, which has no
+// common divisor with n, modulo n.
 class RandomOrder {
  public:
   explicit RandomOrder(uint32_t n);

@@ -19,12 +19,12 @@ namespace {
 constexpr unsigned char kJunk = 0xd5;
 constexpr uint32_t kNobody = UINT32_MAX, kSeveral = UINT32_MAX - 1;
 
-// Who touched a word since the last barrier.
+// The threads that read, wrote or atomically updated a word since the last barrier.
 struct Word {
   uint64_t interval = 0;
   uint32_t reader = kNobody, writer = kNobody, updater = kNobody;
   uint64_t block = 0;
-  uint8_t written = 0;  // a bit for each byte, since the block began
+  uint8_t written = 0;  // a bit for each byte that the block has written
 };
 
 Word g_words[kMaxSharedBytes / 4];

@@ -1,7 +1,9 @@
-// The shared memory of the thread block that runs, and its race detector: between two barriers, no
-// word that one thread writes is touched by another, unless both use atomics. Words are of 4 bytes.
-// What no thread of the block wrote is not read, and nothing beyond the bytes that the launch asked
-// for is touched.
+// The shared memory of the thread block that runs, and its race detector. It works on words of 4
+// bytes. These are violations:
+//   - Between two barriers, one thread writes a word and another thread reads or writes it, unless
+//     both accesses are atomic.
+//   - A thread reads bytes that no thread of its block has written.
+//   - A thread accesses bytes beyond the size that the launch requested.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +15,9 @@ inline constexpr size_t kMaxSharedBytes = size_t{48} << 10;
 
 enum class Access { kRead, kWrite, kAtomic };
 
-// Discards the writes of the last block.
+// Begins a block: forgets what earlier blocks wrote, and allows accesses to `shared_bytes` bytes.
 void begin_block(size_t shared_bytes);
-// All threads passed a barrier.
+// Call it when all threads of the block have passed a barrier.
 void next_interval();
 
 bool in_shared_memory(const void* p);

@@ -1,5 +1,6 @@
-// Streams that run late: work is queued, and runs when synchronization demands it, or earlier if
-// the schedule decides so. All of it runs on the host thread that needs it, under one lock.
+// Streams whose operations run late. A call only queues an operation. The operation runs when a
+// synchronization needs its result, or earlier if the schedule (schedule.h) decides so. It runs on
+// the host thread that synchronizes or makes the call, while this thread holds the lock.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -13,12 +14,12 @@ struct CUstream_st {
   struct Operation {
     const char* name = "";
     std::function<void()> run;
-    // The host's memory that it reads or writes.
+    // The range of host memory that the operation reads or writes, or null.
     const char* host = nullptr;
     size_t host_bytes = 0;
   };
   std::deque<Operation> waiting;
-  uint64_t queued = 0;  // operations so far
+  uint64_t queued = 0;  // number of all operations, finished ones included
   bool destroyed = false;
 };
 
@@ -33,15 +34,17 @@ namespace voxdag::cuda_sim {
 std::recursive_mutex& device_lock();
 
 cudaStream_t create_stream();
-// Its work runs all the same, some time.
+// Forbids further operations in the stream. Operations that are already queued still run later.
 void destroy_stream(cudaStream_t stream);
 void queue(cudaStream_t stream, CUstream_st::Operation operation);
-// Runs the first `position` operations that were ever queued, if they did not run yet.
+// Runs the operations of the stream that were queued first, until `position` operations have run
+// since the stream was created.
 void run_until(cudaStream_t stream, uint64_t position);
 void run_everything();
-// Runs some work, unless the schedule is late.
+// At random, runs some of the queued operations of all streams. Does nothing if the schedule is
+// late.
 void run_some();
-// True if work that did not run yet uses a range of the host's memory.
+// True if a queued operation will read or write a part of this range of host memory.
 bool is_in_use(const void* memory, size_t bytes);
 
 }  // namespace voxdag::cuda_sim

@@ -27,14 +27,15 @@ char* g_stacks = nullptr;
 uint32_t g_next_number = 1;
 
 struct Fiber {
-  ucontext_t context;  // for the first switch to it; the others are jumps, without system calls
+  ucontext_t context;  // for the first switch to the fiber; later switches are cheaper longjmps
   jmp_buf place;
   bool started = false;
   uint32_t thread = 0;
 };
 
-// One block at work. A fiber runs thread after thread until one waits at a barrier; only then does
-// another fiber run the next, so that a kernel without barriers needs one.
+// Runs one block, then the next. A fiber runs threads one after the other until a thread waits at a
+// barrier. Only then does another fiber run the remaining threads. So a kernel without barriers
+// needs one fiber.
 class Block {
  public:
   void run(const KernelLaunch& launch, uint32_t block) {
@@ -80,7 +81,9 @@ class Block {
     for (size_t i = 0; i < ready.size(); ++i) resume(ready[order.next()]);
   }
 
-  [[gnu::noinline]] void identify() {  // a fiber may resume on another thread
+  // Not inlined, because a fiber may resume on another host thread, where g_running is a different
+  // variable.
+  [[gnu::noinline]] void identify() {
     g_running.thread = current_->thread;
     g_running.number = g_running.first + g_running.block * launch_->threads + current_->thread;
   }
@@ -127,7 +130,7 @@ Fiber* Block::make_fiber() {
   if (!g_stacks)
     g_stacks = static_cast<char*>(mmap(nullptr, kMaxThreads * kStackBytes, PROT_READ | PROT_WRITE,
                                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0));
-  Fiber* fiber = new Fiber;  // for as long as the process runs
+  Fiber* fiber = new Fiber;  // never deleted
   getcontext(&fiber->context);
   fiber->context.uc_stack.ss_sp = g_stacks + kStackBytes * fiber_count_++;
   fiber->context.uc_stack.ss_size = kStackBytes;

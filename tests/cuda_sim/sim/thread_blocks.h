@@ -1,8 +1,8 @@
-// Kernels as the device runs them: thread blocks in any order, the threads of one as fibers that
-// switch at barriers, in any order. One block runs at any time, on the thread of the host that
-// needs its result.
+// Runs kernels as a device does. The thread blocks of a launch run one after the other, in random
+// order. The threads of a block are fibers; they switch at barriers, in random order. All of this
+// happens on the host thread that runs the stream's operations.
 //
-// A barrier that some threads of a block reach while others have ended is a violation.
+// It is a violation if some threads of a block wait at a barrier after others have ended.
 #pragma once
 
 #include <cstddef>
@@ -21,11 +21,12 @@ struct KernelLaunch {
 
 void run_kernel(const KernelLaunch& launch);
 
-// The running kernel; `running` is true only while its code runs on this thread.
+// The simulated thread that runs on this host thread. `running` is true only while code of the
+// kernel runs. Numbers of threads are unique over all launches.
 struct RunningThread {
   bool running = false;
   uint32_t block = 0, thread = 0;
-  uint32_t first = 0, number = 0;  // of this launch's first thread and of this one, of all launches
+  uint32_t first = 0, number = 0;  // numbers of the launch's first thread and of this thread
   const KernelLaunch* launch = nullptr;
 };
 extern thread_local RunningThread g_running;

@@ -1,5 +1,5 @@
-// Reports a violation of a CUDA rule that hardware may tolerate, and ends the process. A test of a
-// rule expects the death.
+// Reports a violation of a CUDA rule, even if hardware may tolerate it, and ends the process. The
+// tests of the simulation expect this end.
 #pragma once
 
 #include <string>
@@ -8,7 +8,8 @@ namespace voxdag::cuda_sim {
 
 [[noreturn]] void violation(const std::string& what);
 
-// What the device executes now, for the message; null between two operations.
+// Sets the name of the operation that the device executes, for the message of a violation. `name`
+// is null between two operations.
 void set_current_operation(const char* name);
 
 // Makes a host access to device memory a violation. Called once.

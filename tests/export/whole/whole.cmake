@@ -1,5 +1,5 @@
-# A program for the digest of all voxels of an exported file, decoded by other code, and a test that runs
-# tests/long/exports_whole.py with it on a small scene.
+# A program that decodes an exported file with code that is not voxdag's, and prints a digest of all
+# voxels. A test runs tests/long/exports_whole.py with this program on a small scene.
 add_executable(digest_voxels export/whole/digest_voxels.cc export/whole/glb.cc export/whole/points.cc
                              export/whole/trees.cc export/whole/vox.cc)
 target_link_libraries(digest_voxels PRIVATE voxdag_options nlohmann_json::nlohmann_json)

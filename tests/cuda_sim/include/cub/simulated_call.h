@@ -1,4 +1,5 @@
-// What all simulated calls of CUB do about their temporary storage.
+// The common part of all simulated CUB calls: their temporary storage, and checks of their
+// accesses.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -8,13 +9,15 @@
 
 namespace voxdag::cuda_sim {
 
-// First phase: answers the bytes that n items need. Second phase: queues `work`, before which the
-// storage becomes junk. CUB returns the thread's last error as its own.
+// CUB calls have two phases. If `storage` is null, the call sets `bytes` to the size of the storage
+// that n items need. Otherwise it queues `work` in the stream; before `work` runs, the storage is
+// filled with junk. Like CUB, it returns the thread's last error if an earlier call failed.
 cudaError_t cub_call(const char* name, void* storage, size_t& bytes, size_t n, cudaStream_t stream,
                      std::function<void()> work);
 
-// Declares the reads and writes of a call; forbidden ones are violations. Nothing may overlap the
-// storage, and outputs may not overlap inputs unless the call `is_in_place`.
+// `work` declares the reads and writes of its call with these functions. It is a violation if a
+// range overlaps the storage, or if an output overlaps an input, unless `is_in_place`. cub_spoils()
+// declares an output with undefined contents and fills it with junk.
 void cub_reads(const void* p, size_t bytes);
 void cub_writes(void* p, size_t bytes, bool is_in_place = false);
 void cub_spoils(void* p, size_t bytes);

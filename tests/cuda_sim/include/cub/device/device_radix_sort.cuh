@@ -18,8 +18,9 @@ struct DoubleBuffer {
   int selector = 0;
 };
 
-// The result is in either buffer; the other one is junk. Both buffers are chosen when the call is
-// queued, since CUB sets the selectors then.
+// The sorted result is in one of the two buffers, chosen at random; the other buffer is filled with
+// junk. The choice is made when the call is queued, because CUB also sets the selectors at that
+// time.
 struct DeviceRadixSort {
   template <class K>
   static cudaError_t SortKeys(void* storage, size_t& bytes, DoubleBuffer<K>& keys, uint32_t n,
@@ -46,7 +47,7 @@ struct DeviceRadixSort {
  private:
   template <class T>
   struct Plan {
-    T *from, *to, *other;  // `to` is one of both buffers, `other` the second one
+    T *from, *to, *other;  // `to` is the buffer for the result, `other` the other buffer
   };
 
   template <class T>
