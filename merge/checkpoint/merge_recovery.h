@@ -26,9 +26,11 @@ class MergeRecovery {
         pending_(pending),
         saver_(checkpoint, inputs.checkpoint_interval_s) {}
 
-  // Resumes the saved state if there is one and it fits the inputs: changes `pending`, the report
-  // and `out`, and returns the progress of the final pass. A state that does not fit is discarded
-  // with a warning.
+  // Resumes the saved state if there is one and it belongs to the same inputs: changes the pending
+  // artifacts, the report and `out`, and returns the progress of the final pass. A damaged state,
+  // or a state of other inputs, is discarded with a warning. Throws Error{kInvalidInput} if the
+  // state was saved for another output path, Error{kOutOfMemory} if the interrupted merge had more
+  // memory.
   PassProgress restore(GlobalFileWriter& out);
 
   // True if it is time to save a state. Rethrows the last save's error.

@@ -126,8 +126,8 @@ class Get : public Coder<Get> {
   void word(T& word) {
     word = in_.get<T>();
   }
-  // Every item takes at least `min_bytes`. So a damaged count cannot allocate more memory than the
-  // bytes allow.
+  // Reads the number of `items`. Every item takes at least `min_bytes` bytes. So a damaged count
+  // cannot allocate more memory than the remaining bytes justify.
   void count(auto& items, size_t min_bytes) {
     const uint64_t n = in_.get<uint64_t>();
     if (n <= in_.left() / min_bytes)

@@ -1,7 +1,8 @@
 // Saves the state of a merge in the background, and keeps the scratch files that the durable state
 // names.
 //
-// One thread calls it. A background thread uses the checkpoint while a state is being saved.
+// Only one thread may call its functions. A background thread uses the checkpoint while a state is
+// being saved.
 #pragma once
 
 #include <atomic>

@@ -67,7 +67,7 @@ struct PartitionWorkers {
 
 // An upper bound of the memory of a Frame with kFrameRows rows.
 inline constexpr uint64_t kFrameMemoryBytes = uint64_t{640} << 10;
-// Limit below which 32 bits can count the words of a partition.
+// Maximum size of a partition, so that 32 bits can count its words.
 inline constexpr uint64_t kMaxPartitionBytes = uint64_t{8} << 30;
 
 class HashPartition {

@@ -1,5 +1,6 @@
-// Runs: the rows of one level of one artifact (or of the top tree), stored in frames, in the total
-// order. Immutable; several threads may read.
+// Runs: the rows of one level of one artifact (or of the top tree), in the total order. The rows
+// are stored in frames, which are blocks of up to kFrameRows rows. Immutable; several threads may
+// read.
 #pragma once
 
 #include <cstdint>

@@ -2,6 +2,7 @@
 //
 //   row             one node or brick of one artifact: hash, mask and words
 //   run             the rows of one level of one artifact (or of the top tree), in the total order
+//   frame           a block of up to kFrameRows consecutive rows of a run, as artifacts store them
 //   hash partition  a contiguous range of the hash space, merged as one unit: its rows
 //                   from all runs are in memory together
 //   bucket          an equal share of a hash partition's range, whose rows one thread sorts

@@ -91,8 +91,8 @@ class ScratchFile {
   static std::string name_of(uint32_t id) { return "merge-" + std::to_string(id) + ".tmp"; }
 
  private:
-  // Words per checksum block. A block's checksum has 8 bytes, so checksums take a thousandth of the
-  // file's size.
+  // Words per checksum block. A block has 8192 bytes and its checksum 8, so the checksums take a
+  // thousandth of the file's size.
   static constexpr uint64_t kBlockWords = 2048;
 
   ScratchFolder& folder_;

@@ -37,7 +37,7 @@ class LevelOutput {
   virtual ~LevelOutput() = default;
   // True if positions count words; otherwise they count rows.
   virtual bool in_words() const = 0;
-  // True if child indices into a level with this many positions must be wide.
+  // True if references to a level with this many positions must be wide (two words each).
   virtual bool is_wide(uint64_t positions) const = 0;
   virtual void begin_level(uint32_t level) = 0;
   // Receives all rows of the level in order. Calls do not overlap.

@@ -23,10 +23,10 @@ struct PassTask {
 
 // The progress of a pass: the data of the merged levels that the merge of the next levels reads.
 struct PassProgress {
-  std::optional<uint32_t> level;     // the last merged level; none before the bricks
-  std::optional<PositionMaps> maps;  // maps of this level
+  std::optional<uint32_t> level;     // the last merged level; nullopt before the first
+  std::optional<PositionMaps> maps;  // position maps of this level
   bool wide = false;                 // true if references to rows of this level are wide
-  std::vector<PlacedNode> placed;    // nodes of this level
+  std::vector<PlacedNode> placed;    // top nodes and subvolume roots of this level
   // Roots of subvolumes in this level and below; `index` is their position in the output.
   std::vector<ArtifactRoot> roots;
 };

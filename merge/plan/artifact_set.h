@@ -50,7 +50,8 @@ class ArtifactSet {
   MemoryCharge charge_;
 };
 
-// Reads the indexes of all artifacts, one after another. `wide`: the merged levels may be wide.
+// Reads the indexes of all artifacts, one after another. `wide`: computes the minimum memory for
+// wide levels.
 ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
                                 const DagShape& shape, bool wide);
 
