@@ -103,7 +103,7 @@ class DagFile {
 
   // Attributes of cells. The grids of up to 2^color_levels() cells per edge have their own values;
   // a finer cell has the value of the cell that contains it. The file of an empty scene has no
-  // attributes. A lookup is faster if its position is near the previous position of the call.
+  // attributes. Lookups are faster if each position is near the previous position in the same call.
   // Throws Error{kInvalidInput} for an attribute that the file does not have.
   uint32_t color_levels() const;
   bool has_colors() const;
@@ -162,14 +162,16 @@ class DagFile {
   // at most 2^62 cells away. A point within rounding error of a boundary between cells counts as on
   // the boundary.
   Position world_to_cell(const Coordinates& world, uint32_t grid_levels) const;
-  // Returns the cells that the half-open box of the scene's space touches. An infinite side ends at
-  // the border of the grid.
+  // Returns the cells that the half-open box low <= p < high overlaps. `low` and `high` are in the
+  // units of the scene. An infinite coordinate stands for the border of the grid.
   Region world_to_region(const Coordinates& low, const Coordinates& high,
                          uint32_t grid_levels) const;
 
-  // Returns a node of level `level` with the `tile_levels` (1 to 5) levels below it, for viewers,
-  // in the format of docs/format.md, "Tiles". The root is at level 0, offset 0. A tile has the
-  // offsets of the tiles below it. Throws Error{kNotFound} if no node can be at that word offset.
+  // Returns a tile, which viewers draw, in the format of docs/format.md, "Tiles". `level` and
+  // `offset` are the level of the tile's root node and the node's word offset in this level. The
+  // root of the DAG is at level 0, offset 0. `tile_levels` is the maximum number of levels in a
+  // tile, from 1 to 5. A tile contains the offsets of the tiles below it. Throws Error{kNotFound}
+  // if no node can be at `offset`.
   std::vector<uint32_t> tile(uint32_t tile_levels, uint32_t level, uint64_t offset) const;
 
   // The file itself, for voxdag_reader.h. It lives as long as this object.
