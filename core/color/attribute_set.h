@@ -1,4 +1,4 @@
-// A set of attributes, such as those that a build stores.
+// A set of attributes, such as the attributes that a build stores.
 #pragma once
 
 #include <algorithm>
@@ -43,7 +43,7 @@ class AttributeSet {
   constexpr bool have_names() const { return any_row(&AttributeTraits::has_names); }
   constexpr bool operator==(const AttributeSet&) const = default;
 
-  // Returns the attributes in the order of their sections.
+  // Returns the attributes in the order of their sections in the global file.
   std::vector<Attribute> list() const {
     std::vector<Attribute> found;
     for (const AttributeTraits& row : kAttributeTable)
@@ -69,7 +69,8 @@ class AttributeSet {
   bool has_[std::size(kAttributeTable)] = {};
 };
 
-// Throws Error{kInvalidInput} with `option` for a name that is not in the table.
+// Returns the attribute with a name. Throws Error{kInvalidInput} if no attribute has this name. The
+// message begins with `option`, the option whose value the name is.
 inline Attribute attribute_named(std::string_view name, const std::string& option) {
   std::string expected = kAttributeTable[0].name;
   for (const AttributeTraits& row : kAttributeTable) {

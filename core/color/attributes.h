@@ -1,7 +1,7 @@
 // The attributes of voxels, one row of kAttributeTable each, and the encodings of attribute values,
 // one row of kEncodingTable each. Code that treats all attributes alike loops over the tables. A
-// new attribute with one of these encodings needs only a row here and the code that bakes it.
-// docs/architecture.md, "Adding things", lists the places.
+// new attribute with one of these encodings needs only a row here, and code in the few places that
+// docs/architecture.md, "Adding things", lists.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@ enum class Attribute : uint32_t { kColor = 1, kAlpha = 2, kNormal = 3, kMaterial
 enum class Encoding : uint8_t {
   kColorBlock,  // the colors of 32 cells in 16 bytes (block_codec.h)
   kByte,        // 0 to 255
-  kOctahedral,  // a unit vector in two bytes up to 254 (normal_code.h)
+  kOctahedral,  // a unit vector in two bytes, each 0 to 254 (normal_code.h)
   kNameIndex,   // an index into a list of names, which is stored after the values
 };
 
@@ -30,7 +30,7 @@ enum class NumberType : uint8_t { kUint8, kUint32, kFloat };
 
 struct EncodingTraits {
   Encoding encoding;
-  uint32_t block_bytes;  // for 32 cells; 0 if it depends on the number of names
+  uint32_t block_bytes;  // size of a block of 32 cells; 0 if it depends on the number of names
   NumberType number;
   uint32_t components;  // number of components of a value
 
@@ -56,11 +56,13 @@ uint32_t alpha_of_cell(const ColorSum& sum, const CellValues& values);
 uint32_t normal_of_cell(const ColorSum& sum, const CellValues& values);
 uint32_t material_of_cell(const ColorSum& sum, const CellValues& values);
 
-// Returns the value of a cell from the values of its 1 to 8 set children in Morton order: the mean,
-// rounded to nearest (half up).
+// The next three functions return the value of a cell from the values of its 1 to 8 set children,
+// in Morton order.
+//
+// Returns the mean, rounded to nearest (half up).
 uint32_t mean_alpha(std::span<const uint32_t> children);
 // Returns the children's normal if all are equal. Otherwise returns the normal of the sum of their
-// directions, or the first child's if the sum is zero.
+// directions, or the first child's normal if this sum is zero.
 uint32_t mean_normal(std::span<const uint32_t> children);
 // Returns the most frequent value; on ties, the lowest.
 uint32_t commonest(std::span<const uint32_t> children);
@@ -74,7 +76,8 @@ struct AttributeTraits {
   Encoding encoding;
   bool uses_images = false;       // depends on the scene's textures
   const char* ply_properties[3];  // names of a value's components
-  // Null for colors, which are encoded from the cells' sums.
+  // The functions return the value of a baked cell, and the value of a coarser cell from its set
+  // children. They are null for colors, which are encoded from the cells' sums.
   uint32_t (*value_of_cell)(const ColorSum& sum, const CellValues& values) = nullptr;
   uint32_t (*value_of_parent)(std::span<const uint32_t> children) = nullptr;
 
@@ -118,7 +121,7 @@ constexpr const AttributeTraits& traits_of(Attribute attribute) {
   return kAttributeTable[static_cast<size_t>(attribute) - 1];
 }
 
-// The rows must be at their index, because lookups use it.
+// The order of rows must be the order of the enumerators, because traits_of() uses them as indexes.
 static_assert([] {
   for (size_t i = 0; i < std::size(kEncodingTable); ++i)
     if (kEncodingTable[i].encoding != static_cast<Encoding>(i)) return false;
@@ -137,7 +140,7 @@ constexpr uint32_t value_bytes(Attribute attribute, uint64_t names) {
   return names <= 256 ? 1 : names <= 65536 ? 2 : 4;
 }
 
-// Returns a text with the expectation that a stored value violates. Returns null if the value is
+// Returns the expectation that a stored value violates, for a message. Returns null if the value is
 // valid.
 constexpr const char* value_error(Encoding encoding, uint32_t value, uint64_t names) {
   if (encoding == Encoding::kOctahedral && ((value & 255) == 255 || value >> 8 == 255))

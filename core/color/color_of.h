@@ -11,9 +11,10 @@ namespace voxdag {
 
 namespace color {
 
-// Element i - 1 is the least linear intensity (65535 is 1) that is stored as i: ceil(65535 f((i -
-// 1/2) / 255)) with the transfer function f of IEC 61966-2-1. All 255 arguments of the ceiling
-// differ from an integer by more than 10^-6.
+// Element i - 1 is the least linear intensity (65535 stands for 1.0) that is stored as i. It is
+// ceil(65535 f((i - 1/2) / 255)) with the transfer function f of IEC 61966-2-1. All 255 arguments
+// of the ceiling differ from an integer by more than 10^-6, so rounding errors do not change the
+// table. Element 255 has no effect.
 struct SrgbThresholds {
   uint16_t of[256] = {
       10,    30,    50,    70,    90,    110,   130,   150,   170,   189,   209,   230,   253,
@@ -37,7 +38,8 @@ struct SrgbThresholds {
       54183, 54708, 55235, 55766, 56300, 56836, 57376, 57918, 58464, 59012, 59564, 60118, 60675,
       61236, 61799, 62366, 62935, 63508, 64083, 64662, 65244, 65535};
 };
-// Element k is the stored value for the intensity 16 k, or one less.
+// Element k is the stored value of the intensity 16 k. The stored value of an intensity from 16 k
+// to 16 k + 15 is the same or one more.
 struct SrgbStarts {
   uint8_t of[4096] = {};
   constexpr SrgbStarts() {
@@ -50,8 +52,8 @@ struct SrgbStarts {
   }
 };
 
-// Returns the nearest value in sRGB: the number of thresholds that are <= `intensity`, which is at
-// most 65535.
+// Returns the nearest value in sRGB: the number of thresholds that are <= `intensity`. Requires
+// intensity <= 65535.
 VOXDAG_HD inline uint8_t srgb_of(uint32_t intensity) {
   static constexpr SrgbThresholds kThresholds{};
   static constexpr SrgbStarts kStarts{};
@@ -60,23 +62,24 @@ VOXDAG_HD inline uint8_t srgb_of(uint32_t intensity) {
   return static_cast<uint8_t>(stored + (stored < 255) * (kThresholds.of[stored] <= intensity));
 }
 
-// Returns the middle of the intensities that are stored as `stored`. For 0 and 255, returns the end
-// of the range.
+// Returns the middle of the intensities that are stored as `stored`. For 0 and 255, returns the
+// ends of the range of intensities, 0 and 65535.
 VOXDAG_HD inline uint32_t intensity_of(uint8_t stored) {
   static constexpr SrgbThresholds kThresholds{};
   if (stored == 0 || stored == 255) return stored == 0 ? 0 : 65535;
   return (uint32_t{kThresholds.of[stored - 1]} + kThresholds.of[stored]) / 2;
 }
 
-// Rounds half up.
+// Returns the quotient rounded to the nearest integer (half up).
 VOXDAG_HD inline uint64_t rounded_quotient(uint64_t numerator, uint64_t denominator) {
   const uint64_t quotient = numerator / denominator, rest = numerator % denominator;
   return quotient + (rest >= denominator - rest ? 1 : 0);
 }
 
-// Returns the quotient rounded to the nearest integer, computed in doubles. Requires numerators
-// below 2^52 and a denominator below 2^35. For an integer k < 2^16, a quotient below k + 1/2 is
-// below it by at least 2^-36, and remains below it after rounding to 2^-37.
+// Returns the quotient rounded to the nearest integer (half up), computed in doubles. Requires a
+// numerator below 2^52, a denominator below 2^35 and a quotient below 2^16. The result is exact: a
+// quotient below k + 1/2, for an integer k, is below it by at least 2^-36. It remains below k + 1/2
+// after rounding to a double, because doubles below 2^16 are at most 2^-37 apart.
 VOXDAG_HD inline uint32_t rounded_quotient_in_doubles(uint64_t numerator, double denominator) {
   const double quotient = static_cast<double>(static_cast<int64_t>(numerator)) / denominator;
   return static_cast<uint32_t>(static_cast<int32_t>(quotient + 0.5));
@@ -91,8 +94,8 @@ VOXDAG_HD inline uint8_t alpha_of(const ColorSum& sum) {
   return static_cast<uint8_t>(alpha < 255 ? alpha : 255);
 }
 
-// Returns the color of a sum with a weight above 0. Surfaces count by weight times alpha. If all of
-// them are transparent, they count by weight, and alpha is 0.
+// Returns the color of a sum whose weight is above 0. It is a mean over the surfaces, weighted by
+// weight times alpha. If all surfaces are transparent (alpha is 0), it is weighted by weight alone.
 VOXDAG_HD inline Color color_of(const ColorSum& sum) {
   const bool visible = sum.seen_weight != 0;
   const std::array<uint64_t, 3>& channels = visible ? sum.seen : sum.plain;

@@ -1,6 +1,6 @@
-// The sum over the surfaces in a cell of the color grid, before it becomes one color. Sums commute,
-// so the order of triangles, threads and subvolumes does not matter, and the sum of a coarser cell
-// is the sum of its children.
+// The sum over the surfaces in a cell of the color grid, from which the cell's color is computed.
+// Addition commutes, so the order of triangles, threads and subvolumes does not matter. The sum of
+// a coarser cell is the sum of its children.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct ColorSum {
   std::array<uint64_t, 3> seen{};   // sums of weight x alpha x intensity: red, green, blue
   uint64_t seen_weight = 0;         // sum of weight x alpha
   std::array<uint64_t, 3> plain{};  // sums of weight x intensity; used if all alpha values are 0
-  uint64_t weight = 0;
+  uint64_t weight = 0;              // sum of weights
 
   VOXDAG_HD void add(const ColorSum& other) {
     // Adds the members as eight numbers of one type, because compilers vectorize such a loop.

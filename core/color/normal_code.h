@@ -1,11 +1,12 @@
-// Normals in two bytes, by the octahedral projection. It is computed with integers and with IEEE
-// doubles in a fixed order (docs/color.md, "Normals"), so that the same sums produce the same bytes
-// on every machine.
+// Normals in two bytes, by the octahedral projection. Codes are computed with integers and with
+// IEEE doubles in a fixed order (docs/color.md, "Other attributes"), so that the same sums produce
+// the same bytes on every machine.
 //
 //     byte 0: 127 + 127 px, byte 1: 127 + 127 py, each 0 to 254
 //
-// For z >= 0, (px, py) = (x, y) / (|x| + |y| + |z|). For z < 0, this point is mirrored at the
-// diagonals: ((1 - |py|) sign x, (1 - |px|) sign y). The sign of 0 is positive.
+// For a direction (x, y, z) with z >= 0, (px, py) = (x, y) / (|x| + |y| + |z|). For z < 0, this
+// point is mirrored at the diagonals: ((1 - |py|) sign x, (1 - |px|) sign y). The sign of 0 is
+// positive.
 #pragma once
 
 #include <array>
@@ -16,10 +17,10 @@
 
 namespace voxdag {
 
-// Byte 0 in the low 8 bits.
+// Byte 0 is the low 8 bits, byte 1 the high 8 bits.
 using NormalCode = uint16_t;
 
-// The normal of sums whose rule gives none: upwards along z.
+// The normal (0, 0, 1), for cells whose sums give no direction.
 inline constexpr NormalCode kNoNormal = 127 << 8 | 127;
 
 namespace color {
@@ -35,7 +36,8 @@ VOXDAG_HD inline int64_t in_127ths(int64_t x, int64_t length) {
 
 }  // namespace color
 
-// Returns the code of a direction of any length. Its components are below 2^53 and not all 0.
+// Returns the code of a direction of any length. Requires components of a magnitude below 2^53, not
+// all 0.
 VOXDAG_HD inline NormalCode encode_normal(int64_t x, int64_t y, int64_t z) {
   const int64_t width = color::absolute(x), height = color::absolute(y);
   const int64_t length = width + height + color::absolute(z);
@@ -48,8 +50,8 @@ VOXDAG_HD inline NormalCode encode_normal(int64_t x, int64_t y, int64_t z) {
                                  (127 + color::in_127ths(along, length)) << 8);
 }
 
-// Returns the direction with a length of 2^14, each component rounded to nearest. The bytes are at
-// most 254.
+// Returns the direction with a length of 2^14, each component rounded to nearest. Requires bytes of
+// at most 254.
 VOXDAG_HD inline std::array<int64_t, 3> decode_normal(NormalCode code) {
   const int across = (code & 255) - 127, along = (code >> 8) - 127;
   const int width = across < 0 ? -across : across, height = along < 0 ? -along : along;

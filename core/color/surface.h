@@ -13,16 +13,16 @@ namespace voxdag {
 
 // Fractional bits of texture coordinates.
 inline constexpr int kTextureBits = 24;
-// 1.0 of colors, factors and alpha: linear light in 16 bits.
+// The integer that stands for 1.0 in colors (linear), factors and alpha.
 inline constexpr uint16_t kFullIntensity = 65535;
 
 // A corner of a triangle.
 struct SurfaceCorner {
-  // Image coordinates from the upper left corner: 2^kTextureBits per image, magnitude at most 2^40,
-  // after KHR_texture_transform and before wrapping.
+  // Texture coordinates from the image's upper left corner, after KHR_texture_transform and before
+  // wrapping. The width or height of the image is 2^kTextureBits. Magnitudes are at most 2^40.
   std::array<int64_t, 2> texture{};
-  // COLOR_0 as red, green, blue (linear) and alpha, with kFullIntensity for 1. White if the file
-  // has none.
+  // The vertex color (COLOR_0 in glTF) as red, green, blue (linear) and alpha, with kFullIntensity
+  // for 1. White if the file has no vertex colors.
   std::array<uint16_t, 4> color{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
 };
 

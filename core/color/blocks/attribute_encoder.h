@@ -21,12 +21,14 @@ class AttributeEncoder {
         levels_(levels),
         colors_(levels) {}
 
-  // Adds baked cells in increasing order, their codes counted from `first_code`. `values` has an
-  // element for each cell if AttributeSums is needed for the attribute.
+  // Adds baked cells in increasing order of their codes, to which `first_code` is added. `values`
+  // has an element for each cell if the attribute is one of AttributeSums. Otherwise it may be
+  // empty.
   void add(std::span<const ColoredCell> cells, std::span<const CellValues> values,
            uint32_t first_code);
   bool empty() const { return traits_.is_color() ? colors_.empty() : values_.empty(); }
-  // Call it once, after at least one cell was added.
+  // Returns the encoded region; `morton` is its EncodedRegion::morton. Call it once, after at least
+  // one cell was added.
   EncodedRegion finish(uint64_t morton);
 
  private:

@@ -1,10 +1,11 @@
 // Encodes colors in blocks of 128 bits: up to 32 cells, 4 bits each. docs/format.md, "Color
 // blocks", documents the layout. voxdag_reader_colors.h decodes the blocks.
 //
-// A block has two ends and, for each cell, a weight between them. The ends follow from the colors'
-// principal axis and one step of least squares. They are computed for both modes of the format, and
-// the mode with the smaller squared error is used. All arithmetic is exact, so that the same colors
-// produce the same bytes on every machine. Blocks of one or two colors are lossless.
+// A block has two colors, its ends, and a weight for each cell. The weight places the cell's color
+// on the line between the ends. The ends follow from the colors' principal axis and one step of
+// least squares. They are computed for both modes of the format, and the mode with the smaller
+// squared error is used. All arithmetic is exact, so that the same colors produce the same bytes on
+// every machine. Blocks of one or two colors are lossless.
 #pragma once
 
 #include <array>

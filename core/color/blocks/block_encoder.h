@@ -1,7 +1,8 @@
-// The encoder of color blocks (block_codec.h), in code that compilers vectorize: it is compiled for
-// each instruction set, with a separate type `Set` that is local to the including file. The
-// arithmetic uses integers, or doubles whose results are exact, so every instruction set gives the
-// same bytes. Nothing here calls inline functions that other files may also contain.
+// The encoder of color blocks (block_codec.h), in code that compilers vectorize. Each file that
+// includes it is compiled for one instruction set. The file passes a local type as `Set`, so that
+// the linker does not merge the functions of different instruction sets. For the same reason,
+// nothing here calls inline functions that other files may also contain. The arithmetic uses
+// integers, or doubles whose results are exact, so every instruction set gives the same bytes.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,8 @@
 
 namespace voxdag {
 
-// The weights are 0 to kTop. An end is the color that its stored bits decode to.
+// The two modes of a block (docs/format.md, "Color blocks"). Weights are 0 to kTop. pack() returns
+// the bits that are stored for an end; unpack() returns the color that they decode to.
 struct BlockModeA {
   static constexpr int32_t kTop = 7;
   VOXDAG_INLINE static uint32_t pack(const int32_t (&end)[3]) {
@@ -54,12 +56,13 @@ class BlockEncoder {
     alignas(64) int16_t value[3][kBlockCells];
     int32_t sum[3];
   };
-  // Positions along an axis, from 0 to `range`.
+  // Positions of the colors along an axis, from 0 to `range`.
   struct Projection {
     alignas(64) int32_t at[kBlockCells];
     int32_t range;
   };
-  // The bits of two ends and a weight for each cell: 0 is the first end, kTop the second.
+  // The stored bits of two ends, and a weight for each cell: 0 for the first end, kTop for the
+  // second end.
   struct Fit {
     uint32_t ends[2];
     alignas(64) uint8_t weights[kBlockCells];
@@ -93,7 +96,7 @@ class BlockEncoder {
     if (b.error == 0) return pack_b(b);
     Fit a;
     fit<BlockModeA>(block, count, projection, a);
-    // Equal ends would look like mode B.
+    // With different ends, the first end is greater than 0, which distinguishes mode A from mode B.
     return a.error < b.error && a.ends[0] != a.ends[1] ? pack_a(a) : pack_b(b);
   }
 
@@ -111,8 +114,8 @@ class BlockEncoder {
     out.range = high - low;
   }
 
-  // Shortens the axis until its components have 10 bits, rounded toward 0. Returns false if the
-  // result is zero.
+  // Sets `axis` to `from`, shortened to components of at most 10 bits that are rounded toward 0.
+  // Returns false if `from` is zero; `axis` is then unchanged.
   VOXDAG_INLINE static bool normalize(const int64_t (&from)[3], int32_t (&axis)[3]) {
     uint64_t largest = 0;
     for (const int64_t f : from) largest |= static_cast<uint64_t>(f < 0 ? -f : f);
@@ -125,7 +128,7 @@ class BlockEncoder {
     return true;
   }
 
-  // Projects the colors to their principal axis. They must not all be equal.
+  // Projects the colors to their principal axis. The colors must not all be equal.
   VOXDAG_INLINE static void project_to_principal_axis(Colors& colors, size_t count,
                                                       Projection& out) {
     constexpr int kSteps = 4;
@@ -152,13 +155,14 @@ class BlockEncoder {
     normalize(next, axis);
     project(colors, count, axis, out);
     if (out.range > 0) return;
-    // After rounding, the axis was orthogonal to all differences.
+    // The rounded axis is orthogonal to all differences of colors. Uses the channel with the
+    // largest variance as the axis instead.
     for (int c = 0; c < 3; ++c) axis[c] = c == widest;
     project(colors, count, axis, out);
   }
 
-  // Fits the ends by least squares. The weight of a color is the one nearest to its position on the
-  // axis. Each weight is at most `top`; the weights 0 and `top` occur, so the determinant is not 0.
+  // Fits the ends by least squares, for weights from 0 to `top` that are nearest to the colors'
+  // positions on the axis. The weights 0 and `top` occur, so the determinant is not 0.
   VOXDAG_INLINE static void fit_ends(const Colors& colors, size_t count,
                                      const Projection& projection, int32_t top,
                                      int32_t (&ends)[2][3]) {
@@ -178,9 +182,9 @@ class BlockEncoder {
     const int32_t mixed = top * sum - second_squares;
     const int32_t first_squares = top * (top * n - sum) - mixed;
     const int32_t determinant = first_squares * second_squares - mixed * mixed;
-    // Numerators are below 2^27 and are multiplied by at most 14 here. If a quotient of 31-bit
-    // numbers is not an integer, it is so far below the next integer that a double is never rounded
-    // up to it.
+    // Numerators are below 2^27 and are multiplied by at most 14 here, so they have 31 bits. The
+    // integer part is exact: a quotient of two 31-bit numbers that is not an integer is never
+    // rounded up to an integer in doubles.
     const double divisor = 2 * determinant;
     for (int c = 0; c < 3; ++c) {
       const int32_t second = product_of(k, colors.value[c], count);
@@ -221,7 +225,7 @@ class BlockEncoder {
     int32_t error = 0;
     for (int c = 0; c < 3; ++c) {
       const auto first = static_cast<uint16_t>(ends[0][c] * top + top / 2);
-      const auto step = static_cast<uint16_t>(along[c]);  // wraps
+      const auto step = static_cast<uint16_t>(along[c]);  // wraps around if negative
       alignas(64) int16_t differences[kBlockCells];
       for (size_t i = 0; i < count; ++i) {
         const auto decoded =
@@ -233,7 +237,7 @@ class BlockEncoder {
     out.error = error;
   }
 
-  // Packs the ends in the order of their bits, the larger first.
+  // Fits ends and weights for a mode. The first end is the end with the larger stored bits.
   template <class Mode>
   VOXDAG_INLINE static void fit(const Colors& colors, size_t count, const Projection& projection,
                                 Fit& out) {
@@ -246,7 +250,7 @@ class BlockEncoder {
     choose_weights(colors, count, ends, Mode::kTop, out);
   }
 
-  // Returns eight weights, the first one lowest.
+  // Returns eight weights as the bytes of one number, the first weight in the lowest byte.
   VOXDAG_INLINE static uint64_t eight(const uint8_t* weights) {
     uint64_t all = 0;
     for (int i = 0; i < 8; ++i) all |= uint64_t{weights[i]} << 8 * i;

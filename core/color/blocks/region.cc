@@ -53,7 +53,7 @@ EncodedRegion RegionEncoder::finish(uint64_t morton) {
     parents_.clear();
     add_level(up, cells, 0);
   }
-  // The parent of the last cell has the same sum.
+  // The last level has one cell. Its parent, the only element of parents_, has the same sum.
   region_.total = parents_.front().sum;
   region_.morton = morton;
   const EncodeBlock encode_block = fastest_block_encoder();

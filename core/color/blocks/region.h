@@ -19,39 +19,41 @@
 
 namespace voxdag {
 
-// A cell's rank is counted within its ancestor this many levels above.
+// To find a cell's rank among all cells of its level, a reader adds its rank within the ancestor
+// this many levels above it to the ancestor's entry in `prefix`.
 inline constexpr uint32_t kPrefixLevels = 4;
 
 struct EncodedRegion {
-  uint64_t morton = 0;  // code of the region among the cubes of its level
+  uint64_t morton = 0;  // Morton code of the region among the cubes of its level
   std::array<uint32_t, kRegionLevels + 1> counts{};  // cells by level, the finest first
   std::vector<std::byte> blocks;
-  // Two tables of ranks: for the finest level and for the next coarser level. A table exists if the
-  // level that is kPrefixLevels above the table's level is below the region. The table has an entry
-  // for each cell of that upper level, in Morton order: the number of cells of the table's level
-  // that come before this cell.
+  // Up to two tables of ranks, for the finest level and then for the next coarser level. A table
+  // has an entry for each cell that is kPrefixLevels above the table's level, in Morton order: the
+  // number of cells of the table's level that come before this cell's descendants. There is no
+  // table for a level if the cells kPrefixLevels above it would be the region itself or larger.
   std::vector<uint32_t> prefix;
-  ColorSum total;
+  ColorSum total;  // sum of the region's cells
 };
 
-// Returns the stored color of a cell `up` levels above the finest level. The cell's code belongs to
-// its level.
+// Returns the stored color of a cell `up` levels above the finest level. The cell's code is its
+// Morton code among the region's cells of this level.
 using CellColor = std::function<Color(uint32_t up, const ColoredCell& cell)>;
 
-// Encodes a region whose finest cells come in parts, so that their sums need not be in memory
-// together. Memory: up to 10 bytes for each cell, and 81 for each cell of the next coarser level,
-// in addition to the result.
+// Encodes a region whose finest cells come in parts, so that their sums need not all be in memory
+// at the same time. Memory: up to 10 bytes for each cell of the finest level, and 81 bytes for each
+// cell of the next coarser level, in addition to the result.
 class RegionEncoder {
  public:
-  // `levels` is kRegionLevels, or less if the grid has fewer remaining levels. If `color` is not
-  // null, it returns the cells' colors, which are used instead of their sums.
+  // `levels` is the number of levels from the region down to its finest cells: kRegionLevels, or
+  // less if the grid has fewer remaining levels. If `color` is not null, it returns the colors of
+  // the cells. Otherwise colors are computed from the cells' sums.
   explicit RegionEncoder(uint32_t levels, CellColor color = nullptr)
       : levels_(levels), color_(std::move(color)) {}
-  // Adds cells in increasing order. Their codes are counted from `first_code`. The resulting codes
-  // are below 8^levels.
+  // Adds cells of the finest level in increasing order of their codes, to which `first_code` is
+  // added. The resulting codes are below 8^levels.
   void add(std::span<const ColoredCell> cells, uint32_t first_code = 0);
   bool empty() const { return colors_.empty(); }
-  // Call it once, at the end. Requires at least one cell.
+  // Returns the encoded region. Call it once, at the end. Requires at least one cell.
   EncodedRegion finish(uint64_t morton);
 
  private:
@@ -64,15 +66,15 @@ class RegionEncoder {
   const CellColor color_;
   EncodedRegion region_;
   std::vector<Color> colors_;
-  std::vector<ColoredCell> parents_;  // cells of the level that was added last
-  uint32_t last_code_ = 0;            // code of a cell of this level
+  std::vector<ColoredCell> parents_;  // parents of the cells of the level that is being added
+  uint32_t last_code_ = 0;            // code of the last cell of the level that is being added
 };
 
 // Encodes all cells in one call. Thread-safe.
 EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
                             const CellColor& color = nullptr);
 
-// Returns the number of entries of `prefix` for these counts.
+// Returns the number of entries of EncodedRegion::prefix for a region with these counts.
 inline size_t prefix_entries(uint32_t levels,
                              const std::array<uint32_t, kRegionLevels + 1>& counts) {
   size_t entries = 0;

@@ -1,6 +1,6 @@
 // Encodes the values of a region for an attribute other than color, as the file stores them. Values
-// are in the same order as colors (region.h). Each has a fixed number of bytes, lowest byte first.
-// Like colors, they come in blocks of 32 cells. Bytes of missing cells are 0.
+// are in the same order as colors (region.h). Each value has a fixed number of bytes, lowest byte
+// first. Like colors, values are stored in blocks of 32 cells. Bytes of missing cells are 0.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,9 @@ struct ValuedCell {
   uint32_t value = 0;  // below 256^bytes
 };
 
-// Encodes a region, as encode_region() does for colors, and leaves `total` zero. Coarser cells get
-// the attribute's value_of_parent(). Thread-safe. Memory: up to 10 bytes for each cell, in addition
-// to the result.
+// Encodes a region, as encode_region() does for colors, and leaves `total` zero. `bytes`: bytes per
+// value, see value_bytes(). Coarser cells get the attribute's value_of_parent(). Thread-safe.
+// Memory: up to 10 bytes for each cell, in addition to the result.
 EncodedRegion encode_values(Attribute attribute, uint32_t bytes, uint32_t levels, uint64_t morton,
                             std::span<const ValuedCell> cells);
 

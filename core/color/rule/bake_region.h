@@ -39,7 +39,8 @@ namespace voxdag {
 template <class Textures>
 class RegionBaker {
  public:
-  // Upper bound of the memory that this object allocates, without `cells`.
+  // Upper bound of the memory that this object allocates, without the sums for `wanted` and the
+  // vectors of the caller.
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
   // Maximum number of cells of a region that a triangle touches: 4 for each cell of its projection.
   static constexpr uint32_t kTriangleCells = 4u << (2 * kRegionLevels);
@@ -65,8 +66,8 @@ class RegionBaker {
     finish(cells);
   }
 
-  // begin(), add() and finish() do the same for triangles that come in any number of parts. add()
-  // stops when there are more than `max_cells` cells.
+  // begin(), add() and finish() do the same as bake() for triangles that come in any number of
+  // parts. add() stops when the region has more than `max_cells` cells.
   void begin(const Cube& region, uint32_t max_cells = color::RegionCells::kMaxCells) {
     max_cells_ = max_cells;
     cells_.reserve(std::min(max_cells + kTriangleCells, color::RegionCells::kMaxCells));
@@ -76,8 +77,8 @@ class RegionBaker {
       last_[a] = first_[a] + (int64_t{1} << down) - 1;
     }
   }
-  // Returns false if the triangles touch more than `max_cells` cells (up to kTriangleCells more).
-  // finish() must then still be called, but its result is incomplete.
+  // Returns false if the region now has more than `max_cells` cells; it then has at most
+  // kTriangleCells more. finish() must still be called in this case, but its result is incomplete.
   bool add(std::span<const FixedSurface> triangles) {
     triangles_ = triangles;
     for (uint32_t i = 0; i < triangles.size() && cells_.count() <= max_cells_; ++i) add_triangle(i);
@@ -85,8 +86,8 @@ class RegionBaker {
     return cells_.count() <= max_cells_;
   }
   // Adds triangles in parts. After each part, charge(bytes) receives the allocated bytes of the
-  // sums for `wanted`, which grow by at most 16 MiB between two calls. If it returns false, add()
-  // stops.
+  // sums for `wanted`, which grow by at most 16 MiB between two calls. If charge() returns false,
+  // add() stops and returns false.
   template <class Charge>
   bool add(std::span<const FixedSurface> triangles, const Charge& charge) {
     constexpr size_t kTrianglesPerCharge = 16;
@@ -126,8 +127,9 @@ class RegionBaker {
     }
   }
 
-  // Returns false if the triangle's box contains no column of any two axes, as for most tiny
-  // triangles.
+  // Returns false if the triangle cannot cover a column, as for most tiny triangles. A column has a
+  // fixed coordinate along two axes. So the triangle's box must contain such a coordinate along at
+  // least two axes.
   bool may_cover(const FixedTriangle& triangle) const {
     const int bits = grid_.cell_bits() - 2;
     const int64_t half = int64_t{1} << (bits - 1);
@@ -228,7 +230,8 @@ class RegionBaker {
     if (waiting_.size() == kMaxWaiting) add_waiting();
     waiting_.push_back({index, code});
   }
-  // Adds closest points to the cells in which no triangle covers a column.
+  // Adds the triangles in waiting_ to the cells in which no triangle covers a column so far. The
+  // color of such a triangle is its color at the point closest to the cell's center.
   void add_waiting() {
     std::optional<color::SurfaceLook<Textures>> look;
     color::SurfaceFacing facing;
@@ -258,7 +261,7 @@ class RegionBaker {
     return spread_[0][position[0] - first_[0]] | spread_[1][position[1] - first_[1]] |
            spread_[2][position[2] - first_[2]];
   }
-  // Returns the center in lattice units.
+  // Returns the center of a cell in lattice units.
   std::array<int64_t, 3> center_of(uint32_t code) const {
     uint32_t at[3];
     morton_decode(code, at[0], at[1], at[2]);

@@ -12,14 +12,14 @@
 //     +--------- axis 0
 //
 // Every test is the sign of a linear function with integer coefficients at a cell or column.
-// Divided by E (for cells) or E/4 (for columns), the function is A p + B q + C. C is a quotient,
-// rounded down or up, which changes no sign.
+// Divided by E (for cells) or E/4 (for columns), the function is A p + B q + C with integers A and
+// B. C is a quotient. It is rounded down or up to an integer, which changes no sign.
 //
 // Bounds. Int is int64_t for triangles in the narrow box: coordinates v with 0 <= v + 2^27 < 2^29
 // (coordinates in the grid are at most 2^28). There, edges are below 2^29 and normals at most 2^58.
 // Edge functions are below 2^59 anywhere in the box, and at most 2^62 when added over 16 columns
-// inside the triangle. Values of the plane at columns of cells that it touches are below
-// 10 n_2 < 2^62 in quarters; other intermediate values wrap.
+// inside the triangle. Values of the plane at columns of cells that the plane touches are below
+// 10 n_2 < 2^62 in quarters; other intermediate values wrap around.
 // Int is int128 for all other triangles: coordinates are at most 2^40, normals at most 2^82, and
 // n.v is below 2^124.
 #pragma once
@@ -51,15 +51,16 @@ VOXDAG_HD inline void normal_of(const FixedTriangle& t, Int (&n)[3]) {
   }
 }
 
-// Returns the length of n, whose components are along x, y, z. IEEE 754 square roots are exact for
-// planes perpendicular to an axis.
+// Returns the length of n. The squares of its components are added in the order x, y, z, because
+// the order determines the rounding. If only one component is not 0, the length is exactly this
+// component's magnitude (as a double), because IEEE 754 square roots are correctly rounded.
 template <class Int>
 VOXDAG_HD inline double length_of(const Int (&n)[3]) {
   const double x = to_double(n[0]), y = to_double(n[1]), z = to_double(n[2]);
   return std::sqrt(x * x + y * y + z * z);
 }
 
-// Returns twice the triangle's area, in lattice units.
+// Returns twice the triangle's area, in square lattice units.
 VOXDAG_HD inline double area_of(const FixedTriangle& triangle) {
   if (is_narrow(triangle)) {
     int64_t n[3];
@@ -84,15 +85,17 @@ struct CellTriangle {
   int cell_bits;    // log2 E
   int64_t v[3][3];  // [vertex][permuted axis]
   Int normal[3];    // all 0 if the triangle is degenerate
-  double slope[2];  // slope of the height along axis 2; only for estimates
+  double slope[2];  // rise along axis 2 per unit of axes 0 and 1; only for estimates
   bool degenerate;
-  double area;  // twice the area in lattice units: the length of the normal
-  // The plane's offset -n.v: in cells, rounded down and up; in quarters, at columns.
+  double area;  // twice the area in square lattice units: the length of the normal
+  // The plane's value at a point x is n.x - n.v. First, its value at the grid's origin, divided by
+  // E and rounded down and up. Then its value at column (0, 0) and height 0, divided by E/4 and
+  // rounded down and up.
   Int plane_floor, plane_ceil, column_floor, column_ceil;
   // [projection along axis d][edge i from vertex i to i + 1], over axes d + 1 and d + 2.
   Edge edges[3][3];
-  // Along axis 2: the edge functions at columns are 2^(cell_bits - 2) (a P + b Q) + at_column, and
-  // >= 0 iff a P + b Q + column >= 0.
+  // In the projection along axis 2, the function of edge i at column (P, Q) is
+  // 2^(cell_bits - 2) (a P + b Q) + at_column[i]. It is >= 0 iff a P + b Q + column[i] >= 0.
   Int at_column[3], column[3];
 
   VOXDAG_HD CellTriangle(const FixedTriangle& triangle, int bits) : cell_bits(bits) {

@@ -25,8 +25,8 @@ VOXDAG_HD inline Vector cross(const Vector& a, const Vector& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-// Returns the position of the point closest to the origin on the segment from a (0) to b (1). Sets
-// `distance` to the square of the point's distance from the origin.
+// Returns the position of the point closest to the origin on the segment from a (position 0) to b
+// (position 1). Sets `distance` to the square of the point's distance from the origin.
 VOXDAG_HD inline double closest_on_segment(const Vector& a, const Vector& b, double& distance) {
   const Vector along = b - a;
   const double length = dot(along, along), forward = -dot(a, along);
@@ -40,8 +40,9 @@ VOXDAG_HD inline double closest_on_segment(const Vector& a, const Vector& b, dou
   return t;
 }
 
-// Returns the center's projection on the plane if the triangle contains it, otherwise the closest
-// point of the edges (on ties, of the first edge). `center` is in lattice units.
+// Returns the projection of `center` on the triangle's plane if the triangle contains this point,
+// otherwise the closest point of the edges (on ties, of the first edge). `center`: the cell's
+// center in lattice units.
 VOXDAG_HD inline SurfacePoint closest_point(const FixedTriangle& triangle,
                                             const std::array<int64_t, 3>& center) {
   constexpr double kOne = static_cast<double>(kPointOne);
@@ -51,7 +52,8 @@ VOXDAG_HD inline SurfacePoint closest_point(const FixedTriangle& triangle,
             static_cast<double>(triangle.v[i][1] - center[1]),
             static_cast<double>(triangle.v[i][2] - center[2])};
   const Vector normal = cross(v[1] - v[0], v[2] - v[0]);
-  // Areas opposite to the vertices, times the normal's length.
+  // Twice the areas of the triangles that the projection forms with the edges opposite to the
+  // vertices, times the normal's length.
   const double opposite[3] = {dot(normal, cross(v[1], v[2])), dot(normal, cross(v[2], v[0])),
                               dot(normal, cross(v[0], v[1]))};
   const double all = opposite[0] + opposite[1] + opposite[2];

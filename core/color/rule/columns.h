@@ -37,8 +37,8 @@ VOXDAG_HD inline ColumnTotals totals_of(uint32_t columns) {
           kTable.sum_j[low] + kTable.sum_j[high] + 2 * high_count};
 }
 
-// Returns the columns (i, j) for which first + a i + b j < 0. The sums must fit, or wrap
-// intentionally.
+// Returns the columns (i, j) for which first + a i + b j < 0. Sums that do not fit in Int wrap
+// around.
 template <class Int>
 VOXDAG_HD inline uint32_t negative_columns_one_by_one(Int first, Int a, Int b) {
   uint32_t columns = 0;
@@ -60,7 +60,7 @@ VOXDAG_HD inline uint32_t negative_columns(Int first, Int a, Int b) {
     const __m128i two = _mm_set1_epi64x(wrapping_sum(a, a)), down = _mm_set1_epi64x(b);
     __m128i left = start, right = _mm_add_epi64(start, two), rows[4];
     for (int j = 0; j < 4; ++j) {
-      // The signs are in the high halves.
+      // Takes the high halves of the four sums, which have their signs.
       rows[j] = _mm_castps_si128(
           _mm_shuffle_ps(_mm_castsi128_ps(left), _mm_castsi128_ps(right), 0b11'01'11'01));
       left = _mm_add_epi64(left, down);

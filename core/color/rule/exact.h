@@ -18,7 +18,8 @@ namespace voxdag::color {
 template <class Int>
 using UnsignedOf = std::conditional_t<sizeof(Int) == 8, uint64_t, uint128>;
 
-// Return products and sums whose intermediate values may not fit in Int, but whose result does.
+// Products and sums modulo 2^64 (for int128, 2^128). They are for expressions whose intermediate
+// values may not fit in Int but whose result does.
 template <class Int>
 VOXDAG_HD inline Int wrapping_product(Int a, Int b) {
   return static_cast<Int>(static_cast<UnsignedOf<Int>>(a) * static_cast<UnsignedOf<Int>>(b));
@@ -41,8 +42,8 @@ VOXDAG_HD inline Int negative_part(Int x) {
   return x < 0 ? x : 0;
 }
 
-// Rounds to nearest, once. 128-bit numbers that do not fit in 64 bits are rounded as two halves,
-// because compilers convert them with different library functions.
+// Numbers that fit in 64 bits are rounded to nearest, once. Other 128-bit numbers are converted as
+// two halves, because compilers convert 128-bit numbers with different library functions.
 VOXDAG_HD inline double to_double(int64_t x) { return static_cast<double>(x); }
 VOXDAG_HD inline double to_double(int128 x) {
   const int64_t low = static_cast<int64_t>(x);

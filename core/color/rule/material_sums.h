@@ -53,7 +53,8 @@ class MaterialSums {
  private:
   static constexpr size_t kFewFurther = size_t{1} << 14;
 
-  // Most cells have one material. The weights of further materials are in one list for all cells.
+  // Most cells have one material, which is stored by cell. The weights of further materials are in
+  // one list for all cells.
   struct FirstMaterial {
     uint32_t material = 0;
     uint32_t is_reset = 0;
@@ -74,7 +75,8 @@ class MaterialSums {
     }
   };
 
-  // Adds up the weights of each cell's materials.
+  // Sorts further_ and adds up the weights that belong together: same cell, same material, and both
+  // before or both after the reset.
   void add_up() {
     std::sort(further_.begin(), further_.end());
     size_t count = 0;

@@ -11,8 +11,9 @@
 
 namespace voxdag::color {
 
-// The sum of the triangles' areas in a cell. In `turned`, the dominant component of each area is
-// positive. This is the orientation of a sheet whose two sides are both in the cell.
+// The sum of the triangles' area vectors in a cell. In `turned`, each vector is oriented so that
+// its dominant component is positive. If both sides of a thin sheet are in the cell, their vectors
+// cancel out in `area`, and `turned` has the sheet's normal.
 struct NormalSum {
   int64_t area[3] = {}, turned[3] = {};
 
@@ -25,8 +26,9 @@ struct NormalSum {
   }
 };
 
-// Returns the normal of the sum of all areas, or, if that sum is less than 1/64 of the sum of the
-// turned areas, the normal of the turned sum.
+// Returns the normal of sum.area. If the largest component of sum.area is less than 1/64 of the
+// largest component of sum.turned, returns the normal of sum.turned. If both sums are 0, returns
+// kNoNormal.
 VOXDAG_HD inline NormalCode normal_of_sum(const NormalSum& sum) {
   const auto largest = [](const int64_t(&v)[3]) {
     int64_t most = 0;

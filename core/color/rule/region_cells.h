@@ -1,9 +1,9 @@
 // The cells of a region that surfaces touch, and their sums, found by Morton code in the region.
 //
 // A cell is covered if a surface covers a column of it. In a covered cell, surfaces that cover no
-// column are ignored. Whether a cell is covered is known only at the end. So a cell has the sum of
-// non-covering surfaces until the first surface that covers a column restarts the sum from zero.
-// The sums do not depend on the order of the surfaces.
+// column are ignored. Whether a cell is covered is known only at the end. So at first a cell's sum
+// contains the surfaces that cover no column. The first surface that covers a column restarts the
+// sum from zero. The final sums do not depend on the order of the surfaces.
 #pragma once
 
 #include <cstdint>
@@ -29,13 +29,13 @@ class RegionCells {
   explicit RegionCells(const AttributeSet& wanted = {})
       : attributes_(wanted), places_(kMaxCells), touched_(kMaxCells / 64) {}
 
-  // Reserves address space for `cells` sums; pages are used when sums are added.
+  // Reserves address space for `cells` sums. The system provides pages only when sums are added.
   void reserve(size_t cells) { sums_.reserve(cells); }
 
   bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
-  // Call it some time before touch() or cover().
+  // Call prefetch() some time before touch() or cover(), so that these do not wait for memory.
   void prefetch(uint32_t code) const { __builtin_prefetch(&places_[code]); }
-  // Adds the cell if it is new, and returns the number of the cell's sum.
+  // Adds the cell if it is new, and returns the number of the cell, for sum() and attributes().
   uint32_t touch(uint32_t code) {
     uint32_t& place = places_[code];
     if (place == 0) {

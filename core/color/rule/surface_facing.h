@@ -1,5 +1,5 @@
-// The side, area and material of a triangle, which add up to the normals and materials of cells.
-// docs/color.md, "Other attributes", states the rule.
+// The side, area and material of a triangle, from which the normals and materials of cells are
+// computed. docs/color.md, "Other attributes", states the rule.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,14 @@
 
 namespace voxdag::color {
 
-// The area of a covered column in the projection along the triangle's dominant axis.
+// The number that stands for the area of one covered column in the projection along the triangle's
+// dominant axis.
 inline constexpr double kColumnArea = 1 << 20;
 
 // A triangle's contribution to each cell that it touches.
 struct SurfaceFacing {
-  // The triangle's normal. Its length is the area of one covered column; each component is at most
-  // kColumnArea.
+  // A vector along the triangle's normal. Its length is the triangle's area in one covered column,
+  // so its dominant component has the magnitude kColumnArea. All 0 for a triangle without area.
   int64_t area[3] = {};
   bool is_backward = false;  // the normal's dominant component is negative
   uint32_t material = 0;

@@ -14,15 +14,16 @@
 
 namespace voxdag::color {
 
-// A point of a triangle: 2^kPointBits times the weights of vertices 1 and 2. All three weights add
-// up to 2^kPointBits.
+// A point of a triangle, given by its barycentric coordinates (weights) times 2^kPointBits.
+// `second` is the weight of vertex 1, `third` of vertex 2. The weights of all three vertices add up
+// to 2^kPointBits.
 inline constexpr int kPointBits = 30;
 inline constexpr int64_t kPointOne = int64_t{1} << kPointBits;
 struct SurfacePoint {
   int64_t second, third;
 };
 
-// The weights are clamped, so that none is negative.
+// Returns the point with these weights, clamped so that none of the three weights is negative.
 VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
   constexpr double kOne = static_cast<double>(kPointOne);
   SurfacePoint point{0, 0};
@@ -41,7 +42,7 @@ template <class Textures>
 VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& textures,
                                         uint32_t image, int cell_bits, double area) {
   const auto& c = surface.corners;
-  double du[3], dv[3];  // along the edges
+  double du[3], dv[3];  // changes of the texture coordinates along the edges
   const double width = textures.width(image, 0), height = textures.height(image, 0);
   for (size_t i = 0; i < 3; ++i) {
     const size_t j = (i + 1) % 3;
@@ -70,7 +71,7 @@ VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& t
   }
   const double cell = static_cast<double>(int64_t{1} << cell_bits);
   const double available = texels * (cell * cell);
-  double needed = area * 0x1p50;  // 2^(2 kTextureBits), and 4 for level 1
+  double needed = area * 0x1p50;  // 2^(2 kTextureBits), times 4 for level 1
   const uint32_t levels = textures.levels(image);
   uint32_t level = 0;
   for (; level + 1 < levels && needed <= available; ++level) needed *= 4;
@@ -83,7 +84,7 @@ VOXDAG_HD inline Texel tinted(Texel texel, const uint32_t (&tint)[4]) {
   return out;
 }
 
-// Adds a texel to a sum. Both weights are below 2^32.
+// Adds a texel to a sum with a weight. `seen`: the weight times alpha. Both are below 2^32.
 VOXDAG_HD inline void add_weighted_one_by_one(Texel texel, uint64_t weight, uint64_t seen,
                                               ColorSum& sum) {
   for (int c = 0; c < 3; ++c) {
@@ -119,8 +120,8 @@ VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, 
 #endif
 }
 
-// The contribution of a triangle to the cells that it touches. The textures must outlive this
-// object.
+// The contribution of a triangle to the cells that it touches. The surface, the material and the
+// textures must outlive this object.
 template <class Textures>
 class SurfaceLook {
  public:
@@ -171,7 +172,7 @@ class SurfaceLook {
   }
 
  private:
-  // Sets tint_ to the material's factor times the vertex color.
+  // Sets tint_ to the material's factor times the vertex color at a point.
   VOXDAG_HD void set_tint(const SurfacePoint& point) {
     const int64_t first = kPointOne - point.second - point.third;
     for (size_t c = 0; c < 4; ++c) {
@@ -182,8 +183,8 @@ class SurfaceLook {
     }
   }
 
-  // Returns texture coordinate `a` of a point, rounded down. Changes of 2^32 or more (256 images)
-  // need 128 bits.
+  // Returns texture coordinate `a` of a point, rounded down. If a coordinate changes by 2^32 (256
+  // images) or more over the triangle, products need 128 bits.
   VOXDAG_HD int64_t coordinate(const SurfacePoint& point, int a) const {
     const int64_t second = change_[0][a], third = change_[1][a];
     int64_t change;
@@ -196,7 +197,7 @@ class SurfaceLook {
     return corners_[0].texture[static_cast<size_t>(a)] + change;
   }
 
-  // Returns the alpha of a surface in 8 bits.
+  // Converts an alpha value of 16 bits to 8 bits, by the material's alpha mode.
   VOXDAG_HD uint32_t alpha_of(uint32_t alpha) const {
     if (material_.alpha_mode == AlphaMode::kOpaque) return 255;
     if (material_.alpha_mode == AlphaMode::kMask) return alpha >= material_.alpha_cutoff ? 255 : 0;

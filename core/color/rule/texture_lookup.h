@@ -1,5 +1,5 @@
-// A bilinear lookup in one level of an image's pyramid, in integers: texture coordinates are
-// wrapped in fixed point, then scaled to the level; the fraction of a texel has 8 bits.
+// A bilinear lookup in one level of an image's pyramid, in integers. Texture coordinates are
+// wrapped in fixed point, then scaled to the size of the level. The fraction of a texel has 8 bits.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,8 @@ VOXDAG_HD inline int64_t wrapped(int64_t coordinate, Wrap wrap) {
   return in_two > kOne ? 2 * kOne - in_two : in_two;
 }
 
-// The two texels next to a coordinate along one axis, and the weight of the second one (of 256).
+// The two texels next to a coordinate along one axis, and the weight of the second texel in units
+// of 1/256.
 struct TexelPair {
   uint32_t first, second, fraction;
 };
@@ -49,7 +50,8 @@ VOXDAG_HD inline TexelPair texels_at(int64_t coordinate, Wrap wrap, uint32_t siz
   return pair;
 }
 
-// Each word has two channels in 32-bit lanes, because 65535 * 65536 + 32768 < 2^32.
+// Returns the mean of four texels, weighted by the fractions. Each word has two channels in 32-bit
+// lanes. The sums in a lane do not overflow, because 65535 * 65536 + 32768 < 2^32.
 VOXDAG_HD inline Texel blended(const Texel (&texels)[4], uint32_t x_fraction, uint32_t y_fraction) {
   constexpr uint64_t kLanes = 0x0000ffff0000ffffull, kHalf = 0x0000800000008000ull;
   const uint64_t x1 = x_fraction, x0 = 256 - x1, y1 = y_fraction, y0 = 256 - y1;
@@ -67,7 +69,7 @@ struct TexelSquare {
   TexelPair x, y;
 };
 
-// `view` is a level of an image.
+// Returns the texels around the texture coordinates (u, v). `view` is a level of an image.
 template <class View>
 VOXDAG_HD inline TexelSquare texels_around(const View& view, const Wrap (&wrap)[2], int64_t u,
                                            int64_t v) {

@@ -1,12 +1,15 @@
 // Finds the cells of a range that a triangle touches, and the columns in which it covers each of
 // these cells. The result is exact, and depends only on the triangle and the cell.
 //
-// The search visits columns of cells along the triangle's dominant axis. The triangle's shadow is
-// its projection along this axis. If the shadow contains a column's whole closed square, the
-// triangle touches exactly the cells of the column that its plane touches. If the shadow only
-// touches the square, the edge tests in the other two projections also decide. From one column to
-// the next the plane climbs by at most one cell. So its height is updated by additions, and starts
-// from an estimate in doubles that exact values correct.
+// The search visits columns of cells along the triangle's dominant axis. The projections of the
+// triangle and of a column of cells along this axis are the triangle's shadow and the column's
+// square. If the shadow contains the complete closed square, the triangle touches exactly the cells
+// of the column that its plane touches. If the shadow only touches the square, the edge tests in
+// the other two projections also decide.
+//
+// From one column of cells to the next, the plane rises or falls by at most one cell. So the
+// plane's height is updated by additions. In the first column of a row it is estimated in doubles,
+// and the estimate is corrected with exact values.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +20,8 @@
 
 namespace voxdag::color {
 
-// A box of cells, along the permuted axes of a triangle; positions count cells of the whole grid.
+// A box of cells, along the permuted axes of a triangle (cell_triangle.h). Positions are counted in
+// cells from the grid's origin; `last` is inclusive.
 struct CellRange {
   int64_t first[3], last[3];
 };
@@ -33,7 +37,8 @@ class TouchedCells {
     fall_ = negative_part(t_.normal[0]) + negative_part(t_.normal[1]);
   }
 
-  // Calls visit(p, q, r, columns) for each touched cell, once.
+  // Calls visit(p, q, r, columns) for each touched cell, once. `columns` is the set of the cell's
+  // columns that the triangle covers (columns.h).
   template <class Visit>
   VOXDAG_HD void visit(Visit&& visit) {
     for (int64_t p = range_.first[0]; p <= range_.last[0]; ++p) visit_row(p, visit);
@@ -61,7 +66,8 @@ class TouchedCells {
     }
   }
 
-  // Sets first_ and last_ to the range of the column's cells that the plane touches.
+  // Sets first_ and last_ to the range of cells that the plane touches in column of cells (p, q),
+  // and highest_ and lowest_ as correct() does.
   VOXDAG_HD void find_plane(int64_t p, int64_t q) {
     if (t_.degenerate) {
       first_ = range_.first[2];
@@ -81,11 +87,11 @@ class TouchedCells {
     lowest_ = wrapping_sum(wrapping_sum(at_cell, t_.plane_ceil), fall_);
     correct();
   }
-  // Updates first_, last_, highest_ and lowest_ from the previous column.
+  // Updates first_, last_, highest_ and lowest_ from the previous column of cells in the row.
   VOXDAG_HD void climb() {
     if (t_.degenerate) return;
-    // The plane rises by at most one cell. One step without branches, which would often be
-    // mispredicted.
+    // The plane rises or falls by at most one cell, so one step of correct() is enough. It is done
+    // without branches, which the CPU would often mispredict.
     const Int n = t_.normal[2];
     highest_ += t_.normal[1];
     lowest_ += t_.normal[1];
@@ -156,10 +162,10 @@ class TouchedCells {
     return ~outside & kAllColumns;
   }
 
-  // Returns the columns in which the surface's plane is above the bottom of a cell. With `or_in`,
-  // also returns the columns in which the plane is exactly at the bottom; then the plane's values
-  // must not need rounding. `at_bottom`: the plane's value at the cell's first column and bottom,
-  // rounded down.
+  // Returns the columns in which the triangle's plane is above the bottom of a cell. If `or_in` is
+  // set, also returns the columns in which the plane is exactly at the bottom; this requires plane
+  // values that were not rounded. `at_bottom`: the plane's value at the cell's first column and
+  // bottom, rounded down.
   VOXDAG_HD uint32_t columns_above(Int at_bottom, bool or_in) const {
     return negative_columns<Int>(wrapping_sum(at_bottom, Int{or_in ? -1 : 0}), t_.normal[0],
                                  t_.normal[1]);
@@ -169,7 +175,8 @@ class TouchedCells {
   const CellRange& range_;
   Int margin_[3];    // an edge function's change over a cell
   Int rise_, fall_;  // the plane's rise and fall over a cell, along axes 0 and 1
-  // The cells of the column that the plane touches, and the plane over them.
+  // The first and the last cell that the plane touches in the current column of cells, the highest
+  // value of the plane in the first cell, and the lowest value in the last cell.
   int64_t first_ = 0, last_ = 0;
   Int highest_ = 0, lowest_ = 0;
 };
