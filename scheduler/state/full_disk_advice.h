@@ -21,7 +21,7 @@ inline std::string full_disk_advice(std::span<const StoredSubvolume> leaves, boo
   if (built > 0) {
     const double artifacts = bytes * (1 + planned / built);
     needed = "about " + std::to_string(std::llround((2 * artifacts - bytes) / 1e6)) + " MB of ";
-    if (has_colors) needed = "what colors take (voxdag plan says how much) and " + needed;
+    if (has_colors) needed = "the space for colors (voxdag plan estimates it) and " + needed;
   }
   return "; the job is paused: free " + needed + "disk space and run the same command again";
 }

@@ -17,7 +17,7 @@ CREATE TABLE job (
   scene_digest TEXT NOT NULL,
   geometry TEXT NOT NULL,
   format_version INTEGER NOT NULL,
-  -- Their ids are 1, 2, ...
+  -- Number of subvolumes. Their ids are 1, 2, ...
   subvolumes INTEGER NOT NULL,
   row_checksum INTEGER NOT NULL
 );
@@ -33,7 +33,7 @@ CREATE TABLE subvolume (
   root_hash INTEGER NOT NULL,
   row_checksum INTEGER NOT NULL
 );
--- Replacing a row searches for rows that refer to it: without an index, all of them.
+-- Replacing a row searches for rows that refer to it. Without this index SQLite reads all rows.
 CREATE INDEX subvolume_by_parent ON subvolume (parent);
 CREATE TABLE stage_time (
   id INTEGER PRIMARY KEY,

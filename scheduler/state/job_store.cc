@@ -19,7 +19,7 @@ struct Sealed {
   uint64_t checksum = 0;
 };
 
-// Digest input: the bytes of the columns, each with its length, in order.
+// Collects the bytes of the columns of a row, each after its length, and returns their checksum.
 class RowDigest {
  public:
   void fixed(const char*, int64_t) {}
@@ -152,7 +152,8 @@ void put_sealed(SqlDatabase& database, const std::string& table, Record record) 
   put_row(database, table, Sealed<Record>{std::move(record), checksum});
 }
 
-// Throws Error{kCorrupt} with `what` if the row differs from the written one.
+// Returns the record of a row. Throws Error{kCorrupt} if the row does not match its checksum;
+// `what` names the row in the message.
 template <class Record>
 Record unsealed(Sealed<Record> sealed, const std::string& what) {
   if (sealed.checksum != checksum_of(sealed.record))
@@ -234,8 +235,9 @@ std::vector<StoredSubvolume> JobStore::leaves() {
     leaves.push_back(built == built_in_memory_.end() ? subvolume : built->second);
   }
   if (count != job.subvolumes)
-    throw Error(ErrorCode::kCorrupt,
-                "job store: rows of subvolumes are missing: start over with --restart");
+    throw Error(ErrorCode::kCorrupt, "job store: rows of subvolumes are missing: expected " +
+                                         std::to_string(job.subvolumes) +
+                                         " rows; start over with --restart");
   return leaves;
 }
 
@@ -309,7 +311,7 @@ void JobStore::update_row(const StoredSubvolume& subvolume) {
 
 std::optional<std::vector<std::byte>> JobStore::ingest() {
   std::lock_guard lock(mutex_);
-  auto row = find_sealed<IngestRow>(database_, "ingest", "what was ingested");
+  auto row = find_sealed<IngestRow>(database_, "ingest", "the ingest progress");
   if (!row) return std::nullopt;
   return std::move(row->record);
 }
