@@ -36,7 +36,8 @@ bool is_partial(const DirectoryEntry& entry) {
   return !entry.is_directory && entry.name.find(".vdart.partial") != std::string::npos;
 }
 
-// An entry is written in seconds, so the writer of a partial entry of this age no longer exists.
+// Age at which a partial entry is removed. Writing an entry takes seconds, so the writer of an
+// older partial entry no longer exists.
 constexpr double kAbandonedAfterS = 3600;
 
 }  // namespace
@@ -103,7 +104,7 @@ void ArtifactCache::mark_used(const std::string& key) {
   try {
     files_.touch(path_of(key));
   } catch (const Error&) {
-    // The cache is read-only for this process.
+    // This process may not write to the cache.
   }
 }
 

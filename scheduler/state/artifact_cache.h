@@ -1,11 +1,12 @@
-// Artifacts shared between builds. A subvolume whose content was built before, here or in another
-// place of the grid, is copied instead of built.
+// Artifacts shared between builds. If the content of a subvolume was built before, in any place of
+// any grid, its artifact is copied instead of built.
 //
 // The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube
-// (corners sorted within each triangle, triangles sorted, duplicates removed), the cube's edge,
-// hash-bits and the format's version. The cache is a folder with one file per entry. When the limit
-// is exceeded, the least recently used entries are removed. Several builds may share the cache:
-// entries appear atomically, by renaming, and a removed or damaged entry is a miss. Thread-safe.
+// (corners sorted within each triangle, triangles sorted, duplicates removed), the cube's edge, the
+// hash bits, and a version that increases whenever artifacts change. The cache is a folder with one
+// file per entry. When the limit is exceeded, the least recently used entries are removed. Several
+// builds may share the cache: entries appear atomically, by renaming, and a removed or damaged
+// entry is a miss. Thread-safe.
 #pragma once
 
 #include <atomic>

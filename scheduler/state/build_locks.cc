@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// `voxdag status` locks a work folder very briefly.
+// Wait before the warning. `voxdag status` locks a work folder for a shorter time.
 constexpr double kQuietS = 0.3;
 constexpr auto kPause = std::chrono::milliseconds(20);
 

@@ -13,13 +13,13 @@
 namespace voxdag {
 
 // Calls `try_lock` until it returns a lock, and returns this lock; null after `max_s` seconds
-// without a lock. Warns, with a text that begins with `what`, if the wait is longer than `voxdag
-// status` may hold a lock.
+// without a lock. Warns, with a text that begins with `what`, after 0.3 s: `voxdag status` holds a
+// lock for a shorter time.
 std::unique_ptr<FileLock> wait_for_lock(const std::function<std::unique_ptr<FileLock>()>& try_lock,
                                         const std::string& what, double max_s,
                                         const BuildContext& context);
 
-// Throws Error{kIo} if another process is still writing the output after `max_wait_s`.
+// Locks the output. Throws Error{kIo} if another process still has it locked after `max_wait_s`.
 OutputLock lock_output(const BuildContext& context, const std::string& output, double max_wait_s);
 
 }  // namespace voxdag

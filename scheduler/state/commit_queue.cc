@@ -22,7 +22,8 @@ void CommitQueue::commit() {
 }
 
 void CommitQueue::finish() {
-  // Durable triangles are kept until their subvolumes are durable.
+  // Commits now if bins must be released, because bins are released only after a commit, and the
+  // triangle store is not used after this call.
   if (!next_group_.bins.empty()) commit();
   wait();
   segment_->complete();

@@ -1,7 +1,7 @@
-// A worker's segment. Artifacts become durable in groups and are then recorded in the job store, on
-// a separate thread, so that the worker does not wait for the disk. The last group becomes durable
-// only by commit(), because a short build ends before a sync of its artifacts is worthwhile. Not
-// thread-safe.
+// A worker's segment, and the built subvolumes that are not recorded yet. Artifacts become durable
+// in groups and are then recorded in the job store, on a separate thread, so that the worker does
+// not wait for the disk. The last group becomes durable only by commit(), because a short build
+// ends before a sync of its artifacts is worthwhile. Not thread-safe.
 #pragma once
 
 #include <future>
@@ -57,8 +57,8 @@ class CommitQueue {
   void commit_pending();
   // Waits for commit_pending() on the other thread and throws its error, if any.
   void wait();
-  // Called after a failure. Makes the artifacts of both groups durable and records them, as far as
-  // the disk accepts them.
+  // Called after a failure. Makes the artifacts of pending_group_ and next_group_ durable and
+  // records them, as far as the disk accepts them.
   void recover();
 
   JobStore& jobs_;

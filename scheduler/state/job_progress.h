@@ -52,7 +52,7 @@ class JobProgress : public Progress {
   std::mutex mutex_;  // guards the next two members
   ProgressSnapshot snapshot_;
   double last_written_s_ = 0;
-  std::mutex store_mutex_;  // guards the store; locked before mutex_, never after it
+  std::mutex store_mutex_;  // guards store_; a thread that locks both mutexes locks this one first
   JobStore* store_;
 };
 

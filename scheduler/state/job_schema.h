@@ -7,8 +7,8 @@
 
 namespace voxdag {
 
-// Throws Error{kInvalidInput} if the database is not a job store, Error{kUnsupportedVersion} if it
-// has another version.
+// Throws Error{kInvalidInput} if the database is not a job store, or Error{kUnsupportedVersion} if
+// the job store has another version.
 void check_job_schema(SqlDatabase& database, const std::string& path);
 // Creates the tables in an empty database, in one transaction. Checks the version and the integrity
 // of any other database. Throws Error.

@@ -1,6 +1,6 @@
 // The durable state of a build in one SQLite file of the work folder (WAL, synchronous = FULL for
-// results, foreign keys): the progress of ingest, the job, its subvolumes and their artifacts, the
-// unfinished merge, timings and progress.
+// results, foreign_keys = ON): the progress of ingest, the job, its subvolumes and their artifacts,
+// the unfinished merge, timings and progress.
 //
 // Invariants:
 //   1. A row names an artifact only after the artifact's bytes were synced.
@@ -37,7 +37,7 @@ namespace voxdag {
 // Properties that must be equal to resume a build.
 struct JobIdentity {
   std::string scene_digest;  // digest of the grid and the snapped triangles
-  std::string geometry;      // geometry options as JSON, for messages
+  std::string geometry;      // geometry options as JSON (geometry_json())
   int64_t format_version = 0;
   bool operator==(const JobIdentity&) const = default;
 };
@@ -58,7 +58,7 @@ struct StoredSubvolume {
 
 // An unfinished merge; see Checkpoint.
 struct StoredMerge {
-  uint32_t level = 0;  // the merge reads only artifact levels above this one
+  uint32_t level = 0;  // the merge still reads the artifact levels with smaller numbers
   std::vector<std::byte> state;
 };
 
@@ -90,13 +90,14 @@ class JobStore {
   enum class Access { kBuild, kRead };
 
   // Opens the store; kBuild also creates it. Throws Error{kCorrupt} for a damaged store,
-  // Error{kInvalidInput} for another kind of database, Error{kUnsupportedVersion}.
+  // Error{kInvalidInput} for another kind of database, and Error{kUnsupportedVersion} for a store
+  // of another version.
   JobStore(const std::string& path, Access access);
 
   std::optional<JobIdentity> job();
   // Replaces the store's contents by a new job whose subvolumes are all planned.
   void start(const JobIdentity& job, std::span<const StoredSubvolume> plan);
-  // Returns the subvolumes that are not split, by id.
+  // Returns the subvolumes that are not split, in the order of their ids.
   std::vector<StoredSubvolume> leaves();
   void record_built(std::span<const StoredSubvolume> built);
   // Makes leaves() of this object return these subvolumes as built. They become durable only with
@@ -104,7 +105,7 @@ class JobStore {
   void mark_built_in_memory(std::span<const StoredSubvolume> built);
   // Makes leaves() return unrecorded subvolumes as planned again.
   void forget_built_in_memory();
-  // Returns the ids of the parts, in their order.
+  // Replaces a subvolume by planned parts. Returns their ids, in the order of `parts`.
   std::vector<SubvolumeId> record_split(const StoredSubvolume& whole, std::span<const Cube> parts);
   // Plans a subvolume with a damaged artifact again. Also removes the progress of ingest, because
   // the triangles of built subvolumes were released.
@@ -114,7 +115,7 @@ class JobStore {
   // or the next job. Throws Error{kCorrupt} if it does not match its checksum.
   std::optional<std::vector<std::byte>> ingest();
   void save_ingest(std::span<const std::byte> record);
-  // Does not write to the store if it has no progress of ingest.
+  // Removes the progress of ingest. Does not write to a store without this progress.
   void forget_ingest();
 
   std::optional<StoredMerge> merge();

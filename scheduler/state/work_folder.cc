@@ -170,7 +170,7 @@ void WorkFolder::remove_cluster_files() {
       remove_silently(path);
       continue;
     }
-    // The attempt itself may also remove it.
+    // The attempt's task may remove the folder at the same time.
     try {
       for (const DirectoryEntry& inner : files_.list(path))
         if (segment_id(inner.name)) remove_silently(path + "/" + inner.name);
@@ -205,7 +205,7 @@ void WorkFolder::remove_if_empty(const std::string& folder) {
   try {
     files_.remove_directory(folder);
   } catch (const Error&) {
-    // Files of other programs and new files remain.
+    // The folder has files of other programs, or new files of a running task.
   }
 }
 
@@ -220,7 +220,7 @@ void WorkFolder::remove_silently(const std::string& path) {
 void WorkFolder::remove() {
   released_.clear();
   try {
-    // The lock file is removed last, so that no other build uses the folder before.
+    // The lock file is removed last, so that no other build uses the folder before it is empty.
     std::vector<std::string> others = scratch_files();
     for (const DirectoryEntry& entry : files_.list(path_))
       if (is_ours(entry) && !entry.is_directory && entry.name != kLockName)

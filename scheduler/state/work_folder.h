@@ -46,9 +46,10 @@ class WorkFolder {
   // Folder that a cluster build shares with its tasks.
   std::string cluster_path() const { return path_ + "/cluster"; }
   std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;
-  // Returns the largest id of an existing segment plus one.
+  // Returns an unused id for this process's segments: one more than the largest existing id below
+  // kFirstClusterSegment.
   uint32_t next_segment_id() const;
-  // Bytes of all files in the folder, for reports.
+  // Returns the bytes of all files in the folder, without released parts. For reports.
   uint64_t bytes() const;
 
   // Frees the disk space of a part of a segment that is no longer needed. Not thread-safe.
@@ -57,15 +58,15 @@ class WorkFolder {
   // Removes the segments for which `is_named` returns false. An interrupted build left them, and no
   // row of the store refers to them.
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
-  // Removes merge data.
+  // Removes the merge's scratch files, and creates the scratch folder if it does not exist.
   void empty_scratch();
   // Removes the files of a cluster build. Errors are ignored.
   void remove_cluster_files();
-  // Removes spilled triangles. Silent, like remove().
+  // Removes spilled triangles. Errors are ignored.
   void remove_spilled() { remove_silently(spill_path()); }
-  // Removes durable triangles. Silent, like remove().
+  // Removes durable triangles. Errors are ignored.
   void remove_durable() { remove_silently(durable_path()); }
-  // Removes colors. Silent, like remove().
+  // Removes stored colors. Errors are ignored.
   void remove_colors() { remove_silently(colors_path()); }
   // Removes all files of voxdag, and the folder if it is empty afterwards. Errors are ignored,
   // because remaining files only cost space.

@@ -13,16 +13,16 @@
 namespace voxdag {
 namespace {
 
-// The clock of file times advances in steps of up to 10 ms. Times without a fraction of a second
-// may have steps of up to two seconds.
+// Upper bounds of the step in which the clock of file times advances. The step is usually at most
+// 10 ms. Times without a fraction of a second may have steps of up to two seconds.
 constexpr int64_t kSecondNs = 1'000'000'000;
 constexpr int64_t kTickNs = kSecondNs / 10;
 constexpr int64_t kCoarseTickNs = 2 * kSecondNs;
-// After the partition the file contains each triangle at least twice, and some triangles more
-// often.
+// Records per triangle in the file after the partition: one in the scene's bin, and one in the bin
+// of each cube that the triangle touches.
 constexpr double kDurableCopies = 2.2;
-// Free disk space that optional checkpoints require, relative to the size of all copies of the
-// scene's triangles: once for the copies, and once for the rest of the build.
+// Free disk space that checkpoints of triangles that fit in memory require, relative to the size of
+// the triangles' records in the file: once for the records, and once for the rest of the build.
 constexpr double kFreePerCopy = 2;
 
 std::string request_of(const BuildSpec& spec) {
@@ -87,8 +87,8 @@ std::optional<IngestState> IngestCheckpoint::resume() {
   if (record_->request == request_of(spec_) && files_are_unchanged() &&
       (record_->state.stage != IngestStage::kReady || jobs_->job()))
     return record_->state;
-  // Keep the saved checkpoint until another scene replaces it: this scene may be temporarily
-  // unreachable.
+  // Keeps the saved checkpoint until enable() replaces it, because the files of its scene may be
+  // temporarily unreachable.
   record_.reset();
   return std::nullopt;
 }

@@ -4,10 +4,10 @@
 // chooses the build's triangle store.
 //
 // Invariants:
-//   1. The row refers to no bytes of the file that were not synced before.
+//   1. The row refers only to bytes of the file that were synced before the row was written.
 //   2. A row is valid only for the same request, and if every file of the scene is unchanged: same
-//      inode, size and times. The times must have been old enough when the file was opened that any
-//      later change shows in them.
+//      inode, size and times. When the scene was opened, the times must have been so old that any
+//      later change of a file gives it different times.
 //   3. An invalid or damaged row is removed, and the scene is read again.
 // Used by one thread.
 #pragma once
@@ -43,12 +43,13 @@ class IngestCheckpoint {
   std::optional<IngestState> resume();
   // True if the scene is large enough for checkpoints and the disk has space for its triangles.
   bool is_worthwhile(const TriangleSource& scene) const;
-  // Throws Error{kNoSpace} if the scene's triangles fit neither memory nor disk, unless forced. A
-  // scene of a few bytes can declare billions of triangles.
+  // Throws Error{kNoSpace} if memory and disk together have no space for the scene's triangles.
+  // Does nothing if RunOptions::force is set or the options give the bounds. A scene of a few bytes
+  // can declare billions of triangles.
   void check_disk_space(const TriangleSource& scene) const;
   // Enables checkpoints for a scene that was opened at Unix time `opened_ns`, and removes
-  // checkpoints of other scenes. Does nothing if a later change of a file might not change its
-  // times.
+  // checkpoints of other scenes. Leaves checkpoints disabled if a later change of a file might not
+  // change its times.
   void enable(const TriangleSource& scene, int64_t opened_ns);
   // True if checkpoints are enabled for a scene with exactly these files.
   bool matches(const std::vector<SourceFile>& files) const;
@@ -70,8 +71,8 @@ class IngestCheckpoint {
   // Saves on another thread, so that ingest does not wait for the disk. The next call throws the
   // thread's error.
   void save_in_background(IngestState& state, std::optional<TopTreeCells> top = {});
-  // Removes the triangles after all subvolumes are built and recorded. Keeps the record, so that a
-  // later run recognizes the scene without reading it.
+  // Called when all subvolumes are built and recorded. Removes the durable triangles. Keeps the
+  // record, so that a later run recognizes the scene without reading it.
   void finish();
 
   // True if the job store has a checkpoint of any scene.

@@ -17,7 +17,7 @@ namespace voxdag {
 
 struct IngestCounts {
   uint64_t triangles = 0;        // triangles that may touch the grid
-  uint64_t dropped_outside = 0;  // triangles whose boxes miss the grid
+  uint64_t dropped_outside = 0;  // triangles whose bounding boxes miss the grid
   uint64_t dropped_invalid = 0;
   double expected_voxels = 0;  // sum over the triangles; shared voxels count more than once
 };
@@ -42,7 +42,7 @@ struct IngestState {
   ContentDigest digest;
   Extent top_tree;  // cells of the top tree in the durable store's file
   double top_tree_weight = 0;
-  DurableStoreState triangles;  // has no file after all subvolumes are recorded
+  DurableStoreState triangles;  // empty again after all subvolumes are recorded
 };
 
 struct IngestRecord {

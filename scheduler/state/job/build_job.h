@@ -35,9 +35,11 @@ struct BuildJob {
   }
   // Returns the subvolumes that are not built yet.
   std::vector<StoredSubvolume> planned() const;
-  // Records finished work. Errors are ignored: the build is already failing with its first error.
+  // Records finished work. Errors are ignored: the caller already handles an error, and subvolumes
+  // that are not recorded are only built again.
   void commit_best_effort();
-  // Throws Error{kInvalidInput}: the work folder contains another job.
+  // Throws Error{kInvalidInput} because the work folder contains another job, with the difference
+  // between the jobs.
   [[noreturn]] void refuse(const std::string& difference) const;
 
   const BuildSpec& spec;
