@@ -29,7 +29,7 @@ class PendingArtifacts {
   // Returns the number of rows of all pending artifacts.
   uint64_t rows() const { return rows_; }
   bool has_inputs() const;
-  // Identifies the inputs by their content.
+  // Returns a checksum that identifies the inputs by their content.
   uint64_t inputs_checksum() const { return inputs_checksum_; }
   // Divides the artifacts into consecutive groups and returns the groups' ends. Each group has at
   // least one artifact. A group of several artifacts can be merged within `partition_bytes` and has

@@ -20,8 +20,8 @@ struct MergeInputs {
   std::vector<ArtifactRef> artifacts;
   // Opens the segment file with this id.
   std::function<std::shared_ptr<ReadableFile>(uint32_t)> open_segment;
-  // A folder for data that does not fit in memory, used only by this merge. After the merge it
-  // contains only files named by the state in the checkpoint.
+  // A folder for data that does not fit in memory. No other merge may use it at the same time.
+  // After the merge it contains only files named by the state in the checkpoint.
   std::string scratch_folder;
   // Minimum CPU time between two checkpoints, in seconds.
   double checkpoint_interval_s = 2;
