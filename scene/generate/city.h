@@ -22,7 +22,7 @@ struct CityParts {
   uint32_t car[2];
 };
 
-// The box that a building may fill.
+// The site of a building: its place, its maximum width and its number of floors.
 struct Lot {
   Vec3 center;  // on the ground
   double width = 0;

@@ -111,7 +111,7 @@ void add_building(SceneBuilder& scene, const CityParts& parts, const Lot& lot, R
   tier.bays_z = static_cast<uint32_t>(random.between(most * 5 / 8, most));
   const bool tall = lot.floors > 9;
   for (uint32_t left = lot.floors;;) {
-    // Tall buildings become narrower two or more times toward the top.
+    // A tall building becomes narrower after each tier, until few floors or few bays are left.
     const bool last = !tall || left < 6 || tier.bays_x < 4 || tier.bays_z < 4;
     tier.floors = last ? left : left / 2 + random.below(left / 4);
     add_tier(scene, parts, tier, lot);

@@ -25,9 +25,9 @@ class ImageBytes : public EncodedBytes {
   bool next_group();
 
   const std::unique_ptr<ReadableFile> file_;
-  uint64_t at_, end_;  // range left in the file
+  uint64_t at_, end_;  // the range of the file that is not read yet
   const bool is_base64_;
-  uint64_t left_;  // bytes left of the image
+  uint64_t left_;  // bytes of the image that are not returned yet
   std::vector<std::byte> window_;
   size_t window_at_ = 0;
   bool has_ended_ = false;
