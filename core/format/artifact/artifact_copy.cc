@@ -22,12 +22,16 @@ constexpr uint64_t kChunkBytes = uint64_t{256} << 10;
 ArtifactIndex read_single_index(const ReadableFile& file, const ArtifactRef& ref) {
   if (ref.bytes > file.size() || ref.offset > file.size() - ref.bytes ||
       ref.index_offset < ref.offset || ref.index_offset - ref.offset > ref.bytes)
-    corrupt_copy(file.path(), "the file ends before its artifact does");
+    corrupt_copy(file.path(), "the file has " + std::to_string(file.size()) +
+                                  " bytes: expected an artifact of " + std::to_string(ref.bytes) +
+                                  " bytes at byte " + std::to_string(ref.offset) +
+                                  " with its index at byte " + std::to_string(ref.index_offset));
   std::vector<std::byte> bytes(ref.offset + ref.bytes - ref.index_offset);
   file.read_at(ref.index_offset, bytes);
   ArtifactIndex index = decode_index(bytes, ref, file.path());
   if (index.roots.size() != 1)
-    corrupt_copy(file.path(), "the artifact contains more than one subvolume");
+    corrupt_copy(file.path(), "the artifact has " + std::to_string(index.roots.size()) +
+                                  " subvolumes: expected 1");
   return index;
 }
 
@@ -37,7 +41,10 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
                           uint32_t grid_levels, SegmentWriter& to) {
   ArtifactIndex index = read_single_index(from, ref);
   if (index.shape.grid_levels - index.roots[0].cube.level != grid_levels - cube.level)
-    corrupt_copy(from.path(), "the artifact belongs to a cube of a different size");
+    corrupt_copy(from.path(),
+                 "the artifact's cube has an edge of 2^" +
+                     std::to_string(index.shape.grid_levels - index.roots[0].cube.level) +
+                     " voxels: expected 2^" + std::to_string(grid_levels - cube.level));
   index.shape.grid_levels = grid_levels;
   index.roots[0].cube = cube;
   const uint64_t first = to.size();
@@ -48,7 +55,8 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
       bytes.resize(frame.bytes);
       from.read_at(frame.offset, bytes);
       if (checksum64(bytes) != frame.checksum)
-        corrupt_copy(from.path(), "a frame fails its checksum");
+        corrupt_copy(from.path(),
+                     "the frame at byte " + std::to_string(frame.offset) + " fails its checksum");
       to.append(bytes);
     }
   }
@@ -85,14 +93,17 @@ CacheEntry read_cache_entry(FileSystem& files, const std::string& path) {
   CacheEntry entry;
   entry.file = files.open_read(path);
   if (entry.file->size() < kSegmentHeaderBytes + kFooterBytes)
-    corrupt_copy(path, "it is too short");
+    corrupt_copy(path, "it has " + std::to_string(entry.file->size()) +
+                           " bytes: expected at least " +
+                           std::to_string(kSegmentHeaderBytes + kFooterBytes));
   std::byte header[kSegmentHeaderBytes];
   entry.file->read_at(0, header);
   check_segment_header(header, 0, path);
   std::byte footer[kFooterBytes];
   entry.file->read_at(entry.file->size() - kFooterBytes, footer);
   ByteSource source(footer);
-  if (source.get<uint64_t>() != kEntryMagic) corrupt_copy(path, "it is not a cache entry");
+  if (source.get<uint64_t>() != kEntryMagic)
+    corrupt_copy(path, "it does not end with the footer of a cache entry");
   entry.ref.offset = source.get<uint64_t>();
   entry.ref.bytes = source.get<uint64_t>();
   entry.ref.index_offset = source.get<uint64_t>();

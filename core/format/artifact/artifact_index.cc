@@ -47,7 +47,8 @@ void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std:
   const uint32_t level = root.cube.level, brick_level = index.shape.brick_level();
   const bool has_level = level <= brick_level && brick_level - level < index.levels.size();
   if (!has_level || root.index >= index.levels[brick_level - level].rows)
-    corrupt(where, "a root is not in the artifact's levels");
+    corrupt(where, "a root is row " + std::to_string(root.index) + " of level " +
+                       std::to_string(level) + ", which the artifact does not have");
   for (const uint32_t p : root.cube.position)
     if (p >> level != 0) corrupt(where, "a root's cube is outside the grid");
   if (root.voxels == 0 || root.svo_nodes == 0) corrupt(where, "a root is empty");
@@ -75,12 +76,18 @@ void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& 
     frame.checksum = source.get<uint64_t>();
     if (reserved != 0) corrupt(here, "a reserved field of a frame is not 0");
     if (frame.rows == 0 || frame.rows > kFrameRows || (i + 1 < count && frame.rows != kFrameRows))
-      corrupt(here, "frame " + std::to_string(i) + " has " + std::to_string(frame.rows) + " rows");
+      corrupt(here, "frame " + std::to_string(i) + " has " + std::to_string(frame.rows) +
+                        " rows, expected " + (i + 1 < count ? "" : "1 to ") +
+                        std::to_string(kFrameRows));
     if (bricks ? frame.children != 0
                : frame.children < frame.rows || frame.children > 8 * frame.rows)
-      corrupt(here, "frame " + std::to_string(i) + " has " + std::to_string(frame.children) +
-                        " children");
-    if (frame.first_hash < hash) corrupt(here, "frames are not in the order of their hashes");
+      corrupt(here,
+              "frame " + std::to_string(i) + " has " + std::to_string(frame.children) +
+                  " children, expected " +
+                  (bricks ? "0" : "1 to 8 for each of " + std::to_string(frame.rows) + " rows"));
+    if (frame.first_hash < hash)
+      corrupt(here, "the first hash of frame " + std::to_string(i) + " is below that of frame " +
+                        std::to_string(i - 1));
     hash = frame.first_hash;
     rows += frame.rows;
     children += frame.children;
@@ -88,7 +95,10 @@ void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& 
     level.frames.push_back(frame);
   }
   if (rows != level.rows || children != level.children || rows == 0 || rows > uint64_t{1} << 32)
-    corrupt(here, "the frames do not add up to the level's rows and children");
+    corrupt(here, "the frames have " + std::to_string(rows) + " rows and " +
+                      std::to_string(children) + " children, expected " +
+                      std::to_string(level.rows) + " and " + std::to_string(level.children) +
+                      ", and 1 to 2^32 rows");
 }
 
 }  // namespace
@@ -134,7 +144,8 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
                            const std::string& where) {
   if (checksum64(bytes) != ref.checksum) corrupt(where, "the index fails its checksum");
   ByteSource source(bytes);
-  if (source.get<uint64_t>() != kIndexMagic) corrupt(where, "no index begins here");
+  if (source.get<uint64_t>() != kIndexMagic)
+    corrupt(where, "no index begins at byte " + std::to_string(ref.index_offset));
   check_version(source.get<uint32_t>(), where);
   ArtifactIndex index;
   index.shape.grid_levels = source.get<uint32_t>();
@@ -152,9 +163,13 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
   // After this check, everything allocated below is limited by the size of `bytes`.
   if (bytes.size() !=
       kFixedBytes + roots * kRootBytes + levels * kLevelBytes + frames * kFrameBytes)
-    corrupt(where, "the index is not as long as its counts say");
+    corrupt(where, "the index has " + std::to_string(bytes.size()) +
+                       " bytes, which do not fit its " + std::to_string(roots) + " roots, " +
+                       std::to_string(levels) + " levels and " + std::to_string(frames) +
+                       " frames");
   if (frame_bytes != ref.index_offset - ref.offset)
-    corrupt(where, "the frames are not as long as the index says");
+    corrupt(where, "the frames have " + std::to_string(ref.index_offset - ref.offset) +
+                       " bytes, expected " + std::to_string(frame_bytes));
 
   for (uint64_t i = 0; i < roots; ++i) index.roots.push_back(get_root(source, where));
   std::vector<uint32_t> frame_counts;
@@ -166,15 +181,21 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
     level.rows = source.get<uint64_t>();
     level.children = source.get<uint64_t>();
     if (level.level != index.shape.brick_level() - i)
-      corrupt(where, "levels do not follow one another");
+      corrupt(where, "level " + std::to_string(level.level) + ", expected level " +
+                         std::to_string(index.shape.brick_level() - i));
     frames_of_levels += frame_counts.back();
     index.levels.push_back(std::move(level));
   }
-  if (frames_of_levels != frames) corrupt(where, "the levels' frames are not as many as counted");
+  if (frames_of_levels != frames)
+    corrupt(where, "the levels have " + std::to_string(frames_of_levels) + " frames, expected " +
+                       std::to_string(frames));
   uint64_t offset = ref.offset;
   for (uint64_t i = 0; i < levels; ++i)
     get_frames(source, frame_counts[i], i == 0, index.levels[i], offset, where);
-  if (offset != ref.index_offset) corrupt(where, "the frames do not end where the index begins");
+  if (offset != ref.index_offset)
+    corrupt(where, "the frames end at byte " + std::to_string(offset) +
+                       ", expected the index there, which begins at byte " +
+                       std::to_string(ref.index_offset));
   for (const ArtifactRoot& root : index.roots) check_root(root, index, where);
   return index;
 }

@@ -71,7 +71,8 @@ void ArtifactReader::read_frame(uint32_t level, size_t index, Frame& out) const 
                    : check_node_order({level, out.hashes, out.masks, out.children},
                                       levels_[place - 1].rows, shape_.hash_bits, last);
   if (wrong) damaged(level, index, wrong);
-  if (out.hashes.front() != info.first_hash) damaged(level, index, "not the frame of its index");
+  if (out.hashes.front() != info.first_hash)
+    damaged(level, index, "its first hash differs from the index's");
   if (index + 1 < frames.size() && last.hash > frames[index + 1].first_hash)
     damaged(level, index, "its hashes overlap the next frame's");
 }

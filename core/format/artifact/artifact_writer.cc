@@ -100,7 +100,7 @@ ArtifactWriter::~ArtifactWriter() = default;
 void ArtifactWriter::begin_level(uint32_t level) {
   State& s = *state_;
   if (s.level_open || level + s.index.levels.size() != s.index.shape.brick_level())
-    s.broken("level " + std::to_string(level) + " does not follow");
+    s.broken("level " + std::to_string(level) + " does not follow the level before it");
   s.child_rows = s.index.levels.empty() ? 0 : s.index.levels.back().rows;
   s.last = {};
   s.index.levels.push_back({level, 0, 0, {}});
@@ -124,7 +124,7 @@ void ArtifactWriter::append_bricks(std::span<const uint64_t> masks) {
 void ArtifactWriter::append_nodes(const NodeLevelView& rows) {
   State& s = *state_;
   if (!s.level_open || s.index.levels.size() < 2) s.broken("nodes outside a node level");
-  if (rows.masks.size() != rows.hashes.size()) s.broken("masks and hashes disagree in number");
+  if (rows.masks.size() != rows.hashes.size()) s.broken("the numbers of masks and hashes differ");
   size_t at = 0, at_child = 0;
   while (at < rows.masks.size()) {
     const size_t n = std::min<size_t>(rows.masks.size() - at, kFrameRows - s.values.size());

@@ -169,7 +169,7 @@ const char* decode_node_frame(std::span<const std::byte> bytes, uint32_t rows, u
     if (column.empty()) return "a child column is incomplete";
     add_plane(column.data(), plane, std::span(out.children));
   }
-  return source.left() == 0 ? nullptr : "bytes are left over";
+  return source.left() == 0 ? nullptr : "bytes follow the last column";
 }
 
 }  // namespace voxdag

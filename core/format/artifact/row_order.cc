@@ -40,7 +40,8 @@ const char* check_counts(const NodeLevelView& rows, uint64_t child_rows, uint32_
   bool any_empty = false;
   const uint64_t children = children_of(rows.masks, any_empty);
   if (any_empty) return "a child mask is 0";
-  if (children != rows.children.size()) return "children and child masks disagree in number";
+  if (children != rows.children.size())
+    return "the number of children differs from the bits in the child masks";
   uint32_t highest = 0;
   for (const uint32_t child : rows.children) highest = std::max(highest, child);
   if (highest >= child_rows) return "a child index is beyond the next level";
@@ -86,7 +87,7 @@ const char* check_brick_order(std::span<const uint64_t> hashes, std::span<const 
 
 const char* check_node_order(const NodeLevelView& rows, uint64_t child_rows, uint32_t hash_bits,
                              LastRow& last) {
-  if (rows.masks.size() != rows.hashes.size()) return "masks and hashes disagree in number";
+  if (rows.masks.size() != rows.hashes.size()) return "the numbers of masks and hashes differ";
   if (const char* wrong = check_counts(rows, child_rows, hash_bits)) return wrong;
   if (rows.masks.empty()) return nullptr;
   // Usually the hashes strictly increase, so masks and children need not be compared.

@@ -32,14 +32,16 @@ void SectionWriter::check(const Tier& tier, const EncodedRegion& region) const {
     const uint32_t count = region.counts[i];
     const uint64_t most = i <= tier.levels() ? uint64_t{1} << 3 * (tier.levels() - i) : 0;
     if (count > most || (count == 0) != (most == 0))
-      fail(std::to_string(count) + " cells on level " + std::to_string(tier.finest - i));
+      fail(std::to_string(count) + " cells on level " + std::to_string(tier.finest - i) +
+           ", expected " + (most == 0 ? "0" : "1 to " + std::to_string(most)));
     cells += count;
   }
   const uint64_t bytes = (cells + kBlockCells - 1) / kBlockCells * block_bytes_;
   if (region.blocks.size() != bytes ||
       region.prefix.size() != prefix_entries(tier.levels(), region.counts))
-    fail(std::to_string(region.blocks.size()) + " bytes of blocks, expected " +
-         std::to_string(bytes) + ", or a number of prefixes that does not fit its cells");
+    fail(std::to_string(region.blocks.size()) + " bytes of blocks and " +
+         std::to_string(region.prefix.size()) + " prefixes, expected " + std::to_string(bytes) +
+         " and " + std::to_string(prefix_entries(tier.levels(), region.counts)));
 }
 
 void SectionWriter::add(uint32_t tier_index, const EncodedRegion& region) {

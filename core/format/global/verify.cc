@@ -111,7 +111,8 @@ class Verifier {
 void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what) const {
   for (uint64_t at = begin; at < end; ++at)
     if (file_.data()[at] != 0)
-      broken(file_.path() + ": byte " + std::to_string(at), what + ", expected 0");
+      broken(file_.path() + ": byte " + std::to_string(at),
+             what + " is " + std::to_string(file_.data()[at]) + ", expected 0");
 }
 
 // The reader has checked the fields that it uses. This function checks all other fields, which must
@@ -126,7 +127,7 @@ void Verifier::check_header() const {
     const size_t entry = kLevelsAt + level * kLevelEntryBytes;
     const bool there = level <= file_.brick_level();
     const size_t last = file_.version() == kVersion ? entry + 24 : entry + 28;
-    check_zeros(there ? last : entry, entry + kLevelEntryBytes, "a reserved field");
+    check_zeros(there ? last : entry, entry + kLevelEntryBytes, "a reserved byte");
   }
   const bool has_features = file_.version() != kVersion;
   bool any_wide = false;
@@ -142,11 +143,11 @@ void Verifier::check_header() const {
   uint64_t features = 0;
   if (has_features) std::memcpy(&features, file_.data() + kFeaturesAt, sizeof(features));
   if (has_features && (features == 0 || any_wide != ((features & kWideLevels) != 0)))
-    broken(file_.path() + ": header",
-           "version 2 without a wide level or attributes, expected version 1; or a feature bit is "
-           "wrong");
+    broken(file_.path() + ": header", "version 2 with feature bits " + std::to_string(features) +
+                                          ", expected bit 1 to be " + (any_wide ? "set" : "0") +
+                                          ", and version 1 if no bit is set");
   check_attributes((features & kAttributes) != 0);
-  check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "reserved");
+  check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "a reserved byte");
 }
 
 // Sections of kinds unknown to this program are not valid.
@@ -156,13 +157,13 @@ void Verifier::check_attributes(bool has_attributes) const {
   std::memcpy(&count, file_.data() + kAttributeCountAt, sizeof(count));
   const std::vector<Attribute> kinds = attributes_of(file_).list();
   if (count != kinds.size() || has_attributes == kinds.empty())
-    broken(file_.path() + ": header", std::to_string(count) +
-                                          " attribute sections, expected only sections of colors, "
-                                          "alpha, normals and materials that "
-                                          "there are, or none and no feature bit 2");
+    broken(file_.path() + ": header", std::to_string(count) + " attribute sections, expected " +
+                                          std::to_string(kinds.size()) +
+                                          ", the number of known sections in the file, and feature "
+                                          "bit 2 only if there are sections");
   for (size_t i = 0; i < kinds.size(); ++i)
     check_section(kAttributesAt + i * kAttributeEntryBytes, kinds[i]);
-  check_zeros(kAttributesAt + kinds.size() * kAttributeEntryBytes, kFeaturesAt, "reserved");
+  check_zeros(kAttributesAt + kinds.size() * kAttributeEntryBytes, kFeaturesAt, "a reserved byte");
 }
 
 // `entry` is the byte offset of the section's entry in the header page. Checks the entry, the
@@ -184,8 +185,10 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
     finest_cells += region.counts[0];
   }
   if (field(kAttributeCellsAt) != cells || field(kAttributeFinestCellsAt) != finest_cells)
-    broken(file_.path() + ": header", std::to_string(field(kAttributeCellsAt)) + " " + plural +
-                                          ", the section has " + std::to_string(cells));
+    broken(file_.path() + ": header",
+           std::to_string(field(kAttributeCellsAt)) + " " + plural + ", the section has " +
+               std::to_string(cells) + "; " + std::to_string(field(kAttributeFinestCellsAt)) +
+               " of them on the finest level, the section has " + std::to_string(finest_cells));
   // End of the section, without the padding up to the next page.
   const uint64_t end = field(kAttributeOffsetAt) + field(kAttributeBytesAt);
   if (traits_of(attribute).has_names()) {
@@ -199,7 +202,7 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
     check_zeros(names, tiers, "padding after the names of " + plural);
   }
   check_zeros(end, round_up_to_page(end), "padding after the " + plural);
-  check_zeros(entry + kAttributeReservedAt, entry + kAttributeEntryBytes, "reserved");
+  check_zeros(entry + kAttributeReservedAt, entry + kAttributeEntryBytes, "a reserved byte");
 }
 
 void Verifier::check_blocks() {

@@ -288,7 +288,7 @@ class File {
   std::optional<uint32_t> material(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     const auto index = BasicColorCursor<File>(*this, materials()).value(x, y, z, level);
     if (index && *index >= material_names().size())
-      broken_colors("a cell has a material that the list has not");
+      broken_colors("a cell's material is not in the list of materials");
     return index;
   }
   const std::vector<std::string>& material_names() const { return materials().names(); }
@@ -441,7 +441,7 @@ class File {
       end = (end + 4 * level.word_count + kPageBytes - 1) / kPageBytes * kPageBytes;
       expect(end <= bytes_->size(), "a level ends beyond the file");
     }
-    expect(nodes == dag_nodes_, "the levels' nodes are not as many as counted");
+    expect(nodes == dag_nodes_, "the nodes of the levels do not add up to the DAG's nodes");
     table_offset_ = end;
   }
 
@@ -474,9 +474,10 @@ class File {
   void read_table(const unsigned char* page) const {
     const uint64_t blocks =
         (table_offset_ - kPageBytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes;
-    expect(get<uint64_t>(page + 96) == table_offset_ && get<uint64_t>(page + 104) == blocks &&
-               bytes_->size() - table_offset_ == 8 * blocks,
-           "the checksum table is not where the levels end, or not as long as they need");
+    expect(
+        get<uint64_t>(page + 96) == table_offset_ && get<uint64_t>(page + 104) == blocks &&
+            bytes_->size() - table_offset_ == 8 * blocks,
+        "the checksum table does not begin after the last level or section, or has the wrong size");
     expect(
         xxh64(data() + table_offset_, static_cast<size_t>(8 * blocks)) == get<uint64_t>(page + 112),
         "the checksum table fails its own checksum");

@@ -177,10 +177,10 @@ class ColorSection {
     const bool has_names = kKindBlockBytes[kind] == 0;
     const bool is_width = has_names ? block_bytes == 32 || block_bytes == 64 || block_bytes == 128
                                     : block_bytes == kKindBlockBytes[kind];
-    if (!is_width) return "expected blocks of 16 bytes for colors, or as many as values have";
+    if (!is_width) return "expected blocks of the size that the kind of attribute requires";
     color_levels_ = color_levels;
     tier_count_ = color_levels / 7 + 1;
-    if (bytes < 32 * tier_count_) return "the color section has no room for its tiers";
+    if (bytes < 32 * tier_count_) return "an attribute section is too short for its tier table";
     const uint64_t tables = bytes - 32 * tier_count_;
     uint64_t end = 0;
     for (uint32_t t = 0; t < tier_count_; ++t) {
@@ -191,18 +191,20 @@ class ColorSection {
       tier.cell_count = get<uint64_t>(entry + 24);
       tier.finest_level = color_levels - 7 * t;
       tier.region_level = tier.finest_level - std::min<uint32_t>(tier.finest_level, 6);
-      if (get<uint64_t>(entry) != end) return "a tier of colors does not follow the one before it";
-      if (tier.units > (tables - end) / 16) return "colors end beyond their section";
+      if (get<uint64_t>(entry) != end)
+        return "a tier of an attribute section does not follow the tier before it";
+      if (tier.units > (tables - end) / 16)
+        return "the data of a tier end beyond the attribute section";
       tier.block_bytes = block_bytes;
       tier.data = section + end;
       end += 16 * tier.units;
       if (tier.region_count == 0 || tier.region_count > (tables - end) / 32)
-        return "a directory of colors has no regions, or ends beyond the section";
+        return "a directory has no regions, or ends beyond the attribute section";
       tier.directory = section + end;
       end += 32 * tier.region_count;
     }
     if (has_names) return read_names(section + end, tables - end, block_bytes / 32);
-    return end == tables ? nullptr : "the color section is longer than its tiers";
+    return end == tables ? nullptr : "an attribute section is longer than its tiers";
   }
   // Returns the names of the materials. The value of a cell is an index in this list. The last name
   // is "", for triangles without a material.
@@ -262,7 +264,8 @@ class ColorSection {
     const char* const kBroken = "the list of materials does not fit between tiers and tier table";
     const uint64_t count = bytes < 4 ? 0 : get<uint32_t>(at);
     if (count == 0 || 4 * count > bytes - 4) return kBroken;
-    if (count > kMaxMaterials || bytes > kMaxNamesBytes) return "there are too many materials";
+    if (count > kMaxMaterials || bytes > kMaxNamesBytes)
+      return "expected at most 2^20 materials in a list of at most 64 MiB";
     if (value_bytes != (count <= 256 ? 1u : count <= 65536 ? 2u : 4u))
       return "the values of materials have the wrong width for their number";
     uint64_t end = 4;
