@@ -44,7 +44,8 @@ TEST_P(Cubes, EveryCubeOfASmallGrid) {
   }
 }
 
-// Small cubes anywhere in large grids, up to 2^20: triangles inside, around and through them.
+// Small cubes at random positions in grids of up to 2^20 voxels per edge. Triangles are inside,
+// around and through the cubes.
 TEST_P(Cubes, SmallCubesOfLargeGrids) {
   const auto backend = open();
   oracle::Random random(21);
@@ -97,8 +98,8 @@ TEST_P(Cubes, RegionsOfLargeCubes) {
   }
 }
 
-// One large cube equals its eight children built separately: it has the same voxels, and one octree
-// node more than they have together.
+// A large cube is built in one piece, and as its eight children. The large cube has as many voxels
+// as its children together, and one octree node more.
 TEST_P(Cubes, CountsAddUp) {
   const auto backend = open();
   for (const oracle::SceneKind kind : oracle::kAllKinds) {
@@ -125,7 +126,7 @@ TEST_P(Cubes, MissedCubesAreEmpty) {
   oracle::Random random(23);
   oracle::Triangles scene;
   for (int i = 0; i < 300; ++i) {
-    // Outside of the cube along some axis, at least one unit away.
+    // The triangle is outside the cube along one axis, at least one unit away.
     oracle::Triangle t;
     const int64_t axis = random.between(0, 2), near = random.coin() ? -1 : 64 * 256 + 1;
     for (oracle::Point& p : t)

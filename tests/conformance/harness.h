@@ -1,5 +1,6 @@
-// The common part of the conformance tests: the backends under test, and builds that store their
-// results. A new backend is one row of backends_under_test(); every test runs for every row.
+// The common part of the conformance tests: the backends under test, and functions that build a
+// subvolume and store its result. To test another backend, add a row to backends_under_test();
+// every test runs for every row.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -48,14 +49,14 @@ struct Built {
   bool sink_called = false;
 };
 
-// Builds, and checks the guarantees of every outcome: the sink is called in order, only for built
-// subvolumes, and all memory is released.
+// Builds a subvolume, and checks a backend's guarantees for every outcome: it calls the sink in
+// order and only if the subvolume is built, and releases all memory.
 Built build(Backend& backend, const SubvolumeTask& task, TriangleStream& stream,
             uint64_t budget_bytes = kAmpleBudget);
 Built build(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles,
             uint64_t budget_bytes = kAmpleBudget);
 
-// Checks that sub-DAG and summary equal those of the oracle, array for array.
+// Checks that the sub-DAG's arrays and the summary equal the oracle's.
 void expect_equals(const Built& built, const oracle::Dag& truth, const SubvolumeTask& task);
 // Builds with the backend and with the oracle, and compares the results.
 void expect_right(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles);

@@ -1,6 +1,6 @@
-// A grid that is too large for the oracle and in which a build uses all its memos (planes and their
-// directions, grown tables, subvolumes of many tiles). Implementations that share no inner loop
-// must agree.
+// The grid is too large for the oracle, so implementations that share no inner loop are compared.
+// In such a grid a build uses all memos (planes and their directions), grown tables, and subvolumes
+// of many tiles.
 #include "tests/conformance/harness.h"
 
 namespace voxdag {
@@ -28,8 +28,8 @@ oracle::Triangles mixed_scene(const Cube& cube, uint64_t seed) {
   return scene;
 }
 
-// The CPU backend with all its instruction sets, and the parallel pipeline, give the same arrays:
-// of the whole grid, and of a subvolume of it.
+// The CPU backend with each instruction set of this machine, and the parallel pipeline, give the
+// same arrays of the complete grid and of a subvolume.
 TEST(LargeGrid, TheSameArraysFromAllThatRunHere) {
   const auto parallel = make_parallel_host_backend(Method::kFast);
   for (const Cube& cube : {Cube{}, Cube{1, {1, 0, 1}}}) {

@@ -1,5 +1,5 @@
-// The memory guarantee of a backend: a cube that does not fit needs a split, and the smallest cube
-// always fits.
+// The memory guarantee of a backend: a cube that does not fit in the budget needs a split, and the
+// smallest cube always fits.
 #include <malloc.h>
 
 #include <atomic>
@@ -47,9 +47,9 @@ namespace {
 using Memory = Conformance;
 VOXDAG_FOR_ALL_BACKENDS(Memory);
 
-constexpr int64_t kUncharged = int64_t{1} << 20;  // for small things that nobody counts
+constexpr int64_t kUncharged = int64_t{1} << 20;  // bytes allowed without a charge
 
-// Makes triangles when they are read: `count` triangles, of which `unique` are different.
+// A stream of `count` triangles that repeats the triangles of `unique`.
 class EndlessStream : public TriangleStream {
  public:
   EndlessStream(const oracle::Triangles& unique, uint64_t count)

@@ -13,8 +13,8 @@ struct Work {
   oracle::Dag truth;
 };
 
-// Tasks of different grids, cubes, cuts and scenes. Some share their triangles, as the subvolumes
-// of one build do.
+// Returns tasks with different grids, cubes, hash bits and scenes. Some tasks have the same
+// triangles, as the subvolumes of one build may have.
 std::vector<Work> make_work() {
   std::vector<Work> all;
   oracle::Random random(41);

@@ -74,8 +74,8 @@ class FailingStream : public oracle::VectorStream {
   int good_reads_;
 };
 
-// An error of the stream is rethrown unchanged, the sink is not called, and the next build is
-// right.
+// An error of the stream is rethrown unchanged, and the sink is not called. The next build gives
+// the right result.
 TEST_P(Streams, ErrorsOfTheStreamComeThrough) {
   const auto backend = open();
   const oracle::Triangles scene = mixed_scene(3);
@@ -133,8 +133,7 @@ TEST_P(Streams, ErrorsOfTheSinkComeThrough) {
   }
 }
 
-// A very long stream that cancels the build after a number of reads, and counts the reads after
-// that.
+// A very long stream. It cancels the build after `reads` reads, and counts the further reads.
 class CancelingStream : public TriangleStream {
  public:
   CancelingStream(const oracle::Triangles& triangles, CancelToken& token, int reads)

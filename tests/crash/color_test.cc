@@ -1,5 +1,5 @@
 // A build with colors and all other attributes is killed, loses power, or its disk becomes full or
-// fails, at any operation on the disk. Run again, it ends with the same bytes.
+// fails, at any disk operation. When the build runs again, it gives the same bytes.
 #include <array>
 #include <set>
 

@@ -1,4 +1,5 @@
-// Builds a small scene with every fault of disks and processes, and checks the results.
+// Builds a small scene, simulates every fault of the disk and of the process, and checks the
+// results.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -28,20 +29,22 @@ namespace crash {
 using voxdag::BuildReport;
 using voxdag::BuildSpec;
 
-// Remembers the last warning: a sound build that is resumed has none.
+// Remembers the last warning. A resumed build must not warn, because nothing that it stored is
+// damaged.
 class Warnings : public voxdag::NoProgress {
  public:
   void warn(std::string_view message) override { last = message; }
   std::string last;
 };
 
-// The number of moments that are tested for each fault. VOXDAG_CRASH_ROUNDS sets it.
+// The number of moments at which each fault is tested. VOXDAG_CRASH_ROUNDS sets it; the default is
+// 6.
 inline uint64_t rounds() {
   const char* text = std::getenv("VOXDAG_CRASH_ROUNDS");
   return text ? std::strtoull(text, nullptr, 10) : 6;
 }
 
-// Where the scene's triangles are stored until they are built.
+// The place of the scene's triangles between ingest and the build stage.
 enum class Ingested { kInMemory, kDurable };
 
 class CrashTest : public testing::TestWithParam<Ingested> {
@@ -61,7 +64,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
   static bool is_durable() { return GetParam() == Ingested::kDurable; }
   std::string output() const { return folder_.file("out.vdag"); }
 
-  // Small budget and several threads: spilling, splitting and merge passes all occur.
+  // A small budget and several threads, so that the build spills triangles, splits subvolumes and
+  // needs several merge passes.
   virtual BuildSpec spec() const {
     BuildSpec spec;
     spec.geometry.scenes = {folder_.file("scene.glb")};
@@ -70,7 +74,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     spec.run.memory_bytes = uint64_t{64} << 20;
     spec.run.threads = 2;
     spec.run.subvolume_edge = 128;
-    spec.run.checkpoint_interval_s = 0;  // after every batch of triangles and level of the merge
+    spec.run.checkpoint_interval_s =
+        0;  // saves after every batch of triangles and every merged level
     if (is_durable()) spec.run.durable_min_triangles = 1;
     return spec;
   }
@@ -83,7 +88,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     Warnings warnings;
     voxdag::CancelToken cancel;
     const BuildReport report = voxdag::run_build(spec(), {files, warnings, cancel});
-    // A recorded artifact that was not durable would be found damaged, and built again.
+    // If an artifact had been recorded before it was durable, the resumed build would find it
+    // damaged, warn, and build it again.
     EXPECT_EQ(warnings.last, "");
     return report;
   }
@@ -98,7 +104,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
       } catch (...) {
         _exit(1);
       }
-      std::fflush(stdout);  // output of the child's EXPECTs
+      std::fflush(stdout);  // prints the failed EXPECTs of the child
       _exit(HasFailure() ? 1 : 0);
     }
     if (after.count() > 0) {
@@ -111,7 +117,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     return WIFSIGNALED(status);
   }
 
-  // Whatever happened before, the build that is run again ends with the expected file and leaves no
+  // Runs the build again after any fault. Checks that it ends with the expected file and leaves no
   // other files.
   void expect_to_resume() {
     if (std::filesystem::exists(output())) {
@@ -133,7 +139,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     if (all.size() > rounds()) {
       std::shuffle(all.begin(), all.end(), std::mt19937_64(rounds()));
       all.resize(rounds());
-      all.front() = count;  // the last one is always among them
+      all.front() = count;  // always includes the last moment
     }
     return all;
   }
@@ -144,7 +150,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     return counting.operations();
   }
 
-  // SIGKILL and power cuts around every write, sync, rename and removal.
+  // The process is killed, or the power fails, before or after every write, sync, rename and
+  // removal.
   void kill_at_any_operation() {
     const uint64_t operations = operations_of_a_build();
     ASSERT_GT(operations, 20u);
@@ -160,8 +167,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     }
   }
 
-  // The disk becomes full, or fails, at any operation. The build reports this, and nothing is lost
-  // when the disk has recovered.
+  // The disk becomes full, or fails, at any operation. The build reports the error, and it resumes
+  // without loss when the disk works again.
   void break_disk_at_any_operation() {
     const uint64_t operations = operations_of_a_build();
     struct Case {

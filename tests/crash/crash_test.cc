@@ -1,8 +1,8 @@
-// A build that is killed, cut off from power, or has its disk fill up or fail, at any operation on
-// the disk, resumes when it is run again and ends with the same bytes.
+// A build is killed, loses power, or its disk becomes full or fails, at any disk operation. When
+// the build runs again, it resumes and gives the same bytes.
 //
-// The short form that CI runs samples the operations. VOXDAG_CRASH_ROUNDS=N gives the number of
-// moments per fault; with N large, every operation is tested and as many random moments.
+// By default the tests choose a few operations at random. VOXDAG_CRASH_ROUNDS=N sets the number of
+// moments per fault. If N is large, the tests use every operation, and N random points in time.
 #include "core/base/clock.h"
 #include "tests/crash/crash_fixture.h"
 
@@ -11,8 +11,8 @@ namespace {
 
 TEST_P(CrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
-// The same scene at a higher resolution, in larger subvolumes. The build takes about as long, and
-// computes most of the time.
+// The same scene at a higher resolution and with larger subvolumes. The build takes about as long
+// as CrashTest's, but spends more of its time on computations.
 class FineCrashTest : public CrashTest {
  protected:
   BuildSpec spec() const override {
@@ -44,7 +44,7 @@ TEST_P(FineCrashTest, KilledAtRandomMoments) {
 
 TEST_P(CrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
-// A disk that fills up while subvolumes are built loses no stored subvolume.
+// If the disk becomes full while subvolumes are built, no stored subvolume is lost.
 TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   if (is_durable()) GTEST_SKIP() << "counts the operations of a build without durable triangles";
   voxdag::GenerateOptions options;
@@ -61,7 +61,8 @@ TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   const BuildReport whole = build(one, counting);
   ASSERT_GT(whole.artifact_bytes, uint64_t{4} << 20) << "fewer than four writes of a segment";
   std::filesystem::remove(output());
-  // Three operations come before the segment's first MiB; the fourth MiB fails.
+  // The segment's first MiB is written by the fourth operation. So operation 7, which fails, is the
+  // write of its fourth MiB.
   FaultyFiles files({Fault::kNoSpace, 7});
   EXPECT_THROW(build(one, files), voxdag::Error);
   const BuildReport report = build(one, voxdag::system_files());
@@ -69,8 +70,7 @@ TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   EXPECT_EQ(report.sha256, whole.sha256);
 }
 
-// A read that fails is an error that does not call any artifact damaged, so no artifact is
-// discarded.
+// If a read fails, the error does not report an artifact as damaged, so no artifact is discarded.
 TEST_P(CrashTest, ReadsThatFail) {
   FaultyFiles counting({});
   run(counting);
@@ -80,7 +80,8 @@ TEST_P(CrashTest, ReadsThatFail) {
     FaultyFiles files({Fault::kReadError, at});
     try {
       run(files);
-      // Threads share the blocks that they read, so a run may have slightly fewer reads.
+      // Threads share the blocks that they read, so the number of reads differs slightly from run
+      // to run, and this run may end before the planned read.
       EXPECT_LT(files.reads(), at) << "the build went through";
     } catch (const voxdag::Error& error) {
       EXPECT_EQ(error.code(), voxdag::ErrorCode::kIo) << error.what();

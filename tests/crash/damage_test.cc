@@ -1,5 +1,5 @@
-// If a disk returns wrong bytes, the build notices it, and repairs or refuses them. It never makes
-// a wrong DAG.
+// The disk returns wrong bytes. The build detects them, and repairs or refuses the data. It never
+// writes a wrong DAG.
 #include <fstream>
 
 #include "core/base/error.h"
@@ -15,8 +15,8 @@ using voxdag::ErrorCode;
 
 class DamageTest : public CrashTest {
  protected:
-  // Builds until the process is killed at this operation on the disk. Returns false if it was not
-  // killed.
+  // Builds until the process is killed at this disk operation. Returns false if the build ended
+  // before.
   bool killed_at(uint64_t operation) const { return killed({Fault::kKillBefore, operation}); }
 
   // Flips one bit of the file, which must not be empty.
@@ -26,8 +26,8 @@ class DamageTest : public CrashTest {
     voxdag::flip_bits(path, bit / 8, 1 << bit % 8);
   }
 
-  // Whatever is on the disk, the build ends with the right bytes, or is refused and makes them from
-  // the beginning. Returns true if it was not refused.
+  // Runs the build on the present state of the disk. It must give the right bytes, or refuse the
+  // state and give the right bytes with --restart. Returns true if it did not refuse.
   bool expect_healed_or_refused(voxdag::FileSystem& files = voxdag::system_files()) {
     bool healed = true;
     try {
@@ -57,8 +57,8 @@ TEST_P(DamageTest, BitsFlippedInAnyWrite) {
   }
 }
 
-// A bit flips while the build is stopped, in any file that it left: segments, the job store and its
-// log, maps, artifacts of merge passes, or the partial global file.
+// While the build is stopped, one bit flips in any of its files: segments, the job store and its
+// log, position maps, artifacts of merge passes, or the partial global file.
 TEST_P(DamageTest, BitsFlippedBetweenTwoRuns) {
   const uint64_t operations = operations_of_a_build();
   std::mt19937_64 random(2);
@@ -86,8 +86,8 @@ TEST_P(DamageTest, BitsFlippedBetweenTwoRuns) {
   EXPECT_GT(flips, 0u);
 }
 
-// The first page identifies a file of voxdag; with its job next to it the file is accepted without
-// it.
+// The first page of the partial file identifies it as a file of voxdag. If the page is damaged, the
+// file is accepted because its job is stored next to it.
 TEST_P(DamageTest, FirstPageOfThePartialFile) {
   const std::string partial = output() + ".partial";
   uint64_t at = operations_of_a_build();
@@ -99,7 +99,8 @@ TEST_P(DamageTest, FirstPageOfThePartialFile) {
   EXPECT_TRUE(expect_healed_or_refused());
 }
 
-// The same for the job store alone, which has no checksums of SQLite's: many bits of one store.
+// As BitsFlippedBetweenTwoRuns, but only in the job store, many times, because SQLite has no
+// checksums of its pages.
 TEST_P(DamageTest, BitsFlippedInTheJobStore) {
   const uint64_t operations = operations_of_a_build();
   std::mt19937_64 random(3);
@@ -107,7 +108,7 @@ TEST_P(DamageTest, BitsFlippedInTheJobStore) {
     if (!killed_at(operations / 4 + random() % (operations / 2))) continue;
     const std::string store = output() + ".work/job.db";
     {
-      // Opened and closed, its log is in it.
+      // Opening and closing the store moves the contents of its log into it.
       voxdag::JobStore closed(store, voxdag::JobStore::Access::kBuild);
     }
     SCOPED_TRACE(round);
@@ -116,8 +117,8 @@ TEST_P(DamageTest, BitsFlippedInTheJobStore) {
   }
 }
 
-// More triangles than memory for them: spilled triangles are read back changed, and the scene is
-// read again.
+// Triangles are spilled because memory cannot hold them. Some of their bytes change before they are
+// read back, so the build reads the scene again.
 TEST_P(DamageTest, BitsFlippedInSpilledTriangles) {
   voxdag::GenerateOptions options;
   options.kind = voxdag::SceneKind::kSoup;

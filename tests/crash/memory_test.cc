@@ -1,5 +1,5 @@
-// A build with a small budget, in a process that has only slightly more address space, ends with
-// the same bytes as a build with enough memory.
+// A build with a small budget runs in a process whose address space is limited to slightly more
+// than the budget. It gives the same bytes as a build with enough memory.
 #include <sys/resource.h>
 
 #include <fstream>
@@ -9,11 +9,11 @@
 namespace crash {
 namespace {
 
-// The memory that a process needs in addition to its budget: code, stacks, the allocator's reserves
-// and SQLite.
+// Address space that a process needs in addition to its budget: code, stacks, the allocator's
+// reserves, and SQLite.
 constexpr uint64_t kBesides = uint64_t{1} << 30;
 
-// The shadow memory of a sanitizer is larger than any useful limit.
+// Sanitizers reserve more shadow memory than any useful limit of the address space.
 bool under_a_sanitizer() {
   uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
@@ -22,7 +22,8 @@ bool under_a_sanitizer() {
 
 class MemoryTest : public CrashTest {};
 
-// Slivers cross the whole grid, so that many subvolumes exceed their share of the memory.
+// The scene consists of slivers that cross the complete grid, so that many subvolumes exceed their
+// share of the memory.
 TEST_P(MemoryTest, EndsUnderALimitOfAddressSpace) {
   if (under_a_sanitizer()) GTEST_SKIP() << "a sanitizer needs the address space for itself";
   voxdag::GenerateOptions options;

@@ -1,5 +1,5 @@
-// The triangles of a glTF scene in another format give the same bytes, even if the build is killed
-// while it ingests them and then run again.
+// The triangles of a glTF scene are stored in another format. The build gives the same bytes, even
+// if it is killed during ingest and then run again.
 #include <cstring>
 
 #include "scene/formats/formats.h"
@@ -19,7 +19,8 @@ void append(std::string& bytes, T value) {
   bytes.append(own, sizeof(T));
 }
 
-// `expected_` is the build of scene.glb; the tests build another file with the same triangles.
+// `expected_` is the digest of a build of scene.glb. The tests build another file with the same
+// triangles.
 class FormatTest : public CrashTest {
  protected:
   BuildSpec spec() const override {
@@ -28,7 +29,7 @@ class FormatTest : public CrashTest {
     return spec;
   }
 
-  // The corners of all triangles of scene.glb, three numbers each.
+  // Returns the corners of all triangles of scene.glb, three coordinates for each corner.
   std::vector<double> corners() const {
     voxdag::MemoryBudget budget(uint64_t{1} << 28);
     const voxdag::CancelToken cancel;
@@ -80,7 +81,8 @@ TEST_P(FormatTest, Ply) {
 
 #ifdef VOXDAG_HAS_MESHOPT
 
-// Positions are compressed, and decoded in the work folder by each run.
+// The positions are compressed with meshopt. Each run decodes them into a temporary file of the
+// work folder.
 TEST_P(FormatTest, Meshopt) {
   const std::vector<double> all = corners();
   std::vector<float> positions(all.begin(), all.end());

@@ -52,7 +52,8 @@ Node node_above(Places& below, const std::vector<uint64_t>& hashes, int x, int y
   return node;
 }
 
-// Gives every key of `wanted` its index in sorted order, and every place the index of its key.
+// Sorts the keys of `wanted`. Sets all places of a key to the key's index in this order, and
+// returns the sorted keys.
 template <class Key>
 std::vector<Key> number(const std::map<Key, std::vector<size_t>>& wanted, Places& places) {
   std::vector<Key> sorted;

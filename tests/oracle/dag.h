@@ -18,7 +18,7 @@ uint64_t truncated(uint64_t hash, int bits);
 
 struct Node {
   uint64_t hash = 0;               // truncated
-  uint32_t mask = 0;               // bit 4x + 2y + z for the child there
+  uint32_t mask = 0;               // bit 4x + 2y + z is set if the child at (x, y, z) exists
   std::vector<uint32_t> children;  // indices into the level below
   auto operator<=>(const Node&) const = default;
 };
@@ -27,13 +27,14 @@ struct Dag {
   std::vector<uint64_t> bricks;           // masks
   std::vector<std::vector<Node>> levels;  // from the bricks' parents up to the root
   uint64_t voxels = 0;
-  uint64_t svo_nodes = 0;  // of the octree, bricks included
-  uint64_t dag_nodes = 0;  // unique ones, bricks included
+  uint64_t svo_nodes = 0;  // nodes of the octree, bricks included
+  uint64_t dag_nodes = 0;  // unique nodes, bricks included
   uint64_t root_hash = 0;  // truncated; 0 if there are no voxels
   bool operator==(const Dag&) const = default;
 };
 
-// `voxels` has an edge of 4 or more, a power of two. Without voxels, the DAG has no levels.
+// Returns the DAG of `voxels`, whose edge is a power of two, 4 or more. If no voxel is set, the DAG
+// has no levels.
 Dag build_dag(const Voxels& voxels, int hash_bits);
 
 }  // namespace oracle

@@ -6,7 +6,7 @@
 namespace oracle {
 namespace {
 
-// Lowest and highest coordinate of all vertices on one axis.
+// Returns the lowest and the highest coordinate of all vertices on one axis.
 std::pair<double, double> extent(const std::vector<WorldTriangle>& triangles, int axis) {
   std::vector<double> all;
   for (const WorldTriangle& t : triangles)

@@ -17,9 +17,10 @@ struct WorldCube {
   double edge = 1;
 };
 
-// The default cube: it contains all vertices, and is slightly larger than their longest extent.
+// Returns the default cube. It contains all vertices, and its edge is slightly larger than the
+// scene's longest extent.
 WorldCube default_cube(const std::vector<WorldTriangle>& triangles);
-// The cube for voxels of a given size, centered on the scene.
+// Returns the cube for voxels of a given size, centered on the scene.
 WorldCube cube_of_voxel_size(const std::vector<WorldTriangle>& triangles, double voxel_size,
                              int64_t resolution);
 

@@ -1,5 +1,6 @@
-// Seeded triangle scenes of every kind that ever revealed a defect, placed in and around a region
-// of the grid. The same seed gives the same triangles on every machine.
+// Triangle scenes from a seed, placed in and around a region of the grid. There is a kind for every
+// arrangement of triangles that has revealed a defect. The same seed gives the same triangles on
+// every machine.
 #pragma once
 
 #include <random>
@@ -13,7 +14,7 @@ enum class SceneKind {
   kSoup,            // random triangles of mixed sizes
   kDegenerate,      // points, segments, doubled vertices, collinear ones
   kSliver,          // long and a few units thin
-  kSubVoxel,        // smaller than a voxel, in one or astride several
+  kSubVoxel,        // triangles smaller than a voxel, within one voxel or across several
   kWalls,           // axis-aligned rectangles
   kDiagonal,        // planes of 45 degrees that pass exactly through voxel edges
   kSpanning,        // from one side of the region to another
@@ -31,7 +32,7 @@ constexpr SceneKind kAllKinds[] = {
 // "soup", "degenerate", ...
 std::string kind_name(SceneKind kind);
 
-// Random numbers that are the same on every machine, unlike those of the standard distributions.
+// Random numbers that are the same on every machine. The standard distributions differ by machine.
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}

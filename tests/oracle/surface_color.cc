@@ -121,7 +121,7 @@ std::array<double, 3> spread_point(int k) {
 struct Piece {
   const Surface* surface;
   SurfacePoint corners[3];
-  double area_up_to;  // of all pieces before, and of this one
+  double area_up_to;  // total area of this piece and all earlier pieces
 };
 
 std::vector<Piece> pieces_in(std::span<const Surface* const> surfaces, const Point& low,

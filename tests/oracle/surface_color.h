@@ -34,7 +34,7 @@ struct SurfaceMaterial {
 
 struct Surface {
   struct Corner {
-    std::array<double, 2> texture{};  // 1 is the width and the height of the image
+    std::array<double, 2> texture{};  // in units of the image's width and height
     Rgba color{1, 1, 1, 1};
   };
   Triangle position{};

@@ -1,5 +1,5 @@
-// Subvolumes shared between builds: unchanged subvolumes are copied, and the bytes do not
-// depend on it.
+// Builds that share subvolumes through a cache. Unchanged subvolumes are copied from the cache, and
+// the cache does not affect the bytes of the file.
 #include <filesystem>
 #include <fstream>
 
@@ -10,7 +10,7 @@ namespace {
 
 using CacheTest = Reference;
 
-// A room of many small things, and a chair at a place of its choice.
+// Returns a room with many small objects, and a chair whose low x is chair_x_voxels.
 Triangles room_with_chair(int resolution, int64_t chair_x_voxels) {
   Triangles scene =
       oracle::make_scene(oracle::SceneKind::kSubVoxel, 3, {{0, 0, 0}, resolution}, 4000);
@@ -20,8 +20,8 @@ Triangles room_with_chair(int resolution, int64_t chair_x_voxels) {
   return scene;
 }
 
-// One thing moved: 95 % of the subvolumes or more come from the cache, and the bytes equal a build
-// from scratch.
+// Only the chair is moved between two builds. At least 95 % of the subvolumes come from the cache,
+// and the file equals a build without a cache.
 TEST_F(CacheTest, OneChairMoved) {
   constexpr int kResolution = 1024;
   auto before = spec_for(room_with_chair(kResolution, 100), kResolution);
@@ -43,7 +43,8 @@ TEST_F(CacheTest, OneChairMoved) {
   EXPECT_EQ(run(before).subvolumes_cached, first.subvolumes);
 }
 
-// The same content elsewhere in the grid, or under other numbering of corners, is the same content.
+// Triangles that are moved to another place of the grid, whose vertices or order differ, or that
+// occur twice, have the same entry in the cache.
 TEST_F(CacheTest, ContentIsRelativeAndCanonical) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSoup, 5, {{0, 0, 0}, 64}, 40);
   Triangles moved = scene;
@@ -64,7 +65,8 @@ TEST_F(CacheTest, ContentIsRelativeAndCanonical) {
   EXPECT_GT(report.subvolumes_cached, 0u);
 }
 
-// Other hash bits are other content; a damaged entry is a miss; a small limit evicts.
+// The cache is missed if the hash bits differ, if an entry is damaged, or if a small limit has
+// evicted the entry.
 TEST_F(CacheTest, MissesWhatItMust) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSoup, 6, {{0, 0, 0}, 256}, 60);
   auto spec = spec_for(scene, 256);

@@ -12,7 +12,7 @@ oracle::Triangle dot(int64_t x, int64_t y, int64_t z) {
   return {p, {p[0] + 20, p[1], p[2]}, {p[0], p[1] + 20, p[2] + 20}};
 }
 
-// R = 4, where the root is a brick: every single voxel, and every voxel together with the first.
+// R = 4, so the root is a brick: each single voxel, and each voxel together with the first voxel.
 TEST_F(Exhaustive, EveryVoxelOfABrick) {
   for (int v = 0; v < 64; ++v) {
     SCOPED_TRACE(v);
@@ -23,8 +23,9 @@ TEST_F(Exhaustive, EveryVoxelOfABrick) {
   }
 }
 
-// Every set of octants, each holding the same voxels, in eight subvolumes: the top tree's root with
-// every mask. A merge that ignores masks moves geometry here.
+// Sets of octants, all of which have the same voxels, in a build of eight subvolumes. So the root,
+// a node of the top tree, gets different masks over equal children. A merge that ignores masks
+// would move voxels to other octants.
 TEST_F(Exhaustive, EveryMaskOfTheTopTree) {
   for (int mask = 1; mask < 256; mask += mask < 32 ? 1 : 7) {
     SCOPED_TRACE(mask);
@@ -40,8 +41,8 @@ TEST_F(Exhaustive, EveryMaskOfTheTopTree) {
   }
 }
 
-// Two equal sub-DAGs in different octants of different parents keep their places over two levels
-// of the merge.
+// Two equal sub-DAGs are in different octants of different parents. They remain at their positions
+// when two levels above them are merged.
 TEST_F(Exhaustive, EqualSubDagsOfDifferentParents) {
   for (int i = 0; i < 8; ++i)
     for (int j = i % 2; j < 8; j += 2) {

@@ -15,7 +15,8 @@ std::vector<oracle::SceneKind> exact_kinds() {
   return kinds;
 }
 
-// Every kind on grids from 4 to 128, one subvolume and many, hashes truncated and whole.
+// Scenes of every kind, in grids of 4 to 128 voxels per edge, with one or many subvolumes, and with
+// truncated and full hashes.
 TEST_F(RandomScenes, EqualTheOracle) {
   for (const oracle::SceneKind kind : exact_kinds())
     for (int levels = 2; levels <= 7; ++levels) {
@@ -35,7 +36,8 @@ TEST_F(RandomScenes, EqualTheOracle) {
     }
 }
 
-// A cube within the scene: triangles cross its walls or miss it, and vertices are far outside.
+// The grid is a cube inside the scene: triangles cross its boundary or miss it, and vertices are
+// far outside.
 TEST_F(RandomScenes, GivenCubeInsideTheScene) {
   const Triangles scene =
       oracle::make_scene(oracle::SceneKind::kSoup, 5, {{-200, -100, -300}, 512}, 150);
@@ -51,7 +53,8 @@ TEST_F(RandomScenes, GivenCubeInsideTheScene) {
   EXPECT_EQ(report.dropped_outside + report.triangles, all.size());
 }
 
-// Any floats, the default cube: scan, snapping and all. The oracle has its own cube and snapping.
+// Vertices are arbitrary floats, and the build computes the default cube. The oracle has separate
+// code for the cube and for snapping.
 TEST_F(RandomScenes, DefaultCube) {
   oracle::Random random(6);
   for (int round = 0; round < 12; ++round) {
@@ -93,7 +96,7 @@ TEST_F(RandomScenes, SeveralFilesAreOneScene) {
   EXPECT_EQ(contents(run(spec).output), contents(whole.output));
 }
 
-// Without triangles in the grid there is a valid file with no nodes.
+// If no triangle is in the grid, the result is a valid file without nodes.
 TEST_F(RandomScenes, EmptyScenes) {
   const Triangles none, outside = {{{{-999, -999, -999}, {-999, -1, -1}, {-1, -999, -999}}}};
   for (const Triangles& scene : {none, outside}) {

@@ -1,5 +1,5 @@
-// Runs the whole pipeline in this process, from a .glb file to the global file, and reads the
-// result back through the reader that engines use.
+// Runs complete builds in this process, from a .glb file to the global file, and reads the result
+// with voxdag_reader.h, the reader for engines.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,35 +20,38 @@ namespace reference {
 
 constexpr uint64_t kMebibyte = uint64_t{1} << 20;
 
-// The arrays of a global file, child offsets turned back into indices; hashes are not in the file.
+// The arrays of a global file, with child indices instead of child offsets. Hashes are not in the
+// file.
 struct FileDag {
   std::vector<uint64_t> bricks;
   std::vector<std::vector<oracle::Node>> levels;  // from the bricks' parents up
 };
 FileDag read_dag(const voxdag_reader::File& file);
 
-// Checks counts and node arrays of a file against the oracle's; on small grids also every single
-// voxel, by its position.
+// Checks that the counts and the node arrays of a file equal the oracle's. In small grids also
+// looks up every voxel by its position.
 void expect_file_equals(const std::string& path, const oracle::Voxels& voxels, int hash_bits);
 
 // The bytes of a file.
 std::string contents(const std::string& path);
 
-// A folder, scenes written into it, builds of them.
+// Writes scenes to a temporary folder, and builds them there.
 class Reference : public testing::Test {
  protected:
-  // A spec for a scene in lattice units on a grid of R voxels: the cube is given, so that the
-  // product snaps every vertex to where it was.
+  // Returns the spec of a build of `scene`, which is in lattice units, in a grid of `resolution`
+  // voxels per edge. The spec gives the grid's cube, so that the build snaps every vertex to its
+  // present position. The scene file has `copies` copies of each triangle.
   voxdag::BuildSpec spec_for(const Triangles& scene, int64_t resolution, int copies = 1);
-  // Builds under a unique name.
+  // Builds with a unique output name.
   voxdag::BuildReport run(voxdag::BuildSpec spec);
-  // Builds a scene in lattice units, and compares with the oracle.
+  // Builds a scene in lattice units, and compares the file with the oracle.
   voxdag::BuildReport expect_right(const Triangles& scene, int resolution, voxdag::BuildSpec spec);
 
   voxdag::TemporaryFolder folder_{fast_disk()};
 
  private:
-  // Hundreds of small builds wait for the disk only: where there is a disk in memory, they use it.
+  // Hundreds of small builds spend their time waiting for the disk. Returns a folder on a disk in
+  // memory if there is one.
   static std::string fast_disk();
 
   int files_ = 0;

@@ -1,5 +1,5 @@
-// Run options, the number of triangles' copies and the order of work never show in the bytes. The
-// reports say that the variants really took different ways.
+// Run options, the number of copies of each triangle and the order of work do not affect the bytes
+// of the file. The reports show that the builds really spilled, split and merged differently.
 #include <algorithm>
 
 #include "tests/reference/reference_build.h"
@@ -20,7 +20,7 @@ Triangles mixed_scene(int resolution, int of_each_kind) {
   return scene;
 }
 
-// Subvolume sizes, threads and budgets on a scene that the oracle knows.
+// Builds with different subvolume sizes, threads and budgets equal the oracle.
 TEST_F(RunOptionsTest, NeverShow) {
   const Triangles scene = mixed_scene(256, 12);
   for (const uint32_t hash_bits : {4u, 16u, 64u}) {
@@ -50,7 +50,7 @@ TEST_F(RunOptionsTest, NeverShow) {
   }
 }
 
-// More triangles than memory holds: they spill, and nothing shows.
+// The memory cannot hold all triangles, so they are spilled to disk. The bytes are the same.
 TEST_F(RunOptionsTest, SpillingNeverShows) {
   Triangles scene = mixed_scene(128, 2);
   for (const auto& t : oracle::make_scene(oracle::SceneKind::kSubVoxel, 2, {{0, 0, 0}, 128}, 2000))
@@ -69,7 +69,8 @@ TEST_F(RunOptionsTest, SpillingNeverShows) {
   }
 }
 
-// A subvolume that outgrows its share is split in eight, and nothing shows.
+// Subvolumes that exceed their share of the memory are split into their eight children. The bytes
+// are the same.
 TEST_F(RunOptionsTest, SplittingNeverShows) {
   const Triangles scene =
       oracle::make_scene(oracle::SceneKind::kSpanning, 3, {{0, 0, 0}, 1024}, 400);
@@ -87,8 +88,8 @@ TEST_F(RunOptionsTest, SplittingNeverShows) {
   }
 }
 
-// With few hash bits the order in the file is another one, the DAG is the same: equal counts,
-// equal voxels, and again the same bytes whatever the run options.
+// With few hash bits, the nodes have a different order in the file, but the DAG is the same: its
+// counts and voxels are equal. Run options again do not affect the bytes.
 TEST_F(RunOptionsTest, HashBitsChangeTheOrderOnly) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSpanning, 4, {{0, 0, 0}, 512}, 60);
   auto spec = spec_for(scene, 512);

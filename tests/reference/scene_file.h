@@ -1,4 +1,4 @@
-// Writes triangles as the plainest .glb file: one mesh, positions as floats, no indices.
+// Writes triangles as a minimal .glb file: one mesh, positions as floats, no indices.
 #pragma once
 
 #include <string>
@@ -11,9 +11,10 @@ namespace reference {
 using oracle::Triangles;
 using oracle::WorldTriangle;
 
-// Lattice units become world units of a voxel each; exact up to 2^24 units.
+// Returns the triangles in a world space where a voxel has edge 1. Exact for coordinates up to 2^24
+// lattice units.
 std::vector<WorldTriangle> as_world(const Triangles& triangles);
-// What floats make of the coordinates.
+// Returns the triangles with their coordinates rounded to floats.
 std::vector<WorldTriangle> as_floats(std::vector<WorldTriangle> triangles);
 
 // `copies` of all triangles, one after the other.

@@ -1,5 +1,5 @@
-// Real scenes: counts found by independent code elsewhere, and the same bytes whatever the run
-// options.
+// Builds of real scenes. Independent code gave the expected counts. Run options do not affect the
+// bytes.
 #include <filesystem>
 
 #include "core/format/global/diff.h"
@@ -74,8 +74,8 @@ TEST_F(SharedScenes, Dragon8192) {
   EXPECT_GT(rounds.spill_bytes, 10 * kMebibyte);
 }
 
-// Cut hashes change the order of the nodes in the file; the voxels are the same and the nodes as
-// many.
+// Truncated hashes change the order of the nodes in the file. The voxels and the number of nodes
+// are the same.
 TEST_F(SharedScenes, HashBits) {
   USE_SHARED_SCENE("sponza.glb", 512);
   const BuildReport full = run_with(256 * kMebibyte, 512, 1);

@@ -35,7 +35,8 @@ class FaultyWriter : public voxdag::ForwardingWriter {
   }
   void sync() override {
     files_.operate([&] {
-      // Data written during the sync may or may not be on the disk afterwards.
+      // Data that is written during the sync may or may not be durable afterwards, so only the
+      // contents from before the sync count as synced.
       std::string before = contents(path());
       ForwardingWriter::sync();
       std::lock_guard lock(files_.mutex_);
@@ -113,7 +114,7 @@ std::unique_ptr<voxdag::WritableFile> FaultyFiles::open_write(const std::string&
   std::unique_ptr<voxdag::WritableFile> file;
   operate([&] {
     std::lock_guard lock(mutex_);
-    // The contents that an earlier process left are on the disk.
+    // Contents that an earlier process left count as synced.
     if (!synced_.contains(path)) synced_[path] = exists(path) ? contents(path) : "";
     file = ForwardingFiles::open_write(path);
   });
@@ -154,8 +155,8 @@ void FaultyFiles::sync_directory(const std::string& path) {
 }
 
 void FaultyFiles::cut_power() {
-  // The lock is held until the end: no other thread may treat bytes as durable that are dropped
-  // here.
+  // Holds the lock until the process ends, so that no other thread can report bytes as durable that
+  // are dropped here.
   std::lock_guard lock(mutex_);
   for (const auto& [path, bytes] : synced_)
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;

@@ -1,5 +1,5 @@
-// A file system that fails on request, modeled on leveldb's fault_injection_test: a disk that drops
-// unsynced data or is full, or a process that is killed.
+// A file system that fails on request, modeled on LevelDB's fault_injection_test. It simulates a
+// disk that loses unsynced data or is full, and a process that is killed.
 //
 // Every call that changes the disk is an operation. Operations are numbered from 1 in the order in
 // which they begin. With several threads, this order differs slightly from run to run. Thread-safe.
@@ -22,15 +22,15 @@ enum class Fault {
   kKillBefore,  // SIGKILL instead of the operation
   kKillAfter,   // SIGKILL once it is done
   kPowerCut,    // unsynced data is dropped, then SIGKILL
-  kNoSpace,     // this write and all later ones are half done and fail with Error{kNoSpace}
+  kNoSpace,     // this write and all later writes are half done and fail with Error{kNoSpace}
   kIoError,     // this and all later operations fail with Error{kIo}; a write is half done
-  kFlipBit,     // if it is a write, one bit of it lands on the disk flipped
-  kReadError,   // this read and all later ones fail with Error{kIo}
+  kFlipBit,     // if the operation is a write, one bit of the written data is wrong
+  kReadError,   // this read and all later reads fail with Error{kIo}
 };
 
 struct FaultPlan {
   Fault fault = Fault::kNone;
-  uint64_t at = 0;  // the operation's number; for kReadError, the read's
+  uint64_t at = 0;  // number of the operation that fails; for kReadError, number of the read
 };
 
 class FaultyFiles : public voxdag::ForwardingFiles {
@@ -50,7 +50,7 @@ class FaultyFiles : public voxdag::ForwardingFiles {
  private:
   friend class FaultyWriter;
   friend class FaultyReader;
-  // Runs one operation, which gets its number, or the planned fault instead. `half` does the part
+  // Gives the operation its number and runs it, or causes the planned fault. `half` does the part
   // of the operation that a failing disk completes.
   template <class Operation, class Half>
   void operate(const Operation& operation, const Half& half);
@@ -58,21 +58,21 @@ class FaultyFiles : public voxdag::ForwardingFiles {
   void operate(const Operation& operation) {
     operate([&](uint64_t) { operation(); }, [] {});
   }
-  // Runs a write. `half` is a write that the disk does not complete, `flipped` a write with a wrong
-  // bit.
+  // Like operate(), for a write. `half` writes the part that a failing disk completes; `flipped`
+  // writes the data with a wrong bit.
   template <class Operation, class Half, class Flipped>
   void write(const Operation& operation, const Half& half, const Flipped& flipped);
   void read();
-  // Reverts files and names to their synced state, then sends SIGKILL.
+  // Reverts files and names to the state of their last sync, then sends SIGKILL.
   void cut_power();
 
   const FaultPlan plan_;
   std::atomic<uint64_t> operations_{0};
   std::atomic<uint64_t> reads_{0};
   std::mutex mutex_;                                   // guards the state after a power cut
-  std::map<std::string, std::string> synced_;          // contents, of files that were written here
+  std::map<std::string, std::string> synced_;          // written files: contents at the last sync
   std::map<std::string, std::string> unsynced_names_;  // new name -> old name, "" for a new file
-  std::map<std::string, std::string> replaced_;        // contents of files whose names those took
+  std::map<std::string, std::string> replaced_;        // contents of files replaced by a rename
 };
 
 }  // namespace crash

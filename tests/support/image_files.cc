@@ -19,7 +19,7 @@ std::string packed(const std::string& bytes) {
   return out;
 }
 
-// The seven passes of Adam7. Each row follows its filter byte.
+// Returns the rows of the seven passes of Adam7, each after its filter byte.
 std::string interlaced_rows(const PngFormat& f, const std::string& pixels, size_t pixel_bytes) {
   constexpr uint32_t kPasses[7][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4},
                                       {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}};

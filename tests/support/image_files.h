@@ -17,7 +17,8 @@ struct PngFormat {
 // Length, type, data and checksum.
 std::string png_chunk(const std::string& type, const std::string& data);
 std::string big_endian(uint32_t value);
-// `pixels` has no filter bytes. A row has whole bytes; in interlaced files, every pixel has.
+// Returns a PNG file. `pixels` has no filter bytes. Each row begins at a whole byte; in an
+// interlaced file, each pixel does.
 std::string png_file(const PngFormat& format, const std::string& pixels);
 
 // `pixels` has 1 (gray), 3 (RGB) or 4 (CMYK) bytes per pixel.
