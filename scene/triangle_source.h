@@ -110,8 +110,8 @@ class TriangleSource {
 };
 
 struct SceneOptions {
-  // Drop and count invalid triangles (non-finite vertices, indices out of range) instead of
-  // refusing the scene.
+  // Drop invalid triangles (vertices that are not finite, indices out of range) instead of refusing
+  // the scene. declared_triangles() includes the dropped triangles, so callers can count them.
   bool skip_invalid = false;
   // Path of the temporary file for decompressed geometry, in an existing folder. The name is
   // removed as soon as the file is open. "": a path in a new folder in temporary_parent().

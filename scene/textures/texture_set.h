@@ -6,10 +6,11 @@
 // The pyramids are kept in memory if they take at most half of the free budget. Otherwise they are
 // in a scratch file. Images are decoded row by row.
 //
-// An image can be missing, broken, too large (over kMaxTexels), or neither PNG nor JPEG (WebP,
-// KTX2). Then one warning names the image and a material that uses it, and the materials of this
-// image keep only their base color factors. A valid image whose decoder exceeds the budget
-// (progressive JPEG, interlaced PNG) is an error, because memory must not decide the colors.
+// An image can be missing, broken, larger than the limits of ImageReader, or neither PNG nor JPEG
+// (WebP, KTX2). In these cases, one warning names the image and a material that uses it, and the
+// materials of this image keep only their base color factors. A valid image whose decoder exceeds
+// the budget (progressive JPEG, interlaced PNG) is an error, because memory must not decide the
+// colors.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +30,7 @@ namespace voxdag {
 
 class TextureSet {
  public:
-  // Maximum number of texels of one image: 16384 x 16384.
+  // Maximum number of texels of one image: 16384 x 16384. ImageReader checks it, as kMaxPixels.
   static constexpr uint64_t kMaxTexels = uint64_t{1} << 28;
 
   // Decodes the images that materials refer to, on up to `threads` threads, and warns about

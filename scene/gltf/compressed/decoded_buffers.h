@@ -60,7 +60,7 @@ class DecodedBuffers {
   // Held shared by all threads that decode. Held exclusively by a thread that decodes a buffer
   // again, because the buffer did not fit in memory while others decoded.
   std::shared_mutex decoding_;
-  std::mutex mutex_;  // guards all members below
+  std::mutex mutex_;  // held while a member below changes
   std::unique_ptr<WritableFile> writer_;
   std::unique_ptr<ReadableFile> reader_;
   uint64_t end_ = 0;
