@@ -8,7 +8,7 @@
 //      memory, the method or the backend's caches.
 //   3. All large buffers are charged to the given budget. If the budget cannot hold the subvolume,
 //      build() returns kNeedsSplit without calling the sink, and the caller splits the cube and
-//      tries again. A cube of kSmallestEdge voxels never needs more than kSmallestBudget.
+//      tries again. A cube with an edge of kSmallestEdge never needs more than kSmallestBudget.
 //   4. A backend is used for many subvolumes, by one thread, and may keep caches between them.
 //
 // tests/conformance tests every backend.
@@ -28,9 +28,9 @@
 
 namespace voxdag {
 
-// Voxels along the edge of the smallest subvolume that the scheduler splits down to.
+// Edge in voxels of the smallest subvolume. The scheduler does not split subvolumes further.
 inline constexpr int64_t kSmallestEdge = 64;
-// Budget that suffices for a subvolume of kSmallestEdge, for any number of triangles.
+// Bytes of budget that suffice for a subvolume with this edge, for any number of triangles.
 inline constexpr uint64_t kSmallestBudget = uint64_t{8} << 20;
 
 // The triangles that may touch a subvolume, in no particular order; can be read repeatedly.
@@ -97,13 +97,14 @@ std::unique_ptr<Backend> make_parallel_host_backend(Method method, unsigned thre
 // the machine has no driver or device. Never throws.
 int cuda_device_count();
 inline bool cuda_device_available() { return cuda_device_count() > 0; }
-// Returns why there is no usable device, as a sentence; "" if there is one.
+// Returns the reason why no device is usable, as a message; "" if a device is usable.
 std::string cuda_device_problem();
 
-// Creates a backend that runs the parallel pipeline on a GPU. Device memory is charged to the
-// build's budget like host memory. Each backend has its own stream. So if two backends share a
-// device, transfers and host work of one backend overlap with kernels of the other. Throws
-// Error{kDevice} if there is no such device.
+// Creates a backend that runs the parallel pipeline on a GPU. `device`: 0 to cuda_device_count()
+// - 1. Device memory is charged to the build's budget like host memory. Each backend has its own
+// stream. So if two backends share a device, transfers and host work of one backend overlap with
+// kernels of the other backend. Throws Error{kDevice} if the device does not exist or cannot be
+// opened.
 std::unique_ptr<Backend> make_cuda_backend(Method method = Method::kFast, int device = 0);
 
 }  // namespace voxdag

@@ -85,7 +85,7 @@ struct AttributeTraits {
   constexpr bool has_names() const { return encoding == Encoding::kNameIndex; }
 };
 
-// Rows in the order of their sections.
+// Rows are in the order of their sections in the global file.
 inline constexpr AttributeTraits kAttributeTable[] = {
     {.attribute = Attribute::kColor,
      .name = "color",

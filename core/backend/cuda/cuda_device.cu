@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kMinMajor = 8;  // min compute capability (major number) that this build has code for
 
-// Returns the runtime's numbers of the devices that can run this build. If there are no such
+// Returns the CUDA runtime's numbers of the devices that can run this build. If there are no such
 // devices, sets `problem` to the reason.
 std::vector<int> usable_devices(std::string& problem) {
   int count = 0, driver = 0;
@@ -38,6 +38,7 @@ std::vector<int> usable_devices(std::string& problem) {
   return usable;
 }
 
+// Returns the CUDA runtime's number of usable device `device`.
 int runtime_device(int device) {
   std::string problem;
   const std::vector<int> usable = usable_devices(problem);

@@ -22,14 +22,15 @@ class CudaDevice {
   static constexpr std::string_view kName = "cuda";
   static constexpr size_t kStagingTriangles = 4096;  // capacity of a staging area (288 KiB)
 
-  // Throws Error{kDevice} with the reason if there is no such device.
+  // `device`: index among the devices that can run this build. Throws Error{kDevice} with the
+  // reason if the device does not exist or a call of the CUDA runtime fails.
   explicit CudaDevice(int device);
 
   // Returns the space of one build, and makes this device the thread's current CUDA device.
   CudaSpace open(const SubvolumeTask& task, MemoryBudget& budget, const CancelToken& cancel);
 
   cudaStream_t stream() const { return stream_.get(); }
-  // A pinned word that single values are copied to.
+  // Returns a word of pinned host memory, to which single values are copied from the device.
   void* mailbox() { return mailbox_.get(); }
 
   // Returns a pinned staging area of kStagingTriangles triangles. Waits until the last copy from

@@ -1,6 +1,6 @@
-// The color grid: K^3 cells over the cube of the voxel grid of R^3, K = 2^color_levels <= R. Its
-// set cells are the octree's nodes of level color_levels. Colors are baked by regions:
-// octree-aligned cubes of at most 64^3 color cells.
+// The color grid: it divides the cube of the voxel grid (R^3 voxels) into K^3 cells, with
+// K = 2^color_levels <= R. Its set cells are the octree's nodes of level color_levels. Colors are
+// baked by regions, which are octree-aligned cubes of at most 64^3 color cells.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct ColorGrid {
 
   // log2 of a color cell's edge in lattice units: 8 to 26.
   VOXDAG_HD int cell_bits() const { return kUnitBits + static_cast<int>(levels - color_levels); }
-  // Returns the level of full regions, or 0 if the complete grid is smaller.
+  // Returns the level of full regions, or 0 if the complete grid is smaller than a full region.
   VOXDAG_HD uint32_t region_level() const {
     return color_levels > kRegionLevels ? color_levels - kRegionLevels : 0;
   }

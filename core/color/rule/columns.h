@@ -1,4 +1,5 @@
-// Sets of the 16 columns of a cell, as bits 4 j + i of column (i, j) along axes 0 and 1.
+// Sets of the 16 columns of a cell (cell_triangle.h) as bit masks. Column (i, j) has bit 4 j + i;
+// i counts along axis 0 and j along axis 1.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Integers of the color rule. Products are exact, or exact modulo 2^64 if the result is known to
-// fit. Conversions to doubles round in the same way on every machine.
+// Integer arithmetic of the color rule. Products are exact, or exact modulo 2^64 if the final
+// result is known to fit. Conversions to doubles round in the same way on every machine.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The materials of the cells of a region. For each cell and material, the weights of the surfaces
-// are added up. Sums are integers and commute.
+// are added up. Sums are integers, so the order of the surfaces does not matter.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace voxdag::color {
 
-// A member of AttributeSums.
+// The class of AttributeSums for materials.
 class MaterialSums {
  public:
   static constexpr Attribute kAttribute = Attribute::kMaterial;

@@ -1,5 +1,5 @@
-// The normals of the cells of a region, as sums of areas along the axes. Sums are integers and
-// commute.
+// The normals of the cells of a region, as sums of area vectors. Sums are integers, so the order of
+// the triangles does not matter.
 #pragma once
 
 #include <cstdint>
@@ -40,7 +40,7 @@ VOXDAG_HD inline NormalCode normal_of_sum(const NormalSum& sum) {
   return (rest | turned) == 0 ? kNoNormal : encode_normal(v[0], v[1], v[2]);
 }
 
-// A member of AttributeSums.
+// The class of AttributeSums for normals.
 class NormalSums {
  public:
   static constexpr Attribute kAttribute = Attribute::kNormal;

@@ -25,7 +25,7 @@ class RegionCells {
   static constexpr uint64_t kMaxBytes =
       uint64_t{kMaxCells} * (4 + 3 * sizeof(ColorSum)) + (64 << 10);
 
-  // `wanted`: attributes other than color that have sums.
+  // `wanted`: the attributes to compute in addition to colors.
   explicit RegionCells(const AttributeSet& wanted = {})
       : attributes_(wanted), places_(kMaxCells), touched_(kMaxCells / 64) {}
 

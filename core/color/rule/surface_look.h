@@ -35,9 +35,9 @@ VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
 
 // Returns the level of the image's pyramid that has one to two texels along the edge of a color
 // cell, on average over the triangle: the largest l with 4^l <= texels in the triangle / its area
-// in cells. `area`: twice the triangle's area, in lattice units. A triangle without area counts as
-// a square over its longest edge, or over a lattice unit. All values are computed in IEEE doubles,
-// in this order.
+// in cells. `area`: twice the triangle's area, in square lattice units. A triangle without area
+// counts as a square over its longest edge, or over a lattice unit. All values are computed in IEEE
+// doubles, in the order written here.
 template <class Textures>
 VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& textures,
                                         uint32_t image, int cell_bits, double area) {

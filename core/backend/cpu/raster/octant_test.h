@@ -1,6 +1,6 @@
 // Finds the children of a cube that a triangle may touch: the overlap test for all eight children
-// in one step, in doubles. The four elements of a quad belong to the three edges of the triangle
-// (the fourth is ignored) or to four children.
+// in one step, in doubles. The four elements of a Quad belong either to the three edges of the
+// triangle (the fourth element is ignored) or to four children.
 //
 // The test need not be exact, because the rasterizers are exact. It may report a child that the
 // triangle does not touch, but two errors must never happen: a touched child is omitted, or a child

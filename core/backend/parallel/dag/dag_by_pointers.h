@@ -87,7 +87,7 @@ struct TakeFirstOfEquals {
   }
 };
 
-// Sets the survivor's position of each item to the place of the item's group.
+// Sets index_of of each item to the place of the item's group among the survivors.
 struct RewireThroughGroups {
   const uint32_t* marked;
   const uint32_t* items;
@@ -133,8 +133,8 @@ struct EmitChildren {
   }
 };
 
-// Removes duplicates from a level. `order` has the level's octree nodes in the total order but for
-// the hash, so equal nodes are neighbors. hash(survivors, hashes) returns a functor that sets
+// Removes duplicates from a level. `order` has the level's octree nodes sorted by mask and
+// children, so equal nodes are neighbors. hash(survivors, hashes) returns a functor that sets
 // hashes[i] to the hash of octree node survivors[i].
 template <class Space, class Same, class MakeHash>
 Reduced<Space> reduce_sorted(Space& space, const Order<Space>& order, Same same, uint32_t hash_bits,

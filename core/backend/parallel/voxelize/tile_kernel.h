@@ -1,10 +1,10 @@
-// Draws the bricks of one tile of 64^3 voxels with one thread block. Its shared memory holds 4096
-// brick masks, and all triangles of the tile are drawn into them. Then the bricks that are not
-// empty are written in Morton order.
+// Draws the bricks of one tile of 64^3 voxels with one thread block. The thread block's shared
+// memory contains the masks of the tile's 4096 bricks. All triangles of the tile are drawn into
+// these masks. Then the bricks that are not empty are written in Morton order.
 //
 // The unit of work is a (triangle, cell) pair; the cell is a cube of 16^3 voxels that the triangle
-// touches. One thread finds the touched bricks of its cell, and then the voxels of each brick.
-// Masks are combined by OR, so the result does not depend on the order.
+// touches. One thread finds the bricks of the cell that the triangle touches, and then the voxels
+// of each brick. Masks are combined by OR, so the result does not depend on the order of the pairs.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ struct DrawTile {
   static constexpr int kMinResidentBlocks = 2;
   static constexpr int kPhases = 5;
   static constexpr uint32_t kRun = kTileBricks / kThreads;  // bricks that a thread writes
-  static constexpr uint32_t kGroup = 16;                    // threads whose counts are added up
+  static constexpr uint32_t kGroup = 16;                    // threads whose counts one thread sums
 
   struct Shared {
     uint64_t masks[kTileBricks + kThreads];  // indexed by slot()

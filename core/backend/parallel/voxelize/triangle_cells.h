@@ -8,8 +8,9 @@
 //     g . k * 2^shift + c
 //
 // For an integer i, 2^shift i + c >= 0 <=> i + floor(c / 2^shift) >= 0. So the tests of cells use
-// only the rounded constants and no units within a cell. Vertices are odd. Their differences are
-// even, so half edges and quarter normals are integers, and no vertex is on the boundary of a cell.
+// only the rounded constants and no units within a cell. The coordinates of vertices are odd, so no
+// vertex is on the boundary of a cell. Edges are even, so half edges are integers, and so are
+// quarter normals, which are cross products of half edges.
 //
 // The bounds are for triangles of less than 2^28 units in each axis ("narrow") and lattices of at
 // most 2^28 units (the largest grid). Half edges are < 2^27, quarter normals n_a < 2^55. If the

@@ -16,7 +16,7 @@ namespace voxdag::parallel {
 
 // Splits the code of a voxel into the code of its brick and the bit of the voxel in the brick.
 struct SplitVoxelCode {
-  uint64_t* codes;  // voxel in, brick out
+  uint64_t* codes;  // codes of voxels, replaced by the codes of their bricks
   uint64_t* bits;
   VOXDAG_HD void operator()(uint32_t i) const {
     bits[i] = uint64_t{1} << (codes[i] & 63);

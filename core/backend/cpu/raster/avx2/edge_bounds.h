@@ -12,8 +12,8 @@
 // The code computes y = slope k + start in doubles; only the division, products and sums are
 // rounded. y is at least 1 / (2 |up|) >= 2^-28 away from a whole number. Its floor is exact where
 // that matters:
-//     |c| <= 2^36:  The error of y is below 2^-12 / |up| + 2^-45, including the error of adding
-//                   small numbers.
+//     |c| <= 2^36:  The error of y is below 2^-12 / |up| + 2^-45, including the error of adding the
+//                   constructor's below_more or over_more.
 //     |c| > 2^36:   |y| > 2^8 is outside the tile, so only the sign of y matters. The error is
 //                   below 1.
 //     up = 0:       |y| >= 2^59, and the error is below 2^58, so the sign is correct.

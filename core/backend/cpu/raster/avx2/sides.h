@@ -1,6 +1,7 @@
 // Bounds of the heights in each voxel column (p, q), from the triangle's box and from the edge
 // tests in the two projections that show the height. One projection bounds the heights for every p,
-// the other for every q. Both are computed once per row of the tile.
+// the other projection bounds them for every q. The bounds of both projections are computed once
+// per row of the tile.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
