@@ -147,7 +147,8 @@ bool Dispatcher::start_next_job() {
   try {
     needed = tasks_.memory_of(parse_job_request(job->request));
   } catch (const RequestError& error) {
-    // The task cannot be read: another version of this program wrote it, or it is damaged.
+    // The request cannot be read: another version of this program stored it, or its record is
+    // damaged.
     log_("job " + job->id + " failed: " + error.message());
     queue_.change(job->id, [&](Job& j) {
       j.state = JobState::kFailed;
@@ -372,8 +373,8 @@ Job Dispatcher::suspend(const std::string& id) {
     is_running = worker != workers_.end() && worker->second.is_running();
     if (is_running) worker->second.live->stop();
   }
-  // A killed service may have left tasks of this job running, even if the job was queued again
-  // since.
+  // An earlier service that was killed may have left cluster tasks of this job running, even if the
+  // job was queued again after that.
   if (!is_running) stop_tasks(id);
   return job;
 }
@@ -390,7 +391,7 @@ Job Dispatcher::resume(const std::string& id) {
 }
 
 Job Dispatcher::retry(const std::string& id) {
-  std::lock_guard lock(mutex_);  // no deletion can begin while the mutex is locked
+  std::lock_guard lock(mutex_);  // so that no deletion begins during the call
   return queue_.change(id, [&](Job& j) {
     if (j.state == JobState::kRunning) return;
     if (j.state != JobState::kQueued && j.state != JobState::kFailed &&
@@ -413,7 +414,7 @@ void Dispatcher::remove(const std::string& id) {
   stop_tasks(id);
   const FilesLock files_lock(*this, id);
   {
-    std::lock_guard lock(mutex_);  // the job cannot be retried while the mutex is locked
+    std::lock_guard lock(mutex_);  // so that the job is not retried between check and mark
     queue_.check_removable(id);
     folders_.mark(id);
   }

@@ -1,15 +1,15 @@
 // Runs the queue's jobs, each in a separate process, within the limits of number, memory and disk.
 // Stops and resumes jobs, and cleans up after them. Thread-safe.
 //
-// Reasons for running each job in a process of its own: a memory limit applies to a process; a
-// scene that crashes a build harms nothing else; and a build can be stopped, killed and reniced
-// without touching the threads that answer requests. A job's process dies with the service. If it
-// is started again with the same task, it resumes from the job's work folder. So the queue and the
-// folders are enough to continue after any crash.
+// Reasons for running each job in a separate process: a memory limit applies to a process; a scene
+// that crashes a build harms nothing else; and a build can be stopped, killed and reniced without
+// touching the threads that answer requests. A job's process dies with the service. A new process
+// with the same task resumes from the job's work folder. So the queue and the folders are enough to
+// continue after any crash.
 //
 // A failure in a thread of the dispatcher ends neither the thread nor the service (Steps in
-// server/base/steps.h). If a job cannot be handled, the job fails. If a folder cannot be handled,
-// it is left alone. All other work continues.
+// server/base/steps.h). If a step for a job throws, the job fails or the step is repeated. If a
+// step for a folder throws, the folder is kept. All other work continues.
 #pragma once
 
 #include <condition_variable>
@@ -60,8 +60,9 @@ class Dispatcher {
 
   // Returns null unless the job's process is running.
   std::shared_ptr<LiveJob> live(const std::string& id) const;
+  // Returns the number of running job processes.
   size_t running() const;
-  // Returns the cluster task totals over all running jobs.
+  // Returns the sums over all running jobs. Sets only `waiting`, `failed_attempts` and `running`.
   ClusterTasks cluster_tasks() const;
   JobFolder folder(const std::string& id) const;
 
@@ -94,7 +95,8 @@ class Dispatcher {
   void retire_old_jobs();
   // Finishes deletions that a crash or an error interrupted.
   void finish_deletions();
-  // Stops the tasks that a job has left on the cluster. No process of this service follows them.
+  // Stops the tasks that a job has left on the cluster. The job has no process that could stop
+  // them.
   void stop_tasks(const std::string& id);
   // Removes the job's work folder if the job has been canceled or has succeeded.
   void remove_work(const std::string& id);
@@ -131,15 +133,16 @@ class Dispatcher {
   // together, but not while files are removed.
   mutable std::mutex mutex_;
   JobFolders folders_;
-  // Keyed by job id. The worker with the key "preview" draws a picture.
+  // Keyed by job id. The worker with the key "preview" renders the preview of a finished job.
   std::map<std::string, Worker> workers_;
   std::set<std::string> locked_;  // jobs with a FilesLock
   std::condition_variable files_unlocked_;
   double next_deletions_s_ = 0;  // in wall_seconds(); infinite if no deletion is pending
   bool stops_ = false;
-  bool recovered_ = false;
+  bool recovered_ = false;  // if false, recover() must run before the next job starts
 
-  // Guards only live_, so that requests for progress wait for nothing else.
+  // Guards only live_. It is separate from mutex_, so that requests for progress do not wait for
+  // changes of the queue.
   mutable std::mutex live_mutex_;
   std::map<std::string, std::shared_ptr<LiveJob>> live_;  // keyed by job
 

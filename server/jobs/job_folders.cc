@@ -13,7 +13,7 @@ bool is_job_id(const std::string& name) {
   return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-// Returns the id of the job whose deletion was begun by renaming this folder; "" for other folders.
+// Returns the id of the job for a folder that a deletion has renamed; "" for other folders.
 std::string marked_job(const DirectoryEntry& entry) {
   const std::string id = entry.name.substr(0, entry.name.find('.'));
   return entry.is_directory && is_job_id(id) && entry.name == id + kDeleted ? id : "";
@@ -57,10 +57,10 @@ void JobFolders::clean_up() {
     steps_.run("clean up jobs/" + entry.name, [&] {
       const auto job = queue_.find(entry.name);
       if (!job) foreign += " jobs/" + entry.name;
-      // The cluster tasks of the job may still run: the service may have been killed before it
-      // stopped them.
+      // A suspended or failed job may still have cluster tasks that run: the service may have been
+      // killed before it stopped them.
       else if (job->state == JobState::kSuspended || job->state == JobState::kFailed)
-        // Also stops the merge job, because no job of the service uses one.
+        // `true` skips the merge job, because no job of the service has one.
         stop_cluster_tasks(files_, of(entry.name).work(), true);
       else if (has_ended(job->state) && job->state != JobState::kFailed)
         remove_work(entry.name);

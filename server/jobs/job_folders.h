@@ -1,5 +1,5 @@
-// The folders of jobs, DATA/jobs/ID: their assignment to jobs, and their deletion. Thread-safe for
-// different jobs.
+// The folders of jobs, DATA/jobs/ID: finds the job of each folder, and deletes folders. Calls for
+// different jobs may run concurrently.
 //
 // A deletion first marks the job's folder by renaming it. Then it removes the folder's files, the
 // job's record and the renamed folder, in this order. The renamed folder remains until the end, so
@@ -34,6 +34,7 @@ class JobFolders {
   // The call is fast, unless an earlier deletion left files under the marked name.
   void mark(const std::string& id);
   bool is_marked(const std::string& id) const { return files_.exists(of(id).path + kDeleted); }
+  // Returns the ids of the jobs whose folders are marked.
   std::vector<std::string> marked() const;
   // Removes the files marked by mark() and the job's record. Throws RequestError{kConflict} if the
   // job has not ended.

@@ -50,8 +50,8 @@ void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
     return finish(job, JobState::kSucceeded, now_s);
   }
   const JobError error = error_of(live, end, now_s);
-  // A process that was requested to stop may end without a failure message, before it handles the
-  // signal. That also counts as stopped.
+  // The stop signal may end a process before the process handles signals. Such a process sends no
+  // failure message, but also counts as stopped.
   const bool stopped = asked && (error.code == "canceled" || !live.failure());
   if (!stopped) job.error = error;
   if (job.state == JobState::kCanceling) return finish(job, JobState::kCanceled, now_s);

@@ -14,8 +14,8 @@ double pause_s(const JobLimits& limits, unsigned attempts);
 
 // Changes the job, which may have been suspended, resumed or canceled since it started:
 //   outcome of the process   new state
-//   a result                 succeeded (canceled if requested)
-//   stopped on request       canceled or suspended, as requested; queued if the service stops
+//   a result                 succeeded; canceled if a client requested that
+//   stopped on request       canceled or suspended, as requested; queued if the service is stopping
 //   no_space, io             queued again after a pause, while attempts remain; then failed
 //   anything else            failed
 void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,

@@ -17,11 +17,13 @@ class LiveJob {
  public:
   explicit LiveJob(uint64_t memory_bytes) : memory_bytes_(memory_bytes) {}
 
+  // Memory limit of the job's process.
   uint64_t memory_bytes() const { return memory_bytes_; }
 
+  // Updates this object by a message of the job's process.
   void apply(const Message& message);
-  // Returns the JSON object PROGRESS of docs/api.md; "" before the first stage. The text is created
-  // only once per version of the progress.
+  // Returns the JSON object PROGRESS of docs/api.md; "" before the first stage. Keeps the text
+  // until the next message arrives.
   std::string progress_json() const;
   // Returns the number of messages received so far.
   uint64_t version() const { return locked(version_); }

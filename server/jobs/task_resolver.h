@@ -17,21 +17,22 @@ class TaskResolver {
   // Throws Error{kInvalidInput} for a scene root that does not exist.
   TaskResolver(const ServerConfig& config, SceneStore& scenes);
 
-  // Throws RequestError: kNotFound for a scene that does not exist or is outside the configured
-  // roots (with the same message), kConflict for an incomplete upload, kLimit for more memory than
-  // a job may use.
+  // Returns the task of a request. Throws RequestError: kNotFound for a scene that does not exist
+  // or is outside the configured roots, kConflict for an incomplete upload, kLimit for more memory
+  // than a job may use. The message of kNotFound is the same in both cases, so that it does not
+  // reveal which files exist outside the roots.
   JobTask make(const JobRequest& request, JobTask::Kind kind);
   // Returns the scenes of a request that are uploads.
   static std::vector<std::string> uploads_of(const JobRequest& request);
 
   // Memory limit of all running jobs together.
   uint64_t memory_bytes() const { return memory_bytes_; }
-  // Returns the memory for one job: the requested memory, or an equal share if the request has
-  // none.
+  // Returns the memory limit in bytes for one job: the requested memory, or memory_bytes() divided
+  // by jobs.max_concurrent if the request has none.
   uint64_t memory_of(const JobRequest& request) const;
 
  private:
-  // Adds the scene's files and permissions to the task.
+  // Adds the scene to the task's uploads and to the paths that the task may read.
   void add_scene(const std::string& scene, JobTask& task);
 
   const ServerConfig& config_;

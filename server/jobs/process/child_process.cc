@@ -20,7 +20,8 @@ constexpr int kTickMs = 100;
 constexpr size_t kMaxLineBytes = 4 << 20;
 
 // Blocks all signals of this thread during the lifetime of this object. A child that is forked
-// during that time receives pending signals as soon as it unblocks them.
+// during that time receives pending signals as soon as it unblocks them. So a stop request that is
+// sent right after fork() is not lost.
 class BlockedSignals {
  public:
   BlockedSignals() {

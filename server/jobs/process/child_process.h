@@ -1,6 +1,6 @@
 // A child process: starts it, reads its output line by line, requests its stop, and waits for it.
-// The child dies with this process, even if this process crashes. It inherits none of its open
-// files.
+// The child dies with this process, even if this process crashes. The child inherits no open files
+// of this process.
 #pragma once
 
 #include <sys/types.h>
@@ -16,7 +16,7 @@ class ChildProcess {
  public:
   struct Start {
     std::vector<std::string> command;  // program and arguments
-    std::string log_file;              // its standard error is appended to this file
+    std::string log_file;              // the child's standard error is appended to this file
     int nice = 0;
   };
   // Must be called by a thread that lives until wait() has returned, because the child dies with
@@ -30,15 +30,17 @@ class ChildProcess {
   // least every tenth of a second. When `tick` returns true, the child is killed.
   void read_lines(const std::function<void(std::string_view line)>& use,
                   const std::function<bool()>& tick);
-  // Sends SIGTERM. A build then stops at its next checkpoint; a program that has not begun to run
-  // ends. May be called from any thread.
+  // Sends SIGTERM. A build then stops at its next checkpoint. A child that has not started its
+  // program yet ends. May be called from any thread.
   void request_stop();
+  // Sends SIGKILL. May be called from any thread.
   void kill();
 
   struct End {
     int exit_status = 0;
     int signal = 0;  // number of the signal that ended the child; 0 if it exited by itself
   };
+  // Waits until the child ends. Returns End{} if the child was already waited for.
   End wait();
 
  private:

@@ -1,6 +1,6 @@
-// A file system that reads only the given files. It protects against uploaded scenes, which may
-// refer to any file as their buffers, by "..", or through symbolic links. All other calls are
-// forwarded.
+// A file system that opens only the given files for reading. An uploaded scene may name any file as
+// its buffer: directly, with "..", or through a symbolic link. This class refuses to open such a
+// file. All calls other than open_read() are forwarded.
 #pragma once
 
 #include <string>
@@ -12,8 +12,8 @@ namespace voxdag::server {
 
 class ConfinedFiles : public ForwardingFiles {
  public:
-  // `readable`: files, or folders with all files below them (ending in '/'). Paths that do not
-  // exist yet must not contain symbolic links or dots.
+  // `readable`: paths of files, and paths of folders, ending in '/', whose files may all be read. A
+  // path that does not exist yet must not contain symbolic links, "." or "..".
   ConfinedFiles(FileSystem& files, const std::vector<std::string>& readable);
 
   // Opens a file for reading. Error messages contain `path` as given. Throws Error{kInvalidInput}
@@ -24,7 +24,7 @@ class ConfinedFiles : public ForwardingFiles {
   std::vector<std::string> readable_;  // resolved
 };
 
-// Returns the path without symbolic links and dots; "" if nothing exists there.
+// Returns the absolute path without symbolic links, "." and ".."; "" if nothing exists there.
 std::string resolved_path(const std::string& path);
 // True if a resolved path equals `place` or, if `place` ends in '/', is below it.
 bool is_within(const std::string& path, const std::string& place);

@@ -46,7 +46,7 @@ void link_uploads(const JobTask& task) {
   }
 }
 
-// Returns a file system with the scene's files and the build's files.
+// Returns a file system that can read only the files of the scene and of the build.
 ConfinedFiles confined(FileSystem& files, const JobTask& task, const JobFolder& folder) {
   const std::string here = resolved_path(".") + "/";
   std::vector<std::string> readable = task.readable;
@@ -95,8 +95,9 @@ std::string result_json(const std::string& report_text, const std::string& outpu
   return result.dump();
 }
 
-// The report is the last file that a build writes. If it exists, the build is complete, and at most
-// the removal of its work folder was interrupted.
+// Runs or resumes the build and returns its RESULT (docs/api.md). The report is the last file that
+// a build writes. If it exists, an earlier run finished the build, and only the work folder may
+// remain.
 std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildContext& context) {
   if (!context.files.exists(folder.report()))
     return result_json(report_json(run_build(spec, context)), spec.run.output);
@@ -113,8 +114,8 @@ std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progre
   const BuildContext context{readable, progress, cancel};
   const BuildSpec spec = spec_of(task, folder);
   if (task.kind == JobTask::Kind::kPlan) return estimate_json(plan_build(spec, context));
-  // Without a work folder and a report, this run starts from the beginning. The subvolume list of
-  // an earlier run is then useless, because the scene may have changed.
+  // Without a job store and a report, this run starts from the beginning. The subvolume list of an
+  // earlier run must then be removed, because the scene may have changed.
   if (!files.exists(WorkFolder::store_path(folder.work())) && !files.exists(folder.report()) &&
       files.exists(folder.subvolumes()))
     files.remove(folder.subvolumes());

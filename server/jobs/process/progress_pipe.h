@@ -34,18 +34,20 @@ class ProgressPipe : public Progress {
   void set_usage(uint64_t memory_bytes, uint64_t disk_bytes) override;
   void set_cluster_tasks(const ClusterTasks& tasks) override;
 
+  // Reports the failure that ends the job. `code` as in docs/errors.md, or "internal".
   void fail(const std::string& code, const std::string& text);
+  // Reports the result of the finished job, RESULT of docs/api.md.
   void finish(const std::string& result_json);
 
  private:
-  // Call these functions with the mutex held. `now`: send even if the previous message was just
-  // sent.
+  // Call these functions, except tick(), with the mutex held. `now`: send even if the previous
+  // message was sent less than the minimum interval ago.
   void send(const Message& message);
   void send_advance(bool now);
   void report_subvolumes(bool now);
-  // The loop of a thread that reports changes held back because they came too soon after the
-  // previous report. Without it they would be reported only with the next change, perhaps minutes
-  // later.
+  // The loop of a thread that reports changes of subvolumes that came too soon after the previous
+  // report. Without this thread, such a change would be reported only with the next change, perhaps
+  // minutes later.
   void tick(const std::stop_token& end);
   void log(const std::string& text);
   // Replaces subvolumes.json atomically. Does not sync the file, because it can be created again.

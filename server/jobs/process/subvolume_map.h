@@ -17,14 +17,16 @@ class SubvolumeMap {
   void set(uint64_t resolution, std::span<const SubvolumeStatus> all);
   void set_grid(const std::array<double, 3>& origin, double edge);
   void begun(int64_t id);
-  // Marks unfinished subvolumes as no longer in progress.
+  // Marks all subvolumes as no longer in progress.
   void stop();
   void built(const SubvolumeStatus& subvolume);
   void split(int64_t id, std::span<const SubvolumeStatus> parts);
 
   const SubvolumeTotals& totals() const { return totals_; }
-  // {"resolution": R, "built": n, "total": n, "cubes": [[x, y, z, edge, built], ...],
-  //  "working": [[x, y, z, edge], ...], "origin": [x, y, z], "edge": e}
+  // Returns the contents of subvolumes.json. The members of the lists "cubes" and "working" are in
+  // voxels; "origin" and "edge" are the grid's, in scene units.
+  //   {"resolution": R, "built": n, "total": n, "cubes": [[x, y, z, edge, built], ...],
+  //    "working": [[x, y, z, edge], ...], "origin": [x, y, z], "edge": e}
   std::string json() const;
 
  private:

@@ -1,5 +1,5 @@
-// The folder of a job's files: DATA/jobs/ID. A job's process has this folder as its working
-// directory and uses an empty path here, so that no message of its build contains a folder of this
+// The paths of a job's files in DATA/jobs/ID. A job's process has this folder as its working
+// directory and uses a JobFolder with an empty `path`. So its messages contain no folder of this
 // machine.
 #pragma once
 

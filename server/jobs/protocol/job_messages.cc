@@ -34,8 +34,8 @@ constexpr std::string_view kNames[] = {
 constexpr size_t kKinds = std::variant_size_v<Message>;
 static_assert(std::size(kNames) == kKinds);
 
-// True if all numbers in the object are integers. The JSON library would silently convert other
-// numbers.
+// True if all numbers in the object and, down to `depth` levels, in its objects are unsigned
+// integers. The JSON library would silently convert other numbers.
 bool has_whole_numbers(const nlohmann::json& object, int depth) {
   for (const auto& member : object) {
     if (member.is_number() && !member.is_number_unsigned()) return false;
@@ -68,7 +68,7 @@ std::optional<Message> decode(std::string_view text) {
     if (!has_whole_numbers(line, 1)) return {};
     return message_of(line, std::make_index_sequence<kKinds>());
   } catch (const nlohmann::json::exception&) {
-    // A malformed line is no message, so the result has no value.
+    // A malformed line is not a message.
   }
   return {};
 }

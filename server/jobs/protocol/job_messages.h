@@ -64,6 +64,7 @@ using Message = std::variant<StageBegun, StageResumed, StageAdvanced, StageEnded
 
 // Returns one line of JSON, without the newline.
 std::string encode(const Message& message);
+// Returns the message of a line; nullopt if the line is not a known message.
 std::optional<Message> decode(std::string_view line);
 
 }  // namespace voxdag::server

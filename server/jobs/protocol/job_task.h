@@ -15,10 +15,10 @@ struct JobTask {
   enum class Kind { kBuild, kPlan };
   Kind kind = Kind::kBuild;
   std::string request;                         // the text of a JobRequest
-  std::map<std::string, std::string> uploads;  // its uploaded scenes: name to path
+  std::map<std::string, std::string> uploads;  // paths of the request's uploaded scenes, by name
   std::vector<std::string> readable;  // files, and folders ending in '/', that scenes may refer to
-  uint64_t memory_bytes = 0;          // limit if the request has no value of its own
-  unsigned threads = 0;               // number if the request has no value of its own
+  uint64_t memory_bytes = 0;          // memory limit if the request has none
+  unsigned threads = 0;               // number of threads if the request has none
   ClusterOptions cluster;             // as in ServerConfig
 };
 void write_task(FileSystem& files, const std::string& path, const JobTask& task);
