@@ -66,7 +66,8 @@ std::unique_ptr<voxdag_reader::File> FileTileSource::read_header(const std::stri
   try {
     return open_global_bytes(path, bytes_);
   } catch (const Error&) {
-    expect_readable();  // throws if pages were unreadable: then the error is not in the format
+    // If pages were unreadable, reports that instead of an error in the format.
+    expect_readable();
     throw;
   }
 }
@@ -76,7 +77,7 @@ const std::string& FileTileSource::manifest(const CancelToken& cancel) const {
   const std::lock_guard lock(manifest_mutex_);
   if (has_manifest_) return manifest_;
   const auto known = manifests_ ? manifests_->find(digest_) : std::nullopt;
-  // Verifies the root.
+  // Verifies the checksum of the root's bytes before the manifest is computed from them.
   if (!known && !dag_.empty()) blocks_.expect_intact(dag_.level(0).words.data(), 8);
   manifest_ = known ? *known : describe(*file_, dag_, digest_, cancel);
   expect_readable();

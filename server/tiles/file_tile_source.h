@@ -1,4 +1,4 @@
-// A finished DAG for viewers: its open file. Thread-safe.
+// The open file of a finished DAG, as a source of tiles for viewers. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -33,14 +33,14 @@ class FileTileSource : public TileSource {
   // Returns a digest of the file's contents and of the version of the tile format.
   const std::string& digest() const override { return digest_; }
   // The first call computes the cameras, which may take a second, or longer if the file is not in
-  // memory. Concurrent calls wait for it. If the first call is canceled, the next call starts
-  // again.
+  // memory. Concurrent calls wait for the first call. If that call is canceled, the next call
+  // starts the computation again.
   const std::string& manifest(const CancelToken& cancel) const override;
   void expect_readable() const override;
   // True if expect_readable() throws. The file must then be opened again before it can be used.
   bool is_broken() const { return mapping_.is_damaged(); }
-  // True if the file's contents were changed. False for a removed file, because its contents remain
-  // until it is closed.
+  // True if the path now leads to a different file or to changed contents. False for a removed
+  // file, because its contents remain until this object closes it.
   bool was_overwritten() const override;
   bool is_first_damage() const override { return !has_damage_.exchange(true); }
 

@@ -7,7 +7,7 @@ namespace {
 
 using ManifestJson = nlohmann::ordered_json;
 
-// Aspect ratio of the named views' pictures.
+// Aspect ratio of the picture for which the camera of a named view is chosen.
 constexpr double kAspect = 16.0 / 9;
 
 ManifestJson point(const query::Vec& voxels, const query::DagView& dag, const GridPlace& place) {

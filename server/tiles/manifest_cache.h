@@ -1,5 +1,5 @@
-// The most recent manifests, by digest. Finding the cameras takes longer than reopening a file.
-// Thread-safe.
+// Caches the most recently used manifests by digest. It outlives the open files, because computing
+// the cameras of a manifest takes longer than reopening a file. Thread-safe.
 #pragma once
 
 #include <list>
@@ -32,7 +32,7 @@ class ManifestCache {
 
  private:
   const size_t max_;
-  std::mutex mutex_;                                        // guards the next member
+  std::mutex mutex_;                                        // guards entries_
   std::list<std::pair<std::string, std::string>> entries_;  // most recently used first
 };
 

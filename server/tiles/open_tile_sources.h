@@ -1,8 +1,7 @@
-// Caches the files that viewers requested last, open and checked, so that a request need not open
-// them again. A file that was removed or replaced is closed when it is requested next, by close(),
-// or by close_stale(), which must be called periodically. A file with an unreadable part is opened
-// again.
-// Manifests remain in the cache longer than files. Thread-safe.
+// Keeps the files that viewers requested last open, so that a request need not open and check them
+// again. A file that was removed or replaced is closed by the next request for it, by close(), or
+// by close_stale(), which must be called periodically. A file with an unreadable part is opened
+// again. Manifests remain in memory longer than files remain open. Thread-safe.
 #pragma once
 
 #include <list>
@@ -19,8 +18,8 @@ class OpenTileSources {
  public:
   OpenTileSources(FileSystem& files, size_t max_open) : files_(files), max_open_(max_open) {}
 
-  // Throws Error{kNotFound}, or the errors of FileTileSource. A request that still uses a file
-  // after it was closed here can finish.
+  // Returns the file, opening it if necessary. Throws Error{kNotFound}, or the errors of
+  // FileTileSource. A request that uses a file while close() closes it can finish.
   std::shared_ptr<const FileTileSource> open(const std::string& path);
   void close(const std::string& path);
   // Closes files that were removed or replaced, or were not requested for `max_idle_s`.
@@ -43,7 +42,7 @@ class OpenTileSources {
 
   FileSystem& files_;
   const size_t max_open_;
-  mutable std::mutex mutex_;  // guards the next member
+  mutable std::mutex mutex_;  // guards entries_
   Entries entries_;           // most recently used first
   const std::shared_ptr<ManifestCache> manifests_ = std::make_shared<ManifestCache>(kMaxManifests);
 };

@@ -24,8 +24,8 @@ class ArtifactRows {
 
   const ArtifactRef& ref() const { return ref_; }
 
-  // Returns the occupied cells of the cube, with a quarter of its edge as cell size. Throws
-  // Error{kCorrupt}.
+  // Returns the occupied cells of the cube as a brick. A cell has a quarter of the cube's edge.
+  // Throws Error{kCorrupt}.
   uint64_t coarse_brick(const Cube& cube) {
     const auto roots = reader_.roots();
     const auto root = std::find_if(roots.begin(), roots.end(),
@@ -102,8 +102,8 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, dou
     cubes.insert(*known);
     return true;
   });
-  // Unreadable artifacts are retried in every call. The list begins where the last call stopped, so
-  // that the other artifacts are also reached.
+  // Unreadable artifacts are retried in every call and may use up its time. So the list begins
+  // where the last call stopped, and later calls reach the remaining artifacts.
   std::rotate(leaves.begin(),
               std::find_if(leaves.begin(), leaves.end(),
                            [&](const StoredSubvolume& leaf) { return leaf.id >= next_; }),

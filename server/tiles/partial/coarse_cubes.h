@@ -1,6 +1,6 @@
 // A coarse view of an unfinished build: each built subvolume with its occupied cells, which have a
-// quarter of the subvolume's edge. The view is read from the work folder. It can be updated at any
-// time, even while another process builds there. Not thread-safe.
+// quarter of the subvolume's edge. The view is read from the work folder, even while another
+// process builds in that folder. Not thread-safe.
 #pragma once
 
 #include <cmath>
@@ -24,14 +24,14 @@ struct CoarseCube {
 
 class CoarseCubes {
  public:
-  // Reads the work folder again, and its new artifacts. Leaves out an unreadable artifact, because
-  // the merge may have freed its bytes. Reads at least one artifact; after `max_read_s` it leaves
-  // the remaining artifacts to the next calls. Throws Error{kNotFound} if the folder has no job
-  // store, and the errors of JobStore.
+  // Reads the job store again, and the artifacts of subvolumes built since the last call. Leaves
+  // out an unreadable artifact, because the merge may have freed its bytes. Reads at least one
+  // artifact; after `max_read_s` seconds it leaves the remaining artifacts to the next calls.
+  // Throws Error{kNotFound} if the folder has no job store, and the errors of JobStore.
   void refresh(FileSystem& files, const std::string& work_folder, double max_read_s = HUGE_VAL);
 
   uint64_t total() const { return total_; }
-  // Number of built subvolumes, including empty and omitted ones.
+  // Number of built subvolumes, including empty subvolumes and those whose artifacts were left out.
   uint64_t built() const { return built_; }
   // Returns the known subvolumes that have voxels.
   const std::map<SubvolumeId, CoarseCube>& cubes() const { return cubes_; }

@@ -49,14 +49,14 @@ class PartialDag {
   const uint32_t brick_level_;
   std::vector<std::vector<uint32_t>> levels_;
   std::vector<std::map<std::vector<uint32_t>, uint64_t>> known_;  // offsets of nodes, by level
-  // Offsets of the nodes of coarse bricks and of solid cells, by level. They make one search per
-  // brick and per cell sufficient.
+  // Offsets of the nodes of coarse bricks and of solid cells, by level. With them, add() does not
+  // make the nodes below a known brick or solid cell again.
   std::vector<std::map<uint64_t, uint64_t>> coarse_;
   std::vector<std::optional<uint64_t>> solid_;
   uint64_t word_count_ = 0;
 };
 
-// An immutable copy of the DAG, for any thread.
+// An immutable copy of a PartialDag, which several threads may read.
 class PartialDagCopy {
  public:
   explicit PartialDagCopy(const PartialDag& dag, uint32_t grid_levels);

@@ -62,7 +62,8 @@ nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, ui
     const GridPlace place{plan.at("origin"), plan.at("edge")};
     nlohmann::ordered_json frame = {{"origin", place.origin}, {"edge", place.edge}};
     PartialDag nodes(levels);
-    // A DAG that was built by one call has only one node on the root's level.
+    // After one call of add(), the root is the only node of its level. So its offset is 0, which
+    // the view of the copy expects.
     if (nodes.add(planned_parts(plan, resolution))) {
       const PartialDagCopy planned(nodes, levels);
       const CancelToken never;

@@ -16,8 +16,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kReadIntervalS = 1;
-constexpr double kMaxCpuShare = 0.05;  // of one core
-constexpr double kMaxReadingS = 0.5;   // wall time of one reading
+constexpr double kMaxCpuShare = 0.05;  // maximum share of one core for reading
+constexpr double kMaxReadingS = 0.5;   // maximum wall time of one reading
 constexpr size_t kDagDigits = 32;
 
 class PartialTileSource : public TileSource {

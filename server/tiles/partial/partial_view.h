@@ -71,7 +71,7 @@ class GrowingDag {
   std::unique_ptr<Nodes> nodes_;
 };
 
-// The answers to requests. Thread-safe; it holds its lock only briefly.
+// The current answers to requests. Thread-safe. Its lock is never held while the folder is read.
 class PublishedAnswers {
  public:
   std::shared_ptr<const std::string> json() const;
@@ -97,7 +97,7 @@ class PartialView {
       : files_(files), job_(job), nodes_(job, max_words) {}
 
   const std::string& job() const { return job_; }
-  // Both functions behave as documented at PartialViews.
+  // json() and tiles() behave as documented in PartialViews.
   std::shared_ptr<const std::string> json(const JobFolder& folder, uint64_t resolution);
   std::shared_ptr<const TileSource> tiles(const JobFolder& folder, uint64_t resolution);
   std::shared_ptr<const TileSource> known(const std::string& digest) const {

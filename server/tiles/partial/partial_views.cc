@@ -10,7 +10,7 @@
 namespace voxdag::server {
 namespace {
 
-// Viewers of a job send requests more often than this.
+// Viewers of a job send requests more often than every kMinIdleS seconds.
 constexpr int kMinIdleS = 10;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The views of the unfinished jobs that were requested most recently. Thread-safe.
+// The views of the unfinished jobs that viewers requested most recently. Thread-safe.
 #pragma once
 
 #include <list>
@@ -20,7 +20,7 @@ class PartialViews {
   // are not planned yet or the folder is removed during the call, RequestError{kBusy} if all
   // remembered jobs were requested in the last seconds, and the errors of CoarseCubes::refresh().
   std::string json(const std::string& job, const JobFolder& folder, uint64_t resolution);
-  // Returns them as the tiles of a DAG of the job's grid.
+  // Returns the built subvolumes as the tiles of a DAG of the job's grid. Throws like json().
   std::shared_ptr<const TileSource> tiles(const std::string& job, const JobFolder& folder,
                                           uint64_t resolution);
   // Returns the previous result of tiles() if it is remembered and has this digest; else null. Does
@@ -46,7 +46,7 @@ class PartialViews {
   FileSystem& files_;
   const size_t max_jobs_;
   const uint64_t max_words_;
-  std::mutex mutex_;          // guards the next member
+  std::mutex mutex_;          // guards entries_
   std::list<Entry> entries_;  // most recently used first
 };
 
