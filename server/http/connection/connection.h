@@ -2,13 +2,15 @@
 // calls may block. Used by one thread.
 //
 // Phases:
-//   - waiting: idle_timeout_s for the next request
-//   - header: header_timeout_s for the complete header
-//   - exchange: the body and the answer, each at min_bytes_per_s and never more than grace_s behind
+//   - waiting: the next request must begin within idle_timeout_s
+//   - header: the header must be complete within header_timeout_s
+//   - exchange: the client sends the body and receives the answer at min_bytes_per_s or faster; it
+//   may
+//     be up to grace_s behind this rate
 //
-// Only time in which the connection waits for its client counts. If a client exceeds its time, the
-// connection enters an error state, in which reads fail. A connection that waits for its client is
-// recorded as waiting in the table, which may close it in favor of a new connection.
+// Only the time in which the connection waits for its client counts. If a client exceeds its time,
+// the connection enters an error state, in which reads fail. A connection that waits for its client
+// is recorded as waiting in the table, which may close it in favor of a new connection.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // The open connections, within their limits. If the table is full, a new connection replaces the
-// one that has waited longest for its client. So clients that send little or nothing cannot keep
-// others out. Thread-safe.
+// connection that has waited longest for its client. So clients that send little or nothing cannot
+// keep other clients out. Thread-safe.
 #pragma once
 
 #include <condition_variable>
@@ -19,8 +19,8 @@ class ConnectionTable {
   struct Entry {
     int socket;
     std::string client;
-    bool waiting;           // for the client
-    bool between_requests;  // waits for a request, or for the rest of a request's header
+    bool waiting;           // the connection waits for its client
+    bool between_requests;  // the head of the next request is incomplete
     double waiting_since_s;
     bool evicted;
   };
@@ -41,7 +41,7 @@ class ConnectionTable {
   void remove(Place place);
 
   size_t size() const;
-  // Closes the connections that wait for a request.
+  // Closes the connections that wait for a request or for the end of its header.
   void close_waiting();
   // Closes all connections and aborts answers in progress.
   void close_all();

@@ -92,8 +92,8 @@ void Listener::accept_all(const std::function<void(int, const std::string&)>& on
     auto* generic = reinterpret_cast<sockaddr*>(&address);
     const int client = accept4(socket_, generic, &size, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (client < 0) {
-      // There are no free file descriptors, or there is no memory. The client waits in the backlog
-      // until the service has them again.
+      // File descriptors or memory are used up. The client waits in the backlog until they are free
+      // again.
       if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM)
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
       continue;

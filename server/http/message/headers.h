@@ -18,7 +18,8 @@ std::string header_value(const HeaderMap& headers, std::string_view name);
 // Returns `text` without leading and trailing spaces and tabs.
 std::string_view trimmed(std::string_view text);
 bool equal_ignoring_case(std::string_view a, std::string_view b);
-// True if the value of If-None-Match contains this entity tag. The comparison is weak.
+// True if `list`, the value of If-None-Match, contains the entity tag `tag` or is "*". The
+// comparison is weak: it ignores the prefix W/.
 bool has_tag(std::string_view list, std::string_view tag);
 
 }  // namespace voxdag::server

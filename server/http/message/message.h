@@ -58,7 +58,8 @@ struct Response {
   std::shared_ptr<ReadableFile> file;
   std::vector<FilePiece> pieces;  // parts of `file` to send
   EventSource next_event;
-  // A permit of a ConcurrencyLimiter, released when the answer is sent.
+  // A permit of a ConcurrencyLimiter; null if none is needed. It is released when the answer is
+  // sent.
   std::shared_ptr<void> permit;
 };
 

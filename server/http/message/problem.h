@@ -1,4 +1,4 @@
-// The answer to a failed request: problem+json (RFC 9457). Handlers throw it.
+// The answer to a failed request: problem+json (RFC 9457). Handlers throw it as an exception.
 //
 // `detail` is shown to clients, so it never contains paths of the server or texts of libraries.
 #pragma once
