@@ -29,7 +29,7 @@ ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
   if (config.http.limits.max_connections > sockets) {
     log("connections are limited to " + std::to_string(sockets) + ", not " +
         std::to_string(config.http.limits.max_connections) +
-        ", because the process may have few open files (ulimit -n, LimitNOFILE)");
+        ", because they may use half of the open files of this process (ulimit -n, LimitNOFILE)");
     config.http.limits.max_connections = sockets;
   }
   return config;
@@ -51,7 +51,8 @@ void remove_plans(FileSystem& files, const ServerConfig& config) {
       remove_tree(files, folder + "/" + entry.name);
 }
 
-// Returns a target for the log, without bytes that control a terminal.
+// Returns the path of a request for the log. Percent-encodes all bytes except visible ASCII
+// characters, so that a path cannot contain control codes of a terminal.
 std::string shown(const std::string& path) {
   std::string text;
   for (const char c : path.substr(0, kMaxLoggedChars)) {
@@ -105,7 +106,8 @@ std::string Service::url() const {
 }
 
 void Service::run() {
-  // Stops builds while requests in progress finish.
+  // This thread stops the builds as soon as the service stops, while http_.run() still waits for
+  // requests in progress.
   std::thread cleaner([this] {
     clean_up_periodically();
     dispatcher_.stop();

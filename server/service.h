@@ -17,13 +17,13 @@ namespace voxdag::server {
 
 class Service {
  public:
-  // Checks the configuration, locks the data folder, opens the stores, resumes the jobs of the
-  // previous service, and listens. `log` receives failures, and also each change with the name of
-  // its author. Throws Error.
+  // Checks the configuration, locks the data folder, opens the databases, resumes the jobs of the
+  // previous service, and listens. `log` receives failures, and a line for every request that is
+  // not GET or HEAD, with the name of the caller's token. Throws Error.
   Service(ServerConfig config, FileSystem& files, Log log);
 
   int port() const { return http_.port(); }
-  // "http://127.0.0.1:8080"
+  // Returns the base URL, such as "http://127.0.0.1:8080".
   std::string url() const;
   // Serves until stop(). Then stops builds at a checkpoint, finishes requests in progress, and
   // returns.
@@ -35,7 +35,7 @@ class Service {
   // Runs until the service stops.
   void clean_up_periodically();
   Response answer(Request& request);
-  // Counts every request. Logs requests for changes.
+  // Counts the request. Logs it unless its method is GET or HEAD.
   void record(const Request& request, int status, double start_s);
 
   const ServerConfig config_;

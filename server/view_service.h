@@ -19,7 +19,7 @@ class ViewService {
   // Opens the file and listens; port 0 means any free port. `log` receives failures. Throws Error.
   ViewService(const std::string& path, int port, FileSystem& files, Log log);
 
-  // "http://127.0.0.1:40123/"
+  // Returns the URL of the page, such as "http://127.0.0.1:40123/".
   std::string url() const;
   // Serves until stop().
   void run();

@@ -5,9 +5,9 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kMaxStepS = 3600;
-constexpr double kMaxPauseS = kSecondsPerDay;  // maximum time between two runs of the service
-constexpr double kUncertainS = kSecondsPerDay;
+constexpr double kMaxStepS = 3600;  // by which the clock may be ahead of the elapsed time
+constexpr double kMaxPauseS = kSecondsPerDay;   // maximum time between two runs of the service
+constexpr double kUncertainS = kSecondsPerDay;  // time after a jump in which nothing is deleted
 
 }  // namespace
 

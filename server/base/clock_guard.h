@@ -13,13 +13,15 @@ class ClockGuard {
   // `last_seen_s`: Unix time at which the previous service is known to have run; 0 if unknown.
   explicit ClockGuard(double last_seen_s) : last_clock_s_(last_seen_s) {}
 
-  // True if the clock jumped since the last call. Call it at least once per hour, with the times of
-  // unix_seconds() and wall_seconds().
+  // True if the clock advanced over an hour more than the time since the last call, or, in the
+  // first call, over a day since `last_seen_s`. Call it at least once per hour. `clock_s`:
+  // unix_seconds(); `now_s`: wall_seconds().
   bool has_jumped(double clock_s, double now_s);
   // True if the clock jumped within the last day.
   bool is_uncertain(double now_s) const { return now_s < uncertain_until_s_; }
   // Returns the Unix time before which data is older than `days`; 0 while the clock is uncertain.
-  // Logs the begin of this state, with `what` in the log line. Call it instead of has_jumped().
+  // Calls has_jumped(). If the clock becomes uncertain, logs that; `what` names the data in the log
+  // line.
   double oldest_s(double days, const char* what, const Log& log);
 
  private:

@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-// Returns a text that replaces the message of an Error in answers to clients.
+// Returns the text that answers to clients contain instead of the message of an Error.
 const char* public_text(ErrorCode code) {
   static constexpr std::pair<ErrorCode, const char*> kTexts[] = {
       {ErrorCode::kInvalidInput, "the request is invalid"},

@@ -42,8 +42,9 @@ class RequestError : public std::exception {
   std::string message_;
 };
 
-// The part of an exception that clients see. A RequestError keeps its message, an Error its code.
-// The code of anything else is "internal".
+// The part of an exception that clients see. A RequestError keeps its code and message. An Error
+// keeps its code and gets a fixed text. std::bad_alloc is shown as the error "out_of_memory", and
+// any other exception as "internal".
 struct PublicError {
   std::string code;
   std::string text;

@@ -17,8 +17,8 @@ class Steps {
  public:
   Steps(Log log, StepHook hook) : log_(std::move(log)), hook_(std::move(hook)) {}
 
-  // Runs `step`. `name` describes it in log lines. Returns false if the step threw. If the same
-  // failure repeats, it is logged once per minute.
+  // Runs `step`. `name` completes the log line "failed to NAME: REASON". Returns false if the step
+  // threw. If the same failure repeats, it is logged at most once per minute.
   bool run(const std::string& name, const std::function<void()>& step) noexcept;
 
  private:
@@ -26,7 +26,7 @@ class Steps {
 
   const Log log_;
   const StepHook hook_;
-  std::mutex mutex_;  // guards the next member
+  std::mutex mutex_;  // guards the members below
   std::string last_line_;
   double last_s_ = 0;
 };

@@ -17,12 +17,12 @@ struct JobLimits {
   uint64_t memory_bytes = 0;  // for all running jobs together; 0: half of the machine's memory
   unsigned threads = 0;       // default number per job; 0: all cores
   uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // no job starts if less space is free
-  int nice = 5;                                      // of the building processes
+  int nice = 5;                                      // nice value of the jobs' processes
   unsigned max_attempts = 5;
   double backoff_s = 15;  // pause before the second attempt; doubles with each further attempt
   double max_backoff_s = 900;
   double stop_timeout_s = 8;    // time for a build to stop at a checkpoint before it is killed
-  uint64_t max_queued = 20000;  // unfinished jobs
+  uint64_t max_queued = 20000;  // maximum number of unfinished jobs
   double plan_timeout_s = 120;  // per dry run
   unsigned max_concurrent_plans = 1;
 };
@@ -30,8 +30,10 @@ struct JobLimits {
 struct TransferLimits {
   uint64_t max_scene_bytes = uint64_t{64} << 30;
   uint64_t max_body_bytes = 64 << 10;  // JSON bodies
-  size_t max_concurrent = 64;          // limit for uploads, and separately for downloads
-  size_t max_per_client = 16;          // limit per client, in the same way
+  // Maximum numbers of concurrent transfers, in total and per client. The same limit applies
+  // separately to uploads, to downloads, and to requests for tiles.
+  size_t max_concurrent = 64;
+  size_t max_per_client = 16;
   size_t max_event_streams = 256;
   size_t max_event_streams_per_client = 64;
   // Rate limit per address. A burst may have twice this number of requests. The loopback is exempt.
@@ -39,9 +41,9 @@ struct TransferLimits {
 };
 
 struct Retention {
-  double finished_days = 30;  // retention of ended jobs and their files
-  uint64_t finished_jobs = 10000;
-  double upload_days = 2;  // retention of unfinished uploads
+  double finished_days = 30;       // retention of ended jobs and their files
+  uint64_t finished_jobs = 10000;  // maximum number of ended jobs that are kept per token
+  double upload_days = 2;          // retention of unfinished uploads
 };
 
 struct ServerConfig {
@@ -54,7 +56,7 @@ struct ServerConfig {
   // was installed under the same name since.
   std::string program = "/proc/self/exe";
   JobLimits jobs;
-  // The cluster that builds subvolumes. Without an engine, this machine builds them.
+  // The cluster that builds the subvolumes of jobs. If its engine is kNone, jobs use this machine.
   ClusterOptions cluster;
   TransferLimits transfers;
   Retention retention;

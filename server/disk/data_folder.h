@@ -1,5 +1,6 @@
-// Files of the data folder other than the stores, and their deletion. Only files marked by the
-// service are ever removed. So no file is lost if a store is lost or restored from a backup.
+// Helpers for the files in the data folder. The service removes a scene or a job only after it has
+// marked its file or folder by renaming it. A file that a database does not list is kept, so no
+// file is lost if a database is lost or restored from a backup.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,8 @@
 
 namespace voxdag::server {
 
-// Suffix of names whose deletion has begun. Scenes and jobs never have such a name.
+// Suffix of the name of a file or folder whose deletion has begun. Scenes and jobs never have a
+// name with this suffix.
 inline constexpr const char* kDeleted = ".deleted";
 
 // True if the folder exists and is not empty.

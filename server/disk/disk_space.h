@@ -1,6 +1,6 @@
-// Manages the free space on the data folder's disk. A part of it is always kept free. Uploads
-// reserve a few megabytes ahead of their writes. So two uploads never count on the same bytes, and
-// a slow upload does not exclude others. Thread-safe.
+// Manages the free space on the data folder's disk. A part of it is always kept free. An upload
+// reserves a few megabytes ahead of its writes: two uploads never use the same free bytes, and a
+// slow upload does not reserve the space of its complete scene. Thread-safe.
 //
 // A ballast file protects against other programs that fill the disk completely: without it, the
 // databases could not even record a deletion.
@@ -17,8 +17,8 @@ namespace voxdag::server {
 
 class DiskSpace {
  public:
-  // Always keeps `min_free_bytes` free, or a small reserve for the databases if that is more. Drops
-  // an existing ballast, because the databases need space to open.
+  // Always keeps `min_free_bytes` free, but at least a few megabytes for the databases. Removes an
+  // existing ballast, because the databases need space to open.
   DiskSpace(FileSystem& files, const std::string& data_folder, uint64_t min_free_bytes);
 
   uint64_t free() const { return files_.free_space(folder_); }
@@ -32,8 +32,8 @@ class DiskSpace {
     Reservation(DiskSpace& disk, uint64_t announced);
     ~Reservation();
     Reservation(const Reservation&) = delete;
-    // Call it before writing `bytes`. If the reserved space is used up, reserves more. Throws
-    // Error{kNoSpace} if the disk is full by then.
+    // Call it before writing `bytes` bytes. If the reserved space is used up, reserves more. Throws
+    // Error{kNoSpace} if the disk no longer has that space.
     void use(uint64_t bytes);
 
    private:
@@ -42,8 +42,9 @@ class DiskSpace {
     uint64_t not_reserved_;  // announced, not yet reserved
   };
 
-  // Calls `act`, which deletes or cancels something. If the disk has no space to record that, drops
-  // the ballast and calls `act` again. The failed first call may have done a part of the work.
+  // Calls `act`, which deletes or cancels a job or scene. If `act` throws Error{kNoSpace}, removes
+  // the ballast and calls `act` again. `act` must work even if its failed first call did a part of
+  // the work.
   template <class Act>
   auto with_ballast(const Act& act) {
     try {
@@ -65,9 +66,9 @@ class DiskSpace {
   FileSystem& files_;
   const std::string folder_;
   const uint64_t min_free_bytes_;
-  std::mutex mutex_;  // guards the next member
+  std::mutex mutex_;  // guards reserved_bytes_
   uint64_t reserved_bytes_ = 0;
-  std::mutex ballast_mutex_;  // guards the ballast
+  std::mutex ballast_mutex_;  // guards the ballast file
 };
 
 }  // namespace voxdag::server

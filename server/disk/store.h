@@ -1,4 +1,5 @@
-// The databases in the data folder: each records the files in some of its folders.
+// Opens the databases of the data folder. Each database lists the files in some folders of the data
+// folder: queue.db the jobs, scenes.db the scenes.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +10,8 @@
 namespace voxdag::server {
 
 struct StoreFormat {
-  const char* records;     // "a queue"
-  const char* files;       // contents of the folders: "jobs"
+  const char* records;     // name of the database for messages, such as "a queue"
+  const char* files;       // name of the listed items for messages, such as "jobs"
   int64_t application_id;  // PRAGMA application_id
   int64_t version;         // PRAGMA user_version
   const char* schema;
@@ -19,8 +20,8 @@ struct StoreFormat {
 };
 
 // Opens a database, creating or upgrading its tables. Throws Error: kInvalidInput if it is not a
-// store of this kind, or if it is new and `may_create` is false because the folders have files;
-// kUnsupportedVersion.
+// database of this kind, or if it is new and `may_create` is false (the folders already have files
+// that a lost database may have listed); kUnsupportedVersion for a different version.
 SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool may_create);
 
 }  // namespace voxdag::server

@@ -32,13 +32,13 @@ inline constexpr std::array<const char*, 7> kJobStateNames = {
 
 inline const char* state_name(JobState state) { return kJobStateNames[static_cast<size_t>(state)]; }
 std::optional<JobState> parse_state(std::string_view name);
-// True for states that change only on request of a client.
+// True for canceled, failed and succeeded. Only a retry changes such a state.
 inline bool has_ended(JobState state) { return state >= JobState::kCanceled; }
 
 struct JobError {
   std::string code;  // docs/errors.md, or "internal"
   std::string message;
-  double at_s = 0;  // Unix time, as in all times of jobs; 0: never
+  double at_s = 0;  // Unix time in seconds, like all times of a job; 0: never
   bool transient = false;
 };
 
@@ -51,7 +51,7 @@ struct Job {
   JobState state = JobState::kQueued;
   std::string request;              // JSON: scene, resolution, options
   std::vector<std::string> scenes;  // uploads that the job needs until it ends
-  std::string posted_by;
+  std::string posted_by;            // name of the token of the client that submitted the job
   int priority = 0;
   bool front = false;  // queued before others of its priority, because it was already running
   unsigned attempts = 0;
@@ -64,7 +64,7 @@ struct Job {
   Preview preview = Preview::kNone;
 };
 
-// One change of a job's state. `number` counts the events of all jobs.
+// One change of a job's state. `number` numbers the events of all jobs in their order.
 struct JobEvent {
   int64_t number = 0;
   double at_s = 0;

@@ -17,9 +17,9 @@ namespace {
 
 constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 
-// Limits for the number of consecutive interrupted runs. Above the first limit, a job no longer
-// restarts immediately; above the second limit, it fails. Because of the pauses in between, a job
-// has been interrupting the service for over an hour before it fails.
+// Limits for the number of consecutive runs that ended because the service ended. Above the first
+// limit, a job no longer restarts immediately; above the second limit, it fails. With the default
+// pauses between these runs, the interruptions must continue for over an hour before the job fails.
 constexpr unsigned kFreeInterruptions = 5;
 constexpr unsigned kMaxInterruptions = 15;
 
@@ -73,7 +73,8 @@ const StoreFormat kQueueFormat = {
     "a queue", "jobs",  0x76647376,
     3,         kSchema, "ALTER TABLE job ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0"};
 
-// A row of the table `job`. Members that are not an SQL type are stored as JSON.
+// A row of the table `job`. The columns scenes, error and warnings contain JSON, because SQL has no
+// type for them.
 struct JobRow {
   Job job;
   std::string scenes, error, warnings;
@@ -113,8 +114,8 @@ JobRow row_of(const Job& job) {
 constexpr const char* kNoRequest = R"({"scene":[],"resolution":0,"options":{}})";
 
 // Returns the job in the current row of a statement from select_rows<JobRow>(). Replaces damaged
-// members by defaults, so that the job can be listed and deleted, and the service can handle the
-// other jobs.
+// members by defaults and adds a warning to the job. So the job can still be listed and deleted,
+// and the damage does not affect other jobs.
 Job read_job(const SqlStatement& statement) {
   JobRow row = read_row<JobRow>(statement);
   Job& job = row.job;
@@ -164,8 +165,8 @@ void write_event(SqlDatabase& database, const Job& job) {
       .run();
 }
 
-// Builds the SQL condition for a list of states. Only the names of states become part of the SQL
-// text; values from callers are always bound.
+// Returns the SQL condition for a list of states. The numbers of states are the only values in the
+// SQL text; all other values are bound.
 std::string states_in(const std::vector<JobState>& states) {
   std::string list;
   for (const JobState state : states)
@@ -348,7 +349,7 @@ void JobQueue::remove(const std::string& id) {
 
 std::optional<Job> JobQueue::next(double now_s, double max_wait_s,
                                   const std::set<std::string>& except) {
-  // `except` is small: it contains at most the jobs whose processes are stopping.
+  // `except` is small: it contains only jobs that have a process or whose files are being removed.
   const auto jobs =
       query("WHERE " + states_in({JobState::kQueued}) +
                 " AND (not_before_s <= " + std::to_string(now_s) + " OR not_before_s > " +

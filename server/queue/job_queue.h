@@ -78,23 +78,24 @@ class JobQueue {
   std::optional<Job> next(double now_s, double max_wait_s, const std::set<std::string>& except);
   // Returns a job that succeeded and has no preview yet.
   std::optional<Job> next_without_preview();
-  // Call it after a crash. `running` are the jobs whose processes are known to run. All other jobs
-  // in the state running are queued again at the front, and those in the state canceling are
-  // canceled. A job with many interruptions may be their cause. So it loses its place at the front
-  // and waits `pause_s` before each further attempt (1, 2, ...); finally it fails. Returns the jobs
-  // that have ended by this call.
+  // Call it after a crash. `running` are the ids of the jobs whose processes are known to run. Of
+  // all other jobs, queues the jobs in the state running again at the front, and sets the jobs in
+  // the state canceling to canceled. A job with many interruptions may be their cause. So it is not
+  // queued at the front and waits for `pause_s(attempt)` seconds before each further attempt (1, 2,
+  // ...); finally it fails. Returns the jobs that have ended by this call.
   std::vector<Job> recover(const std::set<std::string>& running,
                            const std::function<double(unsigned attempt)>& pause_s);
-  // Returns the ended jobs that finished before `finished_before_s`, and the ended jobs that are
-  // not among the `max_count` last-finished jobs of the same poster. A poster's jobs never make
-  // other posters' jobs expire.
+  // Returns the ids of the ended jobs that finished before `finished_before_s`, and of the ended
+  // jobs that are not among the `max_count` last-finished jobs with the same Job::posted_by. So the
+  // jobs of one client never make other clients' jobs expire.
   std::vector<std::string> expired(double finished_before_s, uint64_t max_count);
 
   // Time of the last recorded change of a state; 0 for never.
   double last_event_s();
+  // Returns the job's events with numbers above `number`, oldest first.
   std::vector<JobEvent> events_after(const std::string& id, int64_t number);
-  // Returns the job with this key; nullopt if none exists. Throws RequestError{kKeyReused} if it
-  // came with another request.
+  // Returns the job that was added with this key; nullopt if none exists. Throws
+  // RequestError{kKeyReused} if the key was used with a different request.
   std::optional<Job> find_by_key(const IdempotencyKey& key);
 
   // Returns the number of changes of all jobs, including calls of announce().
@@ -103,8 +104,8 @@ class JobQueue {
   uint64_t changes() const;
   // Waits until version() differs from `seen`, or for `max_s` seconds.
   void wait_for_change(uint64_t seen, double max_s) const;
-  // Wakes the threads in wait_for_change(), as a change does. For events outside the database
-  // (progress).
+  // Wakes the threads in wait_for_change(), as a change does. Use it for events outside the
+  // database, such as progress.
   void announce();
 
  private:
@@ -112,18 +113,18 @@ class JobQueue {
   void announce_change(bool moves);
   std::vector<Job> query(const std::string& rest, const std::vector<int64_t>& numbers);
 
-  std::mutex write_mutex_;  // guards the next member
+  std::mutex write_mutex_;  // guards writer_
   SqlDatabase writer_;
   const NamedFile file_;
-  std::mutex read_mutex_;  // guards the next member
+  std::mutex read_mutex_;  // guards reader_ and find_
   SqlDatabase reader_;
   SqlStatement find_;
 
-  std::mutex places_mutex_;  // guards the next member
+  std::mutex places_mutex_;  // guards places_ and places_version_
   std::shared_ptr<const Places> places_;
-  uint64_t places_version_ = 0;
+  uint64_t places_version_ = 0;  // queue_version_ for which places_ was computed
 
-  mutable std::mutex version_mutex_;  // guards the next member
+  mutable std::mutex version_mutex_;  // guards all members below
   mutable std::condition_variable changed_;
   uint64_t version_ = 1;
   uint64_t changes_ = 1;

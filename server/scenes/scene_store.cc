@@ -15,7 +15,8 @@ namespace {
 
 constexpr size_t kMaxNameBytes = 128;
 
-// The column `total` is -1 while the size is unknown. `sha256` is "" until the upload is complete.
+// In the table `upload`, `total` is -1 while the size of the scene is unknown, and `sha256` is ""
+// until publish() is called for the complete upload.
 constexpr const char* kSceneSchema = R"sql(
 CREATE TABLE scene (
   name TEXT PRIMARY KEY, size INTEGER NOT NULL, sha256 TEXT NOT NULL, modified_s REAL NOT NULL
@@ -181,7 +182,7 @@ bool SceneStore::remove(const std::string& name) {
   const bool found = find(name).has_value();
   if (files_.exists(path(name))) {
     files_.rename(path(name), marked_path(name));
-    // An empty marked file takes the place of the scene, which frees its space.
+    // Truncates the marked file. This frees the scene's space before the database must be written.
     files_.create(marked_path(name))->close();
   }
   drop_upload(name);
@@ -269,7 +270,7 @@ void SceneStore::publish(const std::string& name, uint64_t size, const std::stri
         .run();
     transaction.commit();
   }
-  // A file marked as deleted is left over from a failed deletion. It does not belong to this scene.
+  // A file marked as deleted remains from a failed deletion of an earlier scene with this name.
   if (files_.exists(marked_path(name))) files_.remove(marked_path(name));
   move_into_place(name, size, sha256);
 }
@@ -313,8 +314,8 @@ void SceneStore::put_scene(const std::string& name, uint64_t size, const std::st
   transaction.commit();
 }
 
-// Removes an upload: first its file, so that this frees space on a full disk, then its record. If a
-// crash leaves the record without its file, the upload starts over.
+// Removes an upload: first its file, which frees space on a full disk, then its record. If a crash
+// leaves the record without its file, the upload starts over.
 void SceneStore::drop_upload(const std::string& name) {
   if (files_.exists(part_path(name))) files_.remove(part_path(name));
   std::lock_guard lock(mutex_);

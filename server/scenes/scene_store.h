@@ -1,12 +1,13 @@
-// Uploaded scenes: complete ones under files/NAME, unfinished uploads under parts/NAME, and the
-// records of both in scenes.db.
+// Uploaded scenes: complete scenes in files/NAME, unfinished uploads in parts/NAME, and a record of
+// each in scenes.db. Invariants:
 //
 //   1. A scene is complete only when all its bytes are synced and have the client's digest.
 //   2. The recorded offset of an upload counts synced bytes only: a power cut loses later bytes,
 //      and the client continues from that offset.
 //   3. Only one request writes to an upload.
-//   4. A deletion removes the marked files, not a newer upload of the same name.
-//   5. Nothing is recorded in a deleted database.
+//   4. A deletion first marks the scene's file by renaming it, then removes only the marked file.
+//      So it does not remove a newer upload of the same name.
+//   5. Nothing is recorded in a database file that was removed or replaced.
 //
 // Thread-safe. Callers check names with is_scene_name().
 #pragma once
@@ -28,7 +29,7 @@ namespace voxdag::server {
 // True for 1 to 128 of A–Z a–z 0–9 . _ -, first a letter or digit, with the file name ending of a
 // scene.
 bool is_scene_name(std::string_view name);
-// A regular expression of scene names, for the OpenAPI document.
+// Returns a regular expression that matches scene names, for the OpenAPI document.
 std::string scene_name_pattern();
 
 struct Scene {
@@ -36,8 +37,8 @@ struct Scene {
   bool complete = false;
   std::optional<uint64_t> size;  // size of the complete scene; nullopt while unknown
   uint64_t offset = 0;           // bytes received
-  std::string sha256;            // of complete scenes
-  double modified_s = 0;
+  std::string sha256;            // hex digits; "" while the scene is incomplete
+  double modified_s = 0;         // Unix time
 };
 
 struct UploadState {
@@ -57,8 +58,9 @@ class SceneStore {
   std::vector<Scene> list(const std::string& after, size_t limit);
   // Returns the state of an unfinished upload.
   std::optional<UploadState> upload(const std::string& name);
-  // Removes a scene and its upload. Removes the files first, so that it frees space on a full disk.
-  // Returns false if neither exists. Throws RequestError{kConflict} if the scene is being uploaded.
+  // Removes a scene and its unfinished upload. Removes the files first, so that it frees space on a
+  // full disk. Returns false if the name has neither a scene nor an upload. Throws
+  // RequestError{kConflict} if the scene is being uploaded.
   bool remove(const std::string& name);
   // Finishes removals that a crash or a full disk interrupted.
   void finish_removals();

@@ -56,8 +56,8 @@ SceneUpload::~SceneUpload() {
     else
       store_.drop_upload(name_);
   } catch (const std::exception&) {
-    // The bytes of this part are not recorded. The record still has an earlier offset, which is
-    // also valid.
+    // The latest bytes are not recorded. The record has an earlier offset, from which the client
+    // can also continue.
   }
 }
 

@@ -1,6 +1,6 @@
 // Writes one request's part of an upload to the store as the bytes arrive. Received bytes are
-// recorded, unless the part's digest was wrong, so that the client can continue after them. If an
-// upload received no bytes, nothing of it remains. Used by one thread.
+// recorded, unless the part's digest was wrong, so that the client can continue after them. If no
+// byte of an upload was received, its record and its file are removed. Used by one thread.
 #pragma once
 
 #include <functional>
