@@ -13,7 +13,7 @@
 //
 // Because runs are sorted, the merge can find the frames of a partition and the rows of a bucket.
 // The k-way heap merge also needs sorted runs. It merges rows that a sort cannot hold, which occur
-// with truncated hashes. The budget bounds the memory for any scene: if not all runs fit in one
+// with truncated hashes. The budget bounds the memory for any scene. If not all runs fit in one
 // pass, neighboring artifacts are first merged with each other, in one or more passes.
 // docs/architecture.md, "Why the merge is right", has the proof; merge/load/row.h defines the
 // terms.

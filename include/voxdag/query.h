@@ -96,8 +96,8 @@ class DagFile {
   uint64_t dag_nodes() const;  // nodes of the DAG, including bricks
   uint64_t file_bytes() const;
 
-  // Sets set[i] to 1 if cell points[i] in the grid of 2^grid_levels cells per edge is set; to 0 if
-  // it is not set or outside the grid. All functions below use `grid_levels` in the same way.
+  // Sets set[i] to 1 if cell points[i] is set; to 0 if it is not set or outside the grid. The grid
+  // has 2^grid_levels cells per edge. All functions below use `grid_levels` in the same way.
   void lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
               unsigned threads = 1) const;
 

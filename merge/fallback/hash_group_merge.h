@@ -1,7 +1,7 @@
 // Merges all rows with one hash if they do not fit in memory. This happens if hashes are truncated
-// to a few bits. Rows with equal hashes cannot be divided by hash, so they are merged row by row:
-// the rows of every run are rewired into a scratch file, part by part, and read back through one
-// small buffer per run.
+// to a few bits. Rows with equal hashes cannot be divided by hash, so they are merged row by row.
+// First the rows of every run are rewired, part by part, and written to a scratch file. Then they
+// are read back through one small buffer per run.
 #pragma once
 
 #include <cstdint>

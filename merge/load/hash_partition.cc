@@ -7,8 +7,8 @@ namespace voxdag {
 namespace {
 
 // Returns the number of bits b for buckets of 2^b hashes each. If the hashes are spread evenly, a
-// bucket has about `bucket_rows` rows, or more if there are many slices: the table of bucket begins
-// must not take more than about four bytes per row.
+// bucket has about `bucket_rows` rows. With many slices it has more, so that the table of bucket
+// begins takes at most about four bytes per row.
 unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_t bucket_rows,
                             size_t slices) {
   const uint64_t max_buckets = std::max<uint64_t>(
