@@ -1,6 +1,6 @@
-// The interface of a scene: it streams its triangles in world space, always in the same order and
-// for any number of threads, without having all of them in memory. open_scene() in
-// scene/formats/formats.h opens scene files; tests make their own scenes.
+// The interface of a scene. A scene streams its triangles in world space, without having all of
+// them in memory. The order of the triangles is always the same, for any number of threads.
+// open_scene() in scene/formats/formats.h opens scene files; tests make their own scenes.
 #pragma once
 
 #include <cstdint>

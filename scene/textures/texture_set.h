@@ -73,9 +73,9 @@ class TextureSet {
 uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
                        const CancelToken& cancel);
 
-// Returns the SHA-256 of each image's stored bytes, as lower-case hex digits, or a text that is no
-// such digest for an image that cannot be read to its end. Reads all images, but decodes none.
-// Throws the same errors as TextureSet::prepare().
+// Returns the SHA-256 of each image's stored bytes, as lower-case hex digits. For an image that
+// cannot be read to its end, returns a different text, which is never such a digest. Reads all
+// images, but decodes none. Throws the same errors as TextureSet::prepare().
 std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
                                        unsigned threads, const CancelToken& cancel);
 

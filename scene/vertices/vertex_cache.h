@@ -57,9 +57,9 @@ class VertexCache {
   void read(uint64_t block, std::span<double> out);
 
   PageBuffer<double> positions_;  // transformed and snapped
-  // The untransformed vertices of a source that fits in untransformed_, so that a vertex is not
-  // read again after place(). is_read_ has a flag for each block, and is empty for a source that
-  // does not fit.
+  // The untransformed vertices of the source, if all of them fit here. Then place() does not cause
+  // vertices to be read again. is_read_ has a flag for each block that was read; it is empty for a
+  // larger source.
   PageBuffer<double> untransformed_;
   std::vector<bool> is_read_;
   Transform world_;

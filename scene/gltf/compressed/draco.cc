@@ -30,9 +30,9 @@ namespace voxdag::gltf {
 namespace {
 
 // Upper bounds of Draco 1.5's allocations in bytes, derived from its code. Measured allocations are
-// about half of them. The bounds cover the tables of corners and vertices, a smaller table for each
-// attribute with its own connectivity, and for each vertex of an attribute the value (as integers
-// and final) and two map entries.
+// about half of them. The bounds cover the tables of corners and vertices, and a smaller table for
+// each attribute with its own connectivity. For each vertex of an attribute, they cover the value
+// (once as integers, once final) and two map entries.
 constexpr uint64_t kBytesPerFace = 128;
 constexpr uint64_t kBytesPerFaceOfTable = 64;
 constexpr uint64_t kMapBytesPerValue = 16;

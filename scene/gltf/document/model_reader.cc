@@ -23,9 +23,9 @@ constexpr uint64_t kBytesPerMember = 112;
 constexpr uint64_t kTextCopies = 4;
 constexpr uint64_t kTreeBytesPerValue = 128;
 
-// Returns the bytes that `value` and the values in it take in tinygltf's model: a Value for each
-// value in an extension, a Parameter for each member of a material. Adds the number of these values
-// to `values`.
+// Returns the bytes that `value` and the values in it take in tinygltf's model. The model has a
+// Value for each value in an extension, and a Parameter for each member of a material. Adds the
+// number of these values to `values`.
 uint64_t model_bytes(const Json& value, bool is_in_extensions, uint64_t& values) {
   ++values;
   uint64_t bytes = is_in_extensions ? 3 * sizeof(tinygltf::Value) : 3 * sizeof(double);

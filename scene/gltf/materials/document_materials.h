@@ -13,9 +13,9 @@
 namespace voxdag::gltf {
 
 struct DocumentMaterials {
-  // In this order: the file's materials; one material for primitives without material, if there are
-  // any; copies of the file's materials without image, for primitives without texture coordinates.
-  // `image` is an index into `images`.
+  // First the file's materials, in the file's order. Then, in the order of their first use, one
+  // white material for primitives without material, and copies of the file's materials without
+  // image, for primitives without texture coordinates. Material::image is an index into `images`.
   std::vector<Material> materials;
   std::vector<TextureTransform> transforms;  // transform of each material's texture coordinates
   std::vector<int> images;                   // indices of used images in the model
