@@ -30,8 +30,8 @@ inline bool is_merge_job(const BuildSpec& spec) {
 // Builds subvolumes in tasks of a cluster.
 class ClusterBuilder : public SubvolumeBuilder {
  public:
-  // Submits all batches that Slurm accepts now, and a merge job that starts when their tasks have
-  // ended. Returns the merge job's id. The merge job resubmits failed batches.
+  // Submits all batches that Slurm accepts now, and a merge job that starts when the tasks of these
+  // batches have ended. Returns the merge job's id. The merge job resubmits failed batches.
   virtual std::string submit_merge_job() = 0;
 };
 // `job` must outlive the result.
@@ -40,11 +40,11 @@ std::unique_ptr<ClusterBuilder> make_cluster_builder(BuildJob& job);
 // A cluster build whose merge is also a job of the cluster (`--cluster-merge`). The submitting
 // process submits the tasks and a merge job that depends on them, and unlocks the work folder. Then
 // it follows the merge job. The merge job runs the same voxdag command: it resumes the work folder
-// as any later run does, resubmits failed batches, waits for their tasks and merges. The following
-// process may be stopped and started again with the same command. That command also submits the
-// merge job again if Slurm has lost it. A process finds a running merge job by the job's name,
-// which contains the id of the build in cluster.json. It finds an ended merge job by the report
-// next to the output, which contains the job's request().
+// as any later run does, resubmits failed batches, waits for their tasks and merges. The process
+// that follows the merge job may be stopped, and the same command starts it again. This command
+// also submits the merge job again if Slurm has lost the job. A process finds a running merge job
+// by the job's name, which contains the id of the build in cluster.json. It finds an ended merge
+// job by the report next to the output, which contains the job's request().
 class MergeJob {
  public:
   virtual ~MergeJob() = default;

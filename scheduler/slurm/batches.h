@@ -1,4 +1,4 @@
-// Cuts subvolumes into batches. Pure functions.
+// Cuts subvolumes into batches, the inputs of cluster tasks. Pure functions.
 #pragma once
 
 #include <cstddef>

@@ -23,7 +23,7 @@ void RecordCollector::collect() {
     if (entry.kind == ClusterFolder::Kind::kRecord) read_record(entry);
     if (entry.kind == ClusterFolder::Kind::kFailure) read_failure(entry);
   }
-  // Removes the folders that killed attempts of built batches left behind.
+  // Removes the folders that killed attempts left behind, if their batches are no longer open.
   for (const ClusterFolder::Entry& entry : entries)
     if (entry.kind == ClusterFolder::Kind::kAttempt && !batches_.find(entry.batch))
       remove_attempt(entry);

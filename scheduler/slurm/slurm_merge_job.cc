@@ -207,8 +207,8 @@ void SlurmMergeJob::cancel_held(const SlurmJob& job) {
                            " tasks, such as " + given_up[0] + ": canceled");
 }
 
-// Reports once that the job is running, and once for each reason why it waits that needs a person
-// to act.
+// Reports once that the job is running. If the job waits for a reason that needs a person to act,
+// reports each such reason once.
 void SlurmMergeJob::report_state(const SlurmJob& job) {
   if (job.state == "PENDING" && !waits_for_its_turn(job.reason) &&
       warned_reasons_.insert(job.reason).second)

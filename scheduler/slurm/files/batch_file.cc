@@ -133,7 +133,8 @@ BatchFile::BatchFile(FileSystem& files, const std::string& path) : file_(files.o
     return Error(ErrorCode::kCorrupt, path + ": " + what + ": expected the batch of a build");
   };
   Prologue prologue{};
-  if (file_->size() < sizeof prologue) throw damaged("it is too short");
+  if (file_->size() < sizeof prologue)
+    throw damaged("it has " + std::to_string(file_->size()) + " bytes");
   file_->read_at(0, std::as_writable_bytes(std::span(&prologue, 1)));
   if (std::string_view(prologue.magic, sizeof prologue.magic) != kBatchMagic)
     throw Error(ErrorCode::kUnsupportedVersion,

@@ -47,7 +47,8 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
     if (!record.subvolumes[i].summary.empty()) to_find.insert(subvolumes[i].cube);
   if (to_find.empty()) return record;
   if (record.artifact.segment != ClusterFolder::segment_of(record.batch))
-    refuse_record("it names the segment of another batch");
+    refuse_record("it names segment " + std::to_string(record.artifact.segment) + ": expected " +
+                  std::to_string(ClusterFolder::segment_of(record.batch)));
   const std::shared_ptr<ReadableFile> segment =
       files.open_read(segment_of_record(files, folder, record));
   if (segment->size() < record.segment_bytes)
