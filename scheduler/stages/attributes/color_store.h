@@ -1,9 +1,9 @@
-// The durable artifacts of the color stage: the colors of cubes in one file of the work folder,
-// each under a digest of all its inputs. A large cube is stored in parts. docs/format.md, "Stored
-// colors", documents the byte layout. No row of the job store refers to the file. An artifact is
-// valid if all its parts are complete and have the requested key. Incomplete and damaged artifacts
-// are baked again. A background thread syncs the file regularly, which limits the loss after a
-// power cut.
+// The durable artifacts of the color stage, in one file of the work folder. An artifact has one
+// attribute's values in one cube of the color grid. Its key is a digest of all its inputs
+// (color_keys.h). A large artifact is stored in parts. docs/format.md, "Stored colors", documents
+// the byte layout. No row of the job store refers to the file. An artifact is valid if all its
+// parts are complete and have the requested key. Incomplete and damaged artifacts are baked again.
+// A background thread syncs the file regularly, which limits the loss after a power cut.
 //
 // All functions except keep_only() may be called by several threads.
 #pragma once

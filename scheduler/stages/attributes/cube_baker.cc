@@ -13,8 +13,8 @@
 namespace voxdag {
 namespace {
 
-// Memory of a surface: the surface, a copy for its region, and its number and touched children in
-// the lists of up to 14 nested cubes.
+// Memory of a surface: the surface, a copy for its region, and its index and its touched children
+// in the lists of up to 14 nested cubes.
 constexpr uint64_t kSurfaceBytes =
     2 * sizeof(FixedSurface) + 14 * (sizeof(uint32_t) + sizeof(uint8_t));
 // Bytes of records that are collected for a child cube before they go to the store.

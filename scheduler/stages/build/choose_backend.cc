@@ -70,7 +70,8 @@ BackendChoice choose_backend(const RunOptions& options, Progress& progress) {
   if (options.backend == BackendName::kParallelHost)
     return {"parallel-host", [method] { return make_parallel_host_backend(method); }};
   if (options.backend == BackendName::kCuda) return gpu_choice(cuda_gpus(method));
-  // If a method is given, `auto` means the CPU backend, because the method is one of its methods.
+  // If a method is given, `auto` means the CPU backend, because check_backend() accepts only the
+  // CPU's methods with `auto`.
   if (options.backend == BackendName::kCpu || options.method != MethodName::kDefault)
     return cpu_choice();
   return choose_automatically(cuda_gpus(method), options.memory_bytes, progress);

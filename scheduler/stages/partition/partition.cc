@@ -112,7 +112,8 @@ const CubeBin& nearest(const BinsByCube& bins, const Cube& wanted) {
     if (found != bins.end()) return found->second;
     if (cube.level == 0)
       throw DamagedTriangles("the stored triangles have no bin for a cube of level " +
-                             std::to_string(wanted.level));
+                             std::to_string(wanted.level) +
+                             ": expected the cube's bin or the bin of a cube around it");
   }
 }
 

@@ -10,8 +10,8 @@
 namespace voxdag {
 namespace {
 
-// CPU time per expected brick: measured from 3 ns (the scene repeats itself) to 150 ns (no
-// repetition).
+// CPU time per expected brick. Measured times range from 3 ns (the scene repeats itself) to 150 ns
+// (no repetition).
 constexpr double kSecondsPerBrick = 30e-9;
 constexpr double kTaskSeconds = 120;  // wanted CPU time per task
 constexpr uint64_t kMaxDefaultTasks = 1000;

@@ -13,8 +13,9 @@ namespace {
 // resolution of 4096: 4 bits for the cell, a third of that for the coarser levels, and prefixes
 // (core/color/blocks/region.h). Does not include the padding of regions with few cells.
 constexpr double kColorBytesPerCell = 0.69;
-// Values of other attributes are not compressed. Per cell of the finest level, the file has this
-// number of values, because the coarser levels add about a third, and these bytes of prefixes.
+// Values of other attributes are not compressed. For each cell of the finest level, the file has
+// kCellsOfAllLevels values of an attribute, because the coarser levels add about a third, and
+// kPrefixBytesPerCell bytes of prefixes.
 constexpr double kCellsOfAllLevels = 1.36;
 constexpr double kPrefixBytesPerCell = 0.03;
 constexpr EstimateRange kFileSpread = {0.95, 1, 1.25};

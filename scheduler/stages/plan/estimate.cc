@@ -31,7 +31,8 @@ constexpr double kBytesGrowthPerDoubling = 1.04;
 // of an artifact per node.
 constexpr double kArtifactNodesPerUnique = 1.5;
 constexpr double kArtifactBytesPerNode = 16;
-// More bytes than an uncompressed node takes, in an artifact or in the global file.
+// Upper bound of the bytes of a node, in an artifact or in the global file. An uncompressed node
+// takes fewer.
 constexpr double kMaxDiskBytesPerNode = 40;
 // CPU time per DAG node of a build, relative to its pilot. Measured on real scenes.
 constexpr double kBuildOverPilotTime = 1.5;
@@ -165,9 +166,9 @@ void add_colors(const ColorEstimate& colors, Estimate& estimate) {
 // actual size.
 double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
                       BuildScene& source, const StageContext& context) {
-  // If a triangle touches A + E + 1 cubes (from its area and extents, see expected_work()), it
-  // touches about A/4 + E/2 + 1 cubes of twice the edge. So over all levels it touches at most
-  // twice its bricks, plus one cube per level.
+  // If a triangle touches A + E + 1 cubes (A is computed from its area and E from its extents, see
+  // expected_work()), it touches about A/4 + E/2 + 1 cubes of twice the edge. So over all levels it
+  // touches at most twice its bricks, plus one cube per level.
   double bricks = 0;
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.state.counts.triangles);

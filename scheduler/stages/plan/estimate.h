@@ -1,5 +1,5 @@
-// Estimates the resources of a build: pilot builds of the same scene at coarser resolutions,
-// extrapolated to the requested one.
+// Estimates the resources of a build. Builds the scene at two coarser resolutions (the pilots) and
+// extrapolates their results to the requested resolution.
 //
 // The numbers of voxels and octree nodes grow with the resolution R as a R^2 + b R: a R^2 for the
 // area of surfaces, b R for the length of their borders. Two pilots give a and b. The number of DAG
