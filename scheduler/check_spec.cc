@@ -50,7 +50,7 @@ void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::strin
   own.insert(own.end(), outputs.begin(), outputs.end());
   refuse_inputs(files, own, spec.geometry.scenes);
   // An output file that begins with a zero byte may be an unfinished file of voxdag, or any other
-  // file. Only its path shows whether the scene reads it.
+  // file. So the outputs are also compared with the files that the scene names.
   const bool is_unknown = std::ranges::any_of(outputs, [&](const std::string& path) {
     const auto file = open_if_there(files, path);
     return file && begins_with(*file, std::string_view("\0", 1));

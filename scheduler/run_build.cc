@@ -26,8 +26,8 @@ namespace {
 // Version of the formats of artifacts and job store, and of the rule for scene digests. A job with
 // a different version is refused.
 constexpr int64_t kWorkFormatVersion = 4;
-// Maximum number of reads of the scene, which is read again if stored triangles are damaged, and of
-// merges, which are repeated if artifacts are damaged.
+// The scene is read at most kMaxReads times, and the artifacts are merged at most kMaxMerges times.
+// Damage of the stored triangles or of artifacts causes repeats.
 constexpr int kMaxReads = 3, kMaxMerges = 3;
 
 // Refuses a job with other geometry options before the scene is read.
@@ -161,8 +161,8 @@ void build_artifacts(BuildJob& job, SubvolumeBuilder& builder) {
 }
 
 // Recovers from damage: plans subvolumes with damaged artifacts again. If no artifact is damaged, a
-// file of the merge must be damaged, so the merge restarts. This happens at most once: returns
-// false if the merge has restarted before.
+// file of the merge must be damaged, so the merge restarts. The merge restarts at most once:
+// returns false if it has restarted before.
 bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
   if (replan_damaged(job) > 0) return true;
   if (std::exchange(has_restarted, true)) return false;
@@ -171,8 +171,9 @@ bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
   return true;
 }
 
-// Merge, attributes and publish: from the artifacts to the output file. Returns false if something
-// is damaged; the planned subvolumes must be built before the next call.
+// Merge, attributes and publish: from the artifacts to the output file. Returns false if it found
+// damage and recover() succeeded. The caller must then build the planned subvolumes and call it
+// again.
 bool merge_and_publish(BuildJob& job, bool& has_restarted) {
   AttributeSections attributes(job);
   if (is_published(job, attributes)) return true;

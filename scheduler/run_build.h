@@ -1,5 +1,5 @@
-// run_build(): scene in, global file out. The only entry point for the command line and the
-// service.
+// run_build() builds a global file from a scene. All builds of the command line and of the service
+// start here.
 #pragma once
 
 #include "scheduler/spec/build_report.h"

@@ -1,4 +1,4 @@
-// The options of a build, and the interfaces through which it reaches its environment.
+// The options of a build, and the interfaces through which the build reaches its environment.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// How a build divides its memory budget (--memory). This page lists every fraction of the budget,
-// or the struct that defines it.
+// How a build divides its memory budget (--memory). The table lists every fraction of the budget,
+// or the struct that defines the fraction.
 //
 //   stage         part                              size                         charged by
 //   ------------  --------------------------------  ---------------------------  -------------

@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// Wait before the warning. `voxdag status` locks a work folder for a shorter time.
+// Seconds of waiting before the warning. `voxdag status` locks a work folder for a shorter time.
 constexpr double kQuietS = 0.3;
 constexpr auto kPause = std::chrono::milliseconds(20);
 

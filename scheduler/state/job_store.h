@@ -95,7 +95,8 @@ class JobStore {
   JobStore(const std::string& path, Access access);
 
   std::optional<JobIdentity> job();
-  // Replaces the store's contents by a new job whose subvolumes are all planned.
+  // Replaces the job, its subvolumes, progress, merge and result by a new job whose subvolumes are
+  // all planned. Keeps the progress of ingest and the stage times.
   void start(const JobIdentity& job, std::span<const StoredSubvolume> plan);
   // Returns the subvolumes that are not split, in the order of their ids.
   std::vector<StoredSubvolume> leaves();

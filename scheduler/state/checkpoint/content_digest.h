@@ -1,5 +1,6 @@
-// A digest of the grid and of the snapped triangles in order. It detects scenes that changed since
-// a job began. A plain value: a checkpoint stores it and a later run continues it.
+// A digest of the grid and of the snapped triangles, in the order of the scene. It detects scenes
+// that changed since a job began. A plain value: a checkpoint stores it and a later run continues
+// it.
 #pragma once
 
 #include <string>

@@ -102,7 +102,7 @@ bool IngestCheckpoint::is_worthwhile(const TriangleSource& scene) const {
 }
 
 void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
-  // If the options give the bounds, possibly no triangle is inside them.
+  // If the options give the bounds, the triangles may all be outside and take no space.
   if (spec_.run.force || spec_.geometry.bounds) return;
   const double bytes = static_cast<double>(scene.declared_triangles()) *
                        static_cast<double>(triangle_record_bytes(is_wide(spec_)));

@@ -41,7 +41,8 @@ class IngestCheckpoint {
   // Returns the state of an earlier run with this scene and enables checkpoints; nullopt if there
   // is no such state.
   std::optional<IngestState> resume();
-  // True if the scene is large enough for checkpoints and the disk has space for its triangles.
+  // True if the scene is large enough for checkpoints, and its triangles do not fit in memory (so
+  // that the disk must hold them anyway) or the disk has ample space.
   bool is_worthwhile(const TriangleSource& scene) const;
   // Throws Error{kNoSpace} if memory and disk together have no space for the scene's triangles.
   // Does nothing if RunOptions::force is set or the options give the bounds. A scene of a few bytes
