@@ -11,9 +11,9 @@ namespace voxdag {
 
 // Returns the code with this name; nullopt if none exists.
 std::optional<ErrorCode> error_code_named(std::string_view name);
-// Exit status of the command line for a code; never 0.
+// Returns the exit status of the command line for a code; never 0.
 int exit_status(ErrorCode code);
-// HTTP status of the service for a code.
+// Returns the HTTP status of the service for a code.
 int http_status(ErrorCode code);
 
 }  // namespace voxdag

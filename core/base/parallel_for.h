@@ -78,7 +78,7 @@ class Turns {
     const std::lock_guard lock(mutex_);
     return item > failed_;
   }
-  // After this call, no later item gets a turn.
+  // Reports that an item failed. Later items then get no turn.
   void fail(size_t item) {
     const std::lock_guard lock(mutex_);
     failed_ = std::min(failed_, item);

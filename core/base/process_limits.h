@@ -23,11 +23,11 @@ unsigned default_threads();
 // Returns the lowest CPU quota of the cgroups in `membership` and of their ancestors, in CPUs,
 // rounded up; the parameters are as for cgroup_memory(). Returns UINT64_MAX if there is no quota.
 uint64_t cgroup_cpus(const std::string& membership, const std::string& mount);
-// Largest resident set of this process so far (VmHWM), in bytes.
+// Returns the largest resident set of this process so far (VmHWM), in bytes.
 uint64_t peak_resident_bytes();
-// Resident set of this process now (VmRSS), in bytes.
+// Returns the current resident set of this process (VmRSS), in bytes.
 uint64_t resident_bytes();
-// Maximum number of open files and sockets of this process (RLIMIT_NOFILE).
+// Returns the maximum number of open files and sockets of this process (RLIMIT_NOFILE).
 uint64_t max_open_files();
 
 // Makes the C library return freed memory to the system immediately, so that resident memory

@@ -52,11 +52,11 @@ class Progress {
   // Reports a warning that a user should read: one sentence.
   virtual void warn(std::string_view message) = 0;
 
-  // The grid's low corner and edge length, in the units of the scene. Called before
+  // Reports the grid's low corner and edge length, in the units of the scene. Called before
   // set_subvolumes().
   virtual void set_grid(const std::array<double, 3>& /*origin*/, double /*edge*/) {}
-  // All subvolumes of the build, including subvolumes built by an earlier run. `resolution` is the
-  // grid's, in voxels per edge. Replaces all earlier reports of subvolumes.
+  // Reports all subvolumes of the build, including subvolumes built by an earlier run. `resolution`
+  // is the grid's, in voxels per edge. Replaces all earlier reports of subvolumes.
   virtual void set_subvolumes(uint64_t /*resolution*/, std::span<const SubvolumeStatus> /*all*/) {}
   // A worker has begun to build a planned subvolume. The subvolume is finished when
   // subvolume_built() or subvolume_split() is called.
@@ -64,9 +64,9 @@ class Progress {
   virtual void subvolume_built(const SubvolumeStatus& /*built*/) {}
   // `parts` replace the subvolume `id`.
   virtual void subvolume_split(int64_t /*id*/, std::span<const SubvolumeStatus> /*parts*/) {}
-  // Current resource usage: resident memory, and disk space of the work folder.
+  // Reports the current resource usage: resident memory, and disk space of the work folder.
   virtual void set_usage(uint64_t /*memory_bytes*/, uint64_t /*disk_bytes*/) {}
-  // Current state of the tasks of a cluster.
+  // Reports the current state of the tasks of a cluster build.
   virtual void set_cluster_tasks(const ClusterTasks& /*tasks*/) {}
 };
 

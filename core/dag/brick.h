@@ -1,8 +1,10 @@
-// A brick: 4x4x4 voxels as one 64-bit mask, the last level of the octree.
+// A brick: 4x4x4 voxels as one 64-bit mask. Bricks are the last level of the octree. Voxel (x, y,
+// z) of a brick is this bit of the mask:
 //
 //   bit = 32 x1 + 16 y1 + 8 z1 + 4 x0 + 2 y0 + z0      (x1, x0: high and low bit of x, and so on)
 //
-// This is the voxel's Morton code within the brick: byte k of the mask is child k of a 2x2x2 split.
+// This number is the voxel's Morton code within the brick. So byte k of the mask has the voxels of
+// octant k.
 #pragma once
 
 #include <cstdint>

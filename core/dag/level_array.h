@@ -4,7 +4,7 @@
 //     (hash, mask, child indices lexicographically)         or, for bricks, (hash, mask)
 //
 // Child indices are positions in the next level's array (bricks follow the last node level). Within
-// a level no two nodes are equal in mask and children. Not thread-safe.
+// a level no two nodes are equal in mask and children.
 #pragma once
 
 #include <cstdint>

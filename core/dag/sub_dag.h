@@ -36,7 +36,7 @@ struct SubDagSummary {
   uint64_t voxels = 0;     // set voxels in the cube
   uint64_t svo_nodes = 0;  // octree nodes from the cube's root to the bricks, inclusive
   uint64_t dag_nodes = 0;  // unique nodes, including bricks
-  uint64_t root_hash = 0;  // truncated; 0 when empty
+  uint64_t root_hash = 0;  // hash of the root, truncated to the hash bits; 0 when empty
   bool empty() const { return voxels == 0; }
 };
 

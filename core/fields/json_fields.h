@@ -83,9 +83,10 @@ FieldJson encode(T value) {
 // objects.
 FieldJson difference(const FieldJson& options, const FieldJson& defaults);
 
-inline constexpr size_t kMaxNames = 64;  // in a set of names, for options
+inline constexpr size_t kMaxNames = 64;  // maximum number of names in a set, for options
 
-// The members that JSON must have: kAll for records, kGiven for options.
+// kAll: the JSON of a record, which has all members. kGiven: the JSON of options, which has only
+// the members that were given.
 enum class Members { kAll, kGiven };
 
 template <class T>

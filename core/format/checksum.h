@@ -3,7 +3,7 @@
 //   - XXH64 detects damage in files. It is simple enough for the standalone reader
 //     (voxdag_reader.h) to have its own implementation.
 //   - XXH3 with 128 bits tells whether large contents are equal.
-//   - SHA-256 identifies contents, also against forgery.
+//   - SHA-256 identifies contents, and cannot be forged.
 //   - indexed_checksum() can be computed in parts, in any order.
 #pragma once
 

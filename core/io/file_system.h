@@ -110,7 +110,7 @@ class FileSystem {
   virtual uint64_t device(const std::string& path) = 0;
 };
 
-// The file system of this machine.
+// Returns the file system of this machine.
 FileSystem& system_files();
 
 // Returns the folder for temporary files: $TMPDIR or /tmp, the first that is writable, or else the

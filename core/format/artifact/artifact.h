@@ -48,7 +48,7 @@ struct SegmentRange {
 struct ArtifactRoot {
   Cube cube;
   uint32_t index = 0;
-  uint64_t hash = 0;  // truncated
+  uint64_t hash = 0;  // truncated to the hash bits
   uint64_t voxels = 0;
   uint64_t svo_nodes = 0;
 };
@@ -76,7 +76,7 @@ struct ArtifactLevel {
 struct Frame {
   uint32_t rows = 0;
   std::vector<uint64_t> brick_masks;  // brick level only
-  std::vector<uint64_t> hashes;       // truncated; for bricks too
+  std::vector<uint64_t> hashes;       // truncated hashes of all rows, also of bricks
   std::vector<uint8_t> masks;         // node levels only
   std::vector<uint32_t> children;     // node levels only, popcount(masks[i]) for row i
   std::vector<std::byte> stored;      // buffer: the bytes as stored

@@ -5,11 +5,12 @@
 //   nodes:    plane count, hashes, column(masks), column(children, byte plane 0), ...
 //   column:   [stored size, high bit: zstd] [bytes]
 //
-// Hashes and the lowest byte plane of the children are random, so they are stored uncompressed. The
-// other columns are compressed if that saves enough. On real sub-DAGs, zstd level 1 reduces brick
-// masks to 50-60 %, child masks to 55-80 %, the highest child planes to almost nothing, and the
-// middle planes to 60-90 %. Compression and decompression together take 10-25 ns per row. If a
-// column shrinks by less than a quarter, it is not compressed in the next 15 frames.
+// Byte plane i of a column has byte i of each of its values; plane 0 is the lowest. Hashes and byte
+// plane 0 of the children are random, so they are stored uncompressed. The other columns are
+// compressed if that saves enough. On real sub-DAGs, zstd level 1 reduces brick masks to 50-60 %,
+// child masks to 55-80 %, the highest child planes to almost nothing, and the middle planes to
+// 60-90 %. Compression and decompression together take 10-25 ns per row. If a column shrinks by
+// less than a quarter, it is not compressed in the next 15 frames.
 #pragma once
 
 #include <array>

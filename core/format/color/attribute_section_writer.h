@@ -6,7 +6,7 @@
 // The regions of tier 0 are written when they are added. The cells of the coarser tiers, and the
 // directories of all tiers, are in memory until finish(). This memory is charged to the budget. It
 // takes 32 bytes per region, plus the size of tier 1, which is a ten-thousandth of the size of tier
-// 0. One thread uses a writer.
+// 0. Only one thread may use a writer.
 #pragma once
 
 #include <cstdint>

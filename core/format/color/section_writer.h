@@ -3,8 +3,8 @@
 // byte layout.
 //
 // The regions of tier 0 are written to the file when they are added. The regions of the coarser
-// tiers and the directories are in memory until finish(), charged to the budget. One thread uses a
-// writer.
+// tiers and the directories are in memory until finish(), charged to the budget. Only one thread
+// may use a writer.
 #pragma once
 
 #include <cstdint>

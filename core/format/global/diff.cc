@@ -24,8 +24,8 @@ namespace {
 
 constexpr uint64_t kAbsent = ~uint64_t{0};
 
-// A node of each file, on the same level, given by its word offset. kAbsent: the file has no node
-// at this place.
+// Two nodes on the same level, one of each file, given by their word offsets. An offset is kAbsent
+// if the file has no node at this place of the octree.
 struct NodePair {
   uint64_t a = kAbsent, b = kAbsent;
   friend auto operator<=>(const NodePair&, const NodePair&) = default;

@@ -26,7 +26,7 @@ using voxdag_reader::File;
 // The cubes of this level, at most 2^18, are divided among the threads.
 constexpr uint32_t kSharedLevel = 6;
 
-// A cube that both files have, with its places as in cell_places.h.
+// A cube that is set in both files: its Morton code, and its place (cell_places.h) in each file.
 struct CommonCube {
   uint64_t code = 0;
   std::array<uint64_t, 2> places{};

@@ -26,7 +26,7 @@ struct ColorDiff {
 };
 
 // Throws Error{kInvalidInput} if a file has no colors or the grids differ, Error{kCorrupt} for a
-// damaged file. Memory: a few MiB.
+// damaged file. Needs a few MiB of memory.
 ColorDiff diff_colors(const voxdag_reader::File& a, const voxdag_reader::File& b, unsigned threads,
                       const CancelToken& cancel);
 

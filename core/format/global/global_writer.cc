@@ -21,7 +21,7 @@ namespace {
 constexpr uint64_t kReadBytes = uint64_t{1} << 20;
 static_assert(kReadBytes % kChecksumBlockBytes == 0);
 
-// The header page. Fields that were not put are zero.
+// The header page. Fields that put() has not set are 0.
 class HeaderPage {
  public:
   template <class T>

@@ -90,7 +90,8 @@ class GlobalFileWriter {
   // may write the next levels concurrently.
   void sync();
 
-  // Levels must come in the order L-2, L-3, ..., 0. A scene without voxels has no levels.
+  // Begins a level. Levels must come in the order L-2, L-3, ..., 0. A scene without voxels has no
+  // levels.
   void begin_level(uint32_t level);
   // Adds the next words of the current level to the checksums without writing them. Call it for all
   // words of the level, in order. Calls must not overlap.

@@ -91,7 +91,7 @@ class Verifier {
     if (level == file_.brick_level()) return Pointers::kNone;
     return file_.level(level + 1).pointer_bits == 64 ? Pointers::kWide : Pointers::kNarrow;
   }
-  // Returns the node that begins at this word.
+  // Returns the node that begins at word `at`.
   voxdag_reader::Node node(uint32_t level, uint64_t at) const {
     const uint32_t* const words = file_.level(level).words + at;
     return {*words, words + 1, pointers(level) == Pointers::kWide};
@@ -104,8 +104,8 @@ class Verifier {
   const CancelToken& cancel_;
   const uint64_t narrow_words_;
   std::vector<NodeIndex> indexes_;  // indexes of the levels checked so far
-  PageBuffer<uint64_t> hashes_;     // truncated hashes of the level checked last
-  PageBuffer<uint8_t> used_;        // flags of nodes used by the level above
+  PageBuffer<uint64_t> hashes_;     // truncated hashes of the nodes of the level checked last
+  PageBuffer<uint8_t> used_;        // for that level: 1 if a node above refers to the node
 };
 
 void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what) const {
@@ -150,7 +150,7 @@ void Verifier::check_header() const {
   check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "a reserved byte");
 }
 
-// Sections of kinds unknown to this program are not valid.
+// Checks the attribute table. Sections of kinds that this program does not know are not valid.
 void Verifier::check_attributes(bool has_attributes) const {
   if (!has_attributes) check_zeros(kAttributeCountAt, kLevelsAt, "attribute sections are reserved");
   uint64_t count;

@@ -137,7 +137,8 @@ class ColorVerifier {
       if (region.blocks[at] != 0) fail(tier, i, "its padding is not 0");
   }
 
-  // `cells` are the cells of the finest level, without their values.
+  // Checks the values of a region; not for colors. `cells` are the region's cells of the finest
+  // level, without their values.
   void check_values(const ColorTier& tier, uint64_t i, const ColorRegion& region,
                     std::vector<ValuedCell>& cells) const {
     const auto fail_at = [&](size_t at, const std::string& what) {

@@ -206,7 +206,7 @@ class File {
   uint64_t svo_nodes() const { return svo_nodes_; }
   uint64_t dag_nodes() const { return dag_nodes_; }
   bool empty() const { return dag_nodes_ == 0; }
-  // `l` is 0 (the root) to brick_level().
+  // Returns level `l`, which is 0 (the root) to brick_level().
   const Level& level(uint32_t l) const { return levels_[l]; }
   // Returns the byte offset of the checksum table. The bytes between the header page (4096 bytes)
   // and the table are cut into checksum blocks of 64 KiB. The table has the XXH64 of each block.

@@ -65,7 +65,7 @@ inline Normal octahedral_normal(const unsigned char* bytes) {
           static_cast<float>(z * scale)};
 }
 
-// Returns the color of cell `i`, 0 to 31, in a block of 16 bytes. Any bytes are valid colors.
+// Returns the color of cell `i`, 0 to 31, in a color block of 16 bytes. Any bytes are valid colors.
 inline Rgb block_color(const unsigned char* block, unsigned i) {
   const auto u16 = [&](unsigned at) {
     return static_cast<unsigned>(block[at] | block[at + 1] << 8);
@@ -121,7 +121,7 @@ struct ColorTier {
   uint32_t block_bytes = 16;  // bytes for 32 cells
 };
 
-// The colors, or other values, of a region. Their memory belongs to the File.
+// The colors, or other values, of a region. The memory of the values belongs to the File.
 struct ColorRegion {
   uint64_t morton = 0;      // Morton code of the region among the cubes of the tier's region level
   uint64_t first_unit = 0;  // where its data begin in ColorTier::data, in units of 16 bytes
@@ -336,7 +336,8 @@ class BasicColorCursor {
   uint32_t mask(uint32_t level, uint64_t place) const {
     if (level < brick_level()) return dag_->node(level, place).child_mask;
     if (level > brick_level()) return static_cast<uint32_t>(place);
-    uint64_t any = dag_->brick(place);  // collects each byte's bits in its lowest bit
+    uint64_t any = dag_->brick(place);
+    // Sets the lowest bit of each byte that is not 0.
     any |= any >> 4;
     any |= any >> 2;
     any |= any >> 1;
