@@ -1,6 +1,6 @@
-// Functions for clusters, used by `build`, `plan` and `status`. In a program without cluster
-// support (VOXDAG_CLUSTER=OFF), the option --cluster is refused, and the other cluster options do
-// not exist.
+// The options and the status output for builds on a cluster, used by `build`, `plan` and `status`.
+// In a program without cluster support (VOXDAG_CLUSTER=OFF), the option --cluster is refused, and
+// the other cluster options do not exist.
 #pragma once
 
 #include <string>
@@ -16,12 +16,12 @@ struct BuildClusterOptions {
   std::string merge_options;
 };
 
-// Adds the options of `build`.
+// Adds the cluster options of `build` to `command`. Parsing stores their values in `state`.
 void declare_cluster(Command& command, BuildClusterOptions& state);
-// Applies the cluster options.
+// Sets the members of `run` that the cluster options determine.
 void apply_cluster(const BuildClusterOptions& cluster, RunOptions& run);
 
-// Adds the options of `plan`.
+// Adds the cluster options of `plan` to `command`. Parsing stores their values in `options`.
 void declare_cluster(Command& command, ClusterOptions& options);
 
 // Returns the state of a work folder's tasks as one JSON object, for `status`; "" if there are no

@@ -23,7 +23,8 @@ void read_config_file(const std::string& path, CLI::App& command) {
       throw Error(ErrorCode::kInvalidInput,
                   path + ": '" + item.fullname() + "' is not an option of " + command.get_name());
     if (option->count() > 0) continue;
-    // If the command line gives the option later, the later value is used.
+    // The command line may give the option after --config; then TakeLast lets the command line's
+    // value win.
     option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)->add_result(item.inputs);
   }
 }

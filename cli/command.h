@@ -22,8 +22,9 @@ class Option;
 
 namespace voxdag::cli {
 
-// Parses exactly kCount numbers separated by `separator`, such as X,Y,Z or WIDTHxHEIGHT. Throws
-// Error{kInvalidInput} with the option's name and the text `expected`.
+// Parses exactly kCount numbers separated by `separator`, such as X,Y,Z or WIDTHxHEIGHT. For any
+// other text, throws Error{kInvalidInput} with the option's name and `expected`, a description of
+// the form.
 template <class Number, size_t kCount>
 std::array<Number, kCount> parse_list(const std::string& option, const std::string& text,
                                       char separator, const std::string& expected) {
@@ -47,8 +48,8 @@ class Option {
   Option range(int low, int high);
   Option range(double low, double high);
   Option one_of(const std::vector<std::string>& values);
-  // Checks each value with `problem`, which returns "" for a valid value, otherwise the expected
-  // value.
+  // Checks each value with `problem`, which returns "" for a valid value, otherwise a text that
+  // describes the expected value.
   Option check(std::string (*problem)(const std::string& value));
   Option excludes(Option other);
   Option needs(Option other);
@@ -57,7 +58,8 @@ class Option {
   CLI::Option* option_;
 };
 
-// A handle of a command. Variables get their option values when the command line is parsed.
+// A handle of a command. The functions that add an option take a reference to a variable, which
+// must live until the command line is parsed and then gets the option's value.
 class Command {
  public:
   explicit Command(CLI::App* app) : app_(app) {}
@@ -108,9 +110,9 @@ class CommandLine {
   std::unique_ptr<CLI::App> app_;
 };
 
-// Adds a command whose options set the members of a `State`. declare(command, state) must add the
-// options; run(state, context) is called after they are parsed. Both functions are looked up in the
-// namespace of `State`.
+// Adds a command whose options set the members of a `State`. The caller's file must define two
+// functions in the namespace of `State`: declare(command, state), which adds the options, and
+// run(state, context), which is called after they are parsed.
 template <class State>
 State& add_command(CommandLine& line, const char* name, const char* description) {
   Command command = line.add(name, description);

@@ -56,7 +56,7 @@ void print(const voxdag_reader::File& file, const std::string& sha256) {
                 count_text(facts["cells"].get<uint64_t>()).c_str(),
                 size_text(facts["bytes"].get<uint64_t>()).c_str());
   }
-  // The last name, "", is for triangles without a material.
+  // The last name is "" and stands for triangles without a material, so it is not counted.
   for (const AttributeTraits& row : kAttributeTable)
     if (const auto& names = section_of(file, row.attribute).names(); !names.empty())
       std::printf("  %s %s\n", count_text(names.size() - 1).c_str(), row.plural);

@@ -11,7 +11,8 @@ namespace voxdag::cli {
 
 class OptionDeclarer {
  public:
-  // Leaves out fields that belong to a later scope than `scope`.
+  // A field's scope is the first command that has the field as an option. Fields of a later scope
+  // than `scope` are not declared.
   OptionDeclarer(Command& command, Scope scope) : command_(command), scope_(scope) {}
 
   template <class T>

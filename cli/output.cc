@@ -21,8 +21,8 @@ void print_json(const nlohmann::ordered_json& json) { print_line(json); }
 void print_json(const nlohmann::json& json) { print_line(json); }
 
 nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section) {
-  // `cells` counts the cells of all levels. `bytes` counts the blocks, and the data with which
-  // blocks are found.
+  // `cells` counts the cells of all levels. `bytes` counts the encoded blocks and the directory
+  // entries of the regions.
   uint64_t cells = 0, bytes = 0;
   for (uint32_t t = 0; t < section.tier_count(); ++t) {
     const voxdag_reader::ColorTier& tier = section.tier(t);

@@ -15,13 +15,15 @@ namespace voxdag::cli {
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
 
-// Returns resolution, cells and bytes of one section.
+// Returns the resolution, the number of cells and the bytes of a section with colors or another
+// attribute.
 nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section);
 // Adds the members `colors` and `attributes` with facts about the file's sections. `attributes`
 // also has the names of the materials.
 void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json);
 
-// True if the file was written by voxdag, with a command of the kind that is writing now.
+// True if the file was written by voxdag and has the type of file that is to be written now, so
+// that it may be replaced without --force.
 using IsOwnFile = std::function<bool(const ReadableFile& file)>;
 
 // A file to write, and the option --force.
@@ -29,10 +31,10 @@ struct OutputFile {
   std::string path;
   bool force = false;
   void declare_force(Command& command);
-  // Throws Error{kInvalidInput} if writing would destroy `input`, or would, without --force,
-  // destroy a file for which `is_own` returns false. Makes the same check for path + ".partial",
-  // the temporary name of write_file_atomically(). Also throws if the output's folder does not
-  // exist.
+  // Throws Error{kInvalidInput} if writing would destroy `input`, or if --force is not given and
+  // writing would destroy a file for which `is_own` returns false. Makes the same check for path +
+  // ".partial", the temporary name of write_file_atomically(). Also throws if the output's folder
+  // does not exist.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
   // Makes these checks for one name, such as path + ".partial".
   void check(FileSystem& files, const std::string& name, const std::string& input,

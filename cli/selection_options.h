@@ -22,8 +22,8 @@ struct SelectionOptions {
   query::Selection selection(const voxdag_reader::File& file) const;
 };
 
-// Parses the value of --memory; "" means half of the machine's memory. Throws Error{kInvalidInput}
-// for less than 64 MiB.
+// Parses the value of --memory and returns bytes; "" means half of the machine's memory. Throws
+// Error{kInvalidInput} for less than 64 MiB.
 uint64_t memory_limit(const std::string& text);
 
 }  // namespace voxdag::cli

@@ -105,7 +105,8 @@ ClientResponse HttpClient::send(const std::string& method, const std::string& pa
 
 ClientResponse HttpClient::upload(const std::string& path, uint64_t size, const Source& source,
                                   const HeaderMap& headers) {
-  // `source` may throw, but exceptions must not propagate through httplib. So they are stored here.
+  // `source` may throw, but exceptions must not propagate through httplib. So `failure` stores the
+  // exception, and it is thrown again after the request.
   std::exception_ptr failure;
   const auto provider = [&](size_t offset, size_t length, httplib::DataSink& sink) {
     try {
@@ -128,7 +129,8 @@ ClientResponse HttpClient::stream(const std::string& path, const HeaderMap& head
   std::string error_body;
   bool closed = false;
   std::exception_ptr failure;
-  // `begin` and `sink` may throw, but exceptions must not propagate through httplib.
+  // Calls `begin` or `sink`. They may throw, but exceptions must not propagate through httplib. So
+  // `failure` stores the exception, and it is thrown again after the request.
   const auto guarded = [&](const auto& step) {
     try {
       if (step()) return true;
@@ -165,7 +167,8 @@ void throw_if_problem(const ClientResponse& response) {
   if (response.status < 400) return;
   const auto json = nlohmann::json::parse(response.body, nullptr, false);
   std::string code, detail = "the server answered with status " + std::to_string(response.status);
-  // The answer may not be this service's JSON, because it may come from another server or a proxy.
+  // Returns the member `name` if it is a string, otherwise `otherwise`. The answer may come from
+  // another server or a proxy, so its JSON may have any form.
   const auto text = [&](const char* name, const std::string& otherwise) {
     const auto found = json.find(name);
     return found != json.end() && found->is_string() ? found->get<std::string>() : otherwise;

@@ -45,8 +45,8 @@ class HttpClient {
   ClientResponse send(const std::string& method, const std::string& path, const std::string& body,
                       const HeaderMap& headers = {});
 
-  // Sends `size` bytes with PUT. source(offset, max_bytes) must return the next bytes, at least
-  // one.
+  // Sends `size` bytes with PUT. source(offset, max_bytes) must return the bytes from `offset` on:
+  // at least one and at most max_bytes.
   using Source = std::function<std::string(uint64_t offset, uint64_t max_bytes)>;
   ClientResponse upload(const std::string& path, uint64_t size, const Source& source,
                         const HeaderMap& headers = {});
@@ -65,8 +65,8 @@ class HttpClient {
   std::unique_ptr<Impl> impl_;
 };
 
-// Returns the code with this name (docs/errors.md). Without one, returns the code that fits
-// the HTTP status best.
+// Returns the error code with this name (docs/errors.md). If no code has the name, returns kIo for
+// an HTTP status from 500 up, and kInvalidInput for a lower one.
 ErrorCode error_code_of(const std::string& name, int http_status);
 // Throws the Error that a problem+json answer describes (status 400 and above).
 void throw_if_problem(const ClientResponse& response);

@@ -54,8 +54,8 @@ class Download {
     return bytes <= size_ ? bytes : 0;
   }
 
-  // Requests the bytes from `offset` on. Returns the number of seconds to wait if a busy server
-  // requested a pause.
+  // Requests the bytes from `offset` on and writes them to the partial file. Returns the number of
+  // seconds to wait before the next attempt, if a busy server requested a pause; otherwise 0.
   double fetch_rest(uint64_t offset) {
     HeaderMap headers;
     if (offset > 0) {
@@ -90,8 +90,9 @@ class Download {
     return 0;
   }
 
-  // Distinguishes errors of the local file from errors of the connection. Both are Error{kIo}, but
-  // a retry does not help against the former.
+  // Runs `step`, which accesses the local file. If it throws, file_failed_ remains true. Errors of
+  // the local file and of the connection are both Error{kIo}, but only the connection's are worth a
+  // retry.
   template <class Step>
   void guard_file(const Step& step) {
     file_failed_ = true;

@@ -16,11 +16,12 @@ struct DownloadResult {
   std::string sha256;
 };
 
-// Downloads the .vdag file of a succeeded JOB to `output`. Until the file is complete and verified,
-// it has the name `output`.<first digits of the SHA-256>.partial, and a later call resumes the
-// download. Failed attempts are repeated as RetryPolicy allows; an attempt that makes progress
-// restarts the policy. Throws Error{kNotFound} for a job that has not succeeded, Error{kCorrupt} if
-// the bytes do not match the SHA-256.
+// Downloads the .vdag file of a succeeded job to `output`. `job` is the JSON object JOB of
+// docs/api.md. Until the file is complete and verified, it has the name `output`.<first 12 digits
+// of the SHA-256>.partial, and a later call resumes the download. Failed attempts are repeated as
+// RetryPolicy allows; an attempt that makes progress restarts the policy. Throws Error{kNotFound}
+// for a job that has not succeeded, Error{kCorrupt} if the bytes do not match the SHA-256, and
+// Error{kIo} when no further retry is allowed.
 DownloadResult download_result(ServiceClient& service, FileSystem& files, const Json& job,
                                const std::string& output, Progress& progress);
 

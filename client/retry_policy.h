@@ -1,5 +1,6 @@
-// Delays before retries. The first delay is half a second; later delays are longer, up to five
-// minutes in total. Used by one thread.
+// Delays before retries. The first delay is half a second, and each later delay is twice as long,
+// up to ten seconds. After five minutes of delays in total, no further retry is allowed. Used by
+// one thread.
 #pragma once
 
 #include "client/http_client.h"
@@ -10,8 +11,8 @@ namespace voxdag::client {
 class RetryPolicy {
  public:
   explicit RetryPolicy(const CancelToken& cancel) : cancel_(cancel) {}
-  // Waits before the next attempt, for at least `min_wait_s`. Returns false if the total time for
-  // retries is used up. Throws Error{kCanceled}.
+  // Waits before the next attempt, for at least `min_wait_s` seconds, and returns true. Returns
+  // false without waiting if the total time for retries is used up. Throws Error{kCanceled}.
   bool wait(double min_wait_s = 0);
   // Restarts the delays. Call it after an attempt that made progress.
   void reset() { waited_s_ = 0, pause_s_ = kFirstPauseS; }
@@ -22,9 +23,9 @@ class RetryPolicy {
   double waited_s_ = 0, pause_s_ = kFirstPauseS;
 };
 
-// Returns the number of seconds to wait before the next request to a busy server (status 408, 429,
-// 502 to 504); 0 if its answer does not have the header Retry-After. Returns -1 for any other
-// status, because a retry would give the same answer.
+// If the response has the status of a busy server (408, 429, 502 to 504), returns the number of
+// seconds to wait before the next request: the value of the header Retry-After, or 0 without this
+// header. Returns -1 for any other status, because a retry would give the same answer.
 double retry_after_s(const ClientResponse& response);
 
 // Sleeps. Throws Error{kCanceled} within about 50 ms of a cancellation.

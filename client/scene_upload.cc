@@ -86,10 +86,11 @@ class Upload {
     return false;
   }
 
-  // Sends the missing bytes in parts, so that a crash of the server loses at most one part. The
-  // first part is small: if the server rejects the scene, it can answer after a small part, but
-  // would close the connection within a large part. If no bytes are missing, an empty part finishes
-  // the upload. Returns false if a retry is needed, and stores the reason in failure_.
+  // Sends the missing bytes in parts, one request each, so that a crash of the server loses at most
+  // one part. The first part is small, because a server that rejects the scene can still answer
+  // after a small part, but closes the connection within a large one. If no bytes are missing, an
+  // empty part finishes the upload. Returns true if the upload is complete; false if a retry is
+  // needed, whose reason is then in failure_.
   bool send_rest() {
     progress_.begin_stage("upload", size_, "bytes");
     progress_.resume_at(offset_);
@@ -111,7 +112,8 @@ class Upload {
     return true;
   }
 
-  // Returns nullopt if the connection broke.
+  // Sends the bytes from offset_ to `end` and returns the server's answer. Returns nullopt if the
+  // connection broke; the reason is then in failure_.
   std::optional<ClientResponse> send_part(uint64_t end) {
     const uint64_t first = offset_;
     const std::string range =

@@ -19,20 +19,21 @@ class ServiceClient {
   ServiceClient(const ClientOptions& options, const CancelToken& cancel)
       : url_(options.url), cancel_(cancel), http_(options) {}
 
-  // Sends a request that may safely be sent twice. Repeats it while the server is busy (status 408,
-  // 429, 502 to 504). If an earlier request was answered, also repeats it while the server cannot
-  // be reached. Throws an Error for any other status of 400 or above.
+  // Sends a request that may safely be sent twice. Repeats the request while the server is busy
+  // (status 408, 429, 502 to 504), as long as RetryPolicy allows. If an earlier request of this
+  // client was answered, also repeats it while the server cannot be reached. Throws an Error for
+  // any other status of 400 or above.
   using Request = std::function<ClientResponse(HttpClient& http)>;
   ClientResponse send_with_retries(const Request& request);
 
   Json get(const std::string& path);
   Json post(const std::string& path, const Json& body, const HeaderMap& headers = {});
-  // Returns the JOB.
+  // Returns a job as the JSON object JOB of docs/api.md.
   Json job(const std::string& id);
   // Posts an action ("cancel", "suspend", "resume", "retry"). Returns the JOB after the action.
   Json post_action(const std::string& id, const std::string& action);
-  // Calls on_job(JOB) twice per second until the job has ended, and returns its last JOB. Throws
-  // Error{kCanceled} if the cancel token is canceled; the job itself continues.
+  // Fetches the JOB twice per second and calls on_job(JOB), until the job has ended. Returns the
+  // last JOB. Throws Error{kCanceled} if the cancel token is canceled; the job itself continues.
   Json follow_job(const std::string& id, const std::function<void(const Json& job)>& on_job);
 
   HttpClient& http() { return http_; }

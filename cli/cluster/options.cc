@@ -26,8 +26,9 @@ std::vector<std::string> own_arguments() {
   return words;
 }
 
-// Returns the options of the merge job: the user's --memory and --threads. Without these options,
-// the merge job gets the resources of a task.
+// Returns the command of the merge job, and the job's options for sbatch: from the user's --memory
+// and --threads, and the user's --cluster-merge-options. Without --memory or --threads, the merge
+// job gets this resource of a task.
 ClusterOptions::MergeJobOptions merge_job(const BuildClusterOptions& cluster,
                                           const RunOptions& run) {
   ClusterOptions::MergeJobOptions job;
@@ -46,14 +47,14 @@ ClusterOptions::MergeJobOptions merge_job(const BuildClusterOptions& cluster,
   return job;
 }
 
-// Sets the options that the user left out from the Slurm allocation of this job.
+// For the process of a merge job: sets memory and threads, if the user did not give them, to the
+// values of the job's Slurm allocation.
 void take_allocation(RunOptions& run) {
   const Allocation given = slurm_allocation();
   if (run.memory_bytes == 0 && given.memory_bytes > 0)
     run.memory_bytes = batch_budget(given.memory_bytes);
   if (run.threads == 0) run.threads = given.cpus;
-  // Waits this long for the lock, because an earlier attempt at this job may still be ending on
-  // another node.
+  // An earlier attempt at this job may still be ending on another node, and then it holds the lock.
   run.lock_wait_s = 300;
   run.restart = false;
 }

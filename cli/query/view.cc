@@ -19,8 +19,8 @@ struct ViewCommand {
   bool json = false;
 };
 
-// Starts the user's browser as a detached process, so that the end of the browser does not affect
-// this process.
+// Opens `url` in the user's browser. The browser is a detached process, so that signals for one of
+// the two processes, such as Ctrl-C, do not end the other.
 void open_in_browser(const std::string& url) {
   const pid_t child = fork();
   if (child == 0) {

@@ -7,7 +7,7 @@
 namespace voxdag::cli {
 namespace {
 
-// Shows the changes between two states of a job.
+// Shows a job's progress. Each call of show() prints only the changes since the previous call.
 class JobView {
  public:
   void show(const Json& job) {

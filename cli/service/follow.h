@@ -7,8 +7,8 @@
 
 namespace voxdag::cli {
 
-// Waits until the job has ended (succeeded, failed or canceled), and returns its JOB (docs/api.md).
-// Throws Error{kCanceled} on Ctrl-C; the job itself continues.
+// Waits until the job has ended (succeeded, failed or canceled), and returns it as the JSON object
+// JOB of docs/api.md. Throws Error{kCanceled} on Ctrl-C; the job itself continues.
 Json follow_job(ServiceClient& service, const std::string& id);
 
 // Throws an Error for a job that failed or was canceled.

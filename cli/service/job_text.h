@@ -1,4 +1,4 @@
-// Texts that describe a JOB of the service.
+// Texts that describe a job of the service. `job` is the JSON object JOB of docs/api.md.
 #pragma once
 
 #include <string>
@@ -11,11 +11,12 @@ using client::Json;
 
 // Replaces control characters in a text from the network, because a terminal would interpret them.
 std::string printable(std::string text);
-// "job 6b1f0c7a93d2e845: queued, number 2 in the queue"
+// Returns a line such as "job 6b1f0c7a93d2e845: queued, number 2 in the queue".
 std::string state_line(const Json& job);
 // Returns the job's name, or its scenes if it has no name.
 std::string job_title(const Json& job);
-// Returns the job's progress as text, such as "build 32 %, 31.4 s left" or "118 MiB".
+// Returns the job's progress as text, such as "build 32 %, 31.4 s left"; the size of the result,
+// such as "118 MiB", for a succeeded job.
 std::string progress_text(const Json& job);
 // Prints the result of a succeeded job in a few lines.
 void print_result(const Json& job);

@@ -33,7 +33,8 @@ void run(const JobsCommand& command, ServiceClient& service, CommandContext&) {
     print(answer);
 }
 
-// Accepts only characters that need no escape in a query.
+// Returns "" if `states` has only characters that need no escape in a URL, otherwise the expected
+// value. The server checks the states themselves.
 std::string check_states(const std::string& states) {
   const bool fine = states.find_first_not_of("abcdefghijklmnopqrstuvwxyz,") == std::string::npos;
   return fine ? "" : "expected states such as running,queued";

@@ -1,4 +1,4 @@
-// Runs a server of a command until a signal ends it.
+// Runs a server, for a command such as `serve`, until a signal cancels the command.
 #pragma once
 
 #include <chrono>

@@ -49,8 +49,8 @@ server::ServerConfig settings(const ServeCommand& command, const Command& line, 
 }
 
 void serve(const ServeCommand& command, const Command& line, CommandContext& context) {
-  // Makes new files private to this user. Otherwise all users of the machine could read scenes and
-  // results, not only clients with a token.
+  // Makes new files private to the user who runs the service. Otherwise all users of the machine
+  // could read scenes and results, not only clients with a token.
   umask(0077);
   server::Service service(settings(command, line, context.files), context.files, log_line);
   log_line("listening on " + service.url());

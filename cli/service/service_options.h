@@ -15,8 +15,9 @@ using client::ServiceClient;
 class ServiceOptions {
  public:
   void declare(Command& command);
-  // Calls `action` with a client for the server. Throws Error{kInvalidInput} for a malformed URL or
-  // token file, and Error{kIo} if an answer does not conform to docs/api.md.
+  // Calls `action` with a client for the server that the options name. Throws Error{kInvalidInput}
+  // for a malformed URL or token file, Error{kIo} if an answer does not conform to docs/api.md, and
+  // the errors of `action`.
   void with_service(CommandContext& context,
                     const std::function<void(ServiceClient&)>& action) const;
 
@@ -26,8 +27,9 @@ class ServiceOptions {
   std::string url_, token_file_, ca_file_;
 };
 
-// Adds a command whose State has a member `service` with these options. When the command runs,
-// run(state, client, context) is called with a client for the server.
+// Like add_command(), for a client command: `State` has a member `service` of the type
+// ServiceOptions, and the function to define is run(state, client, context), which gets a client
+// for the server.
 template <class State>
 State& add_service_command(CommandLine& line, const char* name, const char* description) {
   Command command = line.add(name, description);

@@ -21,7 +21,7 @@ constexpr int kBarWidth = 24;
 constexpr size_t kNameWidth = 11;
 constexpr const char* kClearLine = "\r\033[K";
 
-// 1234567 -> "1.23 M"
+// Returns a count with three or more digits and a unit prefix: 1234567 becomes "1.23 M".
 std::string short_count(double count) {
   const char* suffix = "";
   for (const char* larger : {"k", "M", "G", "T"}) {

@@ -1,5 +1,6 @@
-// Shows progress on standard error: on a terminal as a bar with rate and ETA, otherwise as a plain
-// line every few seconds and at the end of each stage. The bar is thread-safe.
+// Shows progress on standard error. On a terminal, it is a bar with the rate and the remaining
+// time. Otherwise it is a plain line every five seconds and at the end of each stage. The progress
+// bar is thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +20,8 @@ struct StageView {
   double eta_s = 0;  // 0 if unknown
 };
 
-// Shows the progress of a stage as one line on standard error: a bar that is redrawn if this is a
-// terminal, otherwise a plain line. Not thread-safe.
+// Shows the progress of a stage as one line on standard error. If standard error is a terminal, the
+// line has a bar and is redrawn. Not thread-safe.
 class ProgressLine {
  public:
   // A quiet line shows only warnings and notes.
@@ -30,7 +31,7 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  // The interval at which a running stage should be shown.
+  // Returns the number of seconds that should pass between two calls of show() for a running stage.
   double interval_s() const;
   void show(const StageView& stage, bool ended);
   void warn(std::string_view message);
@@ -43,7 +44,7 @@ class ProgressLine {
   bool open_ = false;  // the terminal shows a line that will be redrawn
 };
 
-// A quiet bar shows only warnings.
+// Returns a progress bar. If `quiet` is true, it shows only warnings.
 std::unique_ptr<Progress> make_progress_bar(bool quiet = false);
 
 }  // namespace voxdag::cli
