@@ -1,4 +1,7 @@
-"""From a mesh in numpy arrays to a picture of its voxels: usage mesh_to_picture.py [PICTURE.png]"""
+"""Builds a DAG of a mesh in numpy arrays, and writes a picture of its voxels, made with rays.
+
+usage: mesh_to_picture.py [PICTURE.png]
+"""
 
 import sys
 import tempfile
@@ -11,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import voxdag
 
-# A knotted tube: vertices (N, 3), triangles (M, 3).
+# The mesh is a knotted tube: vertices (N, 3) and triangles (M, 3), which are made below.
 around, across = 400, 24
 t = np.linspace(0, 2 * np.pi, around, endpoint=False)
 center = np.stack(

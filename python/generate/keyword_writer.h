@@ -28,8 +28,9 @@ std::string python_type(const Field& field) {
   }
 }
 
-// Collects one line of text per keyword. Skips required options, which are named parameters of the
-// Python functions.
+// Collects the lines of _options.py: one line per keyword in `members` and in `documents`, and the
+// quoted names of keywords with path values in `paths`. Skips required options, because these are
+// parameters of the Python functions, not keywords.
 class KeywordWriter {
  public:
   template <class T>

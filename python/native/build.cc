@@ -20,7 +20,7 @@
 namespace voxdag::python {
 namespace {
 
-// The vertices of a mesh, as floats or doubles.
+// The vertices of a mesh, one per row. mesh_of() accepts floats and doubles.
 using Vertices = nb::ndarray<nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Triangles = nb::ndarray<const uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using MeshArrays = std::pair<Vertices, Triangles>;
@@ -43,7 +43,9 @@ Mesh mesh_of(const MeshArrays& arrays) {
   return mesh;
 }
 
-// Takes options out of a dict of keyword arguments. An argument that is None counts as absent.
+// Sets the members of a BuildSpec from a dict of keyword arguments, and removes these arguments
+// from the dict. An argument that is None counts as absent. Throws Error{kInvalidInput} for a wrong
+// value.
 class KeywordReader {
  public:
   explicit KeywordReader(nb::dict given) : given_(std::move(given)) {}
@@ -106,7 +108,8 @@ BuildSpec spec_of(uint64_t resolution, nb::dict options) {
   return spec;
 }
 
-// Returns work(spec, context) for a scene, which is a list of files or one mesh.
+// Adds the scene to `spec` and returns work(spec, context). The scene is a list of files, or one
+// mesh if `arrays` is not nullopt.
 template <class Work>
 std::string run_with_scene(BuildSpec spec, std::vector<PathText> files,
                            const std::optional<MeshArrays>& arrays, nb::object progress,

@@ -29,7 +29,7 @@ using Rows = nb::ndarray<Number, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu
 template <class Number>
 using Cells = nb::ndarray<Number, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
-// Returns the rows of an array of shape (N, 3), without copying them.
+// Returns the rows of an array of shape (N, 3) as C++ objects, without copying them.
 std::span<const Position> positions_of(const Rows<const int64_t>& rows) {
   return {reinterpret_cast<const Position*>(rows.data()), rows.shape(0)};
 }
@@ -55,7 +55,8 @@ void lookup(const query::DagFile& dag, const Rows<const int64_t>& points, uint32
   dag.lookup(positions_of(points), grid_levels, {set.data(), set.shape(0)}, threads_of(threads));
 }
 
-// Number of rays per batch. It limits the memory for the hits in the library's format.
+// Number of rays per batch. It limits the memory for `hits`, from which the results are copied to
+// the arrays.
 constexpr size_t kRays = size_t{1} << 16;
 
 void rays(const query::DagFile& dag, const Rows<const double>& origins,
@@ -121,7 +122,8 @@ std::pair<Position, Position> world_to_region(const query::DagFile& dag,
   return {region.low, region.high};
 }
 
-// Returns the number of rows that points() fills. Finds it by a walk over the region only.
+// Returns the number of rows that points() fills. Unlike count(), this function does not store
+// counts of all nodes of the file; it only visits the region.
 uint64_t point_count(const query::DagFile& dag, const Position& low, const Position& high,
                      uint32_t grid_levels) {
   const nb::gil_scoped_release released;
@@ -149,8 +151,9 @@ void nearest(const query::DagFile& dag, const Rows<const int64_t>& points, doubl
   }
 }
 
-// Fills the rows with the cells' values of an attribute. attribute_types() lists the type `Number`
-// of each attribute.
+// Writes the values of the attribute `name` for the cells `points` to `found`, one row per cell.
+// Leaves the rows of cells that are not set unchanged. `Number` is the attribute's type in
+// attribute_types().
 template <class Number>
 void values(const query::DagFile& dag, const std::string& name, const Rows<const int64_t>& points,
             uint32_t grid_levels, const nb::ndarray<Number, nb::c_contig, nb::device::cpu>& found) {
@@ -186,7 +189,7 @@ std::vector<std::tuple<std::string, uint32_t, std::string>> attribute_types() {
   return all;
 }
 
-// Names are UTF-8, unless the scene's names were not.
+// Returns the names as bytes, because a scene may have names that are not UTF-8.
 std::vector<nb::bytes> material_names(const query::DagFile& dag) {
   std::vector<nb::bytes> names;
   for (const std::string& name : dag.file().material_names())
@@ -194,7 +197,7 @@ std::vector<nb::bytes> material_names(const query::DagFile& dag) {
   return names;
 }
 
-// Returns nodes and bytes of each level.
+// Returns the number of nodes and of bytes of each level, the root's level first.
 std::vector<std::pair<uint64_t, uint64_t>> levels(const query::DagFile& dag) {
   std::vector<std::pair<uint64_t, uint64_t>> all;
   for (uint32_t l = 0; l <= dag.file().brick_level(); ++l) {

@@ -1,6 +1,7 @@
-// Long-running work called from Python. The work runs on its own thread without the interpreter's
-// lock. The calling thread handles signals (Ctrl-C raises KeyboardInterrupt) and forwards progress
-// and warnings, so Python code runs only on the caller's thread.
+// Runs work that takes long and was called from Python. The work runs on a new thread without the
+// interpreter's lock. The calling thread waits for it, handles signals (Ctrl-C raises
+// KeyboardInterrupt) and forwards progress and warnings to Python. So Python code runs only on the
+// calling thread.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -20,7 +21,7 @@ namespace voxdag::python {
 
 namespace nb = nanobind;
 
-// Keeps the newest state of the work. Thread-safe.
+// Stores the newest progress of the work, and its warnings until they are taken. Thread-safe.
 class LatestProgress : public Progress {
  public:
   struct State {
@@ -45,11 +46,12 @@ class LatestProgress : public Progress {
   std::vector<std::string> warnings_;
 };
 
-// Polling interval of the calling thread.
+// Interval at which the calling thread checks for signals, progress and the end of the work.
 inline constexpr std::chrono::milliseconds kLookInterval{50};
 
-// Forwards new messages to Python: warnings, and progress by calls of callback(stage, done, total,
-// unit) unless `callback` is None. Raises the exceptions of Python code, and KeyboardInterrupt.
+// Forwards warnings and new progress to Python. For progress, calls callback(stage, done, total,
+// unit) unless `callback` is None. Raises the exceptions of the called Python code, and
+// KeyboardInterrupt.
 class Messenger {
  public:
   explicit Messenger(nb::object callback) : callback_(std::move(callback)) {}

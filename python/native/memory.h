@@ -1,4 +1,4 @@
-// The argument `memory` of the functions that work within a memory budget.
+// Parses the argument `memory` of the Python functions that have a memory budget.
 #pragma once
 
 #include <string>
@@ -9,7 +9,8 @@
 
 namespace voxdag::python {
 
-// Parses a memory limit; "" means half of the machine's memory. Throws Error{kInvalidInput}.
+// Parses a memory limit and returns bytes; "" means half of the machine's memory. Throws
+// Error{kInvalidInput} for malformed text and for less than 64 MiB.
 inline uint64_t memory_of(const std::string& text) {
   const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "memory");
   if (bytes < kMinMemory)

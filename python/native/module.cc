@@ -1,5 +1,5 @@
-// The native part of the Python module voxdag. Users call the functions in python/voxdag, which
-// call this part.
+// The native module voxdag._native. Users call the Python functions in python/voxdag, which call
+// this module.
 #include <nanobind/nanobind.h>
 
 #include "core/base/error.h"
@@ -12,7 +12,7 @@ namespace nb = nanobind;
 namespace voxdag::python {
 namespace {
 
-// Raises voxdag.Error, which the Python part defines.
+// Sets voxdag.Error, which voxdag/_error.py defines, as the current Python exception.
 void raise(const Error& error) {
   const nb::object type = nb::module_::import_("voxdag._error").attr("Error");
   const nb::object raised = type(message_text(error.message()), error_name(error.code()));

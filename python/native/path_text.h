@@ -9,8 +9,8 @@
 
 namespace voxdag::python {
 
-// A path. In Python it is a str. Bytes of the path that are not UTF-8 are surrogates in this str,
-// as in the results of os.fsdecode().
+// A path as bytes. In Python it is a str, in which bytes that are not UTF-8 are surrogates, as in
+// the results of os.fsdecode().
 struct PathText {
   std::string bytes;
 };

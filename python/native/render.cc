@@ -36,8 +36,9 @@ query::Vec in_voxels(const Point& point, const voxdag_reader::File& file) {
   return voxels;
 }
 
-// Throws if the renderer's memory and the array of pixels together exceed the limit. This is
-// checked before any allocation, because allocating too much memory can end the process.
+// Throws Error{kOutOfMemory} if the renderer's memory and the array of pixels together exceed the
+// limit `memory`. The caller checks this before any allocation, because the system can end a
+// process that allocates too much memory.
 void check_memory(int width, int height, const std::string& memory) {
   const uint64_t limit = memory_of(memory);
   const uint64_t bytes = (query::kRenderBytesPerPixel + 3) * static_cast<uint64_t>(width) *

@@ -1,4 +1,4 @@
-"""A small scene that all tests share."""
+"""A small scene that all tests share, and a function that interrupts a program."""
 
 import signal
 import subprocess
@@ -11,7 +11,8 @@ import voxdag
 
 
 def torus(around=48, across=24, big=3.0, small=1.25):
-    """Vertices (N, 3) and triangles (M, 3)."""
+    """Returns the vertices (N, 3) and triangles (M, 3) of a torus. `around` and `across` are
+    numbers of vertices; `big` is the radius of the ring, `small` the radius of the tube."""
     u, v = np.meshgrid(
         np.arange(around) * 2 * np.pi / around,
         np.arange(across) * 2 * np.pi / across,
@@ -27,9 +28,9 @@ def torus(around=48, across=24, big=3.0, small=1.25):
 
 
 def interrupted(lines):
-    """Runs a Python program of these lines and sends Ctrl-C after the first line of its output.
-    Ctrl-C must end the program. Returns the rest of the output. The program can use voxdag, and
-    say() to show its progress."""
+    """Runs a Python program of these lines, and sends Ctrl-C after the first line of its output.
+    Fails unless Ctrl-C ends the program. Returns the output after the first line. The program can
+    use the module voxdag, and the function say() as a `progress` that prints a line."""
     program = textwrap.dedent(f"""
         import sys
         sys.path[:0] = {sys.path!r}
@@ -66,7 +67,7 @@ def dag(path):
 
 @pytest.fixture(scope="session")
 def cells(path):
-    """All voxels as an array, read by lookups."""
+    """Whether each voxel of the file is set, (64, 64, 64) bool, found by lookup()."""
     with voxdag.open(path) as opened:
         grid = np.stack(np.meshgrid(*[np.arange(64)] * 3, indexing="ij"), axis=-1)
         return opened.lookup(grid.reshape(-1, 3)).reshape(64, 64, 64)

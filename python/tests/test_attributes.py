@@ -29,8 +29,8 @@ def test_values(torus):
     normals = torus.normals(cells)
     assert normals.shape == cells.shape and normals.dtype == np.float32
     assert np.allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
-    # The normals point away from the ring in the middle of the tube, because the triangles face
-    # outwards.
+    # The normals point away from `ring`, the nearest points on the center line of the tube, because
+    # the triangles face outwards.
     positions = torus.to_world(cells + 0.5)
     across = positions[:, :2]
     ring = np.concatenate(

@@ -1,4 +1,4 @@
-"""Builds from Python: they write the same bytes as the command line, and can be stopped."""
+"""Builds from Python: their reports, options, errors and progress, and how they are stopped."""
 
 import hashlib
 import os
@@ -172,7 +172,7 @@ def test_what_progress_raises_ends_the_build(mesh, tmp_path):
 
 
 def test_ctrl_c(tmp_path):
-    """The build stops, and the same call resumes it."""
+    """Ctrl-C stops a build, and the same call resumes it and gives the same file."""
     interrupted(f"""
         from conftest import torus
         output = {str(tmp_path / "x.vdag")!r}

@@ -72,7 +72,7 @@ def test_refuses(path, tmp_path, derive, code):
     ],
 )
 def test_outputs(path, tmp_path, derive):
-    """Outputs that cannot be written are refused before anything is done."""
+    """Outputs that cannot be written are refused before `progress` is called."""
     for output, code in [
         (tmp_path / "none" / "out", "not_found"),
         (tmp_path, "invalid_input"),

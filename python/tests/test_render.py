@@ -15,7 +15,8 @@ from conftest import interrupted
 
 
 def shown(picture):
-    """Returns the share of pixels that are not background. Rows begin with background."""
+    """Returns the share of pixels that do not show the background. The first pixel of each row must
+    show the background."""
     return (np.abs(picture.astype(int) - picture[:, :1].astype(int)).max(axis=2) > 24).mean()
 
 
@@ -117,7 +118,7 @@ def test_other_threads_run_meanwhile(path):
     end = time.monotonic()
     ended.set()
     thread.join()
-    # One tick may fall between the clock and the call.
+    # A single tick could also happen between time.monotonic() and the call of render().
     assert len([tick for tick in ticks if begin < tick < end]) >= 3, (end - begin, len(ticks))
 
 
@@ -144,7 +145,7 @@ def test_progress_stops_it(path):
 
 
 def test_the_example_of_the_docs(tmp_path):
-    """From a mesh to a picture, in six lines, as in docs/python.md."""
+    """The example in docs/python.md makes a picture of a mesh, in at most six lines."""
     text = (Path(__file__).parents[2] / "docs" / "python.md").read_text(encoding="utf-8")
     example = re.search(r"```python\n(.*?)```", text, re.DOTALL).group(1)
     assert len([line for line in example.splitlines() if line.strip()]) <= 6

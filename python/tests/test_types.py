@@ -1,4 +1,4 @@
-"""The package is typed: mypy finds no contradiction, and knows the types of the public API."""
+"""Checks the type annotations: mypy finds no error in the package, and finds wrong arguments."""
 
 import os
 import shutil
@@ -10,7 +10,7 @@ import voxdag
 
 
 def mypy(folder, *arguments):
-    # mypy does not check installed packages, so it gets a copy.
+    # mypy does not report errors in installed packages, so it gets a copy of the package.
     package = os.path.dirname(voxdag.__file__)
     shutil.copytree(
         package, folder / "voxdag", ignore=shutil.ignore_patterns("*.so", "__pycache__")

@@ -7,7 +7,8 @@ import voxdag
 
 @pytest.fixture(scope="module")
 def fine(tmp_path_factory):
-    """A few voxels in a grid of 131072^3 whose corner and edge are no round numbers."""
+    """A few voxels in a grid of 131072^3. The grid's corner and edge are not round numbers, so that
+    positions in world space have rounding errors."""
     output = tmp_path_factory.mktemp("fine") / "fine.vdag"
     corners = np.array([[0.01, 0.02, 0.03], [0.05, 0.02, 0.09], [0.02, 0.07, 0.03]])
     voxdag.build(
@@ -22,7 +23,8 @@ def fine(tmp_path_factory):
 
 
 def test_corners_of_voxels(fine):
-    """A voxel contains its low corner, and a box between two corners has no additional layer."""
+    """A voxel contains its low corner in world space, and a region between two such corners has no
+    additional layer of voxels."""
     voxels = np.random.default_rng(7).integers(0, 131072, (20000, 3))
     assert np.array_equal(fine.to_voxel(fine.to_world(voxels)), voxels)
     assert np.array_equal(fine.to_voxel(fine.to_world(voxels + 0.5)), voxels)
@@ -42,7 +44,7 @@ def test_shapes(fine):
 
 
 def test_regions_without_end(path, dag, tmp_path):
-    """An infinite side of a region ends with the grid."""
+    """A region with an infinite coordinate ends at the border of the grid."""
     inf = np.inf
     everything = (-inf, -inf, -inf, inf, inf, inf)
     assert dag.count(everything, world=True) == dag.voxels

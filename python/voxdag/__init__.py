@@ -4,10 +4,11 @@
     with voxdag.open("scene.vdag") as dag:
         dag.lookup([[10, 20, 30]])              # is the voxel set?
         dag.rays(origins, directions)           # the first voxel on each ray
-        dag.dense(region, level=8)              # a box of the grid of 2^8 cells as an array
+        dag.dense(region, level=8)              # a box of the grid with 2^8 cells per edge
 
-Long calls release the interpreter's lock; build, plan, extract, export and render stop on Ctrl-C.
-Errors of this package are `voxdag.Error`, with a `code`.
+Long calls release the interpreter's lock, so other Python threads can run. build(), plan(),
+extract(), export() and render() stop on Ctrl-C. Errors of this package are `voxdag.Error`, with a
+`code`.
 """
 
 from ._build import Mesh, Progress, Scene, build, plan

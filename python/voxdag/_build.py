@@ -1,4 +1,4 @@
-"""Builds from files, and from meshes in memory."""
+"""Builds DAGs of scenes, which are files or meshes in memory, and estimates the cost of builds."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from ._options import PATHS, BuildOptions
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-# vertices (N, 3) of float, triangles (M, 3) of integers
+# Vertices, (N, 3) numbers, and triangles, (M, 3) integers: the indexes of their three vertices.
 Mesh = tuple[Any, Any]
 Scene = Union[Path, Sequence[Path], Mesh]
-# Called with the stage, units done, total units (0 if unknown) and the unit.
+# A function that is called with the stage's name, the number of units done, the total number of
+# units (0 if unknown) and the unit's name, such as "triangles".
 Progress = Callable[[str, int, int, str], None]
 _Arrays = tuple[np.ndarray, np.ndarray]
 
@@ -35,15 +36,17 @@ def build(
 ) -> dict[str, Any]:
     """Builds the DAG of a scene, or resumes an interrupted build, and returns its report.
 
-    scene             one or several files, together one scene, or a mesh in memory: a tuple of
-                      vertices (N, 3), with the precision of their type, and triangles (M, 3);
-                      do not change arrays before build() returns
+    scene             one file, several files that are one scene together, or a mesh in memory: a
+                      tuple of vertices (N, 3), which keep the precision of float32 or float64,
+                      and triangles (M, 3), the indexes of their vertices; do not change these
+                      arrays before build() returns
     resolution        voxels per edge of the grid, a power of two from 4 to 2^20
     output            the .vdag file to write
     progress          called up to 20 times a second; if it raises an exception, build() cancels
                       the build and raises the exception
 
-    The report has the names of `voxdag build --json`. Raises Error. Further options:
+    The report has the same names as the JSON of `voxdag build --json`. Raises Error. Further
+    options:
 
     """
     output = path_text(output)
@@ -58,8 +61,8 @@ def plan(
     progress: Progress | None = None,
     **options: Unpack[BuildOptions],
 ) -> dict[str, Any]:
-    """Estimates the cost of a build and creates no files. The estimate has the names of
-    `voxdag plan --json`. Further options:
+    """Estimates the cost of a build and creates no files. The arguments are the arguments of
+    build(). The estimate has the same names as the JSON of `voxdag plan --json`. Further options:
 
     """
     output = "voxdag-plan" if output is None else path_text(output)
@@ -97,7 +100,7 @@ def _call(
 
 
 def _parts_of(scene: Scene) -> tuple[list[str], _Arrays | None]:
-    """Returns the files of a scene, and its mesh."""
+    """Returns the paths of a scene's files and None, or an empty list and the scene's mesh."""
     if isinstance(scene, (str, bytes, os.PathLike)):
         return [path_text(scene)], None
     if _is_mesh(scene):
@@ -114,7 +117,7 @@ def _is_mesh(scene: Scene) -> bool:
 
 
 def _mesh_arrays(vertices: Any, triangles: Any) -> _Arrays:
-    """Checks a mesh and returns its arrays with the types of the native module."""
+    """Checks a mesh. Returns its arrays with the types that the native module requires."""
     vertices, triangles = np.asarray(vertices), np.asarray(triangles)
     if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
         raise Error(

@@ -1,4 +1,4 @@
-"""Finished files, and queries of them."""
+"""Opens finished .vdag files, and answers queries of their voxels and attributes."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Optional, Union, overload
@@ -8,41 +8,48 @@ import numpy as np
 from . import _native
 from ._error import Error, Path, path_text, thread_count
 
-# For each name: the number of components of a value, and their type. int64 values are indexes; -1
-# means none.
+# For each attribute's name: the number of components of a value, and the numpy type of a component.
+# int64 values are indexes of material_names; -1 means that the cell is not set.
 _ATTRIBUTE_TYPES = {
     name: (components, np.dtype(dtype)) for name, components, dtype in _native.attribute_types()
 }
 
-# A half-open box: the low corner x, y, z and the high corner x, y, z.
+# Six numbers: the low corner x, y, z, which is in the region, and the high corner x, y, z, which is
+# not.
 Region = Union[Sequence[Any], np.ndarray]
 
 
 class Hits(NamedTuple):
     """The hits of rays, one row per ray. A ray without a hit has an infinite distance."""
 
-    distance: np.ndarray  # (N,) float64, in voxels, or in units of the scene if the rays were
-    voxel: np.ndarray  # (N, 3) int64, the low corner of the hit cell; -1 without a hit
-    normal: np.ndarray  # (N, 3) int8, of the face; 0 if the ray began inside, and without a hit
+    distance: np.ndarray  # (N,) float64, in voxels; with world=True, in units of the scene
+    voxel: np.ndarray  # (N, 3) int64, the low corner of the hit cell in voxels; -1 without a hit
+    normal: np.ndarray  # (N, 3) int8, of the hit face; 0 without a hit or if the ray began inside
 
     @property
     def hit(self) -> np.ndarray:
-        """(N,) bool"""
+        """True for each ray with a hit, (N,) bool."""
         return np.isfinite(self.distance)
 
 
 def open(path: Path) -> "Dag":
-    """Opens a .vdag file. The file is mapped, not read, so opening takes no time at any size."""
+    """Opens a .vdag file. The file is mapped into memory and read only where a query needs it, so
+    the time to open it does not depend on its size."""
     return Dag(path)
 
 
 class Dag:
     """A finished file. Immutable; any number of threads may query it concurrently.
 
-    Positions are voxels of the finest grid, (N, 3) integers. With a `level` l they are cells of the
-    grid of 2^l per edge; a cell is set if any voxel in it is set. A region is half-open, in cells
-    of the same grid, and may extend beyond it. With world=True, positions, regions and distances
-    are in the units of the scene. `threads` is the number of threads, 0 for all.
+    The methods have these arguments in common:
+
+    points    positions of voxels, (N, 3) integers
+    level     l: positions and regions are in cells of the coarser grid with 2^l cells per edge; a
+              cell is set if any voxel in it is set; by default, the cells are voxels
+    region    six numbers: the low corner x, y, z, which is in the region, and the high corner
+              x, y, z, which is not; it may extend beyond the grid; by default, the complete grid
+    world     True: positions, regions and distances are in world space, in the units of the scene
+    threads   number of threads; 0 means all cores
     """
 
     def __init__(self, path: Path) -> None:
@@ -87,32 +94,42 @@ class Dag:
 
     @property
     def bounds(self) -> np.ndarray:
-        """The low and the high corner of the grid in the units of the scene, (2, 3)."""
+        """The low and the high corner of the grid in the units of the scene, (2, 3) float64."""
         low = np.array(self._dag.origin)
         return np.stack([low, low + self._dag.edge])
 
     @property
     def levels(self) -> list[dict[str, int]]:
-        """Nodes and bytes of each level of the DAG, from the root's level to the bricks' level."""
+        """A dict with "level", "nodes" and "bytes" for each level of the DAG, from the root's level
+        to the level of the bricks, which are nodes of 4 x 4 x 4 voxels."""
         return [
             {"level": level, "nodes": nodes, "bytes": size}
             for level, (nodes, size) in enumerate(self._dag.levels())
         ]
 
     def to_world(self, positions: Any, level: Optional[int] = None) -> np.ndarray:
-        """Converts grid positions to scene positions; the center of voxel v is at v + 0.5."""
+        """Converts positions in the grid to positions in the scene, float64. `positions` may have
+        fractions: v is the low corner of voxel v, and v + 0.5 its center."""
         size = self._dag.edge / (1 << self._levels(level))
         return np.asarray(self._dag.origin) + np.asarray(positions, np.float64) * size
 
     def to_voxel(self, points: Any, level: Optional[int] = None) -> np.ndarray:
-        """The voxel or cell that contains each point of the scene, int64; may be outside the grid.
+        """Returns the voxel or cell that contains each point of the scene, int64 in the shape of
+        `points`. It may be outside the grid.
 
-        A cell contains its low corner as to_world() computes it, within the rounding of doubles."""
+        For the low corner of a cell, as to_world() returns it, the result is this cell: errors from
+        the rounding of doubles are corrected."""
         values = np.asarray(points, np.float64)
-        if not np.all(np.isfinite(values)):
-            raise Error("a point is not finite: expected finite coordinates", "invalid_input")
         if values.ndim == 0 or values.shape[-1] != 3:
             raise Error(f"the points are an array {values.shape}: expected (N, 3)", "invalid_input")
+        finite = np.isfinite(values).all(axis=-1)
+        if not np.all(finite):
+            index = np.argwhere(~finite)[0].tolist()
+            raise Error(
+                f"points{index or ''} is {values[tuple(index)].tolist()}: "
+                "expected finite coordinates",
+                "invalid_input",
+            )
         cells = np.empty(values.shape, np.int64)
         self._dag.world_to_cells(
             np.ascontiguousarray(values.reshape(-1, 3)), self._levels(level), cells.reshape(-1, 3)
@@ -122,7 +139,7 @@ class Dag:
     def lookup(
         self, points: Any, level: Optional[int] = None, *, world: bool = False, threads: int = 1
     ) -> np.ndarray:
-        """True for each set voxel, (N,) bool; False outside the grid."""
+        """Returns whether each voxel or cell is set, (N,) bool; False outside the grid."""
         positions = self._positions(points, level, world)
         found = np.empty(len(positions), np.bool_)
         self._dag.lookup(
@@ -141,9 +158,10 @@ class Dag:
         threads: int = 1,
     ) -> Hits:
         """Returns the first set voxel on each ray. Origins and directions are (N, 3); one of them
-        may be a single row for all rays. Directions may have any length.
+        may be a single row for all rays. Directions may have any length except 0.
 
-        Rays stop at cells with an edge of `stop_size` voxels; 1 stops at voxels.
+        Set voxels farther than `max_distance` from the origin are not found. A ray stops at the
+        first set cell whose edge is at most `stop_size` voxels, so 1 stops at single voxels.
         """
         starts = _rows(origins, np.float64, "origins")
         ways = _rows(directions, np.float64, "directions")
@@ -169,7 +187,8 @@ class Dag:
     def dense(
         self, region: Optional[Region] = None, level: Optional[int] = None, *, world: bool = False
     ) -> np.ndarray:
-        """The cells of a region as an array of bool, indexed [x, y, z] from its low corner."""
+        """Returns the cells of a region as an array of bool: the element [x, y, z] is True if the
+        cell at the region's low corner + (x, y, z) is set."""
         low, high = self._region(region, level, world)
         cells = np.empty([max(0, b - a) for a, b in zip(low, high)], np.bool_)
         self._dag.dense(low, high, self._levels(level), cells.view(np.uint8))
@@ -232,36 +251,37 @@ class Dag:
     def colors(
         self, points: Any, level: Optional[int] = None, *, world: bool = False
     ) -> np.ndarray:
-        """The color of each cell, (N, 3) uint8, sRGB; 0 where none is set.
+        """Returns the color of each cell, (N, 3) uint8, sRGB; 0 for a cell that is not set.
 
-        If a cell is finer than the color grid, it has the attributes of the coarser cell that
-        contains it. Raises Error if the file has no colors. alphas(), normals() and
-        materials() follow the same rules."""
+        The color grid is the finest grid with attributes. A smaller cell has the color of the color
+        grid's cell that contains it. Raises Error if the file has no colors. alphas(), normals()
+        and materials() follow the same rules."""
         return self._values("color", points, level, world)
 
     def alphas(
         self, points: Any, level: Optional[int] = None, *, world: bool = False
     ) -> np.ndarray:
-        """The alpha of each cell, (N,) uint8; 0 where none is set."""
+        """Returns the alpha of each cell, (N,) uint8, linear; 0 for a cell that is not set."""
         return self._values("alpha", points, level, world)
 
     def normals(
         self, points: Any, level: Optional[int] = None, *, world: bool = False
     ) -> np.ndarray:
-        """The normal of each cell, (N, 3) float32, of length 1; 0 where none is set."""
+        """Returns the normal of each cell, (N, 3) float32, of length 1; 0 for a cell that is not
+        set."""
         return self._values("normal", points, level, world)
 
     def materials(
         self, points: Any, level: Optional[int] = None, *, world: bool = False
     ) -> np.ndarray:
-        """The material of each cell, (N,) int64, an index into material_names; -1 where none is
-        set."""
+        """Returns the material of each cell, (N,) int64, an index into material_names; -1 for a
+        cell that is not set."""
         return self._values("material", points, level, world)
 
     def count(
         self, region: Optional[Region] = None, level: Optional[int] = None, *, world: bool = False
     ) -> int:
-        """The exact number of set cells in a region."""
+        """Returns the exact number of set cells in a region."""
         low, high = self._region(region, level, world)
         return self._dag.count(low, high, self._levels(level))
 
@@ -269,10 +289,10 @@ class Dag:
         self, points: Any, max_distance: float = np.inf, *, threads: int = 1
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns the set voxel nearest to each voxel, (N, 3) int64, and the distances between the
-        centers.
+        centers, (N,) float64, in voxels.
 
-        Among equally near voxels, returns the first in Morton order. If none is found, the voxel
-        is -1 and the distance is infinite."""
+        Among equally near voxels, returns the first in Morton order. If no set voxel is within
+        `max_distance`, the voxel is -1 and the distance is infinite."""
         positions = self._positions(points, None, False)
         voxels = np.empty_like(positions)
         distances = np.empty(len(positions))
@@ -340,7 +360,8 @@ class Dag:
 
 
 def _rows(values: Any, dtype: Any, what: str) -> np.ndarray:
-    """An array (N, 3) of `dtype`, contiguous."""
+    """Returns the argument `what` as a contiguous array (N, 3) of `dtype`. A single row x, y, z is
+    allowed. Raises Error for another shape, or for an array whose dtype must not be converted."""
     array = np.asarray(values)
     if array.ndim == 1 and array.shape == (3,):
         array = array.reshape(1, 3)
@@ -348,10 +369,16 @@ def _rows(values: Any, dtype: Any, what: str) -> np.ndarray:
         raise Error(f"the {what} are an array {array.shape}: expected (N, 3)", "invalid_input")
     if dtype == np.int64 and array.dtype.kind not in "iu":
         raise Error(
-            f"the {what} are {array.dtype}: expected integers, or world=True", "invalid_input"
+            f"{what} has the dtype {array.dtype}: expected an integer dtype, int8 to int64 or "
+            "uint8 to uint64 (a float dtype requires world=True)",
+            "invalid_input",
         )
     if array.dtype.kind not in "fiu":
-        raise Error(f"the {what} are {array.dtype}: expected numbers", "invalid_input")
+        raise Error(
+            f"{what} has the dtype {array.dtype}: expected a float dtype, such as float64, or an "
+            "integer dtype, int8 to int64 or uint8 to uint64",
+            "invalid_input",
+        )
     if dtype == np.int64 and array.dtype == np.uint64 and (array >> np.uint64(63)).any():
         raise Error(f"the {what} are over 2^63: expected smaller coordinates", "invalid_input")
     return np.ascontiguousarray(array, dtype=dtype)

@@ -1,4 +1,4 @@
-"""Derives files from finished files: extracts, and the formats of other programs."""
+"""Makes files from finished .vdag files: extracts, and exports to formats of other programs."""
 
 import json
 import os
@@ -24,11 +24,17 @@ def extract(
     force: bool = False,
     progress: Optional[Progress] = None,
 ) -> dict[str, Any]:
-    """Writes a region of a .vdag file, or a coarser level of it, or both, as a .vdag file.
+    """Writes a part of a .vdag file as a new .vdag file: a region, a coarser grid, or a region of a
+    coarser grid.
 
-    region, level, world  as in Dag
-    crop                  make the smallest octree cube around the region the new grid
+    path, output          the .vdag file to read, and the .vdag file to write
+    region, level, world  the part to write, as in Dag
+    crop                  make the smallest octree-aligned cube around the region the new grid
+    memory                limit of the memory in bytes, or text such as "8GiB"; by default half of
+                          the machine's memory
+    threads               number of threads; 0 means all cores
     force                 replace an existing output
+    progress              as in build()
 
     Returns counts, bounds and the SHA-256 of the new file. Raises Error.
     """
@@ -68,9 +74,17 @@ def export(
 ) -> dict[str, Any]:
     """Writes a .vdag file, or a part of it, in the format of another program (docs/export.md).
 
-    Includes colors if the file and the format have them, unless `gray` is True.
-    `to` is one of export_formats(). Returns the written files, their bytes, the voxels, and
-    notes on how to open them. Raises Error.
+    path, output          the .vdag file to read, and the file to write
+    to                    the format, one of export_formats()
+    region, level, world  the part to write, as in Dag
+    memory                limit of the memory in bytes, or text such as "8GiB"; by default half of
+                          the machine's memory
+    gray                  leave out the colors that the file may have
+    force                 replace existing files
+    progress              as in build()
+
+    Returns a dict: "files", the written files; "bytes", their total size; "voxels", the number of
+    voxels; "notes", sentences on how to use the files. Raises Error.
     """
     path, output = path_text(path), path_text(output)
     files = _native.export_paths(to, output)
@@ -87,7 +101,7 @@ def export(
 
 
 def export_formats() -> dict[str, str]:
-    """The formats of export() and a description of each."""
+    """Returns the names of the formats of export(), with a description of each."""
     return dict(_native.export_formats())
 
 

@@ -1,4 +1,4 @@
-"""The exception of this package, and the type of its paths."""
+"""The exception of this package, and checks of arguments that several functions have."""
 
 import operator
 import os
@@ -10,7 +10,7 @@ _MAX_THREADS = 1024
 
 
 class Error(Exception):
-    """The problem, the place and the expectation.
+    """An error of this package. The text names the problem, the place and the expected value.
 
     `code` is one of the names in docs/errors.md, such as "invalid_input", "corrupt" or "no_space".
     """
@@ -20,12 +20,12 @@ class Error(Exception):
         self.code = code
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickles message and code, so that another process can send the error."""
+        """Lets pickle keep the message and the code, to send the error between processes."""
         return type(self), (str(self), self.code)
 
 
 def path_text(path: Path) -> str:
-    """Returns the path as text, or raises Error if no file can have it."""
+    """Returns a path as text. Raises Error if no file can have this path."""
     text = os.fsdecode(path)
     try:
         os.fsencode(text)
@@ -38,12 +38,12 @@ def path_text(path: Path) -> str:
 
 
 def memory_text(memory: Union[int, str, None]) -> str:
-    """A limit of memory, "" for the default."""
+    """Returns a memory limit in the form that the native module expects; "" is its default."""
     return "" if memory is None else str(memory)
 
 
 def thread_count(threads: int) -> int:
-    """A number of threads, 0 for all."""
+    """Returns `threads` as an int; 0 means all cores. Raises Error if the number is not allowed."""
     if not 0 <= operator.index(threads) <= _MAX_THREADS:
         raise Error(f"threads={threads}: expected 0 (all) to {_MAX_THREADS}", "invalid_input")
     return operator.index(threads)

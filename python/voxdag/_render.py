@@ -1,4 +1,4 @@
-"""Pictures of finished files."""
+"""Renders pictures of finished .vdag files."""
 
 import math
 import operator
@@ -27,18 +27,23 @@ def render(
     threads: int = 0,
     progress: Optional[Progress] = None,
 ) -> np.ndarray:
-    """Returns the picture of `voxdag render`: sRGB, (height, width, 3) uint8.
+    """Renders the same picture as `voxdag render`. Returns it as (height, width, 3) uint8, sRGB.
 
     view             auto, iso, front, back, left, right, top or inside
-    camera, target   two points of the scene, used instead of a view
-    fov              vertical field of view, 1 to 170 degrees
+    camera, target   the camera's position and a point that it looks at, in the units of the
+                     scene; used instead of a view
+    fov              vertical field of view, 1 to 170 degrees; by default chosen by the view, or
+                     50 degrees with a camera
     size             width and height in pixels
     samples          N: N * N samples per pixel, 1 to 8
     gray             leave out the colors that the file may have
-    memory           bytes, or text such as "8GiB"; by default half of the machine's memory. A
-                     picture needs about 66 bytes per pixel; Error if they exceed the limit
+    memory           limit of the memory in bytes, or text such as "8GiB"; by default half of the
+                     machine's memory. A picture takes about 66 bytes per pixel; if this exceeds
+                     the limit, render() raises Error
+    threads          number of threads; 0 means all cores; the pixels do not depend on it
+    progress         as in build()
 
-    The pixels do not depend on threads. Raises Error.
+    Raises Error.
     """
     width, height = _size(size)
     if (camera is None) != (target is None):
@@ -68,7 +73,7 @@ def render(
 
 
 def _number(value: Any) -> float:
-    """Returns NaN if the value is not a number."""
+    """Returns the value as a float; NaN if it is not a number."""
     try:
         return float(value) if np.ndim(value) == 0 and not isinstance(value, str) else math.nan
     except (TypeError, ValueError, OverflowError):
