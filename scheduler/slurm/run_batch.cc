@@ -83,7 +83,7 @@ class TemporaryFolder {
         if (!files_.exists(path + kTemporaryLock)) continue;
         if (const auto lock = files_.try_lock(path + kTemporaryLock)) remove_tree(files_, path);
       } catch (const Error&) {
-        // The folder belongs to another user.
+        // Another task may be removing the folder.
       }
     }
   }

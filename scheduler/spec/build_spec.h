@@ -112,7 +112,7 @@ struct DoesNotFit : Error {
   explicit DoesNotFit(std::string message) : Error(ErrorCode::kNoSpace, std::move(message)) {}
 };
 
-// The outside world of a build.
+// The interfaces to a build's environment: the file system, the progress display and cancellation.
 struct BuildContext {
   FileSystem& files;
   Progress& progress;

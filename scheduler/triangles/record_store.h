@@ -27,7 +27,7 @@ class RecordStore {
   // are written to a file at `spill_path`, which the first such chunk creates.
   RecordStore(FileSystem& files, std::string spill_path, MemoryBudget& share,
               const std::string& what);
-  // Removes the file.
+  // Removes the spill file.
   ~RecordStore();
   RecordStore(const RecordStore&) = delete;
 

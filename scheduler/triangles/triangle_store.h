@@ -59,8 +59,9 @@ class TriangleStore {
   // Returns true if references remain. The caller must then call release() when the bin's artifact
   // is durable.
   virtual bool drop(BinId bin) = 0;
+  // Adds one reference.
   virtual void retain(BinId bin) = 0;
-  // Does nothing for a bin that drop() has freed.
+  // Removes one reference. Does nothing for a bin that drop() has freed.
   virtual void release(BinId bin) = 0;
 
   // Bytes that this run wrote to files.

@@ -108,7 +108,7 @@ struct ColorStage::State {
   template <class T>
   using ByAttributeAndCube = std::vector<std::vector<T>>;
   ByAttributeAndCube<Checksum128> keys;
-  // Positions of the baked records.
+  // Places in the ColorStore of the parts of each cube's records.
   ByAttributeAndCube<std::vector<ColorStore::Place>> parts;
 
   State(const ColorSource& s, const StageContext& c)
