@@ -17,7 +17,8 @@
 
 --cameras takes a file whose lines have a name and the camera options of `voxdag render`, such as
 sponza.txt in this folder. Without it, the script uses named views. Bytes, tiles and steps
-do not depend on the load of the machine; the other figures do, so the load is printed. Needs Playwright, numpy and Pillow.
+do not depend on the load of the machine; the other figures do, so the load is printed. Needs
+Playwright, numpy and Pillow.
 """
 
 import argparse
