@@ -60,8 +60,8 @@ struct Grid {
 
 enum class SnapResult {
   kInside,   // may touch the grid
-  kOutside,  // the bounding box of the triangle misses the grid: dropped and counted
-  kTooFar,   // touches the grid, but a coordinate is beyond kCoordinateLimit: a limit error
+  kOutside,  // the triangle's bounding box misses the grid; a build drops and counts the triangle
+  kTooFar,   // the box touches the grid, but a coordinate exceeds kCoordinateLimit; a build fails
 };
 
 // Snaps vertices, three coordinates each, in place. NaN remains NaN.

@@ -35,7 +35,7 @@ class ImageReader {
   // Max width and height, and max number of pixels. Larger images are refused.
   static constexpr uint32_t kMaxEdge = 65535;
   static constexpr uint64_t kMaxPixels = uint64_t{1} << 28;
-  // Images whose decoder needs more memory are refused.
+  // Images whose decoder needs more bytes of memory are refused.
   static constexpr uint64_t kMaxDecoderBytes = uint64_t{2} << 30;
 
   virtual ~ImageReader() = default;
@@ -56,7 +56,8 @@ class ImageReader {
   int bits_ = 8;
 };
 
-// With kSize, only the image's size can be read. No memory for rows is allocated.
+// With kSize, only the image's size can be read. The reader then does not allocate the memory for
+// decoding a JPEG or for all rows of an interlaced PNG.
 enum class ImageUse { kPixels, kSize };
 
 // Opens an image and reads its header. The source must outlive the reader. Throws BrokenImage,
