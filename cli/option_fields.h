@@ -75,8 +75,8 @@ class OptionDeclarer {
   std::map<std::string, Option> options_;
 };
 
-// Returns work(). Error messages contain the name of the option, such as "--color-resolution",
-// instead of the name of the field.
+// Returns work(). Converts a FieldError to an Error whose message has the name of the option, such
+// as "--color-resolution", instead of the name of the field.
 auto with_option_names(const auto& work) {
   try {
     return work();

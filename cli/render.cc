@@ -98,8 +98,8 @@ void check_outputs(const RenderCommand& command, FileSystem& files) {
   depth.check(files, command.input, [](const ReadableFile&) { return false; });
 }
 
-// Throws Error before any work is done if a picture of the requested size does not fit in the
-// memory.
+// Throws Error{kOutOfMemory}, before any work is done, if a picture or depth map of the requested
+// size exceeds --memory.
 void check_memory(const RenderCommand& command) {
   const uint64_t limit = memory_limit(command.memory);
   // The picture is written and freed before the depth map is computed. So the two are never in

@@ -17,8 +17,9 @@ std::string lower_case(std::string_view name) {
   return lower;
 }
 
-// Adds a header that requests bodies without compression, unless the caller sets this header. Newer
-// versions of httplib would otherwise request compression.
+// Converts headers to httplib's type. Unless the caller sets Accept-Encoding, adds this header with
+// the value "identity", because newer versions of httplib would otherwise request compressed
+// bodies.
 httplib::Headers to_httplib(const HeaderMap& headers) {
   httplib::Headers all(headers.begin(), headers.end());
   if (all.find("Accept-Encoding") == all.end()) all.emplace("Accept-Encoding", "identity");

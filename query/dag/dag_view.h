@@ -24,7 +24,8 @@ namespace voxdag::query {
 
 class DagView {
  public:
-  // The words of a level. `wide`: pointers into this level take two words, low half first.
+  // The 32-bit words of a level, in the layout of the global file (docs/format.md). If `wide` is
+  // true, a pointer to a node of this level takes two words, low half first.
   struct Level {
     std::span<const uint32_t> words;
     bool wide = false;
@@ -38,8 +39,8 @@ class DagView {
   uint32_t grid_levels() const { return grid_levels_; }
   // Returns the words of the level at `depth`, 0 to L - 2. The DAG must not be empty.
   const Level& level(uint32_t depth) const { return levels_[depth]; }
-  // Prefetches the node or brick at this word offset of the level at `depth`. Does nothing if the
-  // level has no such word.
+  // Requests that the CPU loads the node or brick at this word offset of the level at `depth` into
+  // its cache. Does nothing if the level has no such word.
   void prefetch(uint32_t depth, uint64_t offset) const {
     const std::span<const uint32_t> words = levels_[depth].words;
     if (offset < words.size()) __builtin_prefetch(words.data() + offset);

@@ -38,7 +38,8 @@ struct ExportFormat {
 // Returns the formats that this build of voxdag supports. A format that needs a missing library is
 // absent.
 std::span<const ExportFormat> export_formats();
-// Throws Error{kInvalidInput} with the list of all names if no format has this name.
+// Returns the format with this name. If no format has it, throws Error{kInvalidInput} with the list
+// of all names.
 const ExportFormat& export_format(const std::string& name);
 // Returns the names of all files of an export. Throws Error{kInvalidInput} if `output` does not
 // have the suffix that the format needs.

@@ -44,8 +44,8 @@ std::string coarser_options(const ExportJob& job, uint32_t grid_levels) {
 
 void refuse_size(const ExportJob& job, const std::string& problem,
                  const std::function<bool(uint32_t grid_levels)>& fits, ErrorCode code) {
-  // Starts with the coarsest grid. A grid that does not fit may be very large, and this order
-  // visits only one such grid.
+  // Tries the coarsest grid first, then finer ones. Testing a grid that does not fit may take long,
+  // and in this order only one such grid is tested.
   uint32_t end = kBrickLevels;
   {
     ExportStage stage(job, "find a level that fits", job.selection.grid_levels - end, "levels");

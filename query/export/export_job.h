@@ -93,7 +93,8 @@ Selection coarser(const Selection& selection, uint32_t grid_levels);
 // also "--region", in cells of that grid, if only a part is selected.
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
-// Publishes the files. Throws instead if a part of the input could not be read.
+// Publishes the files and returns their total size in bytes. If a part of the input could not be
+// read (WatchedFile), throws Error{kIo} instead.
 inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> written) {
   job.watched.check_readable();
   return ExportFile::publish(written);
@@ -127,17 +128,18 @@ class CellLimit {
   std::optional<LevelCells> cells_;  // only for a complete file, if the memory can hold them
 };
 
-// Returns count_voxels() of the job's selection. If this is over `limit`, throws Error{kLimit} like
-// refuse_size(), with `reason` as the explanation. Throws Error{kInvalidInput} for an empty
-// selection.
+// Returns the number of set cells of the job's selection. If this number is over `limit`, throws
+// Error{kLimit} like refuse_size(). `reason` begins the message's explanation of the limit, such as
+// "readers of PLY take". Throws Error{kInvalidInput} for a selection without set cells.
 uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string& reason);
 
 [[noreturn]] void refuse_empty(const ExportJob& job);
 
-// Throws Error{kCorrupt} unless `written` equals `expected`, which is the number of voxels in the
-// file's header or from an earlier count.
+// Throws Error{kCorrupt} unless `written`, the number of voxels that a writer has found, equals
+// `expected`, the number of voxels in the file's header or from an earlier count.
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
-// Returns the color of a selected cell. Throws Error{kCorrupt}.
+// Returns the color of a selected cell, which must be set. Throws Error{kCorrupt} if it has no
+// color.
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
                                  const std::array<int64_t, 3>& cell);
 

@@ -38,8 +38,9 @@ struct GlbBrick {
   uint64_t mask = 0;
 };
 
-// A rectangle of faces perpendicular to an axis: at the coordinate `plane` of this axis, over [u0,
-// u1) x [v0, v1) of the next two axes.
+// A rectangle of faces perpendicular to `axis`. `plane` is the coordinate of the faces on this
+// axis. The rectangle extends from u0 to u1 on the next axis, and from v0 to v1 on the axis after
+// that; z is followed by x. All coordinates are in cells.
 struct GlbQuad {
   uint32_t plane = 0, u0 = 0, v0 = 0, u1 = 0, v1 = 0;
   bool upward : 1 = false;  // the faces look along the axis, not against it
@@ -50,7 +51,7 @@ static_assert(sizeof(GlbQuad) == 24);
 
 class GlbSurface {
  public:
-  // Stops searching as soon as there are more than `max_quads` rectangles.
+  // Finds the rectangles of the surface. Stops as soon as there are more than `max_quads`.
   GlbSurface(const ExportJob& job, uint64_t max_quads)
       : job_(job), max_quads_(max_quads), colors_(job.file) {
     const uint64_t count = count_bricks();
@@ -170,8 +171,9 @@ class GlbSurface {
     return color_of_cell(job_, colors_, cell);
   }
 
-  // Divides each row into the longest runs of one color along u, and merges a run with an equal run
-  // of the previous row.
+  // Makes rectangles of sorted faces. Divides each row, which is the faces of one plane and one v,
+  // into the longest runs of one color. If the previous row has a run with the same color, u0 and
+  // u1, the run extends that run's rectangle; otherwise it begins a new rectangle.
   void merge(const std::vector<uint64_t>& faces, uint8_t axis, bool upward) {
     std::vector<size_t> row, previous;  // rectangles of the current row and of the previous row
     size_t candidate = 0;

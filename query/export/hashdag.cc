@@ -25,9 +25,9 @@ constexpr uint64_t kMaxCount = uint64_t{1} << 24;  // limit of the number above 
 constexpr uint32_t kGray = 0xffb0b0b0;             // A, B, G, R
 constexpr uint64_t kHashDagHeaderBytes = 6 * sizeof(double) + sizeof(uint32_t) + sizeof(uint64_t);
 
-// Number of levels whose voxel counts are in the color file. A node of level L - 7 encloses at most
-// 128^3 voxels, so its count always fits above the mask. HashDAG supports up to ten such top
-// levels, which are enough for L = 17.
+// Returns the number of top levels, whose voxel counts are in the color file. A node of level L - 7
+// encloses at most 128^3 voxels, so its count always fits in the 24 bits above the mask. HashDAG
+// supports up to ten top levels, which are enough for L = 17.
 uint32_t top_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels > 7 ? grid_levels - 7 : 1, 1, 10);
 }

@@ -34,8 +34,8 @@ class SelectedDag {
   uint64_t word_count() const;
   DagView view() const;
 
-  // Upper bounds of the DAG's size on a coarser grid. On such a grid, bricks are made from the
-  // nodes two levels above the grid's cells.
+  // Upper bounds of the size that the DAG would have on a coarser grid. On such a grid, bricks are
+  // made from the nodes two levels above the grid's cells.
   struct Size {
     uint64_t words = 0, nodes = 0, bricks = 0;  // nodes without the bricks
   };

@@ -55,10 +55,11 @@ struct ExtractReport {
 // grid. The cube has at least 4 cells per edge.
 Cube crop_cube(const Selection& selection);
 
-// Writes spec.output, which gets its final name when it is complete. Temporary files are in a
-// folder next to the output, which is removed at the end, also after an error. If the process is
-// killed, the next extract with the same output removes the folder. Throws Error: kCorrupt for a
-// damaged file, kNoSpace, kOutOfMemory, kCanceled, and the errors of LockedOutputs.
+// Writes the selected part of `file` to spec.output, which gets its final name when it is complete.
+// Temporary files are in a folder next to the output, which is removed at the end, also after an
+// error. If the process is killed, the next extract with the same output removes the folder. Throws
+// Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the errors of
+// LockedOutputs.
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel);
 

@@ -30,7 +30,8 @@ class CheckedReader {
   // kBlockBytes bytes. Throws Error{kCorrupt} for a block that fails its checksum.
   void read(uint32_t level, uint64_t first, std::span<uint32_t> words, std::span<std::byte> block);
 
-  // Verifies the checksum blocks that contain these bytes of the file, as read() does.
+  // Verifies the checksum blocks that contain `bytes` bytes from the file offset `begin` on, as
+  // read() does.
   void check(uint64_t begin, uint64_t bytes, std::span<std::byte> block);
 
   static constexpr uint64_t kBlockBytes = CheckedBlocks::kBlockBytes;
@@ -67,8 +68,8 @@ class NodeReader {
 
   // Returns the node, valid until the next call.
   voxdag_reader::Node node(uint32_t level, uint64_t offset);
-  // Calls visit(node, words) for each wanted node. `words` begins with the node's words and
-  // contains all of them. `wanted` must be in the order of the offsets.
+  // Calls visit(node, words) for each wanted node. `words` begins at the node's first word and
+  // contains at least all words of the node. `wanted` must be sorted by the offsets.
   template <class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Visit&& visit) {
     for_each(
@@ -79,8 +80,9 @@ class NodeReader {
   template <class Ahead, class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Ahead&& ahead, Visit&& visit);
 
-  // Returns the node or brick at the beginning of `words`; `offset` is its offset in the level.
-  // Throws Error{kCorrupt} if no node can begin there.
+  // Return the node or the mask of the brick at the beginning of `words`. `offset`, its word offset
+  // in the level, is only for the error message. Throw Error{kCorrupt} if no node or brick can
+  // begin there.
   voxdag_reader::Node parse_node(uint32_t level, uint64_t offset,
                                  std::span<const uint32_t> words) const;
   uint64_t parse_brick(uint64_t offset, std::span<const uint32_t> words) const;

@@ -9,7 +9,8 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kNodesBetweenChecks = 4096;  // checks of the cancel token
-// Expected number of new nodes in the level below, per node: half of the average for surfaces.
+// Number of nodes in the level below for which memory is reserved, per node. It is half of the
+// average for surfaces.
 constexpr uint64_t kExpectedChildren = 2;
 constexpr uint64_t kPrefetchAhead = 8;  // nodes
 
@@ -100,8 +101,8 @@ void PartBuilder::read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below,
   nodes.release_entries();
 }
 
-// Reads the file's nodes from which bricks are made, with all their children. Cells outside the
-// region are removed later.
+// Reads the file's nodes from which bricks of a coarser grid are made, and adds all their children
+// to `below`. build_bricks() removes cells outside the region later.
 void PartBuilder::read_all_children(uint32_t level, PartLevel& nodes, PartLevel& below,
                                     Children& children) {
   read(level, nodes, below, children, [&](uint64_t index, const voxdag_reader::Node& node) {
@@ -127,8 +128,8 @@ PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
   return cells;
 }
 
-// Returns the masks of the bricks of the selected grid. The masks still contain cells outside the
-// region.
+// Returns the masks of the bricks of the selected grid. build_bricks() later removes their cells
+// outside the region.
 PooledArray<uint64_t> PartBuilder::read_bricks(PartLevel& bricks) {
   PooledArray<uint64_t> masks(memory_, bricks.size());
   if (selection_.grid_levels == file_.grid_levels()) {

@@ -39,7 +39,8 @@ uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
 // Number of regions that are encoded together before they are written.
 constexpr size_t kBatchRegions = 32;
 
-// A cube of the file that has set voxels. `code` is its Morton code among the cubes of its level.
+// A cube of a level of the file that has set voxels. `code` is the Morton code of the cube's
+// position in its level.
 struct PlacedCube {
   uint64_t code = 0;
   uint64_t content = 0;  // see DagView
@@ -75,7 +76,7 @@ class ResidentPages {
   }
 
  private:
-  // Memory that the system may load for one access to a page that is not in memory.
+  // Number of bytes that the system may load for one access to a page that is not in memory.
   static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
   static constexpr uint64_t kMinVisits = 512;  // 32 MiB
   const voxdag_reader::File& file_;
@@ -105,7 +106,8 @@ class PartColors {
   // Returns the file's level whose cubes are the regions of the part's tier `tier`.
   uint32_t region_level(uint32_t tier) const { return finest_of(tier) - depth_of(tier); }
 
-  // Verifies the checksums of all data that is needed to find nodes and colors.
+  // Verifies the checksums of the data with which nodes and colors are found: the DAG's levels, the
+  // directories of the regions and the list of names.
   void check_index() {
     std::vector<std::byte> block(CheckedReader::kBlockBytes);
     for (uint32_t l = 0; l <= std::min(finest_, file_.brick_level()); ++l) {
@@ -124,7 +126,7 @@ class PartColors {
                     list_bytes(section_.names()), block);
   }
 
-  // Calls visit(cube) for each region of the finest tier, in Morton order.
+  // Calls visit(cube) for the cube of each region in the part's finest tier, in Morton order.
   template <class Visit>
   void for_each_region(const Visit& visit) const {
     const auto place = [&](const auto& self, uint32_t level, const PlacedCube& cube) -> void {
@@ -237,7 +239,7 @@ class PartColors {
       if (children.has(i)) walk(level + 1, child(level, cube, children, i), target, visit);
   }
 
-  // True if the encoded region can be copied, because the file has a region with the same bytes.
+  // True if the part's region at `code` can be copied, because the file has the same region.
   bool is_copied(uint32_t tier, uint64_t code) const {
     const uint32_t finest = finest_of(tier);
     if (finest > section_.color_levels()) return false;

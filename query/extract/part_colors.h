@@ -44,7 +44,8 @@ struct ColoredPart {
   const Cube& crop;                 // the new grid: the complete grid or a cube around the region
 };
 
-// Returns the levels of the part's color grid, from 2 to the levels of the part's grid.
+// Returns the number of levels of the part's color grid: at least 2, at most the number of levels
+// of the part's grid.
 uint32_t part_color_levels(const ColoredPart& part, Attribute attribute);
 
 // Writes the attribute to `out`, in which the levels must be complete. Throws Error{kCorrupt} for a

@@ -16,7 +16,8 @@ uint64_t digit_of(const WantedNode& node, int shift) {
   return node.offset >> shift & (kDigits - 1);
 }
 
-// Sorts the nodes by one digit of their offsets and writes them to `to`. The sort is stable.
+// Sorts the nodes by one digit of their offsets and writes them to `to`: a step of a radix sort.
+// The digit is the kDigitBits bits from bit `shift` up. The sort is stable.
 void sort_by_digit(std::span<const WantedNode> from, WantedNode* to, int shift) {
   uint64_t next[kDigits] = {};
   for (const WantedNode& node : from) ++next[digit_of(node, shift)];

@@ -66,7 +66,8 @@ class PartLevel {
                             uint64_t{position[2]} << 2 * kAxisBits});
   }
 
-  // All nodes, sorted by their offsets. No node may be added after the call of sort().
+  // All nodes, sorted by their offsets. A node's `index` is its number. No node may be added after
+  // the call of sort(), which frees the hash table.
   struct Sorted {
     PooledArray<WantedNode> nodes;
     uint64_t count = 0;

@@ -47,7 +47,8 @@ void for_each_batch(unsigned threads, size_t items, const Body& body) {
   });
 }
 
-// Makes rays with directions of length 1. Computes two numbers per operation, because otherwise the
+// Fills `rays`, with directions scaled to length 1. Throws Error{kInvalidInput} for numbers that
+// are not finite and for directions of 0. Processes two rays per operation, because otherwise the
 // divisions would take longer than the walk of the rays through large cells.
 void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
                Ray* rays) {
@@ -133,15 +134,16 @@ constexpr size_t kManyQueries = size_t{1} << 14;
 // of 2 MiB, and for a file that is larger than memory.
 void DagFile::State::prepare_for_queries(size_t count) {
   if (count < kManyQueries || file->file_bytes() > default_memory()) return;
-  // This is only a request: pages already in memory keep their size, and not every system supports
-  // huge pages for files.
+  // The system may ignore this request: pages already in memory keep their size, and not every
+  // system supports huge pages for files.
   std::call_once(huge_pages, [&] {
     madvise(const_cast<unsigned char*>(file->data()), file->file_bytes(), MADV_HUGEPAGE);
   });
 }
 
-// Returns the table of the top cells; null after only a few queries. Also returns null if the top
-// levels are damaged: then each descent from the root reports the damage that it finds.
+// Returns the table of the top cells. `points` is the number of lookups that will use the table.
+// Returns null until there were kManyQueries lookups, and if the top levels are damaged. In the
+// second case, the descents begin at the root, and each reports the damage that it finds.
 const TopCells* DagFile::State::top_cells(size_t points) {
   if ((points_looked_up += points) < kManyQueries || !TopCells::serve(view, view.grid_levels()))
     return nullptr;

@@ -15,7 +15,7 @@
 
 namespace voxdag::query {
 
-// Counts the cells of one grid. Immutable after construction; safe to use from several threads.
+// Counts the set cells of one grid. Immutable after construction; safe to use from several threads.
 class NodeCounts {
  public:
   // Stores the counts, which take 8 bytes per node above the bricks, and 2 bits per word of these

@@ -63,8 +63,8 @@ struct PacketJob {
   Level levels[kMaxLevels];
   uint32_t grid_levels = 0, leaf_depth = 0;
 
-  // The rays. The signs of their directions are equal, and the rays are mirrored so that the
-  // directions are positive.
+  // The rays of one packet. On each axis, the directions of all rays have the same sign. The bits
+  // of `mirror` are the axes on which the rays are mirrored: 4 for x, 2 for y, 1 for z.
   int mirror = 0;
   double t_min = 0, t_max = 0;
   alignas(64) double origin[3][kPacketRays], inverse[3][kPacketRays];

@@ -24,7 +24,7 @@
 namespace voxdag::query {
 namespace {
 
-// Table of child masks: of[mirror][mask] is `mask` with the children in mirrored order.
+// A table that mirrors child masks: bit i of `mask` is bit i ^ mirror of of[mirror][mask].
 struct MirroredMasks {
   uint8_t of[8][256] = {};
   constexpr MirroredMasks() {
@@ -87,7 +87,8 @@ class PacketWalk {
 #endif
   VOXDAG_INLINE static Int4 all(int32_t number) { return Int4{number, number, number, number}; }
 
-  // Computes bounds of the origins and of the inverse directions of all rays.
+  // Computes bounds of the origins and of the inverse directions of the job's rays whose bits are
+  // set in `rays`.
   VOXDAG_INLINE void bound(uint64_t rays) {
     Four lows[6], highs[6];
     for (Four& low : lows) low = Four::of(std::numeric_limits<double>::infinity());
@@ -428,8 +429,8 @@ class PacketWalk {
   PacketJob& job_;
   const uint8_t (&mirrored_)[256];
   const uint32_t brick_depth_;
-  // The rays that descend separately, as bits and as a list, and the number of cells that wait for
-  // them.
+  // The rays that descend separately: as bits in under_way_, and as the first count_ elements of
+  // list_. waiting_ is the number of cells that wait for these rays.
   uint64_t under_way_ = 0;
   uint8_t list_[kPacketRays];
   int count_ = 0, waiting_ = 0;

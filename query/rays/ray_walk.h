@@ -56,8 +56,9 @@ class RayWalk {
   // empty. Throws Error{kCorrupt} for a damaged DAG.
   bool run(double t_min, Hit& hit);
   // Walks from a cell that has children. `low` is the cell's low corner, mirrored like the ray, and
-  // `size` the cell's edge, both in voxels. `axis` is the axis of the face through which the ray
-  // enters the cell at `t`; -1 if the ray begins in the cell.
+  // `size` the cell's edge, both in voxels. `content` is the cell's content as in DagView. `axis`
+  // is the axis of the face through which the ray enters the cell at `t`; -1 if the ray begins in
+  // the cell.
   bool run_below(uint32_t depth, const double (&low)[3], double size, uint64_t content,
                  const double (&out)[3], double t, int axis, Hit& hit) {
     axis_ = axis;

@@ -61,10 +61,12 @@ Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
   if (m.weight < 3) return face;
   Vec c[3];
   for (int i = 0; i < 3; ++i) c[i] = m.second[i] - m.first * (m.first[i] / m.weight);
-  // Regularization. Without it, the adjugate of a perfect plane's covariance could be zero.
+  // Normalizes the covariance and adds a small multiple of the identity matrix. Without it, the
+  // adjugate of a perfect plane's covariance could be zero.
   const double trace = c[0][0] + c[1][1] + c[2][2];
   for (int i = 0; i < 3; ++i) c[i] = c[i] * (1 / trace), c[i][i] += 1e-3;
-  // Inverse iteration. It uses the adjugate, which equals the inverse matrix up to a factor.
+  // Finds the eigenvector by inverse iteration, with the adjugate instead of the inverse matrix.
+  // The two differ only by a factor.
   const Vec adjugate[3] = {cross(c[1], c[2]), cross(c[2], c[0]), cross(c[0], c[1])};
   const double scale = 1 / (adjugate[0][0] + adjugate[1][1] + adjugate[2][2]);
   Vec n = toward_eye;

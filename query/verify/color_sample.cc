@@ -20,7 +20,8 @@ using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 
 struct SampledRegion {
-  // One region per attribute of the file, in the order of attribute numbers.
+  // The region in the file for each attribute, at index_of(attribute). Attributes that the file
+  // does not have are unused.
   std::array<ColorRegion, std::size(kAttributeTable)> stored;
   Cube cube;
   std::vector<FixedSurface> surfaces;  // surfaces that may touch the region
@@ -122,7 +123,8 @@ class RegionComparison {
                    const std::vector<ColoredCell>& cells, const std::vector<CellValues>& values)
       : file_(file), grid_(grid), cells_(cells), values_(values) {}
 
-  // True if all bytes are equal. Throws Error{kCorrupt} if the values differ too much.
+  // Returns true if all bytes are equal. Throws Error{kCorrupt} if they differ, unless they are
+  // colors that are similar (kMinSamplePsnr).
   bool compare(const SampledRegion& region, Attribute attribute) const {
     const ColorRegion& stored = region.stored[index_of(attribute)];
     const EncodedRegion baked = encode(region.cube, attribute, stored);

@@ -16,8 +16,9 @@ using Lab = std::array<uint32_t, 3>;
 // bytes differ by about 16, and sums of squares over 2^32 voxels fit in 64 bits.
 constexpr double kLabScale = 4096, kLabShift = 1;
 
-// Newton's method with a start value above the root. The fixed number of steps is enough for the
-// cube roots of all 16-bit light values, which are at least 1 / 65.
+// Returns the cube root, by Newton's method with a start value above the root. The fixed number of
+// steps is enough for all 16-bit light values, because their cube roots, except 0, are at least 1 /
+// 65.
 double cube_root(double x) {
   double root = 1;
   for (int i = 0; i < 24; ++i) root = (2 * root + x / (root * root)) / 3;
@@ -137,8 +138,8 @@ Rgb ColorPalette::mean_of(const Bin& bin) {
   return {channel(0), channel(1), channel(2)};
 }
 
-// Gives each bin the palette color that is nearest to the bin, which may be the mean of another box
-// than the bin's. On ties, the first palette color is used.
+// Gives each bin the palette color that is nearest to the bin. This color may be the mean of a box
+// that does not contain the bin. If several colors are equally near, the first one is used.
 void ColorPalette::assign_bins() {
   std::vector<Lab> labs;
   for (const Rgb color : colors_) labs.push_back(oklab_of(color));
