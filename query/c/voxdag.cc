@@ -47,7 +47,7 @@ voxdag_status status_of(voxdag::ErrorCode code) {
     case voxdag::ErrorCode::kLimit:
       return VOXDAG_LIMIT;
     default:
-      return VOXDAG_INTERNAL;  // other codes cannot occur: queries use no disk space and no device
+      return VOXDAG_INTERNAL;  // no query throws other codes: they concern disk space and devices
   }
 }
 

@@ -38,9 +38,9 @@ typedef enum voxdag_status {
   VOXDAG_CORRUPT,             /* the file is damaged, or not a .vdag file */
   VOXDAG_UNSUPPORTED_VERSION, /* the file has a later format version */
   VOXDAG_IO,                  /* the system failed to read the file */
-  VOXDAG_OUT_OF_MEMORY,
-  VOXDAG_LIMIT,
-  VOXDAG_INTERNAL /* a defect of this library */
+  VOXDAG_OUT_OF_MEMORY,       /* the machine has too little memory for the answer */
+  VOXDAG_LIMIT,               /* a limit of the format is exceeded; the message names it */
+  VOXDAG_INTERNAL             /* a defect of this library */
 } voxdag_status;
 
 /* An open file. */

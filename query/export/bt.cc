@@ -1,8 +1,8 @@
 // Writes OctoMap's binary octree (Hornung et al. 2013): a text header, then two bytes for each
 // inner node, depth first. Bits 2i and 2i + 1 of these bytes describe child i: 01 (only bit 2i is
-// set) is free, 10 occupied, 11 an inner node, 00 unknown. The child at (x, y, z) has the index x +
-// 2y + 4z. This code does not use the OctoMap library, because the library would store all nodes in
-// memory.
+// set) is free, 10 occupied, 11 an inner node, 00 unknown. Child x + 2y + 4z is the child at (x, y,
+// z), where each coordinate is 0 or 1. This code does not use the OctoMap library, because the
+// library would store all nodes in memory.
 //
 // The octree has 16 levels, and the origin of its coordinates is in its middle. The low corner of
 // voxdag's grid is at this origin. Only a grid of 2^16 cells fills the complete octree; its low

@@ -43,7 +43,7 @@ struct GlbBrick {
 // that; z is followed by x. All coordinates are in cells.
 struct GlbQuad {
   uint32_t plane = 0, u0 = 0, v0 = 0, u1 = 0, v1 = 0;
-  bool upward : 1 = false;  // the faces look along the axis, not against it
+  bool upward : 1 = false;  // the outer side of the faces is toward larger coordinates
   uint8_t axis : 2 = 0;
   voxdag_reader::Rgb color;
 };

@@ -81,8 +81,8 @@ class Extraction {
     shape_ = {.grid_levels = report_.grid.levels, .hash_bits = file.hash_bits()};
   }
 
-  // Writes the output. Calls before_publish() before the output gets its final name; if it throws,
-  // the output is discarded.
+  // Writes the output. Calls before_publish() before the output gets its final name. If
+  // before_publish() throws, the output is discarded.
   ExtractReport run(const std::function<void()>& before_publish) {
     if (spec_.crop && crop_.level == 0 &&
         spec_.selection.region != whole_grid(spec_.selection.grid_levels))

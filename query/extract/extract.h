@@ -6,8 +6,8 @@
 // necessary part of the DAG, builds the DAG of the selected cells in memory (part_builder.h), and
 // writes it as an artifact. A cube that does not fit in the thread's share of the memory is divided
 // into its children. The merge then makes the file from the artifacts, as in a build. So the memory
-// budget limits the memory, whatever the size of the file. If the file has colors or other
-// attributes, they are written last (part_colors.h).
+// depends on the budget, not on the size of the file. If the file has colors or other attributes,
+// they are written last (part_colors.h).
 #pragma once
 
 #include <cstdint>

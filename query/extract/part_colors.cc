@@ -274,8 +274,8 @@ class PartColors {
       const ColorTier& tier = section_.tier(t);
       const bool is_coarser = t > 0 && tier.finest_level < level;
       if (is_coarser || tier.region_level > finest) continue;
-      // The regions with colors of the cube are the ones with Morton codes from `begin` to `end` -
-      // 1.
+      // The regions with colors of the cube are the ones with Morton codes from `begin` on and
+      // below `end`.
       const bool within = tier.region_level < level;
       const uint32_t between = within ? level - tier.region_level : tier.region_level - level;
       const uint64_t begin = within ? code >> 3 * between : code << 3 * between;

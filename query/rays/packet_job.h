@@ -38,8 +38,8 @@ struct RayDescent {
   // `depth`.
   uint32_t open;
   int32_t first_waiting, last_waiting;   // -1 if no cell waits
-  uint8_t left[kMaxLevels];              // children still to be visited, mirrored; by depth
-  const uint32_t* children[kMaxLevels];  // words after the mask of the path's nodes; by depth
+  uint8_t left[kMaxLevels];              // by depth: mirrored mask of the children to visit
+  const uint32_t* children[kMaxLevels];  // by depth: words of the path's node after its mask
 };
 
 // A ray's origin, and the inverse of each component of its direction. The fourth number of each
@@ -53,7 +53,7 @@ struct PacketJob {
   struct Level {
     const uint32_t* words;
     uint64_t count;
-    uint64_t any_node;  // below this offset, even the largest node fits in the level
+    uint64_t any_node;  // a node of any size at a smaller offset is inside the level
     bool wide_children;
   };
 
@@ -70,8 +70,8 @@ struct PacketJob {
   alignas(64) double origin[3][kPacketRays], inverse[3][kPacketRays];
   PacketRay rays[kPacketRays];
   Hit* hits = nullptr;
-  uint64_t found = 0;   // rays with a hit; hits[ray] is the ray's first cell
-  uint64_t single = 0;  // rays that must be cast separately
+  uint64_t found = 0;   // bits of the rays with a hit; hits[ray] is the first cell
+  uint64_t single = 0;  // bits of the rays that RayCaster must cast
 
   // Rays that descend separately are collected and then advanced together in a round. A round
   // begins when this number of cells is loading or waiting: the number of cells that memory can

@@ -27,7 +27,7 @@ struct Cone {
 
 struct Hit {
   double t = 0;
-  uint32_t depth = 0;    // levels below the root; the edge of the cell is R / 2^depth voxels
+  uint32_t depth = 0;    // levels below the root; the cell's edge is the grid's edge / 2^depth
   int64_t cell[3] = {};  // position of the cell, in units of its edge
   // Axis of the normal of the face through which the ray entered the cell; -1 if the ray began in
   // the cell.
