@@ -66,7 +66,8 @@ class Upload {
     return bytes;
   }
 
-  // True if the server has the complete file. Sets offset_ to the number of bytes on the server.
+  // Requests the state of the upload from the server. Returns true if the server has the complete
+  // file; otherwise sets offset_ to the number of bytes that the server has.
   bool is_complete() {
     offset_ = 0;
     try {

@@ -73,7 +73,8 @@ class ExportStage {
   uint64_t pending_ = 0, calls_ = 0;
 };
 
-// Checks for cancellation from time to time in a long loop without an ExportStage.
+// Checks for cancellation in a long loop without an ExportStage, once per kCallsPerCheck calls of
+// advance().
 class CancelCheck {
  public:
   explicit CancelCheck(const ExportJob& job) : job_(job) {}

@@ -87,7 +87,7 @@ VoxChunk palette_chunk(std::span<const voxdag_reader::Rgb> colors) {
 // maps each color to a palette index.
 class VoxColors {
  public:
-  // `voxels`: number of voxels to be added.
+  // `voxels`: number of voxels whose colors are collected, for the progress.
   VoxColors(const ExportJob& job, uint64_t voxels) : job_(job) {
     if (!job.has_colors) return;
     palette_.emplace(job.budget);
@@ -210,7 +210,7 @@ class VoxWriter {
     voxels_.reserve(dag.node_count(depth_));
     uint64_t total = 0;
     for_each_model_node(dag, [&](uint64_t offset) {
-      // Stops counting when the voxels alone, of 4 bytes each, are already too large.
+      // Stops counting when the voxels alone, which take 4 bytes each, exceed the maximum size.
       if (4 * total > kMaxVoxBytes) return;
       models_[offset] = static_cast<uint32_t>(voxels_.size());
       uint64_t voxels = 0;

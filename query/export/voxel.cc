@@ -1,10 +1,11 @@
 // Writes PlayCanvas voxels, version 1.1: NAME.voxel.json describes NAME.voxel.bin, which has the
 // words of the nodes, then two words for each leaf of 4^3 voxels. A node is one word:
 //     interior node   child mask << 24 | index of the first of its children's words
-//     mixed leaf      index of the leaf                         (bit = 16z + 4y + x)
-//     all solid       0xff000000                                (index 0 is never a child)
-// The child at (x, y, z) has the index 4z + 2y + x. A node stores only the index of its children's
-// words, so equal nodes share their children.
+//     mixed leaf      number of the leaf, from 0
+//     all solid       0xff000000
+// Bit 16z + 4y + x of a leaf is the voxel (x, y, z). Bit 4z + 2y + x of a child mask is the child
+// at (x, y, z). An interior node never has the word 0xff000000, because word 0 is the root, not a
+// child. A node stores only the index of its children's words, so equal nodes share their children.
 #include <array>
 #include <cstdio>
 

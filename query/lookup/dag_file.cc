@@ -92,9 +92,9 @@ RayHit as_ray_hit(const Hit& hit, const Ray& ray) {
   return out;
 }
 
-// Returns the largest integer whose square root, as a double, is at most `distance`. Returns 2^62
-// for 2^31 and more: no distance between a point and a voxel, of at most kMaxCoordinate each,
-// exceeds this.
+// Returns the largest integer whose square root, as a double, is at most `distance`. For a distance
+// of 2^31 or more, returns 2^62: coordinates are at most kMaxCoordinate, so no squared distance is
+// larger.
 uint64_t largest_square(double distance) {
   if (distance >= 0x1p31) return uint64_t{1} << 62;
   auto square = static_cast<uint64_t>(distance * distance);
@@ -207,8 +207,8 @@ const std::vector<std::string>& DagFile::material_names() const {
 
 namespace {
 
-// A file, the section of the file that stores an attribute, and the text of the error if the file
-// does not have the attribute.
+// A file, and the section of the file that stores an attribute. `expected` describes a file with
+// the attribute, for the error message if this file does not have the attribute.
 struct AttributeSource {
   const voxdag_reader::File& file;
   const voxdag_reader::ColorSection& section;

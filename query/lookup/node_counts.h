@@ -1,5 +1,5 @@
-// Counts the set cells in regions. For speed, the number of set cells below each node is stored:
-// one 64-bit number per node, computed from the bricks up.
+// Counts the set cells in regions. To make this fast, the number of set cells below each node is
+// computed once, from the bricks up, and stored: one 64-bit number per node.
 #pragma once
 
 #include <cstdint>

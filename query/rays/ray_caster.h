@@ -1,10 +1,10 @@
 // Casts rays through the DAG.
 //
 // A ray descends the octree from the root. At each node it descends into the children that it
-// crosses, nearest first. A ray's parameter at a plane is computed from the plane's integer
-// coordinate, always by the same formula. So the cells on both sides of a plane agree to the last
-// bit, and there are no cracks at any resolution. The ray is mirrored so that its direction is
-// positive on every axis.
+// crosses, nearest first. A ray's parameter t at a plane, its distance from the ray's origin along
+// the ray, is computed from the plane's integer coordinate, always by the same formula. So the
+// cells on both sides of a plane agree to the last bit, and there are no cracks at any resolution.
+// The ray is mirrored so that its direction is positive on every axis.
 //
 // A ray widens into a cone: if an occupied cell is no larger than the width of the cone at the
 // cell, the cell counts as solid. So the descent ends where finer cells would be invisible.

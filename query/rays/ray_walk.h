@@ -17,7 +17,7 @@
 
 namespace voxdag::query {
 
-// A ray whose direction is positive on every axis.
+// A copy of a ray, mirrored so that its direction is positive on every axis.
 struct MirroredRay {
   // Components of a direction with a smaller magnitude are replaced by this number, because their
   // inverse could be infinite.

@@ -20,9 +20,11 @@ class Lighting {
   Lighting(const DagView& dag, const Box& box, const Camera& camera,
            const std::vector<SurfaceHit>& seen);
 
-  // Returns red, green and blue light from the sky, with `rays` rays. An open sky gives about 1.
+  // Returns red, green and blue light from the sky, as the mean over `rays` rays. An open sky gives
+  // about 1.
   Vec sky_light(const SurfaceHit& surface, int rays, const Sampler& sampler) const;
-  // Returns 1 if the surface sees the sampled point of the sun, else 0.
+  // Returns 1 if nothing is between the surface and the point of the sun that `sampler` chooses,
+  // else 0.
   double sun_light(const SurfaceHit& surface, const Sampler& sampler) const;
   // Returns the light of sun and sky (red, green and blue) that a surface with this albedo and
   // normal reflects.

@@ -16,9 +16,9 @@ namespace {
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}
-  // Returns a number from (0, 1).
+  // Returns a random number between 0 and 1, exclusive.
   double unit() { return (static_cast<double>(engine_() >> 11) + 0.5) * 0x1p-53; }
-  // Returns a number from [0, count).
+  // Returns a random number from 0 to count - 1.
   int64_t below(int64_t count) {
     return static_cast<int64_t>(engine_() % static_cast<uint64_t>(count));
   }

@@ -43,7 +43,7 @@ class ColorPalette {
     uint64_t count = 0;
     std::array<uint64_t, 3> sums{};
   };
-  // A point of a box: a bin of colors, in Oklab.
+  // A bin as a point in Oklab. `bin` is the index of the bin.
   struct Point {
     std::array<uint32_t, 3> lab{};
     uint32_t bin = 0;

@@ -121,13 +121,13 @@ class FileBuffer : public std::streambuf {
   std::exception_ptr failure_;
 };
 
+struct VdbSize {
+  uint64_t voxels = 0, bytes = 0;
+};
 // Counts the voxels of a selection, and the bytes of memory for its trees, whose nodes have the
 // sizes `node`. Stops when there are more than `limit` bytes. Bricks are visited in Morton order,
 // so all bricks of a node come one after the other and the node is counted once. Calls
 // steps.advance() for each brick.
-struct VdbSize {
-  uint64_t voxels = 0, bytes = 0;
-};
 template <class Steps>
 VdbSize vdb_size(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
                  uint64_t limit, Steps steps) {
