@@ -52,8 +52,8 @@ export async function upload(file, name, onProgress, signal) {
   }
 }
 
-// Resolves to the offset at which the upload resumes. If this browser sent the bytes that the
-// service has, this is their number; otherwise it is 0.
+// Resolves to the offset at which the upload resumes: the number of bytes that the service has, or
+// 0 if this browser did not send them.
 async function resumeOffset(path, file, name, signal) {
   if (localStorage.getItem(keyOf(name)) !== fingerprintOf(file)) return 0;
   try {

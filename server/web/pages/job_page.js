@@ -171,8 +171,8 @@ class JobPage {
         fact("Finished", ...when(job.finished_at)));
   }
 
-  // Shows the buttons for the job's state. If a button had the keyboard focus, a button has it
-  // afterwards.
+  // Shows the buttons for the job's state. If an old button had the keyboard focus, moves the focus
+  // to the first new button.
   showActions() {
     const hadFocus = this.places.actions.contains(document.activeElement);
     clear(this.places.actions, actions(this.job, () => this.reload()));
@@ -193,7 +193,7 @@ class JobPage {
   }
 }
 
-// Returns a box with the last error, unless the job has succeeded since.
+// Returns a box with the job's last error; null without an error or if the job has succeeded since.
 function errorBox(job) {
   if (!job.error || job.state === "succeeded") return null;
   const problem = {code: job.error.code, detail: job.error.message};

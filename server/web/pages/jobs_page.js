@@ -1,5 +1,5 @@
 // The list of all jobs, newest first, with a filter by state. The list is refreshed every two
-// seconds while any job is active.
+// seconds while a job on the page has not ended, and every eight seconds otherwise.
 
 import {getJson, poll} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";

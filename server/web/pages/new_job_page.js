@@ -29,7 +29,7 @@ class NewJob {
       }
     });
     this.error = h("div", {role: "alert"});
-    // The key is the same until the form changes, so that a double click creates only one job.
+    // The idempotency key changes only with the form, so that a double click creates only one job.
     this.key = randomKey();
     this.submit = h("button", {class: "primary"}, "Submit");
     this.element =

@@ -27,9 +27,9 @@ const kNoPicture = "There is no picture yet.";
 const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
-  // `renderer` may start later. `places` are the elements {panel, tools, status}. With `bookmarks`,
-  // the fragment of the page's address is updated when the camera moves. The viewer ends when
-  // `signal` aborts.
+  // `renderer` need not be started yet. `places` are the elements {panel, tools, status}. With
+  // `bookmarks`, the fragment of the page's address is updated when the camera moves. The viewer
+  // ends when `signal` aborts.
   constructor({canvas, renderer, manifest, places, fileName, signal, bookmarks = true}) {
     Object.assign(this, {canvas, renderer, manifest, places, fileName, signal, bookmarks});
     this.space = new GridSpace(manifest);
@@ -94,8 +94,8 @@ export class Viewer {
     return camera ? this.fit(this.space.placement(camera)) : this.camera.get();
   }
 
-  // The placement shows the scene in a wide picture. In a narrow picture, the camera is moved away
-  // until the scene also fits.
+  // Returns `placement`, which shows the scene in a picture of 16:9. In a narrower picture, an eye
+  // outside the grid is moved away from its target until the scene fits.
   fit(placement) {
     const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
     const outside = placement.eye.some((c) => c < 0 || c > this.manifest.resolution);
@@ -168,7 +168,7 @@ export class Viewer {
     this.schedule();
   }
 
-  // Draws until the picture is complete and nothing moves.
+  // Requests a frame. More frames follow until the picture is complete and nothing moves.
   schedule() {
     if (this.scheduled || this.signal.aborted) return;
     this.scheduled = true;
@@ -220,7 +220,7 @@ export class Viewer {
     this.seen.distance = Math.max(1, hit ? hit.distance : free);
   }
 
-  // Sets those options of the picture that `changed` contains: {level, wire, clip, occlusion,
+  // Sets the options of the picture that `changed` contains: any of {level, wire, clip, occlusion,
   // shadows, color}.
   setOptions(changed) {
     Object.assign(this.options, changed);
@@ -244,7 +244,8 @@ export class Viewer {
   }
   flyToText(text) {
     const placement = parseCameraText(this.space, text, this.camera.fovDegrees);
-    new Camera(this.manifest.resolution).set(placement);  // throws if this shows no picture
+    new Camera(this.manifest.resolution)
+        .set(placement);  // throws if the placement shows no picture
     this.flyTo(placement);
   }
 

@@ -47,7 +47,8 @@ export class Camera {
     return distance(this.eye, this.target);
   }
 
-  // If the camera looks straight down, the up axis is -z.
+  // Returns the axes of the picture, {forward, right, up}. If the camera looks straight down, the
+  // up axis is -z.
   axes() {
     return pictureAxes(subtract(this.target, this.eye));
   }
@@ -94,7 +95,8 @@ export class Camera {
     this.eye = eye;
   }
 
-  // Scales the distances of eye and target from `point`. The point keeps its place in the picture.
+  // Multiplies the distances of eye and target from `point` by `factor`, within limits. The point
+  // keeps its place in the picture.
   zoomAbout(point, factor) {
     const least =
         kMinDistance / Math.min(this.distance, Math.max(distance(this.eye, point), kMinDistance));

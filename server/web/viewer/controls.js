@@ -11,8 +11,8 @@ const kDoubleTimeMs = 350;
 const kDoubleMovePx = 24;
 const kWheelZoom = 0.0016;  // per pixel of the wheel
 const kAnchorTimeMs = 400;  // wheel events within this time zoom to the same point
-const kLinePx = 20;
-const kRecentMs = 80;  // inertia starts with the mean speed in this last part of a drag
+const kLinePx = 20;         // pixels per line of a wheel event
+const kRecentMs = 80;       // inertia starts with the mean speed in this last part of a drag
 
 export class Controls {
   // handlers: pick(x, y) -> Promise of a position or null; onClick(x, y); onDoubleClick(x, y);

@@ -16,14 +16,14 @@ function begin(canvas) {
   const passes = gl.isContextLost() ? null : new Passes(gl),
         mine = {source, manifest, beginMs, gl, passes};
   begun = mine;
-  // If the context is already lost here, it is restored later, but without the programs compiled
-  // here.
+  // If the context is lost before the renderer takes it, its programs are lost too. The renderer
+  // then compiles them again.
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     mine.passes = null;
     if (passes) passes.disposed = true;
   });
-  // A program that fails is reported by the next compile().
+  // The error of a program is ignored here, because the renderer's call of compile() reports it.
   manifest.then(({colors}) => mine.passes?.compile(Boolean(colors))).catch(() => {});
 }
 

@@ -59,7 +59,7 @@ async function finishedJob() {
     if (job?.state === "succeeded") return job;
     const isLive = job !== null && !hasEnded(job.state);
     if (draws && isLive) {
-      // The page of a result, with a growing partial result.
+      // Shows the growing partial result until the job has a result.
       const {watchJob} = await import("./running/running_job.js");
       try {
         if (await watchJob({
@@ -137,7 +137,8 @@ function cameraOfAddress() {
       .join("");
 }
 
-// Without WebGL2, shows the picture of the job, if there is one.
+// Shows that the browser has no WebGL2, the preview of the job if it has one, and a command that
+// renders a picture.
 async function showWithoutWebgl(reason, job) {
   const content = [
     h("h1", {}, "This browser cannot draw the scene."),
@@ -170,7 +171,8 @@ async function start() {
   let renderer = null;
   hideMessage();
   try {
-    // The manifest is requested first: the context and the programs take longer than the manifest.
+    // The manifest is requested first, so that it arrives while the context and the programs are
+    // created.
     const arrives = (begun?.manifest ?? source.manifest()).then((manifest) => {
       if (!job) showTitle(manifest.name ?? "voxdag view");
       return manifest;
@@ -201,7 +203,8 @@ async function start() {
   window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
 }
 
-// Shows the tools. The panel keeps its state when the next picture of the job replaces this one.
+// Shows the tools. When the result of a job replaces its partial result, the panel remains open or
+// closed.
 function showTools() {
   const before =
       place("tools").querySelector('[data-tool="togglePanel"]')?.getAttribute("aria-expanded");

@@ -101,7 +101,7 @@ export class PickView {
     this.onChange();
   }
 
-  // The buttons are replaced; the new one gets the focus.
+  // toggleMeasure() replaces the buttons, so this function moves the focus to the new button.
   toggleMeasureAndFocus() {
     this.toggleMeasure();
     this.element.querySelector('[data-action="measure"]')?.focus();

@@ -1,6 +1,6 @@
-// Fetches the manifest, tiles and color pages of one file. For a given digest they never change. So
-// the browser's cache answers repeated requests for single tiles, and for the first batches when a
-// page is reloaded. Other batches depend on the view and are seldom requested twice.
+// Fetches the manifest, tiles and color pages of one file. The tiles and pages of a digest never
+// change. So the browser's cache answers repeated requests for single tiles, and for the first
+// batches when a page is reloaded. Later batches depend on the view and are seldom requested twice.
 
 const kTimeoutMs = 30000;   // maximum time between two bytes; a complete answer may take longer
 const kMaxBytes = 2 ** 26;  // maximum size of an answer; the largest possible batch has 44 MB
@@ -41,8 +41,8 @@ export class TileError extends Error {
   get isMissing() {
     return this.status === 404 || this.status === 409;
   }
-  // True if the requested items may be the cause of the error, although the answer does not state
-  // this.
+  // True if the requested items may have caused the error, although the answer does not report
+  // that.
   get isSuspicious() {
     return this.status === 200 || (this.status === 500 && this.isTransient);
   }
@@ -109,7 +109,7 @@ export class TileSource {
       if (info.digest !== this.info.digest) this.ended = kReplaced;
       this.lookedMs = performance.now();
     } catch (error) {
-      // A proxy does not send these codes.
+      // These codes come from the service, not from a proxy in front of it.
       if (error.code === "not_found" || error.code === "conflict") this.ended = kRemoved;
     }
   }

@@ -8,7 +8,7 @@ import {countText, hasEnded} from "../lib/format.js";
 const kWidth = 480, kHeight = 460;
 const kMargin = 10;
 const kCos = Math.cos(Math.PI / 6), kSin = 0.5;
-const kGlowMs = 900;
+const kGlowMs = 900;          // duration of the highlight of a new cube
 const kMinOutlinePx = 5;      // smaller cubes are drawn without outlines
 const kMaxGlowing = 6000;     // with more cubes nothing glows, because each frame draws all cubes
 const kMinIntervalMs = 1000;  // between two requests
@@ -94,8 +94,8 @@ export class CubesView {
     this.canvas.hidden = this.turner.hidden = empty;
   }
 
-  // Explains why there are no cubes. An ended job gets cubes only if it is retried. `known`: the
-  // service has reported that the job has no cubes.
+  // Shows why there are no cubes. `ended`: the job has ended, and gets cubes only if it is retried.
+  // `known`: the service has reported that the job has no cubes.
   sayWhyEmpty(ended, known) {
     if (this.resolution !== undefined) return;
     const end = known ? "There are no subvolumes." : "";
@@ -242,7 +242,8 @@ export class CubesView {
   }
 }
 
-// A coordinate has up to 17 bits, so a double represents the 51 bits of the code exactly.
+// Returns the Morton code of a position. A coordinate has up to 17 bits, so a double represents the
+// 51 bits of the code exactly.
 function morton(x, y, z) {
   let code = 0;
   for (let bit = 2 ** 16; bit >= 1; bit /= 2) {

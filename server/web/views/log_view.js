@@ -4,8 +4,8 @@ import {poll, request} from "../lib/api.js";
 import {h, setText} from "../lib/dom.js";
 
 const kMaxBytes = 32768;
-const kLiveMs = 2500;
-const kIdleMs = 20000;
+const kLiveMs = 2500;   // between two requests while the job has not ended
+const kIdleMs = 20000;  // between two requests after the job has ended
 
 export class LogView {
   constructor(path, signal) {

@@ -1,4 +1,5 @@
-// The subvolumes that a running job has built. Each is drawn from the coarse brick of its voxels.
+// Shows the subvolumes that a running job has built. Each subvolume is drawn as the occupied cells
+// of its coarse brick.
 
 import {CubesView} from "./cubes_view.js";
 
@@ -15,8 +16,8 @@ export class PartialView extends CubesView {
     this.element.hidden = ended;
   }
 
-  // `cubes` comes from the service. Each entry is [x, y, z, edge, low, high]; low and high are the
-  // halves of a brick.
+  // `cubes` comes from the service. Each entry is [x, y, z, edge, low, high]: the low corner and
+  // edge of a subvolume in voxels, and the low and high 32 bits of its coarse brick.
   show({resolution, built, total, cubes}) {
     const parts = cubes.length <= kMaxDetailed ? cubes.flatMap(cellsOf) :
                                                  cubes.map(([x, y, z, edge]) => [x, y, z, edge, 1]);
@@ -24,8 +25,8 @@ export class PartialView extends CubesView {
   }
 }
 
-// Returns the occupied ones of the 64 cells of a cube. The bits are in the order of a brick
-// (docs/format.md).
+// Returns the occupied cells of a subvolume, each as a built cube for CubesView.show(). The 64 bits
+// of a coarse brick are in the order of docs/format.md.
 function cellsOf([x, y, z, edge, ...halves]) {
   const cells = [];
   for (let bit = 0; bit < 64; ++bit) {

@@ -8,8 +8,8 @@ const kLeft = 52, kRight = 8, kTop = 10, kBottom = 24;
 const kWindowS = 2;       // minimum duration over which a rate is averaged
 const kMaxSamples = 600;  // if there are more samples, every other sample is dropped
 
-// Job id -> series by stage. They are kept, so that they are shown again when the user returns to a
-// job.
+// Maps a job's id to the series of its stages. The series are kept until the browser leaves the
+// dashboard, so that they are shown again when the user returns to a job.
 const seriesByJob = new Map();
 
 export class RatePlot {
@@ -121,7 +121,8 @@ function plot(samples) {
   ];
 }
 
-// Returns 0 and two to five round steps, of which the last reaches `max`.
+// Returns the values of the ticks: 0 and two to four multiples of a round step. The last value is
+// at least `max`.
 function roundTicks(max) {
   const power = 10 ** Math.floor(Math.log10(max));
   const step = [0.25, 0.5, 1, 2, 5].map((factor) => factor * power).find((size) => max / size <= 4);

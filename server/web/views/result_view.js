@@ -12,7 +12,7 @@ export function resultView(place, job, signal) {
   const key = `${job.result.sha256} ${job.preview}`;
   if (place.dataset.key === key && place.firstChild) return;
   if (place.querySelector("canvas.scene") && place.dataset.key?.startsWith(job.result.sha256))
-    return;  // in use
+    return;  // the user explores this result in the embedded viewer
   place.dataset.key = key;
   const r = job.result;
   const saved = 100 * (1 - r.dag_nodes / Math.max(1, r.svo_nodes));
@@ -50,7 +50,7 @@ function cubeText({origin, edge}) {
   return `from ${origin.map(short).join(", ")}, edge ${short(edge)}`;
 }
 
-// Returns the picture, with the ways to explore the result below it.
+// Returns the picture and, below it, the buttons that open the result in a viewer.
 function picture(job, signal) {
   const place = preview(job, signal);
   const error = h("p", {class: "bad", role: "alert"});

@@ -11,7 +11,7 @@ import {meter, problemBox} from "./parts.js";
 const kPageSize = 200;
 
 export class SceneChoice {
-  // `changed` is called when another scene is chosen.
+  // `changed` is called when the user chooses a different scene.
   constructor(signal, changed) {
     this.signal = signal;
     this.changed = changed;
@@ -45,12 +45,14 @@ export class SceneChoice {
                       "In one of the scene folders configured for the service.")));
   }
 
-  // Returns the entered path, or the chosen scene if no path is entered, or "" if none is chosen.
+  // Returns the entered path. Without a path, returns the scenes of a copied job that has several,
+  // or the selected scene; "" if no scene is selected.
   value() {
       return this.path.value.trim() || this.several || this.select.value;
   }
 
-  // Fills the list, and selects the scenes in `chosen`, which are the scenes of an earlier job.
+  // Fills the list of uploaded scenes. Then selects the scenes in `chosen`: the scenes of a copied
+  // job, or a scene that was just uploaded.
   async load(chosen = null) {
       const scenes = [];
       for (let cursor = null, more = true; more; more = cursor !== null) {

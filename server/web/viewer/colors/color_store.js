@@ -8,9 +8,9 @@ import {TilePool} from "../tiles/tile_pool.js";
 
 import {decodePage, kBlockWords, kMoreAt} from "./page_format.js";
 
-const kRecentMs = 1500;
+const kRecentMs = 1500;     // recently used pages remain until kRoundsToKnow readings
 const kFreeShare = 1 / 64;  // share of the pool that is freed when pages are evicted
-const kTableShare = 1 / 5;  // share of the budget
+const kTableShare = 1 / 5;  // share of the budget for the hash table
 const kEntryBytes = 16, kTableWidth = 1024;  // the shaders contain the same table width
 // Entries of the hash table. The pool has at most 2^20 blocks, so half of the entries remain free.
 const kMaxEntries = 2 ** 21;

@@ -3,7 +3,7 @@
 
 import {kCameraSource, kPrecision} from "./ray_shader.js";
 
-// The color state of a pixel, as the passes write and read it.
+// GLSL source: the word with the color of a pixel, which the passes write and read.
 export const kColorState = `
 const uint kColored = 1u << 24;      // the low bits are red, green and blue, as sRGB
 const uint kPageMissing = 1u << 25;  // the color is coarse or absent because a page is missing
@@ -15,7 +15,7 @@ vec3 linear_of(uint color) {
 
 export const kColorSource = `${kColorState}
 uniform usampler2D u_page_texels, u_page_table;
-uniform uint u_page_mask;    // entries of the table - 1
+uniform uint u_page_mask;    // number of entries of the table, minus 1
 uniform int u_color_levels;  // finest level with colors; -1: colors are off
 
 uvec4 page_texel(uint address) {
@@ -31,7 +31,8 @@ uint popcount32(uint x) {
   return ((x + (x >> 4)) & 0x0f0f0f0fu) * 0x01010101u >> 24;
 }
 
-// Returns the page's first block number plus 1, or 0 if the page is not loaded.
+// Returns 1 plus the number of the page's first block (16 texels) in the pool; 0 if the page is not
+// loaded. place: the position of the page on its level.
 uint page_at(int level, ivec3 place) {
   uvec3 key = uvec3(place);
   key.x |= uint(level) << 20;
@@ -70,7 +71,8 @@ uint block_color(uvec4 block, uint i) {
   return color.x | color.y << 8 | color.z << 16;
 }
 
-// Returns the color of a cell by its Morton code within the page; 0 if the cell is not set.
+// Returns the color of the cell with this Morton code in the page; 0 if the cell is empty. first:
+// the address of the page's first texel.
 uint color_in_page(uint first, uint code) {
   uint word = code >> 5, quarter = word >> 2, below = (1u << (code & 31u)) - 1u;
   uvec4 mask = page_texel(first + 1u + quarter);
@@ -96,9 +98,9 @@ uint spread_bits(int x) {
   return uint((x & 1) | (x & 2) << 2 | (x & 4) << 4);
 }
 
-// Returns the color of the cell of 2^scale voxels with this low corner, or of the nearest coarser
-// cell whose page is loaded. If finer cells will replace the cell, a page counts as missing only if
-// the color is much coarser.
+// Returns the color of the cell with this low corner and 2^scale voxels per edge, or of the nearest
+// coarser cell whose page is loaded. Sets kPageMissing if the color is too coarse: by one level, or
+// by three if is_final is false, because finer cells will then replace this cell.
 uint color_of_cell(ivec3 cell, int scale, bool is_final) {
   int wanted = min(u_levels - scale, u_color_levels);
   ivec3 at = cell >> (u_levels - wanted);
@@ -115,9 +117,10 @@ uint color_of_cell(ivec3 cell, int scale, bool is_final) {
 }
 `;
 
-// Writes one texel per block of u_block x u_block pixels. The texel describes a page: x and the
-// level; y; z; and a number. The number is 0 if the block has no page, 1 if the page is used, and
-// otherwise 1 plus the number of pixels that lack the page.
+// Writes one texel per block of u_block x u_block pixels. The texel describes one page of the block
+// in four words: x, with the level in the bits from 20; y; z; and a number. The number is 0 if no
+// page is needed at the chosen pixel, 1 if no pixel of the block lacks a page, and otherwise 1 plus
+// the number of pixels that lack a page.
 export const kColorFeedback = `#version 300 es
 ${kPrecision}${kCameraSource}${kColorState}
 uniform usampler2D u_hits, u_colors;
@@ -126,7 +129,8 @@ uniform int u_levels, u_color_levels, u_block;
 uniform ivec2 u_size, u_sample;
 layout(location = 0) out uvec4 o_page;
 
-// Returns the page of a pixel's color. The hit is computed again and may be in a neighboring page.
+// Returns the page of a pixel's color. The position of the hit is computed again from its t. So it
+// is rounded differently and may be in a neighboring page.
 uvec3 page_of(ivec2 pixel, uvec4 g) {
   vec3 direction = direction_of(vec2(pixel) + 0.5 + u_jitter), p = direction * t_in(g);
   if (axis_in(g) < 3)

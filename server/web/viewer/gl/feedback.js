@@ -1,7 +1,7 @@
 // Decodes a reading of the feedback: the missing tiles, the used tiles, and statistics of the
 // picture.
 
-const kMaxSamples = 4096;  // for the statistics
+const kMaxSamples = 4096;  // texels from which the statistics are computed
 const kHalf = new DataView(new ArrayBuffer(4));
 
 function halfToNumber(bits) {
@@ -20,8 +20,10 @@ function shareOf(sorted, share) {
 }
 
 // Returns
-// {wanted: Map of leaf address -> priority, slots: Set, coarsePixels: width of the largest missing
-//  cell, medianT, nearestT, exposure (null if no surface is seen), stepsMean, steps99}.
+// {wanted: Map from the texels of cut-off nodes whose tiles are missing to priorities,
+//  slots: Set of the slots of used tiles, coarsePixels: width of the widest cell with a missing
+//  tile, medianT, nearestT, exposure (null if no surface is seen), stepsMean, steps99}.
+// The last five values are measured on a sample of the pixels.
 export function readFeedback(words) {
   const wanted = new Map(), slots = new Set(), texels = words.length / 4;
   const stride = Math.ceil(texels / kMaxSamples) | 1, count = Math.ceil(texels / stride);

@@ -52,10 +52,10 @@ export class Passes {
     this.targets = null;
     this.vertexArray = gl.createVertexArray();
     // Starts the compilation of the programs that do not depend on the file. If the browser cannot
-    // report the end of a compilation, this is left to compile(), so that all programs are linked
-    // before the first result is queried.
+    // report the end of a compilation, compile() calls begin() later, so that all programs are
+    // linked before the first result is queried.
     this.begun = this.parallel ? this.begin() : null;
-    this.begun?.catch(() => {});  // compile() reports it
+    this.begun?.catch(() => {});  // compile() reports the error
     this.compiled = null;         // promise of compile()
   }
 
@@ -126,10 +126,10 @@ export class Passes {
     return true;
   }
 
-  // Provides targets for a picture of width x height pixels. This is the size `full` {width,
-  // height} of the canvas, or a smaller size while the camera moves. If a larger size is needed
-  // later, the targets get the full size, so that nothing is allocated when the camera starts or
-  // stops. `colored` is true if the file has colors.
+  // Provides targets for a picture of width x height pixels. The picture has the size of the
+  // canvas, `full` {width, height}, or a smaller size while the camera moves. If a larger size is
+  // needed later, the targets get the full size, so that nothing is allocated when the camera
+  // starts or stops. `colored` is true if the file has colors.
   resize(width, height, full, colored) {
     const {targets} = this,
           isForCanvas = targets?.full.width === full.width && targets.full.height === full.height;
@@ -168,7 +168,7 @@ export class Passes {
       feedback: new Target(
           gl, Math.ceil(full.width / kFeedbackBlock), Math.ceil(full.height / kFeedbackBlock),
           kFeedbackFormats),
-      // Large enough for any size with the matching colorBlock.
+      // Large enough for any size of the picture, with the colorBlock that resize() sets for it.
       colorFeedback: colored ?
           new Target(
               gl, Math.ceil(Math.min(width, across + 4)),
@@ -190,10 +190,10 @@ export class Passes {
         (target) => target !== null);
   }
 
-  // Draws one sample per pixel and accumulates it with the earlier samples; `values.u_frame` is its
-  // number (from 0). Yields between parts of at most `partPixels()` pixels. Returns the reading of
-  // the feedback. The member `colors` of the reading is the reading of the color feedback, which is
-  // ready at the same time; it is null if no colors are shown.
+  // Draws one sample per pixel and accumulates it with the earlier samples; `values.u_frame` is the
+  // number of the sample, from 0. Yields between parts of at most `partPixels()` pixels. Returns
+  // the reading of the feedback. The member `colors` of the reading is the reading of the color
+  // feedback, which is ready at the same time; `colors` is null if no colors are shown.
   * draw(values, partPixels) {
     const {targets} = this, {width, height, hits, light, sky, colors} = targets;
     const all = this.passValues(values);
@@ -290,9 +290,10 @@ export class Passes {
     return reading.take();
   }
 
-  // Returns {place, wanted}. `place` is the best of the 48 positions of the sun: the share of the
-  // last picture's surface that it lights is nearest to `share`. `wanted` maps the leaf address of
-  // each tile that would improve the choice to 1. Call compileLater() first.
+  // Returns {place, wanted}. `place` is one of the 48 positions of the sun: the one where the lit
+  // share of the surfaces in the last picture is nearest to `share`. `wanted` maps the texels of
+  // the cut-off nodes whose missing tiles could change the choice to the priority 1. Call
+  // compileLater() first.
   chooseSun(values, share) {
     const {gl, targets} = this, wanted = new Map();
     const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]),

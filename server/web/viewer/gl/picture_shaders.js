@@ -36,7 +36,7 @@ void main() {
   for (int s = 0; s < 21; ++s) picked_slots[s] = 0u;
 #endif
 #ifdef PICK
-  vec2 point = vec2(0.5);  // center of both pixels; the second has more words of the hit
+  vec2 point = vec2(0.5);  // both pixels cast this ray; the second one writes more words of the hit
 #else
   vec2 point = gl_FragCoord.xy + u_jitter;
 #endif
@@ -99,7 +99,7 @@ vec3 unpack_normal(uint packed_normal) {
 // Source that the passes of light share, for rays that begin at the surface of a pixel.
 const kSurface = `
 uniform usampler2D u_hits;
-uniform ivec2 u_size;        // of the picture, a corner of the targets
+uniform ivec2 u_size;        // size of the picture in the lower left corner of the targets
 uniform vec2 u_jitter;
 uniform int u_frame;         // number of the sample
 
@@ -118,13 +118,14 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
   s.cube = clamp((s.size / max(s.t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
   return s;
 }
-// The start of a ray is beyond the steps that the cells of a slope form.
+// Returns the start of a ray: above the steps that the cells of a slope form, which would block it.
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
 }
-// Weight, 0 to 1, of the floor's shadow where a ray meets the floor below the scene.
-uniform vec2 u_floor;  // distance below the eye, or 0 without a floor; the scene's diagonal
-uniform vec3 u_floor_center; // of the scene, from the eye
+uniform vec2 u_floor;  // x: distance of the floor below the eye, 0: no floor; y: scene's diagonal
+uniform vec3 u_floor_center; // center of the scene, relative to the eye
+// Computes the point where the pixel's ray meets the floor below the scene. Returns the weight, 0
+// to 1, of the shadow there; 0 if the ray does not meet the floor.
 float floor_at(ivec2 pixel, out Surface s) {
   s.direction = direction_of(vec2(pixel) + 0.5 + u_jitter);
   if (u_floor.x <= 0.0 || s.direction.y >= 0.0) return 0.0;
@@ -147,7 +148,7 @@ void set_ray_from(vec3 offset, vec3 direction) {
   set_ray(u_eye_cell + ivec3(whole), p - whole, direction);
 }
 
-// The R2 sequence. Each pixel starts at one of 16 offsets, which differ within every 4 x 4 pixels.
+// Returns a point of the R2 sequence. The 4 x 4 neighboring pixels start at 16 different offsets.
 vec2 sample_pair(ivec2 pixel, int dimension) {
   int place = (pixel.x & 3) * 4 + (pixel.y & 3);
   float n = float(u_frame * 16 + place * 7 % 16);
@@ -157,10 +158,10 @@ vec2 sample_pair(ivec2 pixel, int dimension) {
 `;
 
 const kBlocked = `
-// True if something blocks the light within the reach.
+// True if a cell within the distance reach blocks the light from the direction toward.
 bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out Hit hit) {
-  // In a narrow place the start may be occupied. The path of the camera ray is free, unless the eye
-  // is in an occupied cell.
+  // In a narrow place the start may be in an occupied cell. The second attempt starts on the path
+  // of the camera ray, which is free unless the eye is in an occupied cell.
   for (int attempt = 0; attempt < 2; ++attempt) {
     vec3 start = attempt == 0 ? start_of(s, normal) : s.direction * max(0.0, s.t - 1.5 * s.size);
     set_ray_from(start, toward);
@@ -256,7 +257,7 @@ void main() {
   vec3 a, b;
   basis_around(u_sun, a, b);
   vec2 p = sample_pair(pixel, 1);
-  // A single sample has sharp shadows, because noise disappears only with more samples.
+  // The first sample has sharp shadows, because noise disappears only with more samples.
   float r = u_frame == 0 ? 0.0 : kSunRadius * sqrt(p.x), angle = 2.0 * kPi * p.y;
   vec3 toward = normalize(u_sun + a * (r * cos(angle)) + b * (r * sin(angle)));
   if (is_blocked(s, normal, toward, 1e30, vec2(s.size, kSunWidening), hit)) {
@@ -265,7 +266,7 @@ void main() {
   }
 }`;
 
-// Light from the sky, for one of every 2 x 2 pixels.
+// Computes the light from the sky for one of every 2 x 2 pixels.
 export const kOcclusion = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
 uniform float u_sky_reach;   // distance beyond which nothing occludes the sky
@@ -307,7 +308,7 @@ void main() {
 
 // Writes one texel for each of 48 places of the sun (columns) and each of 40 x 24 probed pixels
 // (rows). Its first word is 0 if the pixel has no surface, 1 if the surface is in shadow, and 2 if
-// it is lit. Its second word is the cut-off node whose missing tile makes the result uncertain.
+// it is lit. Its second word is the cut-off node (0: none) whose missing tile may change this.
 export const kSunPlaces = 48, kSunRows = 960;
 export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
@@ -330,7 +331,7 @@ void main() {
     o_lit = uvec4(1, 0, 0, 0);
     return;
   }
-  // The same detail as in render, which chooses among the same places.
+  // Uses the same detail as query/render, which chooses among the same places.
   bool blocked = is_blocked(s, normal, sun, 1e30, vec2(s.size, 0.004), hit);
   o_lit = uvec4(blocked ? 1u : 2u, blocked ? hit.missing : 0u, 0, 0);
 }`;
@@ -379,14 +380,14 @@ vec3 sky_around(ivec2 pixel, uvec4 g, vec3 normal) {
 }
 `;
 
-// Combines light and color. The result is multiplied by its coverage of the background, which haze
-// reduces. A shadow on the floor is black with a coverage below 1.
+// Combines light and color. The result is premultiplied by its coverage of the background. Haze
+// reduces the coverage of far surfaces. A shadow on the floor is black, with a coverage below 1.
 export const kCombine = `${kVersion}${kCameraSource}${kSky}${kColorState}${kSkyFilter}
 uniform usampler2D u_colors;
-uniform bool u_colored;      // u_colors has colors
+uniform bool u_colored;      // true if u_colors has colors
 uniform sampler2D u_before;
-uniform vec2 u_haze;  // begin, and 1 / the scene's diagonal
-uniform float u_share;  // share of this sample among all so far
+uniform vec2 u_haze;  // x: distance at which haze begins; y: 1 / the scene's diagonal
+uniform float u_share;  // weight of this sample: 1 / number of samples so far; 1: no u_before
 uniform float u_range;       // the brightest light that the target can hold
 uniform vec2 u_floor;
 uniform vec3 u_floor_center;
@@ -423,8 +424,8 @@ void main() {
 
 export const kPresent = `${kVersion}
 uniform sampler2D u_color;
-uniform ivec2 u_size;        // of the picture, a corner of u_color
-uniform vec2 u_extent;       // of the canvas, in pixels
+uniform ivec2 u_size;        // size of the picture in the lower left corner of u_color
+uniform vec2 u_extent;       // size of the canvas in pixels
 uniform float u_exposure;    // includes the range of the target
 out vec4 o_color;
 
@@ -451,10 +452,10 @@ void main() {
   o_color = vec4(srgb(mix(background, lit, color.a)) + (float(order) / 16.0 - 0.47) / 255.0, 1.0);
 }`;
 
-// Writes one texel per block of u_block x u_block pixels. Its words are: the cut-off node of the
-// largest cell whose tile is missing; this cell's width in pixels, and the brightness of a sample;
-// a used tile, and the number of steps of the sample; and the t of the sample. The pixel of the
-// block that is sampled changes with each frame.
+// Writes one texel per block of u_block x u_block pixels. Its words are: the cut-off node (0:
+// none) of the widest cell whose tile is missing; this cell's width in pixels, and the brightness
+// of a sampled pixel; the slot of a used tile, and the number of steps of the pixel's ray; and the
+// ray's t. The sampled pixel changes with each frame.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;
@@ -490,7 +491,7 @@ void main() {
   if (found_in(g)) {
     vec3 normal = unpack_normal(texelFetch(u_normals, at, 0).x);
     vec3 sky = sky_around(at, g, normal);
-    // The exposure is measured for plaster, as in render, so dark colors remain dark.
+    // Like query/render, measures the exposure on plaster, so that dark colors remain dark.
     vec3 light = reflected(kPlaster, normal, sky, texelFetch(u_light, at, 0).x);
     luminance = dot(light, vec3(0.2126, 0.7152, 0.0722));
   }

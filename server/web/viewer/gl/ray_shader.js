@@ -2,10 +2,10 @@
 // query/rays/ray_walk.h.
 //
 // The ray is mirrored so that its direction is positive on every axis. Voxel coordinates are
-// integers, and a ray begins at an integer voxel plus a fraction. The ray's parameter at a plane is
-// always computed by the same formula, time_of, from the difference of two integers. So it is exact
-// to the last step for any grid up to 2^20, wherever the camera is. The cells on both sides of a
-// plane agree to the last bit, so there are no cracks.
+// integers, and a ray begins at an integer voxel plus a fraction. The ray's parameter t at a plane
+// is always computed by the same function, time_of, from the difference of two integers. So its
+// error does not grow along the ray, for any grid up to 2^20 and any position of the camera. The
+// cells on both sides of a plane get the same t to the last bit, so there are no cracks.
 
 export const kPrecision = `
 precision highp float;
@@ -52,7 +52,7 @@ export const kRaySource = `${kPoolSource}
 struct Hit {
   float t;
   int scale;       // the cell has 2^scale voxels per edge
-  int axis;        // of the face that the ray entered by; -1 if it began in the cell
+  int axis;        // axis of the face through which the ray enters; -1: the ray begins in the cell
   uint missing;  // texel of the cut-off node whose tile is missing; 0: none
 };
 
@@ -61,9 +61,9 @@ vec3 ray_shift, ray_inverse;
 uint ray_mirror;
 int step_count = 0;
 uint random_state = 1u;
-uint entered_count = 0u, entered_slot = 0u;  // a random one of the entered tiles
+uint entered_count = 0u, entered_slot = 0u;  // slot of a random tile among all entered tiles
 #ifdef WIRE
-uniform int u_wire_scale;  // of the drawn cubes; -1: none
+uniform int u_wire_scale;  // scale of the cubes whose edges are drawn; -1: none
 uniform float u_wire_width;  // half the width of a line at distance 1
 bool wire = false;
 #endif
@@ -74,7 +74,7 @@ ivec3 hit_cell = ivec3(0);   // low corner of the cell that was hit
 uint picked_slots[21];
 #endif
 
-// A ray that begins at cell + part, in voxels. A smaller component of a direction counts as 0.
+// Begins a ray at cell + part, in voxels. A component of the direction below 1e-18 counts as 1e-18.
 void set_ray(ivec3 cell, vec3 part, vec3 direction) {
   ivec3 negative = ivec3(lessThan(direction, vec3(0)));
   ray_base = cell + negative * ((1 << u_levels) - 2 * cell);
@@ -103,7 +103,7 @@ void note_tile(uint slot) {
 }
 
 #ifdef WIRE
-// True if the ray enters the cell near an edge of the face.
+// Sets wire if the ray enters the cell near an edge of the cell's face.
 void note_wire(ivec3 position, int scale, int axis, float t) {
   if (scale != u_wire_scale || axis < 0) return;
   vec3 inward = (t - time_of(position)) / ray_inverse;
@@ -114,9 +114,10 @@ void note_wire(ivec3 position, int scale, int axis, float t) {
 }
 #endif
 
-// The first occupied cell between t_min and t_max. An occupied cell that is no wider than the cone,
-// which is cone.x + cone.y * t wide, is hit as one cell. So is the finest cell in the coarse brick
-// of a tile that is not loaded.
+// Finds the first occupied cell between t_min and t_max; returns false if no cell is hit. The cone
+// around the ray is cone.x + cone.y * t wide. An occupied cell that is no wider than the cone is
+// hit as one cell, without a descent to finer cells. If a tile is not loaded, the finest cells of
+// its coarse brick are also hit as one cell.
 bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
   int edge = 1 << u_levels;
   ivec3 mirrored = ivec3(ray_mirror >> 2 & 1u, ray_mirror >> 1 & 1u, ray_mirror & 1u);
@@ -135,7 +136,7 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
   uint stack[21];            // at s: the node whose children have 2^s voxels per edge
   uint node = u_root, leaf = 0u, octant = 0u;
   uvec2 brick = uvec2(0);
-  int brick_scale = -1;  // of the brick around the ray; -1: none
+  int brick_scale = -1;  // scale of the brick around the current position; -1: none
   ivec3 position = ivec3(0);
   int scale = u_levels - 1;
   if (u_levels == 2) {
@@ -202,7 +203,8 @@ bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
       position += ivec3(greaterThanEqual(vec3(t), time_of(position + (1 << scale)))) << scale;
       continue;
     }
-    // No component is addressed by a variable: some compilers would move the vector to memory.
+    // No component is indexed by a variable, because some compilers would then move the vector to
+    // memory.
     vec3 next = time_of(position + (1 << scale));
     axis = nearest_axis(next);
     t = min(next.x, min(next.y, next.z));
@@ -232,7 +234,7 @@ export const kCameraSource = `
 uniform ivec3 u_eye_cell;
 uniform vec3 u_eye_part, u_forward, u_right, u_up;
 uniform float u_pixel;       // width of a pixel at distance 1
-uniform vec2 u_center;       // of the picture, in pixels from its lower left corner
+uniform vec2 u_center;       // center of the picture, in pixels from its lower left corner
 
 vec3 direction_of(vec2 point) {
   vec2 p = (point - u_center) * u_pixel;

@@ -8,7 +8,7 @@ import {Passes} from "../gl/passes.js";
 const kDefaultMaxSize = 4096;  // edge of a texture, until a context has reported its own limit
 
 export class GraphicsContext {
-  // `early`: the context that early.js has created for this canvas, or null without one.
+  // `early`: the context that early.js has created for this canvas; null if it has created none.
   // Throws WebGLUnavailable.
   constructor(canvas, early, {onLost, onRestored}) {
     this.canvas = canvas;

@@ -50,7 +50,8 @@ export class Light {
     this.setSun(0);
   }
 
-  // `place` is one of 48: 16 directions at three heights.
+  // Moves the sun to one of 48 positions: `place`, 0 to 47, selects one of 16 directions at one of
+  // three heights.
   setSun(place) {
     const turn = this.turn - 2 * Math.PI * (place % 16) / 16,
           height = 0.65 + 0.25 * Math.floor(place / 16);
@@ -67,8 +68,8 @@ export class Light {
         this.skyReach, Math.max(1, (this.seesFloor(eye) ? 0.35 : 1) * read.medianT),
         this.readings > 0);
     this.hazeStart = toward(this.hazeStart, Math.max(1, read.nearestT), this.readings > 0);
-    // The second reading also sets the exposure directly: the first one measured it before the
-    // reach was known.
+    // The second reading also sets the exposure directly, because the first reading measured it
+    // before the reach was known.
     this.exposure = toward(this.exposure, read.exposure, this.readings > 1);
     this.readings++;
   }

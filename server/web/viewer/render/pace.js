@@ -2,7 +2,7 @@
 // and the resolution while the camera moves.
 
 const kTargetMs = 40;  // time of a frame while the camera moves
-const kPartMs = 120;   // per part of a sample
+const kPartMs = 120;   // time of a part of a sample
 const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // of the internal resolution
 // Limits for lacksFew: missing tiles, and width in pixels of the widest missing cell.
 const kFewTiles = 64, kCoarsePixels = 16;
@@ -48,8 +48,8 @@ export class Pace {
     return Math.max(1, seenMs - this.intervalMs / 2);
   }
 
-  // Takes the observed time of a part that is not the last one. Returns the estimated time on the
-  // GPU.
+  // Takes the observed time of a part that is not the last part of its sample, and adjusts the
+  // number of pixels per part. Returns the estimated time on the GPU.
   partDone(seenMs) {
     const partMs = this.gpuMs(seenMs);
     this.partPixels =
@@ -57,8 +57,9 @@ export class Pace {
     return partMs;
   }
 
-  // Takes the observed time of the last or only part of a picture. `busyMs` is the time of the
-  // other parts. If the frame `counts`, chooses the internal resolution from the total time.
+  // Takes the observed time of the last or only part of a sample. `busyMs` is the sum of partDone()
+  // for the other parts, and `pixels` the number of the sample's pixels. If `counts` is true,
+  // chooses the internal resolution from the total time.
   frameDone(seenMs, busyMs, pixels, counts) {
     const frameMs = busyMs + this.gpuMs(seenMs);
     if (busyMs === 0)

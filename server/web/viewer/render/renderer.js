@@ -27,9 +27,10 @@ export {WebGLUnavailable};
 const kBudgetBytes = 256 << 20, kPhoneBudgetBytes = 64 << 20;
 // Maximum number of canvas pixels. The budget does not include the render targets for these pixels.
 const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;
-const kMovingMs = 180;           // duration of "moving" after the last change of the view
-const kSamples = 16;             // number of samples per pixel of a still picture
-const kFirstPicturePixels = 16;  // in the first picture all missing cells are narrower
+const kMovingMs = 180;  // duration of "moving" after the last change of the view
+const kSamples = 16;    // number of samples per pixel of a still picture
+// A picture counts as the first one if its cells with missing tiles are narrower than this.
+const kFirstPicturePixels = 16;
 
 export class Renderer {
   // `begun`: the context that early.js has created for this canvas, or null. onChange() is called
@@ -164,7 +165,7 @@ export class Renderer {
   }
 
   // Resolves when all tiles for the canvas pixels have arrived and the sun is placed. Inside a
-  // scene, placing the sun needs further tiles, so this does not resolve while the service does not
+  // scene, placing the sun needs further tiles, so the promise waits while the service does not
   // answer.
   complete() {
     if (this.isReady && this.isComplete && this.progress.isFullSize && this.isSunPlaced &&

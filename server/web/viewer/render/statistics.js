@@ -1,10 +1,10 @@
 // Measurements of a renderer, for the panel and for benchmarks.
 
-export const kBlockBytes = 256;  // block size of the pools: the least for a tile or a color page
+export const kBlockBytes = 256;  // block size of the pools; a tile or color page has at least one
 
 export class Statistics {
   constructor(beginMs) {
-    this.beginMs = beginMs;  // of the page
+    this.beginMs = beginMs;  // time at which the page began to load
     this.firstPictureMs = null;
     this.firstPictureBytes = 0;
     this.rays = this.stepsMean = this.steps99 = 0;

@@ -3,7 +3,7 @@
 // tiles are requested, and the search is repeated until no tile is missing or the search makes no
 // progress.
 
-const kLitShare = 0.35;    // of the visible surface
+const kLitShare = 0.35;    // share of the visible surface that the sun should light
 const kMaxIdleTrials = 8;  // consecutive trials that do not reduce the number of missing tiles
 
 export class SunSearch {

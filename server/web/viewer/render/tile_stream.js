@@ -10,7 +10,7 @@ import {TileStore} from "../tiles/tile_store.js";
 
 import {kBlockBytes, mark} from "./statistics.js";
 
-const kMinPoolBytes = 4 << 20;  // of a small file
+const kMinPoolBytes = 4 << 20;  // size of the pool for the smallest file
 const kMaxFirstWaitMs = 400;  // maximum time that the first frame waits for the first view's tiles
 
 export class TileStream {
@@ -80,8 +80,8 @@ export class TileStream {
     this.loader.firstView = null;
   }
 
-  // True while the first frame should wait for the tiles of the first view. A frame drawn with
-  // these tiles is soon complete. A frame drawn without them would only cost time.
+  // True while the first frame should wait for the tiles of the first view. A frame with these
+  // tiles is almost complete. A frame without them would show little and delay the next frame.
   get awaitsFirstTiles() {
     return performance.now() < this.waitUntilMs &&
         (this.loader.firstView !== null || this.rootPointer === undefined);
@@ -155,8 +155,9 @@ export class TileStream {
   }
 }
 
-// Returns the size of the pool. A small file needs less than the budget: in the worst case each
-// voxel has its own path of tiles. The number of voxels is unknown for a DAG that is still growing.
+// Returns the size of the pool in bytes. A small file needs less than the budget: in the worst
+// case, each voxel needs a separate tile at each step from the root to the bricks. For a growing
+// DAG the number of voxels is unknown, so its pool gets the complete budget.
 function poolBudget({voxels, levels, tile_levels: tileLevels}, budgetBytes) {
   const pathBlocks = Math.ceil(levels / tileLevels);
   return Math.min(

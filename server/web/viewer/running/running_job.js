@@ -71,13 +71,13 @@ export async function watchJob({job, place, budgetBytes, showPicture, showTools,
     wires?.dispose();
     banner?.element.remove();
     delete window.voxdagViewer;
-    // Without tiles, because their digest has changed.
+    // Pauses before the caller follows the job again, because the reason for ending may recur.
     if (rests) await sleep(kPauseMs, signal, true);
   }
 }
 
-// Resolves to the manifest; to null if the job is not planned yet, if its files were deleted, and
-// while the service does not answer.
+// Resolves to the manifest. Resolves to null if the job is not planned yet, if its files were
+// deleted, or if the service does not answer.
 async function manifestOf(source) {
   try {
     return await source.manifest();

@@ -4,9 +4,9 @@
 
 import {dot, subtract} from "../vector.js";
 
-const kMaxEdges = 24000;  // if there are more, only the edges of active subvolumes are drawn
+const kMaxEdges = 24000;  // with more edges, only active subvolumes are drawn
 const kOpaque = 10;       // square root of the largest number of cubes of one kind drawn opaque
-const kNear = 1e-3;       // share of the grid's edge; lines nearer to the eye are clipped
+const kNear = 1e-3;       // lines nearer to the eye are clipped; 1 is 1/16 of the grid's edge
 
 // Later styles are drawn over earlier ones.
 export const kStyles = {
@@ -96,7 +96,8 @@ export class SubvolumeWires {
     }
   }
 
-  // Adds the visible part of an edge to the path.
+  // Returns a function (pen, points, i) that adds the visible part of an edge to the path of the
+  // pen. The edge's two ends are the six numbers of `points` from index i.
   projection(camera, width, height) {
     const {forward, right, up} = camera.axes(), eye = camera.eye,
                            pixel = camera.pixelSpread(height);
@@ -126,7 +127,8 @@ export class SubvolumeWires {
   }
 }
 
-// Adds the twelve edges of a cube. If cubes of the same size share an edge, it is drawn only once.
+// Adds the twelve edges of a cube to `found`. If cubes of the same size share an edge, the edge is
+// drawn only once, in the style of the cube with the highest rank.
 function addEdges(x, y, z, edge, rank, found) {
   for (let axis = 0; axis < 3; ++axis)
     for (let corner = 0; corner < 4; ++corner) {

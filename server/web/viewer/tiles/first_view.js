@@ -4,9 +4,9 @@
 // are already rather narrow, and ends after a maximum number of tiles, or if no tile arrives for
 // some time.
 
-const kPixels = 15;  // in pixels of the canvas; wider cells are refined
+const kPixels = 15;  // cells wider than this number of canvas pixels are refined
 const kMaxTiles = 1500;
-const kStallMs = 1500;
+const kStallMs = 1500;                // the search ends if no tile arrives within this time
 const kHeadWords = 4, kCutWords = 4;  // in a tile (docs/format.md)
 
 export class FirstView {
@@ -45,7 +45,8 @@ export class FirstView {
     for (const corner of this.places.get(tile.key) ?? []) this.walk(store, tile, words, corner);
   }
 
-  // Adds the missing tiles below a tile at a place.
+  // Adds to `wanted` the tiles that the view needs below a tile. `corner` is the low corner of the
+  // tile's cube; a tile that is shared has several cubes.
   walk(store, tile, words, corner) {
     if ((words[1] >>> 16 & 1) === 1) return;  // bricks
     const leafEdge = 2 ** (this.levels - tile.level - tile.levels), cell = leafEdge / 4;
@@ -76,7 +77,8 @@ export class FirstView {
     if (places) places.push(corner);
     else this.places.set(node.key, [corner]);
     const words = this.known.get(node.key), tile = store.get(node.level, node.offset);
-    if (words && tile) this.walk(store, tile, words, corner);  // it may have been evicted
+    if (words && tile)
+      this.walk(store, tile, words, corner);  // tile is undefined if it was evicted
   }
 
   // True if a cube is in the picture and the cells in it are too wide. `cell` is their edge in
@@ -86,8 +88,8 @@ export class FirstView {
         this.isSeen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);
   }
 
-  // Returns the width in pixels of a cell of edge `cell`, at the point of a cube nearest to the
-  // eye.
+  // Returns the width in pixels of a cell with the edge `cell` at the point of a cube that is
+  // nearest to the eye.
   pixelsOf(x, y, z, edge, cell) {
     const [ex, ey, ez] = this.view.eye;
     const far = Math.hypot(

@@ -8,7 +8,7 @@ export const kRoundsToKnow = 4;
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
 const kMaxTries = 3;         // tries per item if the answers are unusable
 const kRefusedMs = 300000;   // time until a refused item is requested again
-const kMaxFailures = 65536;  // remembered items
+const kMaxFailures = 65536;  // maximum number of remembered failures
 const kMaxWarnings = 20;
 const kFullPauseMs = 250;
 
@@ -21,13 +21,14 @@ const kRefused = {
   message: "Part of the file is drawn coarse: the service fails to send it."
 };
 
-// Returns a pause before a retry. It is random, so that the clients of a restarted service do not
-// all return at the same time.
+// Returns the pause in ms before a retry. It is random, so that the clients of a restarted service
+// do not all return at the same time.
 export function pauseAfter(failures) {
   return Math.min(kMaxPauseMs, kFirstPauseMs * 2 ** (failures - 1)) * (0.5 + 0.5 * Math.random());
 }
 
 // Base class of TileLoader and ColorLoader. A request is {key, priority, ...}. Derived classes have
+// these functions:
 //     async fetchAll(batch, options) resolves to the answers, in the order of the requests
 //     keep(request, answer, nowMs)   false if there is no space; throws if the answer is damaged
 //     nameOf(request)                the item's name for messages
@@ -44,9 +45,11 @@ export class Loader {
     this.allowed = maxRequests;  // concurrent requests allowed now; fewer while the service is busy
     this.batchSize = maxBatch;   // smaller after timeouts
     this.queue = [];
-    this.loading = new Map();   // key -> request
-    this.failures = new Map();  // key -> {count, retryMs, batch: the largest that it may be in,
-                                // last}, the oldest first
+    this.loading = new Map();  // key -> request
+    // The failures of items, the oldest first: key -> {count, retryMs, batch, last}. `batch` is the
+    // size of the largest batch in which the item is requested. Items with `last` are requested
+    // after all others.
+    this.failures = new Map();
     this.maxFailures = kMaxFailures;
     this.requests = 0;
     this.failedTotal = 0;
@@ -225,8 +228,8 @@ export class Loader {
     this.queue.push(...batch.reverse());
   }
 
-  // Stores a failure. If there are too many, forgets the oldest ones; their items are then
-  // requested like any other.
+  // Stores a failure. If there are too many, forgets the oldest failure. Its item is then requested
+  // like an item without failures.
   remember(key, failure) {
     this.failures.delete(key);
     this.failures.set(key, failure);
@@ -291,7 +294,7 @@ export class Loader {
             (f) => f.count > 0 && f.count < kMaxTries && nowMs < f.retryMs);
   }
 
-  // True if no request is in progress and the next one is sent only after a scheduled wake-up.
+  // True if no request is in progress and none is sent before retryMs.
   pauses(nowMs) {
     return this.requests === 0 && nowMs < this.retryMs;
   }

@@ -17,8 +17,8 @@ export class TileLoader extends Loader {
     this.firstView = null;  // the FirstView that receives the next tiles
   }
 
-  // Requests the tiles of one reading. `wanted` maps leaf address -> priority. Returns the number
-  // of cut-off nodes that were linked to already loaded tiles.
+  // Requests the tiles of one reading. `wanted` maps the texels of cut-off nodes to priorities.
+  // Returns the number of cut-off nodes that were linked to already loaded tiles.
   demand(wanted, nowMs) {
     const byKey = new Map();
     let linked = 0, unmet = 0;

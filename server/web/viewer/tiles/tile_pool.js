@@ -1,9 +1,9 @@
 // The GPU's memory for tiles. It consists of a texture of four-word texels, divided into blocks,
-// and a table that contains, for each slot, the pointer to the slot's tile. A tile uses any free
-// blocks, so memory does not fragment. Only few views need much memory, so a large pool starts
-// small and grows to its final size in one step. During this step the old texture also exists; all
-// textures together never exceed the budget. If the GPU has no memory for the larger texture, the
-// pool keeps its size.
+// and a table that contains, for each slot (tile_store.js), the pointer to the slot's tile. A tile
+// uses any free blocks, so memory does not fragment. Only few views need much memory, so a large
+// pool starts small and grows to its final size in one step. During this step, both the old and the
+// new texture exist; together they do not exceed the budget. If the GPU has no memory for the
+// larger texture, the pool keeps its size.
 
 import {kBlockTexels, kTexelWords} from "./tile_format.js";
 
@@ -61,7 +61,7 @@ export class TilePool {
   grow() {
     const {gl} = this, before = this.texels;
     for (let flags = 0; flags < kErrorFlags && gl.getError() !== gl.NO_ERROR; ++flags)
-      ;  // of other calls
+      ;  // clears the errors of earlier calls
     const texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.maxRows);
     if (gl.getError() !== gl.NO_ERROR) {
       gl.deleteTexture(texels);

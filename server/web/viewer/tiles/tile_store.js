@@ -12,7 +12,7 @@
 import {kRoundsToKnow} from "./loader.js";
 import {decodeTile, kBlockTexels, kTexelWords, tileShape} from "./tile_format.js";
 
-const kRecentMs = 1500;
+const kRecentMs = 1500;  // recently used tiles remain until kRoundsToKnow readings
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
 const kFreeShare = 1 / 64;  // share of the pool that is freed when tiles are evicted
 
@@ -58,7 +58,7 @@ export class TileStore {
     return {tile, index, level, offset, key: keyOf(level, offset), texel};
   }
 
-  // Returns the same by the index of the node in its tile.
+  // Returns the cut-off node with this index in `tile`, in the form of cutOffNode().
   leaf(tile, index) {
     const at = tile.leafBegin + index;
     return this.cutOffNode(
