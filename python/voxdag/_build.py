@@ -62,7 +62,8 @@ def plan(
     **options: Unpack[BuildOptions],
 ) -> dict[str, Any]:
     """Estimates the cost of a build and creates no files. The arguments are the arguments of
-    build(). The estimate has the same names as the JSON of `voxdag plan --json`. Further options:
+    build(); `output` is optional. The estimate has the same names as the JSON of
+    `voxdag plan --json`. Further options:
 
     """
     output = "voxdag-plan" if output is None else path_text(output)

@@ -43,7 +43,7 @@ class Dag:
 
     The methods have these arguments in common:
 
-    points    positions of voxels, (N, 3) integers
+    points    positions of voxels, (N, 3) integers; with world=True, (N, 3) numbers
     level     l: positions and regions are in cells of the coarser grid with 2^l cells per edge; a
               cell is set if any voxel in it is set; by default, the cells are voxels
     region    six numbers: the low corner x, y, z, which is in the region, and the high corner
@@ -161,7 +161,8 @@ class Dag:
         may be a single row for all rays. Directions may have any length except 0.
 
         Set voxels farther than `max_distance` from the origin are not found. A ray stops at the
-        first set cell whose edge is at most `stop_size` voxels, so 1 stops at single voxels.
+        first set cell whose edge is at most `stop_size`, which is always in voxels: 1 stops at
+        single voxels.
         """
         starts = _rows(origins, np.float64, "origins")
         ways = _rows(directions, np.float64, "directions")
@@ -240,12 +241,14 @@ class Dag:
 
     @property
     def attributes(self) -> list[str]:
-        """Names of the file's attributes: "color", "alpha", "normal", "material"."""
+        """The names of the file's attributes: none, some or all of "color", "alpha", "normal" and
+        "material"."""
         return self._dag.attributes
 
     @property
     def material_names(self) -> list[str]:
-        """Material names, to which materials() returns indices. The last, "", means no material."""
+        """The names of the materials; materials() returns indexes of this list. The last name is ""
+        and stands for triangles without a material."""
         return [name.decode(errors="replace") for name in self._dag.material_names]
 
     def colors(

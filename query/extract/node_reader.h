@@ -57,7 +57,7 @@ struct WantedNode {
 class NodeReader {
  public:
   static constexpr uint64_t kBufferBytes = uint64_t{1} << 19;
-  // Memory that a reader charges.
+  // Bytes that a NodeReader charges to the budget.
   static constexpr uint64_t kMemoryBytes = kBufferBytes + CheckedReader::kBlockBytes;
 
   NodeReader(CheckedReader& source, MemoryBudget& budget, const CancelToken& cancel)

@@ -62,7 +62,8 @@ class PartBuilder {
   };
 
   uint32_t brick_level() const { return selection_.grid_levels - kBrickLevels; }
-  // Returns the low corner and the edge of a cube, in cells of the selected grid.
+  // corner() returns the low corner of a cube on this level, and edge() the cube's edge, both in
+  // cells of the selected grid.
   std::array<int64_t, 3> corner(uint32_t level, const PartLevel::Position& position) const;
   PartLevel level_of_part(uint32_t level) {
     return PartLevel(memory_, file_.level(level).pointer_bits == 64);

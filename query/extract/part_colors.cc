@@ -61,7 +61,7 @@ class ResidentPages {
  public:
   ResidentPages(const voxdag_reader::File& file, uint64_t limit_bytes, unsigned threads)
       : file_(file), limit_bytes_(limit_bytes), threads_(threads) {}
-  // Call it for each node that is read.
+  // Must be called for each node that is read. Calls check() often enough to keep the budget.
   void visit() const {
     thread_local uint64_t visits_left = 0;
     if (visits_left-- == 0) visits_left = check();
@@ -156,8 +156,8 @@ class PartColors {
   }
 
   // Encodes a region of an attribute other than color. The values of coarser cells are computed
-  // from the finest cells. So a cell that the region does not cut has the same value as in the
-  // file.
+  // from the finest cells. So a cell that the selection's region does not cut has the same value as
+  // in the file.
   EncodedRegion encode_valued(const PlacedCube& cube) const {
     voxdag_reader::ColorCursor cursor(file_, section_);
     std::vector<ValuedCell> cells;

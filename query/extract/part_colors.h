@@ -6,19 +6,19 @@
 // smaller cells, 4 per edge. They have the colors of the file's cells that contain them. A cell of
 // the part has
 //
-//   1. the color stored in the file, on the finest level of the color grid and if the region does
-//      not cut the cell;
-//   2. otherwise the mean of its finest cells that are inside the region, in linear light.
+//   1. the color stored in the file, on the finest level of the color grid and if the selection's
+//      region does not cut the cell;
+//   2. otherwise the mean of its finest cells that are inside that region, in linear light.
 //
-// Colors are stored in regions of up to 64^3 cells; all regions with the same levels are a tier
-// (docs/format.md). A region of the file is copied byte for byte if it is completely inside the
-// selection, and if the part has a tier with the same finest level and the same level of regions.
-// Other regions are decoded and encoded again, so their colors are close to the file's colors. The
-// written bytes depend only on the file and the selection.
+// Colors are stored in color regions of up to 64^3 cells; all color regions with the same levels
+// are a tier (docs/format.md). A color region of the file is copied byte for byte if it is
+// completely inside the selection, and if the part has a tier with the same finest level and the
+// same level of color regions. Other color regions are decoded and encoded again, so their colors
+// are close to the file's colors. The written bytes depend only on the file and the selection.
 //
 // For the other attributes, the finest cells have the file's values. The values of coarser cells
-// are computed by the attribute's rule, so cells that the region does not cut have the same values
-// as in the file.
+// are computed by the attribute's rule, so cells that the selection's region does not cut have the
+// same values as in the file.
 //
 // This code reads the file through a mapping. Every checksum block is verified before it is read,
 // and pages are released when the process exceeds the budget.

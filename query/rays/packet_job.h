@@ -1,8 +1,8 @@
 // The data of a packet of rays that are cast together. RayPacket prepares this data, and a walk
 // (packet_walk.h) processes it.
 //
-// The rays of a packet are mirrored: on each axis on which their directions are negative, the
-// coordinate x is replaced by R - x, where R is the resolution. So all directions are positive, and
+// The rays of a packet are mirrored: on each axis on which their directions are negative, a
+// coordinate c is replaced by R - c, where R is the resolution. So all directions are positive, and
 // positions and child masks in this data are mirrored like the rays.
 #pragma once
 

@@ -236,8 +236,8 @@ class PacketWalk {
     const int32_t half = edge / 2;
     uint32_t candidates = mirrored_[n.mask] & cross_any(low, half);
     const bool only = (candidates & (candidates - 1)) == 0;
-    // Children into which all rays go without a test per ray: children that all rays cross, or the
-    // only candidate.
+    // Children that get all rays without a test per ray: the only candidate, or the children that
+    // all rays cross.
     const uint32_t by_all = only ? candidates : cross_all(low, half);
     Child children[8];
     int count = 0;
