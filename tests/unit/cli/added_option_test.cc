@@ -1,5 +1,5 @@
-// An option that is added to a struct's description is on the command line, in JSON, in the schema
-// and among the Python keywords without another line.
+// An option that is added to the description of a struct appears on the command line, in JSON, in
+// the schema and among the Python keywords without any other change.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -101,7 +101,8 @@ TEST(AddedOption, IsAPythonKeyword) {
   EXPECT_THAT(writer.members, HasSubstr("    backend: Optional[Literal[\"auto\", \"cpu\""));
 }
 
-// Finds the options in the public header, where a name may be followed by its unit.
+// Finds the options in the public C++ header, where the name of a member may have a unit at its
+// end.
 struct MemberFinder {
   template <class T>
   void operator()(const Field& field, T&) {

@@ -15,7 +15,7 @@ struct Row {
   int http_status;
 };
 
-// The table that docs/errors.md promises to scripts and HTTP clients.
+// The table of docs/errors.md, on which scripts and HTTP clients depend.
 constexpr Row kPromised[] = {
     {ErrorCode::kInvalidInput, "invalid_input", 2, 400},
     {ErrorCode::kNotFound, "not_found", 3, 404},
@@ -29,7 +29,7 @@ constexpr Row kPromised[] = {
     {ErrorCode::kCanceled, "canceled", 130, 409},
 };
 
-// Names and statuses are an interface: none may change unnoticed.
+// Names and statuses are an interface, so the test fails if one of them changes.
 TEST(ErrorTable, IsAsPromised) {
   for (const Row& row : kPromised) {
     SCOPED_TRACE(row.name);
@@ -39,8 +39,8 @@ TEST(ErrorTable, IsAsPromised) {
   }
 }
 
-// A script can tell errors apart by the exit status, and never mistakes one for success or for a
-// status of the shell (126 and above, except Ctrl-C).
+// Every error has a different exit status. It is neither success nor a status that the shell uses
+// (126 and above, except for Ctrl-C).
 TEST(ErrorTable, ExitStatusesAreDistinctAndNotTheShells) {
   std::set<int> seen;
   for (const Row& row : kPromised) {

@@ -12,7 +12,8 @@
 namespace voxdag {
 namespace {
 
-// A charge that fits is recorded; a charge that does not changes nothing. The limit itself fits.
+// A charge that fits is recorded. A charge that does not fit changes nothing. A charge up to the
+// limit itself fits.
 TEST(MemoryBudget, ChargesUpToItsLimit) {
   MemoryBudget budget(100);
   EXPECT_TRUE(budget.try_charge(60));
@@ -27,7 +28,7 @@ TEST(MemoryBudget, ChargesUpToItsLimit) {
   EXPECT_EQ(budget.peak(), 100u);
 }
 
-// Sizes near 2^64 must not wrap around to something that fits.
+// Sizes near 2^64 must not wrap around to a small sum that fits.
 TEST(MemoryBudget, RefusesSizesThatWouldWrap) {
   MemoryBudget budget(100);
   ASSERT_TRUE(budget.try_charge(50));
@@ -54,7 +55,8 @@ TEST(MemoryBudget, NamesWhatDidNotFit) {
   EXPECT_EQ(budget.used(), 300u);
 }
 
-// A share charges all budgets above it, stops at the tightest, and undoes half-made charges.
+// A share charges itself and all budgets above it. If one of them has no room, the charges already
+// made are undone.
 TEST(MemoryBudget, SharesChargeTheirParents) {
   MemoryBudget whole(100);
   MemoryBudget half(50, &whole);
@@ -75,7 +77,7 @@ TEST(MemoryBudget, SharesChargeTheirParents) {
   EXPECT_EQ(whole.used(), 65u);
 }
 
-// A charge follows its owner: moved, resized, overwritten, and released exactly once.
+// A charge can be moved, resized and overwritten. It is released exactly once.
 TEST(MemoryCharge, IsReleasedOnce) {
   MemoryBudget budget(100);
   {
@@ -96,7 +98,7 @@ TEST(MemoryCharge, IsReleasedOnce) {
   EXPECT_EQ(budget.used(), 0u);
 }
 
-// A charge that belongs to no budget holds nothing, and cannot grow.
+// A charge without a budget charges nothing and cannot grow.
 TEST(MemoryCharge, WithoutBudgetHoldsNothing) {
   MemoryCharge none;
   EXPECT_TRUE(none.try_resize(0));
@@ -104,7 +106,8 @@ TEST(MemoryCharge, WithoutBudgetHoldsNothing) {
   EXPECT_EQ(none.bytes(), 0u);
 }
 
-// Many threads on shares of one budget: the limit is never exceeded and all is released.
+// Many threads charge shares of one budget. The limit is never exceeded, and everything is released
+// at the end.
 TEST(MemoryBudget, IsNotExceededByThreads) {
   constexpr uint64_t kLimit = 1000;
   MemoryBudget whole(kLimit);

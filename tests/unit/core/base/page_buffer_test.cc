@@ -41,7 +41,7 @@ TEST(PageBuffer, ChargesWhatItHolds) {
   EXPECT_EQ(budget.used(), 0u);
 }
 
-// Growing retains the contents, zero-fills the rest and charges it; a failed growth changes
+// Growing keeps the contents, zero-fills the added part and charges it. A failed growth changes
 // nothing.
 TEST(PageBuffer, Grows) {
   MemoryBudget budget(uint64_t{1} << 20);
@@ -72,8 +72,8 @@ TEST(PageBuffer, MayBeEmpty) {
   EXPECT_EQ(buffer.begin(), buffer.end());
 }
 
-// Refused by the budget, by the system, or because the size in bytes does not fit 64 bits:
-// kOutOfMemory naming the buffer, and nothing remains charged.
+// An allocation is refused by the budget, by the system, or because its size in bytes exceeds 64
+// bits. The error is kOutOfMemory and names the buffer, and nothing remains charged.
 TEST(PageBuffer, NamesWhatDidNotFit) {
   MemoryBudget small(4096), endless(UINT64_MAX);
   const auto refused = [](MemoryBudget& budget, size_t size) {

@@ -1,4 +1,5 @@
-// Items are committed in their order, all before the first that fails and none behind it.
+// Items are committed in their order. If an item fails, all items before it are committed, and none
+// after it.
 #include "core/base/parallel_for.h"
 
 #include <gtest/gtest.h>

@@ -22,7 +22,8 @@ class CgroupTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// Version 2: the lowest limit of the process's group and of all above it; siblings do not count.
+// In cgroup version 2, the limit is the lowest of the process's group and its ancestors. Siblings
+// do not count.
 TEST_F(CgroupTest, WalksUpInVersion2) {
   write("slice/box/memory.max", "max\n");
   write("slice/memory.max", "3000000000\n");
@@ -37,7 +38,8 @@ TEST_F(CgroupTest, WalksUpInVersion2) {
   EXPECT_EQ(cgroup_memory("0::/not/there\n", mount()), 500000000u);
 }
 
-// A quota is rounded up to whole CPUs; the lowest one on the way up counts.
+// A CPU quota is rounded up to complete CPUs. The lowest quota of the group and its ancestors
+// counts.
 TEST_F(CgroupTest, CpuQuotas) {
   write("slice/box/cpu.max", "max 100000\n");
   EXPECT_EQ(cgroup_cpus("0::/slice/box\n", mount()), UINT64_MAX);
@@ -56,7 +58,7 @@ TEST_F(CgroupTest, CpuQuotas) {
   EXPECT_GE(default_threads(), 1u);
 }
 
-// Version 1, alone or together with version 2, and texts that are not memberships.
+// cgroup version 1, alone or together with version 2, and texts that do not describe a membership.
 TEST_F(CgroupTest, WalksUpInVersion1) {
   write("memory/pool/job/memory.limit_in_bytes", "9223372036854771712\n");
   write("memory/pool/memory.limit_in_bytes", "700000000\n");

@@ -8,7 +8,7 @@
 namespace voxdag {
 namespace {
 
-// Units are binary whether or not they say so; anything that is no size is refused.
+// Units are powers of 1024, with or without an "i". A text that is not a size is refused.
 TEST(Text, ParsesSizes) {
   EXPECT_EQ(parse_size("1000000", "--memory"), 1000000u);
   EXPECT_EQ(parse_size("64M", "--memory"), uint64_t{64} << 20);
@@ -23,7 +23,7 @@ TEST(Text, WritesHexadecimal) {
   EXPECT_EQ(hex_text(bytes), "0009afff");
 }
 
-// Escapes may stand anywhere, in either case; a broken one is not passed through.
+// Escapes can be anywhere, in upper or lower case. A broken escape is refused.
 TEST(Text, DecodesPercentEscapes) {
   EXPECT_EQ(percent_decoded(""), "");
   EXPECT_EQ(percent_decoded("a%20b%2Fc%2f%C3%A9"), "a b/c/\xc3\xa9");
@@ -32,7 +32,8 @@ TEST(Text, DecodesPercentEscapes) {
     EXPECT_EQ(percent_decoded(text), std::nullopt) << text;
 }
 
-// A list has exactly the requested number of numbers, and nothing before, between or after them.
+// A list must have exactly the requested number of numbers, without other text before, between or
+// after them.
 TEST(Text, ParsesListsOfNumbers) {
   const auto three = parse_numbers<double, 3>("1,-2.5,3e2", ',');
   ASSERT_TRUE(three);

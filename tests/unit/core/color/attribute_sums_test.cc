@@ -1,4 +1,5 @@
-// The material of a cell has the largest weight, for any number and order of materials.
+// The material of a cell is the material with the largest weight, for any number and order of
+// materials.
 #include "core/color/rule/attribute_sums.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,8 @@ TEST(AttributeSums, FindTheHeaviestOfManyMaterials) {
   for (int round = 0; round < 2; ++round) {
     for (uint32_t i = 0; i < kAdded; ++i) {
       const auto cell = static_cast<uint32_t>(random() % kCells);
-      // Cells of odd numbers are covered at some time, and earlier contributions do not count.
+      // At a random time, a cell with an odd number becomes covered. From then on, its earlier
+      // contributions do not count.
       if (cell % 2 == 1 && !is_covered[cell] && random() % 2000 == 0) {
         sums.reset(cell);
         weights[cell].clear();
@@ -31,7 +33,8 @@ TEST(AttributeSums, FindTheHeaviestOfManyMaterials) {
       sums.add(cell, facing, 1, weight);
       weights[cell][facing.material] += weight;
     }
-    // What is added up takes no more than there are cells and materials, while it grows.
+    // Memory is limited by the number of pairs of a cell and a material (16 bytes each), with a
+    // factor of 4 for growing tables.
     EXPECT_LE(sums.bytes(), uint64_t{4} * kCells * kMaterials * 16);
     sums.finish();
     size_t ties = 0;

@@ -1,5 +1,5 @@
-// Alpha, normals and materials of cells, compared with what doubles and brute force make of the
-// same triangles.
+// Compares alpha, normals and materials of cells with values computed in doubles by brute force
+// from the same triangles.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -62,7 +62,8 @@ TEST(NormalCode, DirectionsAreThoseOfTheirCodes) {
                      static_cast<double>(d[2])};
       ASSERT_NEAR(length(v), 16384, 1);
       ASSERT_LT(degrees_between(v, direction_of(code)), 0.01) << p << " " << q;
-      // The same code, except for codes of equal directions: on the rim, in the lower half.
+      // Encoding the decoded direction gives the same code. Codes of equal directions, on the rim
+      // of the lower half, are the exception.
       const NormalCode again = encode_normal(d[0], d[1], d[2]);
       ASSERT_TRUE(again == code || d[2] <= 0);
       ASSERT_LT(degrees_between(v, direction_of(again)), 0.01);
@@ -135,8 +136,9 @@ class BruteForce {
     return n;
   }
 
-  // The columns through the cell along the dominant axis whose point on the plane is in both. All
-  // in integers, eighths of the cell's edge being whole numbers.
+  // Returns the number of columns through the cell, along the dominant axis, whose point on the
+  // plane is in both the cell and the triangle. The columns' positions are integers, because
+  // eighths of the cell's edge are integers.
   int columns_of(const FixedTriangle& t) const {
     int dominant;
     const Vector n = normal_of(t, dominant);
@@ -195,7 +197,7 @@ double largest_of(const Vector& v) {
   return std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
 }
 
-// Triangles of all kinds, some flipped, with materials of different alpha.
+// Scenes have triangles of all kinds, some of them flipped, and materials with different alpha.
 TEST(Attributes, AreThoseOfTheTriangles) {
   TestLooks looks;
   for (uint32_t i = 0; i < looks.materials.size(); ++i) {
@@ -239,7 +241,7 @@ TEST(Attributes, AreThoseOfTheTriangles) {
         for (const auto& [material, other] : expected.weights)
           ASSERT_TRUE(other != weight || values[i].material <= material);
 
-        // Around the change from one sum to the other either is right.
+        // Near the threshold between the two sums, both normals are accepted.
         const double rest = largest_of(expected.area), turned = largest_of(expected.turned);
         const double from_rest =
             rest == 0 ? 180 : degrees_between(expected.area, direction_of(values[i].normal));

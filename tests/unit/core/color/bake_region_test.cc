@@ -54,8 +54,8 @@ std::vector<FixedSurface> scene(const TestLooks& looks, SceneKind kind, uint64_t
   return looks.surfaces(oracle::make_scene(kind, seed, whole, count), seed);
 }
 
-// Cells are those that the oracle's overlap test finds, for grids as fine as the voxels and
-// coarser.
+// The baked cells are the cells that the oracle's overlap test finds, for color grids as fine as
+// the voxel grid and coarser ones.
 TEST(BakeRegion, CellsAreThoseThatTrianglesTouch) {
   const TestLooks looks;
   size_t set = 0;
@@ -80,7 +80,7 @@ TEST(BakeRegion, CellsAreThoseThatTrianglesTouch) {
   EXPECT_GT(set, 5000u);
 }
 
-// Neither the order of the triangles nor the regions that are baked show in any sum.
+// Neither the order of the triangles nor the choice of regions affects any sum.
 TEST(BakeRegion, SumsAreFunctionsOfTheCell) {
   const TestLooks looks;
   for (const SceneKind kind : oracle::kAllKinds)
@@ -98,7 +98,8 @@ TEST(BakeRegion, SumsAreFunctionsOfTheCell) {
     }
 }
 
-// The result does not depend on the batches: a covering triangle may follow a touching one.
+// The result does not depend on the division into batches: a triangle that covers a cell may come
+// after a triangle that only touches it.
 TEST(BakeRegion, TrianglesMayComeInParts) {
   const TestLooks looks;
   for (const SceneKind kind : oracle::kAllKinds) {
@@ -119,7 +120,8 @@ TEST(BakeRegion, TrianglesMayComeInParts) {
   }
 }
 
-// More triangles than wait for the end: those that wait are added when there are too many.
+// Triangles that cover no column wait for the end of the region. If too many wait, they are added
+// earlier.
 TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   TestLooks looks;
   const ColorGrid grid{10, 2};
@@ -143,7 +145,8 @@ TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   EXPECT_LT(in_others, 115000u);
 }
 
-// The same triangle in 64 and in 128 bits: a vertex far away along its plane makes it wide.
+// The same triangle is baked with 64-bit and with 128-bit integers: a vertex far away in the
+// triangle's plane makes it need 128 bits.
 TEST(BakeRegion, WideTrianglesCoverWhatNarrowOnesDo) {
   TestLooks looks;
   looks.materials.assign(1, Material{});
@@ -180,7 +183,8 @@ TEST(BakeRegion, WorkedExample) {
   EXPECT_EQ(color_of(sums.at({0, 0, 0})), (Color{{188, 255, 255}, 255}));
 }
 
-// Coordinates of positions and textures at their limits; undefined behavior is for the sanitizers.
+// Coordinates of positions and textures are at their limits. Sanitizers check that there is no
+// undefined behavior.
 TEST(BakeRegion, HostileCoordinates) {
   const TestLooks looks;
   const int64_t far = (int64_t{1} << 40) - 1;
@@ -207,11 +211,11 @@ TEST(BakeRegion, HostileCoordinates) {
   }
 }
 
-// The same bits by every compiler, at every level of optimization.
+// Every compiler and every optimization level must give the same bits.
 TEST(BakeRegion, GoldenDigest) {
   const TestLooks looks;
   uint64_t digest = 0, covered = 0;
-  // Those whose random numbers all compilers draw in the same order.
+  // Only the kinds of scenes for which all compilers draw the random numbers in the same order.
   for (const SceneKind kind :
        {SceneKind::kDegenerate, SceneKind::kSliver, SceneKind::kWalls, SceneKind::kDiagonal,
         SceneKind::kSpanning, SceneKind::kThroughCorners, SceneKind::kCrossing, SceneKind::kWide})

@@ -11,7 +11,8 @@
 namespace voxdag {
 namespace {
 
-// Blocks of every size: noise, colors near a line and near a point, two colors, one.
+// Returns blocks of every size with random colors, colors near a line, colors near a point, two
+// colors, and one color.
 std::vector<std::vector<Color>> many_blocks(size_t count) {
   oracle::Random random(3);
   const auto byte = [&] { return static_cast<int>(random.between(0, 255)); };

@@ -1,4 +1,4 @@
-// Images of tests: pyramids in memory, of seeded noise and stripes.
+// Images for tests: pyramids in memory that show noise and stripes from a seed.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,8 @@ class TestImages {
       for (uint32_t x = 0; x < width; ++x) {
         std::array<uint16_t, 4> texel;
         for (int c = 0; c < 3; ++c) {
-          // Triangle waves: no libm, so that the digest is the same everywhere.
+          // Uses triangle waves instead of sines, because the mathematical library differs between
+          // machines and the digest must not.
           const double phase = wave * (c + 1) * x / width + (wave - c) * y / height;
           const double up = phase - std::floor(phase);
           texel[static_cast<size_t>(c)] =

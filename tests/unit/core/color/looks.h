@@ -1,4 +1,5 @@
-// Surfaces of tests: triangles of the oracle's scenes with seeded looks.
+// Surfaces for tests: triangles of the oracle's scenes, with materials and texture coordinates from
+// a seed.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +24,7 @@ inline oracle::Triangle plain(const FixedTriangle& triangle) {
   return out;
 }
 
-// Materials of every kind: with and without image, all alpha modes and wraps.
+// Materials of every kind: with and without an image, with all alpha modes and wrap modes.
 struct TestLooks {
   TestImages images;
   std::vector<Material> materials;

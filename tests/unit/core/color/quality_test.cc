@@ -1,5 +1,5 @@
-// Compares the rule's colors, and the stored colors, with the oracle's mean over the surface in
-// each cell. The bounds are up to a dB below the measured values.
+// Compares the rule's colors, and the stored colors, with the oracle's mean color of the surface in
+// each cell. The bounds are up to 1 dB below the measured values.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace {
 struct Sheet {
   static constexpr int kQuads = 12;
 
-  // `images`: how often the texture is laid along an edge of the sheet.
+  // `images`: number of times that the texture repeats along an edge of the sheet.
   Sheet(const ColorGrid& sheet_grid, double images, const Material& m) : grid(sheet_grid) {
     material = m;
     for (int i = 0; i < kQuads; ++i)
@@ -164,7 +164,7 @@ class ColorQuality : public testing::Test {
   TestImages images_;
 };
 
-// The oracle itself, where the answer is known: on a cube of edge 256, at z = 100.
+// Tests the oracle itself with known answers, in a cube of edge 256, on surfaces at z = 100.
 class ColorOracle : public testing::Test {
  protected:
   void add(double from_x, double to_x, const oracle::SurfaceMaterial& material) {
@@ -244,7 +244,7 @@ TEST_F(ColorQuality, OfTextures) {
   }
 }
 
-// Where an image ends, coarser levels of it are less sharp than it.
+// At the border of an image, the coarser levels of its pyramid are less sharp than the image.
 TEST_F(ColorQuality, OfBorders) {
   for (const Wrap wrap : {Wrap::kClampToEdge, Wrap::kMirroredRepeat}) {
     Material material = textured();

@@ -1,5 +1,5 @@
-// Compares the rule's vector code with plain code, and its quotients in doubles with integer
-// quotients.
+// Compares the rule's vector code with plain code, and its divisions in doubles with divisions of
+// integers.
 #include <gtest/gtest.h>
 
 #include "core/color/color_of.h"
@@ -70,7 +70,8 @@ TEST(ColorVectors, SumsAreThoseOfPlainCode) {
   EXPECT_EQ(sum.seen_weight, 2 * plain.seen_weight);
 }
 
-// The color by the definition: quotients of 128 bits, and thresholds counted one by one.
+// Returns the color by the definition: divides 128-bit integers, and counts the thresholds one by
+// one.
 Color plain_color(const ColorSum& sum) {
   const auto rounded = [](uint64_t numerator, uint64_t denominator) {
     return static_cast<uint64_t>((uint128{2} * numerator + denominator) /
@@ -88,7 +89,7 @@ Color plain_color(const ColorSum& sum) {
   return color;
 }
 
-// Means at and next to every threshold, exact halves among them, of small and of large weights.
+// Means at and next to every threshold, including exact halves, with small and large weights.
 TEST(ColorVectors, StoredColorsAreThoseOfTheDefinition) {
   oracle::Random random(4);
   constexpr color::SrgbThresholds kThresholds{};

@@ -20,7 +20,7 @@ constexpr uint32_t kCubeLevel = 4;  // 32 voxels: bricks on level 7, nodes on 6,
 
 SubDagShape shape_of(uint32_t hash_bits) { return {kCubeLevel, kGridLevels, hash_bits}; }
 
-// A right sub-DAG, with equal truncated hashes where there are few bits.
+// Returns a right sub-DAG. With few hash bits, some of its nodes have equal truncated hashes.
 SubDag right_one(int hash_bits) {
   const oracle::Region region{{0, 0, 0}, 32};
   const auto scene = oracle::make_scene(oracle::SceneKind::kSoup, 3, region, 12);
@@ -122,7 +122,7 @@ TEST(CheckSubDag, FindsEachBrokenInvariant) {
   }
 }
 
-// With 4 bits many nodes share a hash, and ties are in the order of mask and children.
+// With 4 hash bits many nodes have equal hashes. They must be in the order of mask and children.
 TEST(CheckSubDag, KnowsTheOrderOfTies) {
   const SubDag right = right_one(4);
   ASSERT_NO_THROW(check_sub_dag(right, shape_of(4)));
@@ -139,8 +139,8 @@ TEST(CheckSubDag, KnowsTheOrderOfTies) {
   EXPECT_GT(ties, 10);
 }
 
-// Eight nodes of one mask, each with its own brick: some have equal truncated hashes and can be
-// exchanged without any hash becoming wrong.
+// Eight nodes have the same mask, and each has a different brick. Some of them have equal truncated
+// hashes, so exchanging them makes only the order wrong, not the hashes.
 TEST(CheckSubDag, KnowsTheOrderOfTiedNodes) {
   oracle::Random random(2);
   oracle::Voxels voxels(16);
@@ -170,17 +170,17 @@ TEST(CheckSubDag, KnowsTheOrderOfTiedNodes) {
   EXPECT_GT(ties, 0);
 }
 
-// The number of hash bits is checked: hashes truncated to another number are wrong.
+// A sub-DAG whose hashes are truncated to a different number of bits is refused.
 TEST(CheckSubDag, KnowsTheHashBits) {
   expect_corrupt(right_one(64), 16, "level ");
   expect_corrupt(right_one(16), 64, "level ");
 }
 
-// Nodes without a parent are not part of the DAG, on any level.
+// A node without a parent is refused on any level, because it is not part of the DAG.
 TEST(CheckSubDag, FindsOrphans) {
   const SubDag right = right_one(64);
   SubDag bricks = right;
-  // A brick whose hash is beyond all others does not break the order.
+  // The added brick has a larger hash than all others, so the order remains right.
   uint64_t mask = 1;
   while (hash_brick(mask) <= hash_brick(bricks.brick_masks.back())) ++mask;
   bricks.brick_masks.push_back(mask);
@@ -202,7 +202,8 @@ TEST(CheckSubDag, FindsOrphans) {
   expect_corrupt(nodes, 64, "no parent refers to it");
 }
 
-// A cube of brick size has one brick and no levels; anything else there is refused.
+// The DAG of a cube as large as a brick has one brick and no levels of nodes. Anything else is
+// refused.
 TEST(CheckSubDag, BrickCubes) {
   SubDag dag;
   dag.brick_masks = {5};

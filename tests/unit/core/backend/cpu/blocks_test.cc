@@ -28,7 +28,7 @@ class Blocks : public testing::Test {
   }
 };
 
-// list_blocks() lists the non-empty blocks in order, each with its block_key(), and clears all
+// list_blocks() lists the non-empty blocks in order, each with its block_key(). It clears all
 // marks, also of empty blocks.
 TEST_F(Blocks, KernelsListThem) {
   for (const Kernels* kernels : all_kernels())
@@ -86,8 +86,8 @@ class Memos : public Blocks {
   PooledMemory memory_{budget_, pool_};
 };
 
-// A block is found with its own node or not at all, also where thousands have the same key; one
-// that was just inserted is found, even if the memo grew.
+// The memo returns a block's own node or nothing, even if thousands of blocks have the same key. A
+// block that was just inserted is found, even if the memo grew.
 TEST_F(Memos, FindWholeBlocksOnly) {
   for (const bool same_key : {false, true}) {
     SCOPED_TRACE(same_key);
@@ -116,7 +116,7 @@ TEST_F(Memos, FindWholeBlocksOnly) {
   }
 }
 
-// The memo is bypassed for a while where nearly all blocks are new, never where blocks repeat.
+// The memo is bypassed for a while if nearly all blocks are new, but never if blocks repeat.
 TEST_F(Memos, RestWhereTheyDoNotPay) {
   for (const bool repeating : {false, true}) {
     SCOPED_TRACE(repeating);
@@ -136,7 +136,7 @@ TEST_F(Memos, RestWhereTheyDoNotPay) {
   }
 }
 
-// In a small budget the memo is small, and nothing is charged afterwards.
+// With a small budget the memo is small. After its destruction nothing is charged.
 TEST_F(Memos, FitSmallBudgets) {
   MemoryBudget small(64 << 10);
   PooledMemory memory{small, pool_};

@@ -5,8 +5,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// Calls check(triangle, region) for triangles of every kind in tiles of every size, at the origin
-// and anywhere in a grid of 2^20.
+// Calls check(triangle, region) for triangles of every kind, in tiles of every size, at the origin
+// and at random positions in a grid of 2^20 voxels per edge.
 template <class Check>
 void for_many_triangles(int rounds, Check check) {
   oracle::Random random(1);
@@ -23,7 +23,7 @@ void for_many_triangles(int rounds, Check check) {
     }
 }
 
-// Every kernel sets the voxels that the oracle's separating-axis test sets, no others.
+// Every kernel sets exactly the voxels that the oracle's separating-axis test sets.
 TEST(Draw, KernelsEqualOracle) {
   for_many_triangles(120, [](const oracle::Triangle& t, const oracle::Region& region) {
     if (!is_narrow(t)) return;
@@ -34,7 +34,8 @@ TEST(Draw, KernelsEqualOracle) {
   });
 }
 
-// The 128-bit path sets the same voxels, for triangles that need it and for others.
+// The path with 128-bit integers sets the same voxels, both for triangles that need it and for
+// others.
 TEST(Draw, WideEqualsOracle) {
   int wide_ones = 0;
   for_many_triangles(40, [&](const oracle::Triangle& t, const oracle::Region& region) {
@@ -45,13 +46,13 @@ TEST(Draw, WideEqualsOracle) {
   EXPECT_GT(wide_ones, 50);
 }
 
-// Fixed-point heights are ambiguous for planes that pass exactly through voxel corners or miss them
-// by very little: slopes that are ratios of small numbers, at every offset.
+// Planes that pass exactly through voxel corners, or miss them by very little, where heights in
+// fixed point are ambiguous: slopes that are ratios of small numbers, at every offset.
 TEST(Draw, AmbiguousHeightsAreExact) {
   oracle::Random random(2);
   const oracle::Region region{{512, 1024, 4096}, 16};
   for (int round = 0; round < 3000; ++round) {
-    // x = (p y + q z) / n + offset over an area larger than the tile.
+    // The triangle is in the plane x = (p y + q z) / n + offset and extends beyond the tile.
     const int64_t n = 256 * random.between(1, 8), p = random.between(-n, n);
     const int64_t q = random.between(-n, n), offset = random.between(-600, 600) * 2;
     const int up = static_cast<int>(random.between(0, 2));
@@ -72,8 +73,8 @@ TEST(Draw, AmbiguousHeightsAreExact) {
   }
 }
 
-// Bounds by edges are computed in doubles: edges of every length, also those parallel to an axis,
-// that pass through voxel corners or miss them by very little.
+// The bounds that edges give are computed in doubles. The tests use edges of every length, also
+// parallel to an axis, that pass through voxel corners or miss them by very little.
 TEST(Draw, AmbiguousEdgesAreExact) {
   oracle::Random random(4);
   const int64_t middle = int64_t{1} << 19;
@@ -96,7 +97,7 @@ TEST(Draw, AmbiguousEdgesAreExact) {
   }
 }
 
-// Where a triangle covers a cube, drawing its plane alone makes no difference.
+// If a triangle covers a cube, drawing only its plane sets the same voxels.
 TEST(Draw, InsideIsThePlaneOnly) {
   oracle::Random random(3);
   int covered = 0;

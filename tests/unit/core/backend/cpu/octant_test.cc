@@ -10,8 +10,8 @@ struct Tally {
   int touched = 0, reported = 0, inside = 0;
 };
 
-// Checks one answer: no child that the triangle touches is left out, and a child said to be inside
-// is touched only as the plane through the triangle touches it.
+// Checks one result of the octant test. Every child that the triangle touches must be reported.
+// Every child that is reported as inside the triangle must also be reported as touched.
 void check(const Octants& octants, const oracle::Triangle& t, const oracle::Region& region,
            Tally& tally) {
   for (int c = 0; c < 8; ++c) {
@@ -27,7 +27,7 @@ void check(const Octants& octants, const oracle::Triangle& t, const oracle::Regi
   EXPECT_EQ(octants.inside & ~octants.touched, 0u);
 }
 
-// Cubes of every size, up to the whole of the largest grid; culling misses nothing and reports few
+// Cubes of every size, up to the largest grid. The octant test reports every touched child, and few
 // children that are not touched.
 TEST(Octants, NoTouchedChildIsLeftOut) {
   oracle::Random random(4);
@@ -41,7 +41,7 @@ TEST(Octants, NoTouchedChildIsLeftOut) {
       const uint64_t seed = static_cast<uint64_t>(round);
       for (const oracle::Triangle& t : oracle::make_scene(kind, seed, region, 2)) {
         const Padded<int64_t> as_wide(t);
-        // Only triangles that the cube's parent was not culled for are ever asked about.
+        // The octant test is called only for triangles that may touch the cube.
         if (box.misses(as_wide.triangle)) continue;
         check(test_octants_wide(as_wide.triangle, box, false), t, region, wide);
         if (!is_narrow(t)) continue;
@@ -59,7 +59,7 @@ TEST(Octants, NoTouchedChildIsLeftOut) {
   }
 }
 
-// A cube that a triangle covers has children that it covers, where the plane passes them.
+// If a triangle covers a cube, it also covers the children that its plane touches.
 TEST(Octants, InsideStaysInside) {
   const oracle::Region region{{0, 0, 0}, 64};
   const Padded<int32_t> narrow(

@@ -23,7 +23,7 @@ struct Workshop {
   PlaneMemo planes;
 };
 
-// The node of a cube that the triangle covers, tile by tile.
+// Returns the node of a cube that the triangle covers, made by drawing tile by tile.
 NodeRef drawn_node(Workshop& shop, const NarrowTriangle& t, const LatticeCube& box, int size_log2,
                    TileBricks& tile) {
   if (size_log2 > kTileLog2) {
@@ -37,7 +37,8 @@ NodeRef drawn_node(Workshop& shop, const NarrowTriangle& t, const LatticeCube& b
   return shop.reducer.reduce_bricks(tile, size_log2);
 }
 
-// A triangle far larger than the region, through its middle, along a plane whose normal is `n`.
+// Returns a triangle in a plane with the normal `n` through the middle of the region. The triangle
+// extends far beyond the region.
 oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t, 3>& n,
                           oracle::Random& random) {
   oracle::Triangle t;
@@ -49,8 +50,8 @@ oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t
   const int64_t corners[3][2] = {{-reach, -reach}, {2 * reach, -reach}, {-reach, 2 * reach}};
   const int64_t offset = random.between(-region.edge * 100, region.edge * 100) * 2;
   for (int i = 0; i < 3; ++i) {
-    // Multiples of n[up] along p and q make the height an integer, so the plane is exactly this
-    // one.
+    // The displacements along p and q are multiples of n[up], so the height is an integer, and the
+    // vertices are exactly in the plane.
     const int64_t dp = corners[i][0] * 2 * n[up], dq = corners[i][1] * 2 * n[up];
     const int64_t middle = region.edge * 128 + 1;
     t[i][p] = region.low[p] * 256 + middle + dp;
@@ -60,7 +61,8 @@ oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t
   return t;
 }
 
-// Compares a cube from the memo with the same one drawn, and its children down to the smallest.
+// Compares the node of a cube from the memo with the drawn node, and does the same for the cube's
+// children down to the smallest size. Returns the number of compared cubes.
 int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, const LatticeCube& box,
             int size_log2, TileBricks& tile) {
   const OctreeCounts before = by_memo.tables.counts();
@@ -81,8 +83,8 @@ int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, con
   return compared;
 }
 
-// Nodes, hashes and counts from the memo equal those from drawing the same planes: walls, small
-// normals and others.
+// Nodes, hashes and counts from the memo equal the results of drawing the same planes: walls,
+// planes with small normals, and others.
 TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
   oracle::Random random(6);
   const auto tile = std::make_unique<TileBricks>();
@@ -103,8 +105,8 @@ TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
     Workshop by_drawing(portable_kernels());
     TriangleSet set(by_memo.memory);
     set.add(axis_major(oracle::fixed(t)));
-    // A triangle's plane is added once it has covered enough tiles; a plane that meets lattice
-    // points exactly may never be.
+    // A triangle's plane is added once the triangle has covered enough tiles. A plane through
+    // lattice points may never be added.
     NodeRef node;
     bool found = false;
     for (int i = 0; i < 40 && !found; ++i)
@@ -115,7 +117,7 @@ TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
   EXPECT_GT(compared, 500);
 }
 
-// A plane whose coefficients are too large for 64 bits in a large cube is not used there.
+// A plane is not used for large cubes in which its coefficients exceed 64 bits.
 TEST(Planes, HugeNormalsAreNotUsedForLargeCubes) {
   const oracle::Triangle t{
       {{1, 1, 100000001}, {(1 << 28) - 1, 3, 7}, {5, (1 << 28) - 3, 100000007}}};

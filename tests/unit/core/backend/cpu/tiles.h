@@ -1,4 +1,5 @@
-// Helpers of the tests of drawing: tiles anywhere in the largest grid, and the voxels in them.
+// Helpers for the tests of drawing: tiles at any position of the largest grid, and the voxels in
+// them.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +14,8 @@
 
 namespace voxdag::cpu {
 
-// A triangle of the oracle as this backend stores it: by axis, and with a spare one behind it,
-// since kernels load four coordinates for three.
+// A triangle of the oracle in the form of this backend: coordinates by axis, followed by a spare
+// element, because kernels load four coordinates instead of three.
 template <class Coordinate>
 struct Padded {
   explicit Padded(const oracle::Triangle& t) {

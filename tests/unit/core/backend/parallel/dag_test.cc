@@ -1,4 +1,5 @@
-// The two DAG constructions against each other, and the sweep that makes the second one exact.
+// Compares the two DAG constructions, and tests the verification sweep that makes the second one
+// exact.
 #include <gtest/gtest.h>
 
 #include "core/backend/parallel/dag/dag_by_hashes.h"
@@ -15,7 +16,8 @@ namespace {
 
 class ParallelDag : public testing::Test {
  protected:
-  // An octree of `levels` levels above its bricks, of which there are few different ones.
+  // Returns an octree with `levels` levels above the bricks, and only `different_bricks` different
+  // bricks.
   Octree<HostSpace> random_octree(uint64_t seed, uint32_t levels, int64_t different_bricks) {
     oracle::Random random(seed);
     const uint32_t max_count = 1u << 3 * levels;
@@ -58,8 +60,8 @@ TEST_F(ParallelDag, BothConstructionsAgreeAndAreInOrder) {
     }
 }
 
-// With hashes so short that some octrees have different nodes of equal hash and some do not, the
-// sweep accepts only right DAGs and rejects those with such nodes.
+// The hashes are so short that different nodes have equal hashes in some of the octrees. The sweep
+// must reject the DAGs of such octrees; every accepted DAG must be right.
 TEST_F(ParallelDag, TheSweepRejectsCollisions) {
   int accepted = 0, rejected = 0;
   for (uint64_t seed = 0; seed < 600; ++seed) {
@@ -83,9 +85,9 @@ TEST_F(ParallelDag, TheSweepRejectsCollisions) {
   EXPECT_GT(rejected, 50);
 }
 
-// Two different bricks of equal 4-bit hash under two parents that are alike but for them, so that
-// one of the parents is dropped and its brick is no candidate: only the sweep over all octree nodes
-// can see it.
+// Two different bricks have equal 4-bit hashes. Their parents differ only in these bricks, so they
+// also have equal hashes, one parent is dropped, and its brick is never compared as a candidate.
+// Only the sweep over all octree nodes detects that the bricks differ.
 TEST_F(ParallelDag, TheSweepLooksAtDroppedNodes) {
   uint64_t one = 1, other = 2;
   while (truncate_hash(hash_brick(other), 4) != truncate_hash(hash_brick(one), 4)) ++other;

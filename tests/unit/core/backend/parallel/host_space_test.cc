@@ -1,5 +1,5 @@
-// The host's primitives against the standard library's loops, at sizes around the parts that
-// threads work on.
+// Compares the primitives of HostSpace with loops of the standard library, at sizes around the size
+// of a thread's part.
 #include "core/backend/parallel/space/host_space.h"
 
 #include <gtest/gtest.h>
@@ -69,7 +69,7 @@ TEST_P(HostSpaceTest, SelectKeepsFlaggedPositionsInOrder) {
   }
 }
 
-// Runs of all lengths, one of them longer than any thread's part.
+// Runs of equal keys have all lengths; one run is longer than any thread's part.
 TEST_P(HostSpaceTest, MergeRunsOrsEqualKeys) {
   for (const uint32_t n : kSizes)
     for (const uint64_t longest : {1, 7, 30000}) {
@@ -100,7 +100,7 @@ TEST_P(HostSpaceTest, CountBits) {
   }
 }
 
-// Sorting by any bits ignores the others and preserves the order of equal keys.
+// A sort by a range of bits ignores the other bits, and preserves the order of equal keys.
 TEST_P(HostSpaceTest, SortsAreStableByTheBitsGiven) {
   for (const uint32_t n : kSizes)
     for (const auto& [begin, end] : {std::pair{0, 64}, {0, 0}, {3, 4}, {5, 30}, {60, 64}, {0, 9}}) {
@@ -128,7 +128,8 @@ TEST_P(HostSpaceTest, SortsAreStableByTheBitsGiven) {
     }
 }
 
-// Sources without outputs, at the ends too; any part of the sources.
+// Some sources have no outputs, also the first and the last one. Any part of the sources can be
+// expanded.
 TEST_P(HostSpaceTest, ExpandVisitsEveryOutputOfItsSource) {
   for (const uint32_t n : {1u, 2u, 100u, 5000u}) {
     std::vector<uint32_t> offsets(n + 1);
@@ -150,7 +151,7 @@ TEST_P(HostSpaceTest, ExpandVisitsEveryOutputOfItsSource) {
   }
 }
 
-// Threads of a block see what all wrote in the phase before.
+// In each phase, the threads of a block see the writes of all its threads in the preceding phase.
 struct ReverseInBlocks {
   static constexpr uint32_t kThreads = 32;
   static constexpr int kPhases = 2;

@@ -1,4 +1,4 @@
-// touched_cells() equals the definition, core/geometry/overlap.h, cell for cell.
+// touched_cells() must equal the definition (core/geometry/overlap.h) in every cell.
 #include "core/backend/parallel/voxelize/triangle_cells.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ void expect_defined(const FixedTriangle& t, const int64_t (&low)[3], int shift, 
   tally.cells += static_cast<uint64_t>(popcount64(expected));
 }
 
-// Blocks of every size a grid can have, at a corner of the triangle and next to it.
+// Compares blocks of every possible size, at a corner of the triangle and next to it.
 void expect_defined_around(const FixedTriangle& t, oracle::Random& random, Tally& tally) {
   for (int shift = 8; shift <= 27; shift += static_cast<int>(random.between(1, 3)))
     for (int i = 0; i < 4; ++i) {
@@ -56,8 +56,8 @@ TEST(TouchedCells, EqualsTheDefinitionOnAllKinds) {
   }
 }
 
-// Triangles at, just below and just beyond the size up to which 64-bit products are used, with
-// normals as long as they get there.
+// Triangles at, just below and just above the largest size for which 64-bit products are used.
+// Their normals are as long as possible at this size.
 TEST(TouchedCells, EqualsTheDefinitionAtTheLimitOfNarrow) {
   oracle::Random random(4);
   Tally tally;
@@ -79,8 +79,8 @@ TEST(TouchedCells, EqualsTheDefinitionAtTheLimitOfNarrow) {
   EXPECT_GT(tally.cells, tally.blocks / 10);
 }
 
-// Small and large triangles with vertices a few units from the cells' corners, where a plane or an
-// edge just meets a cell or just misses it.
+// Small and large triangles with vertices a few units from the cells' corners, so that a plane or
+// an edge just touches or just misses a cell.
 TEST(TouchedCells, EqualsTheDefinitionNearCorners) {
   oracle::Random random(5);
   Tally tally;
@@ -99,7 +99,7 @@ TEST(TouchedCells, EqualsTheDefinitionNearCorners) {
   EXPECT_GT(tally.cells, tally.blocks);
 }
 
-// One setup serves blocks all over the lattice, at any offset from it.
+// One TriangleOnLattice can be used for all blocks of its lattice, at any offset.
 TEST(TouchedCells, BlocksOfOneLattice) {
   oracle::Random random(6);
   Tally tally;
@@ -126,7 +126,7 @@ TEST(TouchedCells, BlocksOfOneLattice) {
   EXPECT_GT(tally.cells, 1000u);
 }
 
-// The cells of a block are numbered as children and as bits of a brick are.
+// The cells of a block are numbered in the same order as children and as the bits of a brick.
 TEST(TouchedCells, BitsAreMortonCodes) {
   for (int i = 0; i < 64; ++i) {
     uint32_t k[3];

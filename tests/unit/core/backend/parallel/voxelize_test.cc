@@ -1,4 +1,4 @@
-// Both voxelizations give the oracle's bricks, in whatever batches and slices they work.
+// Both voxelizations give the oracle's bricks, with any size of batches and slices.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ Bricks bricks_of(const oracle::Voxels& voxels) {
 
 class Voxelize : public testing::Test {
  protected:
-  // The list's bricks, which must be in order and without duplicates.
+  // Returns the merged list's bricks. Checks that they are in order and without duplicates.
   static Bricks merged(BrickList<HostSpace>& list) {
     list.merge();
     Bricks out;
@@ -63,8 +63,8 @@ TEST_F(Voxelize, ListAndTilesGiveTheOraclesBricks) {
   }
 }
 
-// The smallest windows that work: frames are expanded in many slices, voxels packed many times, the
-// list merged and grown in between.
+// With the smallest possible windows, frames are expanded in many slices, voxels are packed many
+// times, and the list is merged and grows in between. The result is the same.
 TEST_F(Voxelize, TinyWindowsChangeNothing) {
   const auto scene = oracle::fixed(oracle::make_scene(oracle::SceneKind::kSoup, 2, region, 60));
   const uint32_t count = static_cast<uint32_t>(scene.size());
@@ -84,7 +84,7 @@ TEST_F(Voxelize, TinyWindowsChangeNothing) {
   EXPECT_GT(first.size(), 500u);
 }
 
-// The brick list under many small parts, with codes that repeat.
+// The brick list merges many small parts in which the same codes occur again.
 TEST_F(Voxelize, BrickListMergesWhatComesAgain) {
   oracle::Random random(5);
   BrickList<HostSpace> list(space, 15);

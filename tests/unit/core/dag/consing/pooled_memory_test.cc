@@ -14,7 +14,7 @@ class PooledMemoryTest : public testing::Test {
   PooledMemory memory_{budget_, pool_};
 };
 
-// Cached pages are zeroed again where zeroed pages were requested.
+// If zeroed pages are requested, cached pages are zeroed again.
 TEST_F(PooledMemoryTest, CachedPagesAreZeroedAgain) {
   for (const size_t size : {1000u, 100000u, 3000000u}) {
     SCOPED_TRACE(size);
@@ -27,8 +27,8 @@ TEST_F(PooledMemoryTest, CachedPagesAreZeroedAgain) {
   }
 }
 
-// Cached pages are freed where the budget cannot hold them and an allocation together, and are at
-// most an eighth of a large budget.
+// Cached pages are freed if the budget cannot hold both them and an allocation. They take at most
+// an eighth of a large budget.
 TEST_F(PooledMemoryTest, CachedPagesStayWithinTheBudget) {
   { const PooledArray<uint8_t> used(memory_, 7 << 20); }
   EXPECT_EQ(pool_.cached_bytes(), 7u << 20);
@@ -62,7 +62,7 @@ TEST_F(PooledMemoryTest, ZeroedArraysAreExact) {
   EXPECT_EQ(table.size(), 4u << 20);
 }
 
-// Growing preserves the contents, on cached pages and on new ones, and charges the array's size.
+// Growing keeps the contents, both on cached and on new pages, and charges the array's size.
 TEST_F(PooledMemoryTest, ArraysGrow) {
   PooledArray<uint32_t> array(memory_, 10);
   uint32_t filled = 0;
@@ -74,7 +74,7 @@ TEST_F(PooledMemoryTest, ArraysGrow) {
   }
 }
 
-// What does not fit throws OutOfBudget; the array that could not grow is unchanged.
+// An array that does not fit throws OutOfBudget. If an array cannot grow, it is unchanged.
 TEST_F(PooledMemoryTest, TooLargeIsOutOfBudget) {
   EXPECT_THROW(PooledArray<uint64_t>(memory_, 9 << 20), OutOfBudget);
   PooledArray<uint64_t> array(memory_, 6 << 20);

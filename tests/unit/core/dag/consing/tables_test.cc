@@ -23,7 +23,8 @@ class Tables : public testing::Test {
   uint64_t word() { return hash_brick(static_cast<uint64_t>(random_.between(0, INT64_MAX - 1))); }
 };
 
-// Equal masks get equal ids, different ones different ids, over many growths.
+// Equal masks get equal ids, and different masks get different ids, also after the table has grown
+// many times.
 TEST_F(Tables, BricksAreFoundAgain) {
   BrickTable table(memory_);
   std::map<uint64_t, uint32_t> truth;
@@ -65,11 +66,12 @@ struct Node {
   auto operator<=>(const Node&) const = default;
 };
 
-// Nodes with hashes of a few values only, so that slots, tags and whole hashes collide, the highest
-// ones included, whose clusters run around the table's end.
+// Adds nodes with few different hashes, so that slots, tags and complete hashes collide. Some
+// hashes are the highest possible ones, so that clusters of slots continue at the start of the
+// table.
 class NodeTables : public Tables {
  protected:
-  // The elements behind the children are random: they must make no difference.
+  // The elements behind the node's children are random, because they must not affect the result.
   uint32_t add(NodeTable& table, const Node& node) {
     uint32_t children[8];
     for (uint32_t& child : children) child = static_cast<uint32_t>(random_.between(0, 3));
@@ -110,8 +112,8 @@ TEST_F(NodeTables, NodesAreFoundAgainWhateverTheirHashes) {
   }
 }
 
-// Slots are sorted in the total order (hash, mask, children), ties and wrapped clusters
-// included; the same when hashes were changed behind the table's back.
+// Slots are sorted in the total order (hash, mask, children), also ties and clusters that continue
+// at the start of the table. The same holds if hashes are changed without the table's knowledge.
 TEST_F(NodeTables, SlotsAreInTheTotalOrder) {
   for (const int distinct : {1, 20, 100000})
     for (const bool changed : {false, true}) {
@@ -142,7 +144,7 @@ TEST_F(NodeTables, SlotsAreInTheTotalOrder) {
     }
 }
 
-// A table that cannot grow throws OutOfBudget, and nothing is charged afterwards.
+// A table that cannot grow throws OutOfBudget. After its destruction nothing is charged.
 TEST_F(NodeTables, ThrowsWithoutMemoryToGrow) {
   MemoryBudget small(64 << 10);
   PooledMemory memory{small, pool_};
