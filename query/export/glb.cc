@@ -344,7 +344,7 @@ ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
   const uint64_t quads = made->quads().size();
   if (quads > limit) {
     made.reset();  // frees memory for the search below
-    // Finds grids that fit even if no faces are merged.
+    // Finds grids that fit even if no faces are merged, because a cell has at most 6 faces.
     CellLimit cells(job, limit / 6);
     refuse_size(job,
                 "over " + count_text(limit) + " rectangles are needed" +

@@ -14,7 +14,7 @@
 namespace voxdag::query {
 namespace {
 
-// The CRC-32 of ZIP, 8 bytes per step ("slicing by 8").
+// Computes the CRC-32 of ZIP files, 8 bytes per step ("slicing by 8").
 class Crc32 {
  public:
   Crc32() {
@@ -189,7 +189,7 @@ void visit_cells(const ExportJob& job, ExportStage& stage, const VisitCell& visi
   });
 }
 
-// numpy's name of a type, and the type's code in files.
+// A numpy type: its name, such as "float32", and its code in .npy files, such as "<f4".
 struct NumpyType {
   const char* name;
   const char* description;

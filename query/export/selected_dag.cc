@@ -119,7 +119,7 @@ struct BuiltNode {
   uint64_t voxels = 0;
 };
 
-// Builds the DAG from the leaves up, depth first.
+// Builds the DAG of the selected cells, depth first. A node is added after its children.
 class DagBuilder {
  public:
   explicit DagBuilder(const ExportJob& job) : job_(job), stage_(job, "select", 0, "nodes") {

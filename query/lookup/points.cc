@@ -11,7 +11,7 @@ namespace {
 // faster (measured).
 constexpr size_t kGroup = 32;
 
-// Runs descents in groups of kGroup.
+// Runs the descents of lookups. Up to kGroup descents run interleaved.
 class Descents {
  public:
   Descents(const DagView& dag, const TopCells* top, uint32_t grid_levels)

@@ -8,9 +8,9 @@
 namespace voxdag::query {
 namespace {
 
-// The length of a PNG's signature and IHDR chunk.
+// The length of a PNG's signature and IHDR chunk, in bytes. The chunk kSoftware follows them.
 constexpr size_t kHeadBytes = 33;
-// A tEXt chunk: length, type, keyword and text, CRC.
+// The tEXt chunk that names voxdag as the software: its length, type, keyword and text, and CRC.
 constexpr std::string_view kSoftware{"\0\0\0\x0ftEXtSoftware\0voxdag\x59\x60\x14\x49", 27};
 
 }  // namespace
