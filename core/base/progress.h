@@ -24,8 +24,8 @@ struct SubvolumeStatus {
   uint64_t bytes = 0;  // size of its artifact
 };
 
-// The batches of a build on a cluster, and the tasks that build them. A node here is a machine of
-// the cluster.
+// The batches of a build on a cluster, and the tasks that build them. A *node* is a machine of the
+// cluster in this struct.
 struct ClusterTasks {
   uint64_t batches = 0;                           // total
   uint64_t built = 0;                             // built batches

@@ -10,8 +10,8 @@ namespace {
 
 constexpr const char* kUnits[] = {"B", "KiB", "MiB", "GiB", "TiB", "PiB"};
 
-// Returns the power of two that a unit ("", "B", "K", "KiB", "kB", ...) stands for, as its
-// exponent: 10 for "KiB". Returns -1 for other texts.
+// Returns the exponent e of a unit of 2^e bytes ("", "B", "K", "KiB", "kB", ...): 10 for "KiB".
+// Returns -1 for other texts.
 int unit_shift(std::string unit) {
   if (unit.ends_with("B") || unit.ends_with("b")) unit.pop_back();
   if (unit.ends_with("i")) unit.pop_back();

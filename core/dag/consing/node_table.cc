@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kWordLimit = uint64_t{1} << 32;  // ids are 32-bit
+constexpr uint64_t kWordLimit = uint64_t{1} << 32;  // an id is a word index of 32 bits
 
 }  // namespace
 
