@@ -206,8 +206,8 @@ std::string option_name(const char* field_name);
 // 4 to 1048576".
 template <class T>
 std::string expectation(const Field& field);
-// Returns the values that an integer field accepts, as such a phrase. `low` and `high` are the
-// field's limits as text.
+// Returns the values that an integer field accepts, as a phrase for messages. `low` and `high` are
+// the field's limits as text.
 std::string expected_integer(const Field& field, const std::string& low, const std::string& high);
 bool fits_integer_limits(const Field& field, int64_t value);
 // True if the text has no control characters and its number of characters is within the limits.

@@ -12,8 +12,8 @@ constexpr uint64_t kBytesPerEntry = 80;  // upper bound per entry of a table, in
 
 SubDagTables::SubDagTables(PooledMemory& memory, int size_log2, const TableSizes& expected)
     : memory_(memory), bricks_(memory) {
-  // Reserves at most a quarter of the free memory (table_bytes()). Memory that is reserved for
-  // tables of a cube that turns out to be smaller than expected is not used, so enough must remain.
+  // If the cube is smaller than expected, a part of the reserved tables remains unused. So at most
+  // a quarter of the free memory (table_bytes()) is reserved.
   uint64_t fits_budget = ConsingMemory::table_bytes(memory.budget.available());
   const auto reserve = [&](auto& table, int s) {
     const uint64_t bytes = expected.entries[s] * kBytesPerEntry;
