@@ -102,7 +102,8 @@ void check_config(const ServerConfig& config) {
     if (!holds) throw Error(ErrorCode::kInvalidInput, what);
   };
   expect(!config.data_folder.empty(), "no data folder: expected one (--data DIR, data_folder)");
-  expect(config.http.port >= 0 && config.http.port <= 65535, "the port: expected 0 to 65535");
+  expect(config.http.port >= 0 && config.http.port <= 65535,
+         "port " + std::to_string(config.http.port) + ": expected 0 to 65535");
   expect(config.http.certificate_file.empty() == config.http.key_file.empty(),
          "TLS needs both files, the certificate and its key");
   expect(!config.token_file.empty() || is_loopback_name(config.http.address),

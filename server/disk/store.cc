@@ -20,7 +20,7 @@ SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool 
                     format.files + " that are found");
   const bool is_old = format.upgrade && version == format.version - 1;
   if (!fresh && version != format.version && !is_old)
-    throw Error(ErrorCode::kUnsupportedVersion, path + ": the version is " +
+    throw Error(ErrorCode::kUnsupportedVersion, path + ": the version of this database is " +
                                                     std::to_string(version) + ", expected " +
                                                     std::to_string(format.version));
   database.execute("PRAGMA journal_mode = WAL");

@@ -10,9 +10,10 @@ constexpr size_t kBufferBytes = 256 << 10;
 // Maximum bytes that a client must send again after a power cut.
 constexpr uint64_t kCheckpointBytes = uint64_t{64} << 20;
 
-RequestError wrong_offset(uint64_t expected) {
+RequestError wrong_offset(uint64_t first, uint64_t expected) {
   RequestError error(RequestError::Kind::kConflict,
-                     "the part does not begin where the last one ended");
+                     "the part begins at byte " + std::to_string(first) + ": expected byte " +
+                         std::to_string(expected) + ", where the stored bytes end");
   error.upload_offset = expected;
   return error;
 }
@@ -36,10 +37,10 @@ SceneUpload::SceneUpload(SceneStore& store, std::string name, uint64_t first,
     return;
   }
   const auto known = store_.upload(name_);
-  if (first_ != (known ? known->offset : 0)) throw wrong_offset(known ? known->offset : 0);
+  if (first_ != (known ? known->offset : 0)) throw wrong_offset(first_, known ? known->offset : 0);
   if (!has_part()) {
     store_.drop_upload(name_);
-    throw wrong_offset(0);
+    throw wrong_offset(first_, 0);
   }
   if (known->total && total_ != known->total)
     throw RequestError(RequestError::Kind::kInvalid,

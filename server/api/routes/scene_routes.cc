@@ -104,7 +104,9 @@ Part part_of(const Request& request) {
   if (!parse_content_range(header, range, total))
     throw bad_request("Content-Range: expected bytes FIRST-LAST/TOTAL");
   if (request.content_length && *request.content_length != range.size())
-    throw bad_request("Content-Range and Content-Length do not match");
+    throw bad_request("Content-Length is " + std::to_string(*request.content_length) +
+                      ": expected " + std::to_string(range.size()) +
+                      ", the number of bytes of the Content-Range");
   if (!request.has_body) throw bad_request("expected the part of the scene as body");
   return {range.begin, range.end, total};
 }
@@ -135,7 +137,8 @@ BodyEnd receive(Context& context, Call& call, const Part& part, DiskSpace::Reser
     return true;
   });
   if (end == BodyEnd::kComplete && part.end && received != *part.end)
-    throw bad_request("the body is shorter than its Content-Range");
+    throw bad_request("the body has " + std::to_string(received - part.first) +
+                      " bytes: expected " + std::to_string(*part.end - part.first));
   return end;
 }
 

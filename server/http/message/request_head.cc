@@ -53,7 +53,8 @@ void parse_field(std::string_view line, HeaderMap& headers) {
     throw bad_request("expected header fields as NAME: VALUE, each on one line");
   const std::string_view value = trimmed(line.substr(colon + 1));
   if (std::ranges::any_of(value, [](char c) { return is_control(c) && c != '\t'; }))
-    throw bad_request("a header field has a control character");
+    throw bad_request("the header field " + std::string(line.substr(0, colon)) +
+                      " has a control character");
   if (headers.size() == kMaxFields)
     throw Problem(431, "headers_too_large", "expected at most 100 header fields");
   headers.emplace(line.substr(0, colon), value);

@@ -36,7 +36,9 @@ void parse_query(std::string_view text, std::map<std::string, std::string>& quer
         equals < pair.size() ? pair.substr(equals + 1) : std::string_view{};
     const auto [at, is_new] = query.emplace(decode(std::string(pair.substr(0, equals)), true),
                                             decode(std::string(value), true));
-    if (!is_new) throw bad_request("a query parameter is repeated");
+    if (!is_new)
+      throw bad_request("the query parameter '" + at->first.substr(0, 64) +
+                        "' is repeated: expected it once");
   });
 }
 

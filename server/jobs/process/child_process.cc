@@ -78,7 +78,8 @@ ChildProcess::ChildProcess(const Start& start) {
   arguments.push_back(nullptr);
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
-    throw Error(ErrorCode::kIo, "pipe: " + std::string(std::strerror(errno)));
+    throw Error(ErrorCode::kIo,
+                "cannot start a process: pipe: " + std::string(std::strerror(errno)));
   const pid_t parent = getpid();
   int reason = 0;
   {
@@ -92,7 +93,8 @@ ChildProcess::ChildProcess(const Start& start) {
   output_ = ends[0];
   if (pid_ < 0) {
     close(output_);
-    throw Error(ErrorCode::kIo, "fork: " + std::string(std::strerror(reason)));
+    throw Error(ErrorCode::kIo,
+                "cannot start a process: fork: " + std::string(std::strerror(reason)));
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <new>
@@ -31,7 +33,9 @@ constexpr int kInternalExitStatus = 1;
 void raise_oom_score() { std::ofstream("/proc/self/oom_score_adj") << 500; }
 
 void enter(const std::string& folder) {
-  if (chdir(folder.c_str()) != 0) throw Error(ErrorCode::kIo, "the job's folder cannot be entered");
+  if (chdir(folder.c_str()) != 0)
+    throw Error(ErrorCode::kIo,
+                "cannot enter the job's folder: " + std::string(std::strerror(errno)));
 }
 
 // Links the uploads of a task into the working directory under their public names.
@@ -42,7 +46,7 @@ void link_uploads(const JobTask& task) {
     if (!failure) std::filesystem::create_symlink(path, name, failure);
     if (failure)
       throw Error(failure == std::errc::no_space_on_device ? ErrorCode::kNoSpace : ErrorCode::kIo,
-                  "symlink " + name + ": " + failure.message());
+                  "cannot link the scene " + name + ": " + failure.message());
   }
 }
 
@@ -150,7 +154,7 @@ int run_job(FileSystem& files, const std::string& path, const CancelToken& cance
     return fail(ErrorCode::kOutOfMemory, "the system has no threads or memory left");
   } catch (const std::exception&) {
     // The exception's text is not sent, because messages of libraries may contain paths.
-    pipe.fail("internal", "a fault of the job's process");
+    pipe.fail("internal", "the job's process stopped because of an unexpected exception");
     return kInternalExitStatus;
   }
 }

@@ -33,7 +33,7 @@ export class Camera {
   // Throws an Error if no picture can be taken from this position. The message is for users.
   set({eye, target, fovDegrees}) {
     if (![...eye, ...target].every(Number.isFinite))
-      throw new Error("A camera has finite coordinates.");
+      throw new Error("The coordinates of the camera and its target must be finite numbers.");
     if (!(fovDegrees >= 1 && fovDegrees <= 170))
       throw new Error("The field of view must be between 1 and 170 degrees.");
     if (!(distance(eye, target) > 0)) throw new Error("The camera must not be at its target.");

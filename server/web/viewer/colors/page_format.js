@@ -25,11 +25,12 @@ export function decodePage(page) {
   const colors = single ? count : Math.ceil((skip + count) / 32) * 4;
   if (count < 1 || count > 512 || (single && skip > 0) || (page[0] & ~kUsedBits) !== 0 ||
       page.length !== kMaskAt + kMaskWords + colors)
-    throw new Error(`A color page has ${page.length} words, and ${count} cells.`);
+    throw new Error(
+        `A color page has ${page.length} words; its first word is ${page[0]?.toString(16)}.`);
   const mask = page.subarray(kMaskAt, kMaskAt + kMaskWords), before = [0];
   for (const [i, word] of mask.entries()) before.push(before[i] + countBits(word));
   if (before[kMaskWords] !== count)
-    throw new Error("The mask of a color page has another number of cells.");
+    throw new Error(`The mask of a color page has ${before[kMaskWords]} cells; expected ${count}.`);
   const further = Math.max(0, Math.ceil(colors / 4) - kFirstColors);
   const words = new Uint32Array(kBlockWords * (1 + Math.ceil(further / 16)));
   words.set([page[0], before[4] | before[8] << 10 | before[12] << 20]);

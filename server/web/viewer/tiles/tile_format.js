@@ -43,7 +43,7 @@ export function decodeTile(tile, level, shape) {
     for (let child = 0; child < count; ++child) {
       const index = nodes[at + 1 + child];
       if (depth[at] === levels - 1 && index >= leafCount)
-        throw new Error("A tile has a leaf index beyond its leaves.");
+        throw new Error(`A tile has the leaf index ${index}; expected less than ${leafCount}.`);
       words[to + child] = depth[at] < levels - 1 ? place[index] :
           bricks                                 ? (leafBegin + (index >>> 1)) * 256 + (index & 1) :
                                                    (leafBegin + index) * 256;
@@ -73,14 +73,16 @@ export function tileShape({levels, tile_levels}, level) {
 
 function checkHead(tile, level, {levels, bricks}) {
   if (tile.length < kHeadWords + 2 || tile[0] !== kMagic)
-    throw new Error("A tile does not begin as tiles do.");
+    throw new Error(
+        `A tile has ${tile.length} words and begins with ${tile[0]?.toString(16)}; expected ${
+            kHeadWords + 2} or more words and ${kMagic.toString(16)}.`);
   const shape = level | levels << 8 | bricks << 16;
   if (tile[1] !== shape)
     throw new Error(
         `A tile has the shape ${tile[1].toString(16)}; expected ${shape.toString(16)}.`);
   const length = kHeadWords + tile[2] + tile[3] * (bricks ? 2 : kCutWords);
   if (tile[2] < 2 || length !== tile.length)
-    throw new Error(`A tile has ${tile.length} words; its head says ${length}.`);
+    throw new Error(`A tile has ${tile.length} words; expected ${length} by its head.`);
   if (tile[3] > 8 ** levels)
     throw new Error(`A tile has ${tile[3]} leaves; expected ${8 ** levels} at most.`);
 }
@@ -103,13 +105,13 @@ function placeNodes(nodes, levels, place, depth) {
   for (let at = 0; at < nodes.length;) {
     const count = kPopcount[nodes[at]];
     if (at > 0 && depth[at] === 0)
-      throw new Error(`A tile's node word ${at} begins a node that no other names.`);
+      throw new Error(`A tile's node word ${at} begins a node that is the child of no node.`);
     for (let child = 1; child <= count && depth[at] < levels - 1; ++child) {
       const index = nodes[at + child];
       if (index <= at || index >= nodes.length || place[index] === 0)
         throw new Error(`A tile's node word ${at + child} is not the index of a node after it.`);
       if (depth[index] !== 0 && depth[index] !== depth[at] + 1)
-        throw new Error(`A tile's node word ${at + child} names a node of another level.`);
+        throw new Error(`A tile's node word ${at + child} names a node of the wrong level.`);
       depth[index] = depth[at] + 1;
     }
     at += 1 + count;
@@ -134,7 +136,8 @@ function copyLeaves(leaves, bricks, count, words, begin) {
     words[to + 1] = coarse[2 * i] = leaves[from + 2];
     words[to + 2] = coarse[2 * i + 1] = leaves[from + 3];
     if (addresses[i] > kMaxOffset)
-      throw new Error(`A tile's leaf ${i} lies at word ${addresses[i]} of its level.`);
+      throw new Error(`A tile's leaf ${i} has the word offset ${addresses[i]}; expected ${
+          kMaxOffset} at most.`);
     expectSome(coarse[2 * i], coarse[2 * i + 1], i);
   }
   return {addresses, coarse};
