@@ -23,7 +23,7 @@ TEST(ChecksumTest, KnownValues) {
   EXPECT_EQ(digest.finish(), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
-// The reader's own XXH64 is the library's, at every length up to some blocks.
+// The reader's implementation of XXH64 equals the library's, for every length up to some blocks.
 TEST(ChecksumTest, ReaderAgreesWithTheLibrary) {
   std::string text;
   for (int size = 0; size < 300; ++size) {

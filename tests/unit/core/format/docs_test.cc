@@ -22,8 +22,8 @@ std::vector<std::string> lines_of(const std::string& document) {
   return lines;
 }
 
-// The cells of a row of a table, without the blanks and backquotes around them; empty for other
-// lines.
+// Returns the cells of a row of a table, without surrounding blanks and backquotes. Returns an
+// empty list for other lines.
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
   if (line.empty() || line[0] != '|') return cells;
@@ -63,7 +63,7 @@ TEST(FormatDocTest, WorkedExampleIsTheGoldenFile) {
   EXPECT_EQ(parse_hexdump(lines_of("format.md")), read_bytes(kScene));
 }
 
-// Every field of the header stands in the table with its offset.
+// The table in docs/format.md has every field of the header with its offset.
 TEST(FormatDocTest, HeaderTableIsTheLayout) {
   using namespace global_layout;
   const std::map<std::string, size_t> fields = {{"magic", kMagicAt},
@@ -137,8 +137,8 @@ TEST(ErrorsDocTest, TableIsThatOfTheCode) {
   EXPECT_EQ(documented, coded);
 }
 
-// The example program compiles as its first lines tell users to, C++17 and no include path but the
-// reader's folder, and finds the top of the pillar.
+// The example program compiles as its first lines describe: with C++17, and with the reader's
+// folder as the only include path. It finds the top of the pillar.
 TEST(ReaderExampleTest, CompilesOnItsOwnAndRuns) {
   if (std::system("c++ --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "no c++ on this machine";
   TemporaryFolder folder;

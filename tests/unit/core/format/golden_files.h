@@ -6,8 +6,8 @@
 
 namespace voxdag {
 
-// The worked example of docs/format.md: on a grid of 8^3, the floor y = 0 and a pillar of height 8
-// on its corner.
+// The worked example of docs/format.md: in a grid of 8^3 voxels, the floor y = 0 and a pillar of 8
+// voxels at its corner.
 inline oracle::Dag floor_and_pillar() {
   oracle::Voxels voxels(8);
   for (int x = 0; x < 8; ++x)

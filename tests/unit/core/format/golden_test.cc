@@ -1,4 +1,4 @@
-// Files of version 1 in tests/golden: they must remain readable, and the writer must still make the
+// The files of version 1 in tests/golden must remain readable, and the writer must still make the
 // same bytes.
 #include <gmock/gmock.h>
 

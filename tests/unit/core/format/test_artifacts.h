@@ -1,4 +1,4 @@
-// Artifacts for tests: level arrays in the total order, written and read whole.
+// Artifacts for tests: functions that write and read complete level arrays in the total order.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,9 @@
 
 namespace voxdag {
 
-// Random rows that obey the rules of an artifact, but may lack parents (artifacts of a merge pass
-// have many roots): `count` bricks, and as many nodes on each of `node_levels`.
+// Returns random rows that obey the rules of an artifact: `count` bricks, and `count` nodes on each
+// of `node_levels` levels. Some rows have no parents, as in artifacts of a merge pass, which have
+// many roots.
 inline SubDag random_rows(uint64_t seed, size_t count, uint32_t grid_levels, uint32_t node_levels,
                           uint32_t hash_bits) {
   oracle::Random random(seed);

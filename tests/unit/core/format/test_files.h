@@ -1,5 +1,5 @@
-// What the tests of this room share: a scratch folder, whole files as bytes, random voxels with
-// structure, and global files made from the oracle's DAGs.
+// The common part of these tests: a temporary folder, functions for complete files as bytes, random
+// voxels with structure, and global files made from the oracle's DAGs.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ inline void write_bytes(const std::string& path, const ByteString& bytes) {
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
-// Blobs, walls and dust: DAGs with shared nodes on every level.
+// Returns voxels of blobs, walls and scattered points. Their DAGs have shared nodes on every level.
 inline oracle::Voxels random_voxels(uint64_t seed, int edge) {
   oracle::Random random(seed);
   oracle::Voxels voxels(edge);
@@ -53,8 +53,8 @@ inline oracle::Voxels random_voxels(uint64_t seed, int edge) {
   return voxels;
 }
 
-// The words of the oracle's levels as the global file has them: bricks first. Levels of over
-// `narrow_words` words are wide.
+// Returns the words of the oracle's levels in the layout of the global file, bricks first. Levels
+// of over `narrow_words` words are wide.
 inline std::vector<std::vector<uint32_t>> level_words(
     const oracle::Dag& dag, uint64_t narrow_words = global_layout::kNarrowLevelWords) {
   std::vector<std::vector<uint32_t>> levels;

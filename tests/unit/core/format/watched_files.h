@@ -1,4 +1,4 @@
-// A FileSystem that notes every call that changes the disk, and refuses the n-th of them.
+// A FileSystem that records every call that changes the disk, and lets one of them fail.
 #pragma once
 
 #include <memory>
@@ -14,9 +14,9 @@ class WatchedFiles : public ForwardingFiles {
  public:
   WatchedFiles() : ForwardingFiles(system_files()) {}
 
-  // Calls so far: "create PATH", "write OFFSET SIZE", "sync", "close", "rename PATH", ...
+  // The calls so far: "create PATH", "write OFFSET SIZE", "sync", "close", "rename PATH", ...
   std::vector<std::string> log;
-  // The call of this number (from 0) throws Error{kNoSpace}; none by default.
+  // Number (from 0) of the call that throws Error{kNoSpace}; by default no call fails.
   size_t fail_at = ~size_t{0};
 
   void note(const std::string& what) {

@@ -10,8 +10,8 @@
 namespace voxdag {
 namespace {
 
-// The eight children fill the cube, each has its child index and coordinates, and the cube as
-// parent.
+// The eight children fill the cube. Each has its child index and coordinates, and its parent is the
+// cube.
 TEST(Cube, ChildrenFillTheirParent) {
   const Cube cube{3, {5, 0, 7}};
   std::set<std::tuple<uint32_t, uint32_t, uint32_t>> seen;
@@ -30,7 +30,7 @@ TEST(Cube, ChildrenFillTheirParent) {
   EXPECT_EQ(*seen.rbegin(), std::make_tuple(11u, 1u, 15u));
 }
 
-// Child index = 4x + 2y + z: walking children in order is walking Morton codes in order.
+// Child index = 4x + 2y + z, so the order of the children is the order of their Morton codes.
 TEST(Cube, ChildOrderIsMortonOrder) {
   EXPECT_EQ(Cube{}.child(4), (Cube{1, {1, 0, 0}}));
   EXPECT_EQ(Cube{}.child(2), (Cube{1, {0, 1, 0}}));

@@ -34,7 +34,7 @@ void expect_error(ErrorCode code, const std::function<void()>& call) {
   }
 }
 
-// Bounds grow from nothing, by all three vertices of every triangle.
+// Bounds begin empty and are extended by all three vertices of every triangle.
 TEST(WorldBounds, GrowByTriangles) {
   WorldBounds b = bounds_of({});
   EXPECT_TRUE(b.empty);
@@ -53,7 +53,7 @@ TEST(WorldBounds, GrowByTriangles) {
   }
 }
 
-// The default cube, from manually computed numbers (all exact in binary).
+// Expected values were computed manually; all are exact in binary.
 TEST(Grid, DefaultCubeIsThatOfTheDesign) {
   const Grid grid = Grid::around(bounds({-1, 2, 10}, {7, 4, 11}), 10);
   EXPECT_EQ(grid.levels, 10u);
@@ -64,8 +64,8 @@ TEST(Grid, DefaultCubeIsThatOfTheDesign) {
   EXPECT_EQ(grid.origin[2], 10.5 - 4.0001220703125);
 }
 
-// The cube depends on the scene alone: a finer grid splits the voxels of a coarser one, so voxel
-// positions of all resolutions nest.
+// The cube depends only on the scene. So a finer grid divides the voxels of a coarser grid, and
+// voxels of all resolutions nest.
 TEST(Grid, VoxelsNestAcrossResolutions) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -92,7 +92,7 @@ TEST(Grid, VoxelsNestAcrossResolutions) {
   }
 }
 
-// A scene without triangles or extent still has a cube: edge 1 around it.
+// For a scene without triangles or without extent, the grid is a cube of edge 1 around it.
 TEST(Grid, WithoutExtentHasEdgeOne) {
   const Grid none = Grid::around(WorldBounds{}, 4);
   EXPECT_EQ(none.edge, 1.0);
@@ -102,13 +102,13 @@ TEST(Grid, WithoutExtentHasEdgeOne) {
   EXPECT_EQ(point.origin, (std::array<double, 3>{2.5, 3.5, 4.5}));
 }
 
-// An extent beyond the doubles is an error, not a grid of infinities.
+// An extent that exceeds the largest double is an error.
 TEST(Grid, ExtentMustBeFinite) {
   const double most = std::numeric_limits<double>::max();
   expect_error(ErrorCode::kLimit, [&] { Grid::around(bounds({-most, 0, 0}, {most, 0, 0}), 4); });
 }
 
-// The cube a user gives is taken as it is; nonsense is refused.
+// A cube given by the user is used unchanged. Invalid cubes are refused.
 TEST(Grid, GivenCube) {
   const Grid grid = Grid::given({1, 2, 3}, 0.3, 5);
   EXPECT_EQ(grid.origin, (std::array<double, 3>{1, 2, 3}));
@@ -120,7 +120,8 @@ TEST(Grid, GivenCube) {
     expect_error(ErrorCode::kInvalidInput, [&] { Grid::given({0, x, 0}, 1, 5); });
 }
 
-// --voxel-size: edge = V R, centered; a scene that fills it or more does not fit.
+// With --voxel-size V, the grid's edge is V * R, and the grid is centered on the scene. A scene as
+// large as the grid or larger is refused.
 TEST(Grid, OfAVoxelSize) {
   const WorldBounds b = bounds({0, 10, 20}, {4, 11, 21});
   const Grid grid = Grid::with_voxel_size(b, 0.5, 4);
@@ -133,8 +134,8 @@ TEST(Grid, OfAVoxelSize) {
     expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, size, 4); });
 }
 
-// A grid whose origin or edge is not a finite number cannot be stored: it is refused, where it used
-// to give a file that no command opens.
+// A grid whose origin or edge is not finite is refused, because no command could open its file. An
+// earlier version wrote such files.
 TEST(GridLimits, AGridOutOfTheRangeOfDoublesIsRefused) {
   const WorldBounds far = bounds({1.5e308, 0, 0}, {1.5e308, 1, 1});
   EXPECT_EQ(error_of([&] { Grid::around(far, 6); }).code(), ErrorCode::kLimit);

@@ -18,7 +18,8 @@ uint64_t interleave(uint32_t x, uint32_t y, uint32_t z) {
 TEST(Morton, InterleavesAndComesBack) {
   std::mt19937_64 random(1);
   for (int i = 0; i < 100000; ++i) {
-    // All 21 bits, and few of them, so that low ones are not drowned.
+    // Coordinates have up to 21 bits. Many of them have few bits, so that low bits are also tested
+    // alone.
     const int bits = 1 + i % 21;
     const uint32_t mask = (1u << bits) - 1;
     const uint32_t x = random() & mask, y = random() & mask, z = random() & mask;
@@ -32,7 +33,7 @@ TEST(Morton, InterleavesAndComesBack) {
   }
 }
 
-// The largest coordinates, and bits beyond them, which are ignored.
+// The largest coordinates are encoded; bits above bit 20 are ignored.
 TEST(Morton, HasTwentyOneBitsAnAxis) {
   EXPECT_EQ(morton_encode(0x1fffff, 0x1fffff, 0x1fffff), 0x7fffffffffffffffull);
   EXPECT_EQ(morton_encode(0x200000, 0, 0), 0u);

@@ -27,14 +27,15 @@ bool ours(const Triangle& t, const Box& box) {
   return triangle_touches_cube(fixed, low, box.edge);
 }
 bool truth(const Triangle& t, const Box& box) { return oracle::touches(t, box.low, box.edge); }
-// Touches the cube, but not its inside: what half-open boxes lose.
+// True if the triangle touches the cube but not its inside. A test with half-open cubes would miss
+// such triangles.
 bool grazes(const Triangle& t, const Box& box) {
   return truth(t, box) &&
          !oracle::touches(t, {box.low[0] + 1, box.low[1] + 1, box.low[2] + 1}, box.edge - 2);
 }
 
-// A cube of the lattice near some point of the triangle, so that hits and narrow misses are about
-// as frequent.
+// Returns a cube of the lattice near some point of the triangle, so that hits and narrow misses are
+// about equally frequent.
 Box box_near(const Triangle& t, Random& random) {
   Box box;
   box.edge = 256 << random.between(0, random.coin() ? 2 : 8);
@@ -48,8 +49,8 @@ Box box_near(const Triangle& t, Random& random) {
   return box;
 }
 
-// The product's test and the oracle's, which share no formula, agree on every pair; hits, misses
-// and mere contacts are all well represented.
+// voxdag's test and the oracle's test share no formula. They agree on all pairs, which include many
+// hits, misses, and contacts without overlap.
 TEST(Overlap, EqualsTheOracle) {
   for (const oracle::SceneKind kind : oracle::kAllKinds) {
     Random random(100 + static_cast<uint64_t>(kind));
@@ -75,7 +76,8 @@ TEST(Overlap, EqualsTheOracle) {
   }
 }
 
-// Triangles and cubes anywhere up to the limit of the coordinates: nothing overflows.
+// Triangles and cubes are at random positions up to the limit of the coordinates. No integer
+// overflows.
 TEST(Overlap, EqualsTheOracleAtTheLimit) {
   Random random(5);
   int hits = 0, misses = 0;
@@ -100,7 +102,8 @@ TEST(Overlap, EqualsTheOracleAtTheLimit) {
   EXPECT_GT(misses, 10000);
 }
 
-// Around the reach of the test in 64 bits, whose sums would not fit if it were chosen too often.
+// Triangles are near the largest size for which the test uses 64-bit integers. If the 64-bit test
+// were used for larger triangles, its sums would overflow.
 TEST(Overlap, EqualsTheOracleAtTheNarrowReach) {
   Random random(7);
   int narrow = 0, hits = 0;
@@ -122,8 +125,8 @@ TEST(Overlap, EqualsTheOracleAtTheNarrowReach) {
   EXPECT_LT(hits, 55000);
 }
 
-// Small triangles around one small cube, near-misses by single units: every way of passing a
-// corner, an edge or a face.
+// Small triangles around a small cube miss or touch it by single units, at corners, edges and
+// faces.
 TEST(Overlap, EqualsTheOracleUnitByUnit) {
   Random random(6);
   int contacts = 0;
@@ -139,8 +142,8 @@ TEST(Overlap, EqualsTheOracleUnitByUnit) {
   EXPECT_GT(contacts, 1000);
 }
 
-// A closed cube is the union of its eight closed children, so culling down the octree loses and
-// adds nothing.
+// A closed cube is the union of its eight closed children. So a triangle touches a cube if and only
+// if it touches one of the children.
 TEST(Overlap, CubeIsTheUnionOfItsChildren) {
   for (const oracle::SceneKind kind : oracle::kAllKinds) {
     Random random(200 + static_cast<uint64_t>(kind));
@@ -159,7 +162,8 @@ TEST(Overlap, CubeIsTheUnionOfItsChildren) {
   }
 }
 
-// No axis, direction or vertex is special: turned, mirrored and renumbered pairs get one answer.
+// If a pair of a triangle and a cube is rotated or mirrored, or the vertices change places, the
+// result is the same.
 TEST(Overlap, IsSymmetric) {
   for (const oracle::SceneKind kind : oracle::kAllKinds) {
     Random random(300 + static_cast<uint64_t>(kind));
@@ -188,7 +192,7 @@ TEST(Overlap, IsSymmetric) {
   }
 }
 
-// Known answers: contacts of one point count, one unit less is a miss.
+// Known results: contact in one point counts as touching, and one unit less is a miss.
 TEST(Overlap, CountsContacts) {
   const Box box{{0, 0, 0}, 256};
   // The plane x + y = 512 touches the cube in one edge; x + y = 514 passes by.

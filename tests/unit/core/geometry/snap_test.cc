@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// A grid of 16 voxels of edge 1: world positions are voxel positions.
+// Returns a grid of 16 voxels of edge 1, so that positions in the world equal positions in voxels.
 Grid plain_grid() { return Grid::given({0, 0, 0}, 16, 4); }
 
 WorldTriangle at(double x, double y, double z) { return {{{x, y, z}, {x, y, z}, {x, y, z}}}; }
@@ -20,7 +20,7 @@ int64_t snapped(double x) {
   return out.v[0][0];
 }
 
-// u = 2 floor(128 x) + 1: the middle of one of 128 slices of the voxel.
+// u = 2 floor(128 x) + 1 is the middle of one of the 128 slices of a voxel.
 TEST(Snap, GoesToTheMiddleOfASlice) {
   EXPECT_EQ(snapped(0.0), 1);
   EXPECT_EQ(snapped(std::nextafter(1 / 128.0, 0)), 1);
@@ -30,7 +30,7 @@ TEST(Snap, GoesToTheMiddleOfASlice) {
   EXPECT_EQ(snapped(std::nextafter(16.0, 0)), 4095);
 }
 
-// A vertex is never on a voxel's boundary, and remains in its voxel.
+// A snapped vertex is never on a voxel's boundary, and is in the same voxel as before.
 TEST(Snap, IsOddAndStaysInItsVoxel) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> uniform(0, 16);
@@ -44,7 +44,8 @@ TEST(Snap, IsOddAndStaysInItsVoxel) {
   }
 }
 
-// The formula itself, operation by operation, on an awkward cube.
+// Compares with the formula, operation by operation, for a grid whose origin and edge are not round
+// numbers.
 TEST(Snap, IsThatOfTheDesign) {
   std::mt19937_64 random(12);
   std::uniform_real_distribution<double> uniform(-3, 5);
@@ -65,7 +66,8 @@ TEST(Snap, IsThatOfTheDesign) {
   }
 }
 
-// A triangle whose box misses the grid is dropped, on any side; one whose box touches it is not.
+// A triangle is dropped if its bounding box misses the grid on any side. It is kept if the box
+// touches the grid.
 TEST(Snap, DropsWhatMissesTheGrid) {
   FixedTriangle out;
   const double below = -1e-300, above = 16.0;
@@ -81,7 +83,7 @@ TEST(Snap, DropsWhatMissesTheGrid) {
   EXPECT_EQ(out.v[0][0], -25599);
 }
 
-// A vertex at |u| >= 2^40 is a limit error, unless the triangle misses the grid anyhow.
+// A vertex with |u| >= 2^40 is a limit error, unless the triangle misses the grid.
 TEST(Snap, TellsWhatReachesTooFar) {
   FixedTriangle out;
   const double limit = 0x1p32;  // 2^40 units
@@ -101,8 +103,8 @@ TEST(Snap, TellsWhatReachesTooFar) {
   EXPECT_EQ(snap_triangle(plain_grid(), far_away, out), SnapResult::kOutside);
 }
 
-// Far from its origin a tiny cube makes the quotient overflow: still an answer, never a cast of
-// infinity.
+// If a vertex is far from the origin of a tiny grid, the quotient overflows. The result is still
+// defined, because infinity is never cast to an integer.
 TEST(Snap, SurvivesOverflow) {
   FixedTriangle out;
   const Grid tiny = Grid::given({0, 0, 0}, 1e-300, 20);

@@ -1,5 +1,5 @@
-// Images of every kind decode to the stored pixels, and images that are broken or claim too much do
-// no harm.
+// Images of every kind decode to the stored pixels. Images that are broken, or that declare too
+// large sizes, do no harm.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -132,7 +132,7 @@ TEST(Jpeg, ManyScans) {
   EXPECT_THAT(problem_of(jpeg_of_scans(48, 40, pixels, 600)), HasSubstr("over 500 scans"));
 }
 
-// Kinds of JPEG that need other decoders: the frame header has it.
+// Kinds of JPEG that need other decoders are refused. The frame header gives the kind.
 TEST(Jpeg, OtherFrames) {
   const std::string file = jpeg_file(16, 16, 3, gradient(16, 16, 3));
   const size_t frame = file.find("\xff\xc0");
@@ -149,7 +149,8 @@ TEST(Jpeg, OtherFrames) {
   EXPECT_THAT(problem_of(with(5, std::string(2, '\0'))), HasSubstr("JPEG"));  // height comes later
 }
 
-// Baseline images decode by rows, whatever their height; progressive ones need all coefficients.
+// A baseline JPEG is decoded row by row, so its height does not matter. A progressive JPEG needs
+// memory for all coefficients.
 TEST(Jpeg, MemoryOfProgressiveImages) {
   const std::string pixels = gradient(1024, 1024, 1);
   constexpr uint64_t kMemory = 2400 << 10;
@@ -162,7 +163,7 @@ TEST(Jpeg, MemoryOfProgressiveImages) {
   }
 }
 
-// The size stands in the frame header, behind its length and precision.
+// The size is in the frame header, after the header's length and the precision.
 TEST(Jpeg, HugeSizes) {
   std::string file = jpeg_file(16, 16, 3, gradient(16, 16, 3), true);
   const size_t frame = file.find("\xff\xc2");
@@ -212,7 +213,8 @@ TEST(Png, PaletteWithTransparency) {
   EXPECT_EQ(image.at(3, 0), (Pixel{255, 0, 0, 16}));
 }
 
-// Pixels beyond the palette are black; no palette, or too long a one, is a problem.
+// Pixels with an index beyond the palette are black. A missing palette or one with too many entries
+// is an error.
 TEST(Png, BrokenPalettes) {
   const std::string palette = png_chunk("PLTE", "abcdef");
   const Decoded image = decode(png_file({2, 1, 8, 3, palette}, "\x01\xff"));
@@ -235,7 +237,7 @@ TEST(Png, TransparentColor) {
   EXPECT_EQ(gray.at(1, 0), (Pixel{255, 255, 255, 0}));
 }
 
-// Gamma and profiles change nothing, of whatever size they are.
+// Gamma and color profiles of any size are ignored.
 TEST(Png, WhatIsIgnored) {
   const std::string chunks =
       png_chunk("gAMA", big_endian(100000)) + png_chunk("iCCP", noise(1 << 20));
@@ -269,7 +271,8 @@ TEST(Png, HugeSizes) {
   EXPECT_THROW(decode(claiming(16384, 16384, true)), Error);
 }
 
-// A megabyte that compresses to a thousandth: rows behind the image, and texts.
+// Megabytes that compress to a thousandth of their size: surplus rows after the image, and
+// compressed texts.
 TEST(Png, DecompressionBombs) {
   std::string rows = png_file({2, 512, 8, 6, ""}, std::string(4 << 20, '\0'));
   rows.replace(8, 25,
@@ -300,7 +303,7 @@ TEST(Images, MemoryIsRefused) {
   }
 }
 
-// To know the size takes no memory for rows, of images that are decoded whole too.
+// Reading only the size takes no memory for rows, also for images that are decoded in one piece.
 TEST(Images, SizeAlone) {
   const std::string pixels = noise(4 << 20);
   for (const std::string& file : {png_file({1024, 1024, 8, 6, "", true}, pixels),
@@ -326,7 +329,7 @@ TEST(Images, TruncatedAnywhere) {
   }
 }
 
-// Each file with a changed byte gives pixels or a problem, never anything else.
+// A file with one changed byte gives pixels or an error message, and nothing else.
 TEST(Images, DamagedAnywhere) {
   for (const std::string& file :
        {png_file({9, 7, 8, 6, "", true}, noise(4 * 63)), jpeg_file(24, 16, 3, noise(3 * 24 * 16)),

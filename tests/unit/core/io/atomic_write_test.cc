@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// The real disk, except that call number `fails_at` fails; remembers the calls.
+// Forwards to the real disk, but lets call number `fails_at` fail. Remembers the calls.
 class FailingDisk : public ForwardingFiles {
  public:
   explicit FailingDisk(int fails_at) : ForwardingFiles(system_files()), fails_at_(fails_at) {}
@@ -59,8 +59,8 @@ class FailingDisk : public ForwardingFiles {
   const int fails_at_;
 };
 
-// The order that survives a power cut: the contents are on the disk before they get the name, and
-// the name before the call returns.
+// The order of calls survives a power cut: the contents are durable before they get the name, and
+// the name is durable before the call returns.
 TEST(AtomicWrite, SyncsBeforeRenaming) {
   TemporaryFolder folder;
   FailingDisk disk(0);
@@ -71,7 +71,7 @@ TEST(AtomicWrite, SyncsBeforeRenaming) {
   EXPECT_EQ(disk.list(folder.path()).size(), 1u) << "something was left next to the file";
 }
 
-// Whichever call fails, the error comes through and the name holds the old or the new contents.
+// If any call fails, the error is rethrown, and the file has its old or its new contents.
 TEST(AtomicWrite, IsWholeOrNotAtAll) {
   for (int fails_at = 1; fails_at <= 6; ++fails_at) {
     SCOPED_TRACE(fails_at);

@@ -48,7 +48,7 @@ class PosixFiles : public testing::Test {
   }
 };
 
-// What was written is read back, in any order of offsets, holes zero-filled.
+// Data written at offsets in any order is read back; holes are zero-filled.
 TEST_F(PosixFiles, ReadsWhatWasWritten) {
   const auto out = files_.create(path_);
   EXPECT_EQ(out->path(), path_);
@@ -76,7 +76,7 @@ TEST_F(PosixFiles, ReachesBeyondFourGibibytes) {
   EXPECT_EQ(read(*in, 3, 4), "near");
 }
 
-// A file that ends too early is kCorrupt, and the message says where.
+// Reading beyond the end of a file is kCorrupt. The message gives the position.
 TEST_F(PosixFiles, ReadingPastTheEndIsCorrupt) {
   put(path_, "0123456789");
   const auto in = files_.open_read(path_);
@@ -96,7 +96,7 @@ TEST_F(PosixFiles, CreateEmptiesAndOpenWriteKeeps) {
   EXPECT_EQ(read_small_file(files_, folder_.file("new"), 100), "n");
 }
 
-// What is missing is kNotFound, and each call names the path.
+// Each call on a missing file or folder throws kNotFound and names the path.
 TEST_F(PosixFiles, MissingThingsAreNotFound) {
   const std::string gone = folder_.file("gone"), inside = folder_.file("gone/file");
   const auto expect_not_found = [&](const std::function<void()>& call) {
@@ -136,7 +136,7 @@ TEST_F(PosixFiles, FullDiskIsNoSpace) {
                [&] { full->write_at(0, bytes("x")); });
 }
 
-// Folders: made with all above them, listed, removed only when empty.
+// Folders are created with their parents and listed. Only empty folders are removed.
 TEST_F(PosixFiles, Folders) {
   const std::string deep = folder_.file("a/b/c");
   files_.make_directories(deep);
@@ -157,7 +157,7 @@ TEST_F(PosixFiles, Folders) {
   EXPECT_GT(files_.free_space(deep.substr(0, deep.size() - 2)), 0u);
 }
 
-// Files of one folder are on one disk; /proc is another one.
+// Files in one folder are on the same device; /proc is a different device.
 TEST_F(PosixFiles, DevicesTellDisksApart) {
   put(path_, "x");
   EXPECT_EQ(files_.device(path_), files_.device(folder_.path()));
@@ -194,7 +194,7 @@ TEST_F(PosixFiles, ThreadsShareAFile) {
   EXPECT_EQ(files_.open_read(path_)->size(), 4 * kPart);
 }
 
-// A lock has one holder, until it goes out of scope; the file is kept.
+// A lock has one holder until it goes out of scope. The lock file remains.
 TEST_F(PosixFiles, LocksAreExclusive) {
   auto first = files_.try_lock(path_);
   ASSERT_NE(first, nullptr);
@@ -254,7 +254,7 @@ TEST_F(PosixFiles, LocksEndWithTheProcess) {
   EXPECT_NE(files_.try_lock(path_), nullptr);
 }
 
-// Closing twice, or after the destructor's turn, is harmless.
+// close() may be called twice.
 TEST_F(PosixFiles, CloseMayBeCalledTwice) {
   const auto file = files_.create(path_);
   file->close();

@@ -69,7 +69,8 @@ TEST(WatchedMapping, DamageEndsWithTheWatch) {
   EXPECT_FALSE(WatchedMapping(next.data(), next.bytes()).is_damaged());
 }
 
-// g++ has macros for sanitizers, clang a test. They end the process differently.
+// Detects sanitizers: g++ defines macros, clang has __has_feature. With a sanitizer, the process
+// ends with another status.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define VOXDAG_SANITIZED 1
 #elif defined(__has_feature)

@@ -9,13 +9,15 @@
 namespace voxdag {
 namespace {
 
-// A subvolume of 32^3 voxels, built on a grid of 2^10, as an artifact and as a cache entry of it.
+// Copies a sub-DAG from a cache entry to another cube. The sub-DAG, of 32^3 voxels in a grid of
+// 2^10 voxels per edge, is written as an artifact, and this artifact as a cache entry.
 class ArtifactCopyTest : public testing::Test {
  protected:
   ArtifactCopyTest() {
     SegmentWriter segment(system_files(), folder_.path(), 0, budget_);
     const ArtifactRoot root{{5, {7, 0, 31}}, 0, dag_.root_hash, dag_.voxels, dag_.svo_nodes};
-    // Another artifact first, so that its offsets differ from the entry's.
+    // The segment begins with another artifact, so that offsets in the segment differ from offsets
+    // in the entry.
     write_artifact(segment, random_rows(1, 50, 10, 1, 64), 10, 64);
     const ArtifactRef ref =
         write_artifact(segment, oracle::as_sub_dag(dag_, 10), 10, 64, {&root, 1});
@@ -37,7 +39,8 @@ class ArtifactCopyTest : public testing::Test {
   const std::string entry_path_ = folder_.file("entry.vdart");
 };
 
-// The same rows at another place of another grid, roots and numbers as they were built.
+// The copy has the same rows at another position of another grid. Its roots and counts are
+// unchanged.
 TEST_F(ArtifactCopyTest, MovesASubDagToAnotherCube) {
   const Cube cube{9, {1, 2, 3}};
   const ArtifactReader reader = copy(cube);
@@ -54,8 +57,8 @@ TEST_F(ArtifactCopyTest, CubesOfAnotherSizeAreRefused) {
   EXPECT_EQ(error_of([&] { copy({8, {1, 2, 3}}); }).code(), ErrorCode::kCorrupt);
 }
 
-// Entries are not synced, so a power cut may leave anything: it is an Error, never a wrong
-// artifact.
+// Cache entries are not synced, so after a power cut they may contain anything. Reading a damaged
+// entry is an Error, and never gives a wrong artifact.
 TEST_F(ArtifactCopyTest, EveryBitFlipAndTruncationIsCaught) {
   const ByteString bytes = read_bytes(entry_path_);
   const auto file = system_files().open_write(entry_path_);

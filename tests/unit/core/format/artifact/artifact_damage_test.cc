@@ -1,5 +1,5 @@
-// Bytes from a faulty disk: every bit of a small segment flipped, every truncated length, and
-// indexes with a valid checksum but impossible contents.
+// Artifacts with bytes from a faulty disk: every bit of a small segment is flipped, the segment is
+// truncated to every length, and indexes have a valid checksum but impossible contents.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -70,7 +70,7 @@ TEST(ArtifactDamageTest, EveryTruncationIsCaught) {
     EXPECT_THROW(read_all(small.bytes.substr(0, size), small.ref), Error) << size << " bytes";
 }
 
-// References out of a store that was damaged: any field may be anything.
+// References to artifacts come from a damaged job store, so any field may have any value.
 TEST(ArtifactDamageTest, WildReferencesAreCaught) {
   const SmallSegment small;
   oracle::Random random(1);
@@ -87,8 +87,8 @@ TEST(ArtifactDamageTest, WildReferencesAreCaught) {
   }
 }
 
-// An index whose checksum is right but whose fields were changed: never a crash, never more memory
-// than its bytes allow, and no read outside the file.
+// The index has a right checksum but changed fields. Reading it never crashes, never takes more
+// memory than its bytes allow, and never reads outside the file.
 TEST(ArtifactDamageTest, MutatedIndexesNeverCrash) {
   const SmallSegment small;
   int refused = 0;
@@ -117,8 +117,8 @@ TEST(ArtifactDamageTest, MutatedIndexesNeverCrash) {
   EXPECT_GT(refused, 10000);
 }
 
-// Frames whose checksum is right but whose bytes were changed (a hostile file): decoded or refused,
-// never a crash. Rows that pass keep the invariants that the merge rests on.
+// Frames have a right checksum but changed bytes, as in a hostile file. They are decoded or
+// refused, without a crash. Decoded rows satisfy the invariants on which the merge depends.
 TEST(ArtifactDamageTest, MutatedFramesNeverCrash) {
   const SubDag dag = random_rows(2, 300, 8, 1, 64);
   FrameEncoder encoder;

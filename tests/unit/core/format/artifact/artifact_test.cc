@@ -22,7 +22,7 @@ class ArtifactTest : public testing::Test {
   MemoryBudget budget_{uint64_t{64} << 20};
 };
 
-// A real sub-DAG, its root and all its numbers come back as they were written.
+// A real sub-DAG, its root and all its counts are read back as they were written.
 TEST_F(ArtifactTest, SubDagComesBack) {
   for (const uint32_t hash_bits : {4u, 16u, 64u}) {
     SCOPED_TRACE("hash bits " + std::to_string(hash_bits));
@@ -47,8 +47,8 @@ TEST_F(ArtifactTest, SubDagComesBack) {
   }
 }
 
-// Sizes around the frame boundary, child indices of one, two and three bytes, and columns that
-// compress and that do not, all come back.
+// Numbers of rows around the size of a frame, child indices of one, two and three bytes, and
+// columns that compress well or not are read back unchanged.
 TEST_F(ArtifactTest, FramesOfAllSizesComeBack) {
   SegmentWriter segment(system_files(), folder_.path(), 0, budget_);
   for (const size_t count : {1u, 2u, 255u, 4095u, 4096u, 4097u, 9000u, 70000u}) {
@@ -63,8 +63,8 @@ TEST_F(ArtifactTest, FramesOfAllSizesComeBack) {
   }
 }
 
-// Child indices of four bytes need a level of over 2^24 rows; here is one, all bricks alike but a
-// counter.
+// Child indices of four bytes need a level of over 2^24 rows. Here the level has bricks that differ
+// only in a counter.
 TEST_F(ArtifactTest, ChildIndicesOfFourBytesComeBack) {
   const uint64_t count = (uint64_t{1} << 24) + 10;
   MemoryBudget budget(uint64_t{1} << 30);
@@ -129,7 +129,7 @@ TEST_F(ArtifactTest, PiecesMakeTheSameArtifactAsAWhole) {
   EXPECT_EQ(pieces.checksum, whole.checksum);
 }
 
-// Many artifacts share a segment, with garbage of abandoned ones between them.
+// A segment contains many artifacts, and between them the bytes of abandoned artifacts.
 TEST_F(ArtifactTest, ManyArtifactsShareASegment) {
   SegmentWriter segment(system_files(), folder_.path(), 3, budget_);
   std::vector<ArtifactRef> refs;
@@ -154,7 +154,7 @@ TEST_F(ArtifactTest, WriterChargesItsMemory) {
             ErrorCode::kOutOfMemory);
 }
 
-// Rows that break an invariant are refused before they are written, with the level named.
+// Rows that break an invariant are refused before they are written. The error names the level.
 TEST_F(ArtifactTest, WriterRefusesBrokenRows) {
   const SubDag good = random_rows(1, 50, 9, 1, 64);
   const auto refusal = [&](const SubDag& dag, uint32_t hash_bits = 64) {
@@ -190,7 +190,7 @@ TEST_F(ArtifactTest, WriterRefusesBrokenRows) {
   EXPECT_THAT(refusal(bad, 16), HasSubstr("bits beyond the hash bits"));
 }
 
-// Two rows equal in hash and mask are ordered by their children, also over a frame's end.
+// Two rows with equal hash and mask are ordered by their children, even if they are in two frames.
 TEST_F(ArtifactTest, TiesAreOrderedByChildrenAcrossFrames) {
   SubDag dag = random_rows(1, 200, 9, 0, 64);
   SubDag::Nodes& nodes = dag.levels.emplace_back();
@@ -212,7 +212,8 @@ TEST_F(ArtifactTest, TiesAreOrderedByChildrenAcrossFrames) {
   }
 }
 
-// A segment of another id, of another version, or that is no segment, is refused in plain words.
+// A segment with another id or version, and a file that is not a segment, are refused with a
+// message that gives the reason.
 TEST_F(ArtifactTest, WrongSegmentsAreRefused) {
   SegmentWriter segment(system_files(), folder_.path(), 4, budget_);
   const ArtifactRef ref = write_artifact(segment, random_rows(1, 50, 9, 1, 64), 9, 64);

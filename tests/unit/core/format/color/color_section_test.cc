@@ -1,5 +1,5 @@
-// The color section: at every cell of every level the colors of the reader and of the cursor equal
-// a decoder's written from docs/format.md, and are close to the original colors.
+// Tests the color section. In every cell of every level, the colors of the reader and of the cursor
+// equal the colors of a decoder written from docs/format.md, and are close to the original colors.
 #include <gmock/gmock.h>
 
 #include "core/color/color_of.h"
@@ -17,8 +17,8 @@ std::array<int, 3> channels(const voxdag_reader::Rgb& rgb) { return {rgb.r, rgb.
 
 class ColorSectionTest : public testing::Test {
  protected:
-  // All levels of a scene, against the decoder; the mean squared error of a channel against the
-  // sums.
+  // Compares all levels of a scene with the decoder. Returns the mean squared error of a channel
+  // relative to the scene's sums.
   double check(const ColoredScene& scene, uint64_t narrow_words = uint64_t{1} << 32) {
     write_colored(path_, scene, true, narrow_words);
     const auto file = open_global_file(path_);
@@ -76,7 +76,8 @@ class ColorSectionTest : public testing::Test {
 };
 
 TEST_F(ColorSectionTest, HasTheColorsOfAllLevels) {
-  // Grids from one brick to three tiers, color grids as fine as the grid and coarser.
+  // {levels of the grid, levels of the color grid}: grids from one brick to three tiers, and color
+  // grids as fine as the grid or coarser.
   const uint32_t sizes[][2] = {{2, 2},   {3, 2},   {4, 4},   {5, 3},   {6, 6},   {7, 5},
                                {7, 6},   {7, 7},   {8, 7},   {9, 8},   {10, 10}, {12, 11},
                                {13, 12}, {14, 13}, {15, 14}, {17, 12}, {20, 20}};
@@ -86,8 +87,8 @@ TEST_F(ColorSectionTest, HasTheColorsOfAllLevels) {
     const double error =
         check({levels, color_levels, random_codes(levels * 100 + color_levels, levels, count),
                smooth_colors(color_levels, 3)});
-    // Cells that are far from each other share blocks, so that it is larger than on surfaces; of
-    // colors in the wrong order it would be 10000.
+    // The error is larger than on surfaces, because cells that are far from each other share
+    // blocks. If the colors were in a wrong order, it would be about 10000.
     EXPECT_LT(error, levels < 4 ? 4000 : 2500);
   }
 }
@@ -101,14 +102,15 @@ TEST_F(ColorSectionTest, HasSolidRegions) {
   EXPECT_LT(check({7, 7, half, smooth_colors(7, 0)}), 20);
 }
 
-// Equal colors, or two in a block, are stored exactly, on all levels where they do not mix.
+// If a block has only one or two colors, they are stored exactly, on all levels on which colors do
+// not mix.
 TEST_F(ColorSectionTest, FlatColorsAreExact) {
   const auto flat = [](uint64_t) { return sum_of_color(13, 201, 77, 5); };
   EXPECT_EQ(check({9, 8, random_codes(5, 9, 3000), flat}), 0);
 }
 
-// What a scene of 10^10 cells and more adds up to does not fit in 64 bits. A cell that counts for
-// next to nothing keeps its color.
+// The sums of a scene of 10^10 cells or more do not fit in 64 bits. A cell with a negligible weight
+// keeps its color.
 TEST_F(ColorSectionTest, LargeSumsDoNotOverflow) {
   constexpr int kDust = 170, kDark = 10, kBright = 250;
   const auto gray = [](int value, uint64_t weight) {
@@ -116,8 +118,8 @@ TEST_F(ColorSectionTest, LargeSumsDoNotOverflow) {
   };
   for (const uint32_t levels : {8u, 15u}) {
     SCOPED_TRACE(levels);
-    // A cell in each of 57 regions of level 2: one of dust in its octant, the others dark or
-    // bright.
+    // There is a cell in each of 57 regions of level 2. One cell is dust and alone in its octant;
+    // the others are dark or bright.
     Codes codes{0};
     for (uint64_t i = 8; i < 64; ++i) codes.push_back(i << 3 * (levels - 2));
     write_colored(path_, {levels, levels, codes, [&](uint64_t code) {
@@ -173,7 +175,8 @@ TEST_F(ColorSectionTest, FinerCellsHaveTheColorOfTheirAncestor) {
   EXPECT_FALSE(cursor.color(0, 0, 1 << 10, 10));
 }
 
-// Version 1 where nothing needs more; the features are independent.
+// A file has version 1 if it needs no feature of version 2. The features are independent of each
+// other.
 TEST_F(ColorSectionTest, VersionsAndFeatures) {
   const ColoredScene scene{7, 6, random_codes(4, 7, 3000), smooth_colors(6, 4)};
   const std::string plain = folder_.file("plain.vdag");
@@ -250,8 +253,8 @@ TEST_F(ColorSectionTest, RegionsMustBeInOrderAndWhole) {
   EXPECT_EQ(error_of([&] { add(regions, 1000); }).code(), ErrorCode::kOutOfMemory);
 }
 
-// Every byte of a section changed, with and without corrected checksums: no read leaves the
-// file (the address sanitizer checks this), and verify finds every error.
+// Every byte of a section is changed, with and without corrected checksums. No read leaves the file
+// (the address sanitizer checks this), and `verify` finds every error.
 TEST_F(ColorSectionTest, DamageIsAnError) {
   const ColoredScene scene{3, 3, random_codes(2, 3, 60), smooth_colors(3, 60)};
   write_colored(path_, scene);
@@ -294,9 +297,8 @@ TEST_F(ColorSectionTest, DamageIsAnError) {
   }
 }
 
-// A scene without voxels has no colors.
-// A solid grid of 2^20 voxels along an edge is a node for each level, and has 8^14 regions, of
-// which this file has one: that is found before they are counted.
+// A solid grid of 2^20 voxels per edge has one node per level and 8^14 color regions. This file has
+// only one region; the reader must find that before it counts all regions.
 TEST_F(ColorSectionTest, MissingRegionsAreNotCounted) {
   constexpr uint32_t kLevels = 20;
   GlobalFileWriter writer(system_files(), path_, Grid::given({0, 0, 0}, 1, kLevels), 64);

@@ -1,5 +1,5 @@
-// Scenes with colors, global files of them, and a decoder of the color section written from
-// docs/format.md alone.
+// Scenes with colors, global files of these scenes, and a decoder of the color section that was
+// written only from docs/format.md.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace voxdag {
 
 using Codes = std::vector<uint64_t>;
 
-// What the surfaces in a cell of the color grid add up to, by its Morton code.
+// Returns the sums of the surfaces in a cell of the color grid, which is given by its Morton code.
 using SumOf = std::function<ColorSum(uint64_t code)>;
 
 struct ColoredScene {
@@ -185,7 +185,7 @@ inline uint64_t number_at(const ByteString& bytes, uint64_t at, size_t size) {
   return value;
 }
 
-// Corrects the checksums of a damaged file with one block of checksums.
+// Corrects the checksums of a damaged file that has a single checksum block.
 inline void put_checksums_right(ByteString& file) {
   const uint64_t table = number_at(file, 96, 8);
   const auto data = std::as_bytes(std::span(file));
@@ -197,7 +197,7 @@ inline void put_checksums_right(ByteString& file) {
   std::memcpy(file.data() + 4088, &header, 8);
 }
 
-// Decodes the color section of a file's bytes as the document says.
+// Decodes the color section of a file's bytes as docs/format.md describes it.
 class SectionDecoder {
  public:
   using Color3 = std::array<int, 3>;

@@ -1,4 +1,5 @@
-// Differences of colors, against all colors of both files, decoded by independent code.
+// Compares the differences of colors with a comparison of all colors of both files, decoded by
+// independent code.
 #include "core/format/global/diff_colors.h"
 
 #include <gtest/gtest.h>
@@ -63,7 +64,7 @@ class DiffColors : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// Some cells have another color; the largest difference is in one of them.
+// Some cells have different colors. The largest difference is in one of these cells.
 TEST_F(DiffColors, OfTheSameVoxels) {
   const ColoredScene a{9, 8, random_codes(1, 9, 3000), smooth_colors(8, 0)};
   ColoredScene b = a;
@@ -80,7 +81,7 @@ TEST_F(DiffColors, OfOtherVoxels) {
   check({8, 8, voxels, smooth_colors(8, 3)}, {8, 8, others, smooth_colors(8, 3)});
 }
 
-// The coarser color grid is compared, which is in another tier of the finer one.
+// The comparison uses the coarser color grid, which is in another tier of the finer color grid.
 TEST_F(DiffColors, OfOtherColorGrids) {
   const Codes voxels = random_codes(3, 9, 3000);
   check({9, 9, voxels, smooth_colors(9, 0)}, {9, 2, voxels, smooth_colors(2, 0)});

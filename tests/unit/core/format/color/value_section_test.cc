@@ -1,6 +1,6 @@
-// The sections of alpha, normals and materials: at every cell of every level the reader's value
-// equals the value of a decoder written from docs/format.md, and is the original value or follows
-// from the children by the rule.
+// Tests the sections of alpha, normals and materials. In every cell of every level, the reader's
+// value equals the value of a decoder written from docs/format.md. In finest cells it is the
+// original value; in coarser cells it follows from the children by the rule.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -109,7 +109,7 @@ TEST_F(ValueSectionTest, AreIndependent) {
     SCOPED_TRACE(bits);
     check(scene, set, 7, bits % 2 ? 50 : uint64_t{1} << 32);
   }
-  // Without others, colors have the bytes that they always had.
+  // A file whose only attribute is color has the same bytes as before other attributes existed.
   write_colored(folder_.file("colored.vdag"), scene);
   write_valued(path_, scene, {Attribute::kColor});
   EXPECT_EQ(read_bytes(path_), read_bytes(folder_.file("colored.vdag")));
@@ -162,9 +162,9 @@ TEST_F(ValueSectionTest, ReaderHasAllOfThem) {
   EXPECT_TRUE(colored.material_names().empty());
 }
 
-// Every byte of the sections changed, with checksums put right: no read leaves the file (the
-// address sanitizer sees it), and verify finds all but another value of a finest cell that is
-// within bounds, and a name of another material.
+// Every byte of the sections is changed, with corrected checksums. No read leaves the file (the
+// address sanitizer checks this). `verify` finds all changes except a valid other value of a finest
+// cell, and another name of a material.
 TEST_F(ValueSectionTest, DamageIsAnError) {
   const ColoredScene scene{3, 3, random_codes(2, 3, 60), smooth_colors(3, 60)};
   write_valued(path_, scene, kValues, 3);
@@ -200,7 +200,8 @@ TEST_F(ValueSectionTest, DamageIsAnError) {
     } catch (const voxdag_reader::Error&) {
     }
   }
-  // Bytes of the finest cells alone: 1, 2 and 1 each, and 6 of names.
+  // `verify` may accept changes in bytes of finest cells (1, 2 and 1 bytes per cell) and in the 6
+  // bytes of names.
   EXPECT_LE(accepted, (4 * finest + 6) / 3 + 3);
   EXPECT_GT(found, 100u);
 }

@@ -1,5 +1,5 @@
-// Global files with the other attributes of cells, and a decoder of their sections written from
-// docs/format.md alone.
+// Global files with the attributes other than color, and a decoder of their sections that was
+// written only from docs/format.md.
 #pragma once
 
 #include "core/color/attribute_set.h"
@@ -9,7 +9,7 @@
 
 namespace voxdag {
 
-// The value of a cell of the finest level, by its Morton code.
+// Returns the attribute's value in a finest cell, which is given by its Morton code.
 inline uint32_t value_of_code(Attribute attribute, uint64_t code, uint64_t materials) {
   oracle::Random random(code * 8 + static_cast<uint64_t>(attribute));
   if (attribute == Attribute::kAlpha) return static_cast<uint32_t>(random.between(0, 255));
@@ -18,7 +18,8 @@ inline uint32_t value_of_code(Attribute attribute, uint64_t code, uint64_t mater
   return static_cast<uint32_t>(random.between(0, 254) | random.between(0, 254) << 8);
 }
 
-// "", "m1", "m2m2", ..., and "" for cells without a material.
+// Returns the names "", "m1", "m2m2", and so on. The last name is empty and stands for cells
+// without a material.
 inline std::vector<std::string> names_of_materials(size_t count) {
   std::vector<std::string> names(count);
   for (size_t i = 0; i + 1 < count; ++i)
@@ -63,8 +64,8 @@ inline GlobalFileSummary write_valued(const std::string& path, const ColoredScen
   return writer.finish({dag.voxels, dag.svo_nodes});
 }
 
-// Decodes a section of values as the document says: the cells of a region by levels, in Morton
-// order, `bytes` each, in blocks of 32.
+// Decodes a section of values as docs/format.md describes it: the cells of a region level by level,
+// in Morton order, with `bytes` bytes per cell, in blocks of 32 cells.
 class ValueDecoder {
  public:
   // `index`: of the section in the table.

@@ -25,7 +25,7 @@ class DiffTest : public testing::Test {
   const std::string a_ = folder_.file("a.vdag"), b_ = folder_.file("b.vdag");
 };
 
-// The counts equal a comparison voxel by voxel, whatever the two files' hash bits.
+// The counts equal the counts of a comparison voxel by voxel, for any hash bits of the two files.
 TEST_F(DiffTest, CountsTheVoxelsThatDiffer) {
   for (const int edge : {4, 8, 32})
     for (uint64_t seed = 0; seed < 8; ++seed) {
@@ -69,8 +69,8 @@ TEST_F(DiffTest, EmptyScenes) {
   EXPECT_EQ(diff().only_b, voxels.count());
 }
 
-// A solid cube of 2^20 voxels per edge has one node a level and 2^60 voxels: the walk visits pairs,
-// and counts in 64 bits.
+// A solid cube of 2^20 voxels per edge has one node per level and 2^60 voxels. The walk visits
+// pairs of nodes, so it is fast, and it counts in 64 bits.
 TEST_F(DiffTest, CountsBeyond32BitsInAMoment) {
   const auto write_solid = [](const std::string& path, uint64_t brick) {
     Grid grid;

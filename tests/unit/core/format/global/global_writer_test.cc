@@ -29,8 +29,8 @@ T field(const ByteString& bytes, size_t at) {
   return value;
 }
 
-// Every field of the header is where the layout says, and the words of every level where the header
-// says, as the oracle's DAG has them.
+// Every field of the header has its documented offset. The words of every level are at the offset
+// that the header gives, and equal the words of the oracle's DAG.
 TEST_F(GlobalWriterTest, LaysOutWhatItIsGiven) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(1, 64), 16);
   const Grid grid = grid_of(64);
@@ -73,7 +73,8 @@ TEST_F(GlobalWriterTest, LaysOutWhatItIsGiven) {
             8 * ((end - kPageBytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes));
 }
 
-// The same words written back to front, in small chunks and by several threads are the same file.
+// The file is the same if its words are written from back to front, in small chunks, and by several
+// threads.
 TEST_F(GlobalWriterTest, OrderAndThreadsDoNotShow) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(2, 128), 64);
   const GlobalFileSummary expected = write_global(path_, dag, grid_of(128));
@@ -106,7 +107,8 @@ TEST_F(GlobalWriterTest, EmptySceneIsAHeaderPage) {
   EXPECT_EQ(read_bytes(path_).size(), kPageBytes);
 }
 
-// An unfinished file leaves nothing, and an existing file is kept.
+// A writer that is destroyed before finish() leaves no file. An existing file with the final name
+// is kept.
 TEST_F(GlobalWriterTest, UnfinishedFilesVanish) {
   write_bytes(path_, "before");
   {
@@ -118,7 +120,8 @@ TEST_F(GlobalWriterTest, UnfinishedFilesVanish) {
   EXPECT_EQ(read_bytes(path_), "before");
 }
 
-// The header is written last, all is on the disk before the file gets its name, and the name too.
+// The header is written last. All bytes are durable before the file gets its final name, and then
+// the name becomes durable.
 TEST_F(GlobalWriterTest, IsDurableBeforeItIsNamed) {
   WatchedFiles files;
   GlobalFileWriter(files, path_, grid_of(16), 64).finish({0, 0});
@@ -132,7 +135,7 @@ TEST_F(GlobalWriterTest, IsDurableBeforeItIsNamed) {
   EXPECT_EQ(files.log, expected);
 }
 
-// Whatever call fails, the file under the final name is complete or missing, and no partial file
+// If any call fails, the file with the final name is complete or missing, and no partial file
 // remains.
 TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(3, 16), 64);
@@ -161,8 +164,8 @@ TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
   }
 }
 
-// Another writer can resume a file whose levels were synced, after any level, and the bytes are the
-// same. Levels end within checksum blocks and blocks within levels.
+// Another writer resumes a file whose levels were synced, after any level, and writes the same
+// bytes. Some levels end within a checksum block, and some checksum blocks end within a level.
 TEST_F(GlobalWriterTest, ResumesAfterAnyLevel) {
   oracle::Random random(4);
   oracle::Voxels voxels(128);
@@ -197,8 +200,8 @@ TEST_F(GlobalWriterTest, ResumesAfterAnyLevel) {
   }
 }
 
-// A bit that the disk flips before the file has its checksums is noticed, and so is a partial file
-// that was truncated.
+// The writer detects a bit that the disk flips before the checksums are written. It also detects a
+// truncated partial file.
 TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(5, 32), 64);
   const auto levels = level_words(dag);
@@ -240,7 +243,8 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
   EXPECT_EQ(error_of([&] { writer.resume(saved); }).code(), ErrorCode::kCorrupt);
 }
 
-// A level of over 2^32 words is a limit error that names the level, whichever way it is noticed.
+// A level of over 2^32 words is a limit error that names the level, at every place where the size
+// is checked.
 TEST_F(GlobalWriterTest, LevelsOverTheLimitAreRefused) {
   GlobalFileWriter writer(system_files(), path_, grid_of(16), 64);
   writer.begin_level(2);
@@ -255,7 +259,7 @@ TEST_F(GlobalWriterTest, LevelsOverTheLimitAreRefused) {
   EXPECT_THAT(on_end.message(), HasSubstr("level 2"));
 }
 
-// Levels come from the bricks to the root, one after the other, and all of them.
+// Levels must be written in order from the bricks to the root, and all of them.
 TEST_F(GlobalWriterTest, LevelsOutOfTurnAreRefused) {
   GlobalFileWriter writer(system_files(), path_, grid_of(16), 64);
   EXPECT_THROW(writer.begin_level(1), Error);

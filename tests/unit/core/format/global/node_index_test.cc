@@ -1,4 +1,5 @@
-// The index of a level in several spans equals the index of one walk, for any words.
+// For any words, the index of a level that is made from several spans equals the index of a single
+// walk.
 #include "core/format/global/node_index.h"
 
 #include <gmock/gmock.h>
@@ -67,10 +68,10 @@ TEST_P(NodeIndexTest, LevelsOfSeveralSpans) {
   for (const size_t nodes : {1u, 5u, 100'000u}) expect_index(random_level(nodes, nodes, ~0u));
 }
 
-// Every word looks like a child mask, so that spans are guessed wrong.
+// Every word looks like a child mask, so the guessed starts of spans are wrong.
 TEST_P(NodeIndexTest, PointersThatLookLikeMasks) { expect_index(random_level(1, 100'000, 256)); }
 
-// Any number of threads gives the same message, about the first wrong word.
+// With any number of threads, the message is about the first wrong word.
 TEST_P(NodeIndexTest, BrokenMasks) {
   std::mt19937_64 random(7);
   for (int round = 0; round < 20; ++round) {

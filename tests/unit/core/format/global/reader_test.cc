@@ -35,7 +35,8 @@ struct Collector {
   uint64_t nodes = 0;
 };
 
-// Every voxel that was put in is found by query and by walk, mapped and read, and none other.
+// Lookups and walks find exactly the written voxels, both in a mapped file and in a file that is
+// read.
 TEST_F(ReaderTest, QueriesAndWalksGiveTheVoxels) {
   for (const int edge : {4, 8, 16, 64}) {
     for (uint64_t seed = 1; seed <= 3; ++seed) {
@@ -69,7 +70,7 @@ TEST_F(ReaderTest, TellsTheGrid) {
   EXPECT_EQ(file.brick_level(), 3u);
 }
 
-// A visitor that declines a node does not see its descendants.
+// If a visitor returns false for a node, the walk skips the node's descendants.
 TEST_F(ReaderTest, WalksArePruned) {
   oracle::Voxels voxels(16);
   voxels.set(0, 0, 0);

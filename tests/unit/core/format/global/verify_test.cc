@@ -45,7 +45,7 @@ uint64_t checksum_of(const ByteString& bytes, size_t begin, size_t size) {
   return checksum64(std::as_bytes(std::span(bytes)).subspan(begin, size));
 }
 
-// Corrects all checksums, so that only the contents are wrong.
+// Corrects all checksums, so that `verify` must find the error in the contents.
 void reseal(ByteString& bytes) {
   const size_t table = get<uint64_t>(bytes, kTableOffsetAt);
   for (size_t begin = kPageBytes, i = 0; begin < table; begin += kChecksumBlockBytes, ++i)
@@ -61,7 +61,7 @@ class VerifyTest : public testing::Test {
   const std::string path_ = folder_.file("scene.vdag");
 };
 
-// For any voxels and hash bits, the writer's file of a correct DAG passes.
+// A file that the writer made from a right DAG passes, for any voxels and hash bits.
 TEST_F(VerifyTest, RightFilesPass) {
   for (const int edge : {4, 8, 16, 64, 128})
     for (const uint32_t hash_bits : {4u, 16u, 64u}) {
@@ -73,7 +73,7 @@ TEST_F(VerifyTest, RightFilesPass) {
   EXPECT_NO_THROW(verify(path_));
 }
 
-// A file of 8^3 voxels, each of its bits turned in place and turned back.
+// Each bit of a file of 8^3 voxels is flipped and then restored.
 TEST_F(VerifyTest, EveryBitFlipIsCaught) {
   write_global(path_, random_voxels(5, 8));
   const ByteString bytes = read_bytes(path_);
@@ -118,14 +118,14 @@ TEST_F(VerifyTest, DamagedBlockIsNamed) {
               HasSubstr("bytes 69632 to 135167: the block fails its checksum"));
 }
 
-// DAGs that break one rule each, in files whose checksums are right.
+// DAGs that each break one rule, in files with right checksums.
 struct BrokenDag {
   const char* rule;
   std::function<void(oracle::Dag&)> break_it;
   const char* message;
 };
 
-// A brick that no node refers to, in its right place among the others.
+// Adds a brick to which no node refers, at its right position in the order.
 void add_lonely_brick(oracle::Dag& dag) {
   const uint64_t lonely = 0x0123456789abcdef;
   dag.bricks.push_back(lonely);
@@ -193,7 +193,8 @@ INSTANTIATE_TEST_SUITE_P(
         BrokenDag{"octree nodes counted", [](auto& dag) { --dag.svo_nodes; },
                   "octree nodes, the DAG has "}));
 
-// Word offsets that are within the level but begin no node, or are beyond it.
+// Word offsets of children that are within the level but not at the start of a node, or that are
+// beyond the level.
 TEST_F(VerifyTest, ChildrenThatBeginNoNodeAreNamed) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(7, 32), 64);
   for (const uint32_t offset : {1u, 1000000u, 0xffffffffu}) {
@@ -235,7 +236,8 @@ TEST_F(VerifyTest, OtherNodeOrdersAreNotRead) {
   EXPECT_EQ(error_of([&] { verify(path_); }).code(), ErrorCode::kUnsupportedVersion);
 }
 
-// Several defects in a file of many spans: any number of threads reports the first.
+// A file of many spans has several defects. With any number of threads, the first defect is
+// reported.
 TEST_F(VerifyTest, TheFirstDefectIsReported) {
   oracle::Random random(3);
   oracle::Voxels noise(256);
@@ -255,7 +257,8 @@ TEST_F(VerifyTest, TheFirstDefectIsReported) {
   }
 }
 
-// Hash bits are part of the order: a file that claims others than it was made with is caught.
+// The hash bits determine the order of nodes, so a header with other hash bits than the file was
+// made with is an error.
 TEST_F(VerifyTest, WrongHashBitsAreCaught) {
   write_global(path_, random_voxels(3, 64), 64);
   ByteString bytes = read_bytes(path_);
@@ -265,8 +268,8 @@ TEST_F(VerifyTest, WrongHashBitsAreCaught) {
   EXPECT_THROW(verify(path_), Error);
 }
 
-// Random changes under right checksums: never a crash, and a file that passes is one whose walk
-// agrees with its header.
+// Random changes in files with right checksums. Readers never crash. If a file passes, a walk finds
+// as many voxels as the header gives.
 class MutationTest : public VerifyTest, public testing::WithParamInterface<uint64_t> {};
 
 TEST_P(MutationTest, NeverCrashesAReader) {

@@ -32,8 +32,8 @@ class WideFileTest : public testing::Test {
     const auto file = open_global_file(path);
     verify_global_file(*file, 2, budget, progress, {}, narrow_words);
   }
-  // What opening or verifying the file with a changed header says, the file at path_ having
-  // narrow_words_.
+  // Returns the error of opening or verifying the file after a change of its header. The file is at
+  // path_ and was written with narrow_words_.
   template <class T>
   Error error_with(size_t at, T value) const {
     ByteString bytes = read_bytes(path_);
@@ -95,12 +95,13 @@ TEST_F(WideFileTest, PointersOfOtherWidthsAreRefused) {
     EXPECT_THAT(error_with(bricks, bits).message(),
                 HasSubstr("header: level 4: pointers of " + std::to_string(bits) +
                           " bits, expected 32 or 64"));
-  // The other width: the words of the parents make no sense then.
+  // If the header gives the other pointer width, the words of the parents are invalid.
   EXPECT_EQ(error_with(bricks, uint32_t{32}).code(), ErrorCode::kCorrupt);
   EXPECT_EQ(error_with(kLevelsAt + kPointerBitsAt, uint32_t{33}).code(), ErrorCode::kCorrupt);
 }
 
-// The width of pointers follows from the number of words: there is one file for the same voxels.
+// The number of words determines the width of pointers, so that equal voxels give one canonical
+// file.
 TEST_F(WideFileTest, OtherThresholdsAreNotCanonical) {
   EXPECT_THAT(error_of([&] { verify(path_, uint64_t{1} << 32); }).message(),
               MatchesRegex(".*level 1: pointers of 64 bits into [0-9]+ words, expected 32"));
