@@ -17,8 +17,8 @@
 namespace voxdag {
 namespace {
 
-// Upper limit of the default color resolution, in cells per edge. A finer color grid must be
-// requested: colors repeat less often than geometry, so they compress less well.
+// Upper limit of the default color resolution, in cells per edge. A finer color grid is not the
+// default, because colors repeat less often than geometry.
 constexpr uint64_t kColorResolution = 4096;
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
