@@ -106,8 +106,8 @@ std::string Service::url() const {
 }
 
 void Service::run() {
-  // This thread stops the builds as soon as the service stops, while http_.run() still waits for
-  // requests in progress.
+  // This thread cleans up until the service stops. Then it stops the builds, while http_.run()
+  // still waits for requests in progress.
   std::thread cleaner([this] {
     clean_up_periodically();
     dispatcher_.stop();

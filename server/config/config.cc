@@ -61,8 +61,8 @@ void fields(Visitor& visit, ServerConfig& c) {
     tls("key_file", c.http.key_file);
   });
   visit("jobs", c.jobs);
-  // The cluster options of a service differ from the options of `build`: it has a program path, and
-  // the names have no prefix.
+  // The cluster options of a service differ from the options of `build`: their names have no
+  // prefix, and there is an option for the path of the program.
   visit.object("cluster", [&](auto& cluster) {
     cluster("engine", c.cluster.engine);
     cluster("tasks", c.cluster.tasks);

@@ -21,7 +21,8 @@ struct HttpOptions {
 
 class HttpServer {
  public:
-  // May throw Problem. Any other exception is answered with the problem `internal`.
+  // Answers a request. May throw Problem. If it throws another exception, the answer is the problem
+  // `internal`.
   using Handler = std::function<Response(Request&)>;
   // Called with the status of an answer to a malformed request. Such a request reaches no handler.
   using OnRefused = std::function<void(int status)>;
@@ -35,7 +36,8 @@ class HttpServer {
   size_t connections() const;
   // Serves until stop(), then waits up to `drain_s` for answers in progress.
   void run(double drain_s);
-  // May be called from any thread. Event streams must end by themselves.
+  // Makes run() return. May be called from any thread. Does not end event streams: their
+  // EventSource must return nullopt.
   void stop();
 
  private:

@@ -24,8 +24,8 @@ class JobFolders {
 
   JobFolder of(const std::string& id) const { return {path_ + "/" + id}; }
 
-  // Creates records for folders that the queue does not know. The jobs of folders with a result
-  // become succeeded, all others suspended.
+  // Creates records for folders that the queue does not know. The new jobs of folders with a result
+  // are in the state succeeded, all other new jobs in the state suspended.
   void adopt();
   // Removes the work folders of jobs that no longer need them.
   void clean_up();

@@ -27,7 +27,7 @@ class LiveJob {
   std::string progress_json() const;
   // Returns the number of messages received so far.
   uint64_t version() const { return locked(version_); }
-  // Returns the cluster tasks of the last attempt; nullopt for a build without a cluster.
+  // Returns the cluster tasks of this run; nullopt for a build without a cluster.
   std::optional<ClusterTasks> cluster_tasks() const { return locked(cluster_tasks_); }
   std::vector<std::string> warnings() const { return locked(warnings_); }
   std::optional<Failure> failure() const { return locked(failure_); }

@@ -60,7 +60,8 @@ struct Route {
   std::string id = {};
   std::string summary = {};
   std::string tag = {};
-  // The query parameters that the router accepts. It rejects all others with 400.
+  // The query parameters that the router accepts. It rejects all other parameters with 400, unless
+  // accepts_any_query is set.
   std::vector<Parameter> query = {};
   bool accepts_any_query = false;
   std::vector<Parameter> headers = {};

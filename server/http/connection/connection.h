@@ -4,9 +4,8 @@
 // Phases:
 //   - waiting: the next request must begin within idle_timeout_s
 //   - header: the header must be complete within header_timeout_s
-//   - exchange: the client sends the body and receives the answer at min_bytes_per_s or faster; it
-//   may
-//     be up to grace_s behind this rate
+//   - exchange: the client must send the body, and receive the answer, at min_bytes_per_s or
+//     faster; it may be up to grace_s behind this rate
 //
 // Only the time in which the connection waits for its client counts. If a client exceeds its time,
 // the connection enters an error state, in which reads fail. A connection that waits for its client
@@ -26,8 +25,8 @@ namespace voxdag::server {
 
 class Connection {
  public:
-  // Does not own its parts. The socket must be non-blocking. `place` is the connection's place in
-  // the table.
+  // Does not own the socket, which must be non-blocking, the limits or the table. `place` is the
+  // connection's place in the table.
   Connection(int socket, const HttpLimits& limits, TlsSession tls, ConnectionTable& table,
              ConnectionTable::Place place);
 

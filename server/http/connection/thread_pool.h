@@ -17,7 +17,8 @@ class ThreadPool {
   // Waits for all tasks to finish.
   ~ThreadPool();
 
-  // `task` must not throw. Throws std::system_error if no thread can be started for the task.
+  // Runs `task`, which must not throw, on a thread of the pool. Throws std::system_error if no
+  // thread can be started for the task.
   void run(std::function<void()> task);
 
  private:

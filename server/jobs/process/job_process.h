@@ -18,8 +18,8 @@ namespace voxdag::server {
 // Returns RESULT of docs/api.md for a job whose build has finished. Throws Error.
 std::string finished_result(FileSystem& files, const JobFolder& folder);
 
-// Returns the exit status. Changes the working directory. After a crash at any time, the same call
-// resumes the job.
+// Runs the job in `folder` and returns the exit status for the process. Changes the working
+// directory. After a crash at any time, the same call resumes the job.
 int run_job(FileSystem& files, const std::string& folder, const CancelToken& cancel);
 
 }  // namespace voxdag::server

@@ -25,7 +25,7 @@ class ArtifactRows {
   const ArtifactRef& ref() const { return ref_; }
 
   // Returns the occupied cells of the cube as a brick. A cell has a quarter of the cube's edge.
-  // Throws Error{kCorrupt}.
+  // Throws Error{kCorrupt} if the artifact is damaged or has no such cube.
   uint64_t coarse_brick(const Cube& cube) {
     const auto roots = reader_.roots();
     const auto root = std::find_if(roots.begin(), roots.end(),

@@ -26,7 +26,7 @@ namespace voxdag::server {
 // Limits how often, and for how much CPU time, a job's folder is read. Used by one thread.
 class ReadLimiter {
  public:
-  // Charges the CPU time that passes during the lifetime of this object.
+  // Charges the CPU time that this thread uses during the lifetime of this object to the limiter.
   class Charge {
    public:
     explicit Charge(ReadLimiter& limiter);

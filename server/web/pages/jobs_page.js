@@ -93,7 +93,8 @@ function showPaging(element, state, cursor, next_cursor) {
       next_cursor && h("a", {class: "button", href: to(next_cursor)}, "Older jobs"));
 }
 
-// Shows the jobs of `list`. Keeps the rows of jobs that remain, to preserve focus and selection.
+// Shows `jobs` as rows of the element `list`. Keeps the rows of jobs that are already in the list,
+// to preserve focus and selection.
 function showRows(list, rows, jobs) {
   const ids = new Set(jobs.map((job) => job.id));
   for (const [id, row] of rows) {

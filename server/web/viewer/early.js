@@ -1,6 +1,6 @@
 // Creates the graphics context and its programs while the other modules of the page are still
-// loading, because the compilation takes longest. The page of a job does not use this, because a
-// job may have nothing to draw yet.
+// loading, because the compilation takes longest. The page of a job does not use this module,
+// because a job may have nothing to draw yet.
 
 import {createContext} from "./gl/gl_objects.js";
 import {Passes} from "./gl/passes.js";

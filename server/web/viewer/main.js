@@ -203,8 +203,8 @@ async function start() {
   window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer};
 }
 
-// Shows the tools. When the result of a job replaces its partial result, the panel remains open or
-// closed.
+// Shows the tools. When the result of a job replaces its partial result, the panel remains as the
+// user left it, open or closed.
 function showTools() {
   const before =
       place("tools").querySelector('[data-tool="togglePanel"]')?.getAttribute("aria-expanded");

@@ -33,8 +33,8 @@ export class Program {
     this.uniforms = null;
   }
 
-  // True if the compilation has finished, and also if the browser cannot report this. `parallel` is
-  // the extension KHR_parallel_shader_compile; null if it is missing.
+  // True if the compilation has finished, or if the browser cannot report whether it has.
+  // `parallel` is the extension KHR_parallel_shader_compile; null if the browser lacks it.
   done(parallel) {
     return !parallel || this.gl.getProgramParameter(this.program, parallel.COMPLETION_STATUS_KHR);
   }

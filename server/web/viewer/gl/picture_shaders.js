@@ -75,7 +75,7 @@ const vec3 kGround = vec3(0.40, 0.36, 0.31);
 vec3 sky_color(vec3 direction) {
   return mix(kHorizon, direction.y >= 0.0 ? kZenith : kGround, sqrt(abs(direction.y)));
 }
-// Packs unit vectors into two numbers of 16 bits, by an unfolded octahedron.
+// Packs a unit vector into two numbers of 16 bits, by the octahedral encoding.
 uint pack_normal(vec3 n) {
   n /= abs(n.x) + abs(n.y) + abs(n.z);
   vec2 folded = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
@@ -187,8 +187,8 @@ vec3 offset_of(ivec2 pixel, float t) {
   return direction_of(vec2(pixel) + 0.5 + u_jitter) * t;
 }
 
-// The normal of the plane that best fits the surface near the pixel: the eigenvector of the
-// covariance's smallest eigenvalue, by inverse iteration.
+// Returns the normal of the plane that best fits the surface near the pixel: the eigenvector of the
+// smallest eigenvalue of the covariance matrix, by inverse iteration.
 vec3 plane_normal(ivec2 pixel, vec3 center, float size, vec3 face, vec3 direction) {
   float footprint = u_pixel * length(center), reach = (float(kReach) + 0.5) * max(size, footprint);
   int stride = int(clamp(size / footprint, 1.0, 5.0));

@@ -341,8 +341,9 @@ export class Renderer {
     this.judgeProgress(sample, now);
   }
 
-  // An outdated sample cannot show that the view is complete: tiles arrived after it began, and may
-  // refer to further tiles that are missing.
+  // Notes whether the reading of a sample lacks no tiles. Once the view is complete, places the
+  // sun. An outdated sample cannot show that the view is complete: tiles arrived after it began,
+  // and may refer to further tiles that are missing.
   judgeProgress({isMoving, isFull, isOutdated}, now) {
     const {progress} = this, {isQuiet} = this.stream;
     progress.takeReading(!isMoving && isQuiet && !isOutdated, isFull);

@@ -31,8 +31,8 @@ export class TileStream {
     this.loader = new TileLoader(source, this.store, onArrival);
   }
 
-  // Resolves to the words of the root tile; to undefined if the file has no tiles or the stream has
-  // ended.
+  // Loads the root. Resolves to the words of the root tile; to undefined if the file has no tiles
+  // (an empty grid or a grid of one brick) or the stream has ended.
   async loadRoot() {
     const {root, levels, root_brick: brick} = this.info;
     if (root && levels > 2) {
