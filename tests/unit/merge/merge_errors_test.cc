@@ -17,7 +17,7 @@ class MergeErrors : public testing::Test {
     std::filesystem::create_directory(harness_.scratch_folder());
   }
 
-  // Merges, expects an Error of this code, and an empty scratch folder.
+  // Merges. Checks that this throws an Error of this code and leaves the scratch folder empty.
   Error merge_fails(ErrorCode code, const MergeOptions& options = {}) {
     try {
       harness_.merge(options);
@@ -34,7 +34,7 @@ class MergeErrors : public testing::Test {
   MergeHarness harness_;
 };
 
-// A flipped bit anywhere in the artifacts is found, by any number of threads.
+// A flipped bit anywhere in the artifacts is detected, with any number of threads.
 TEST_F(MergeErrors, DamagedArtifactsAreCorrupt) {
   const std::string path = segment_path(harness_.folder().path(), 7);
   for (const ArtifactRef& ref : harness_.artifacts())

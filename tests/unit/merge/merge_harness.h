@@ -1,5 +1,5 @@
 // Divides voxels into subvolumes, merges the artifacts of their sub-DAGs (made by the oracle) into
-// a global file, and compares it with the file of the oracle's DAG of the whole.
+// a global file, and compares the file with the oracle's DAG of all voxels.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -88,7 +88,7 @@ inline std::vector<Cube> equal_cubes(uint32_t level) {
   return cubes;
 }
 
-// Cubes of levels 1 to `deepest`, split at random, which tile the grid.
+// Returns randomly chosen cubes of levels 1 to `deepest` that tile the grid.
 inline std::vector<Cube> mixed_cubes(uint64_t seed, uint32_t deepest) {
   oracle::Random random(seed);
   std::vector<Cube> waiting{Cube{}}, cubes;

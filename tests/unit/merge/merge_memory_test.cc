@@ -1,5 +1,5 @@
-// The merge under small budgets: same bytes with several hash partitions, several passes, spilled
-// maps and streamed groups. The report must show that each of them happened.
+// The merge under small budgets gives the same bytes with several hash partitions, several passes,
+// spilled position maps and streamed groups. The report must show that each of these happened.
 #include <gtest/gtest.h>
 
 #include "core/dag/node_hash.h"
@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// Dividing the hash space into partitions and spilling maps change nothing.
+// Neither hash partitions nor spilled position maps affect the bytes.
 TEST(MergeMemory, HashPartitionsGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(1, 256);
   for (const uint32_t hash_bits : {16u, 64u}) {
@@ -53,20 +53,21 @@ TEST(MergeMemory, PassesGiveTheSameBytes) {
   }
 }
 
-// A run whose map is larger than the memory for maps is rewired window by window.
+// If the position map of a run exceeds the memory for maps, the run is rewired with one window of
+// the map after the other.
 TEST(MergeMemory, WindowsOfAMapGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(3, 256);
   MergeHarness harness(8, 64);
-  // One run, whose brick map takes 1 MiB. Of 4 MiB, 2/3 MiB are for a level's maps, and a worker
-  // has 1 MiB less a frame for its window.
+  // There is one run, whose brick map takes 1 MiB. Of the 4 MiB, 2/3 MiB are for the maps of a
+  // level, and a worker has 1 MiB minus a frame for its window.
   harness.add(voxels, {Cube{}});
   const Merged merged = harness.merge({.budget_bytes = 4 * kMiB, .threads = 1});
   harness.expect_dag_of(voxels, merged);
   EXPECT_GE(merged.report.scratch_bytes, kMiB);
 }
 
-// Bricks whose hashes all begin with the same four bits: with hashes truncated to these, one group
-// of equal hashes that is larger than the memory of the merge.
+// The hashes of all bricks begin with the same four bits. If they are truncated to four bits, the
+// bricks are one group of equal hashes, which exceeds the merge's memory.
 TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheBudget) {
   constexpr uint64_t kBudgetBytes = 9 * kMiB / 2;
   const uint32_t hash_bits = 4;
@@ -93,7 +94,8 @@ TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheBudget) {
   EXPECT_GT(merged.report.streamed_groups, 0u);
 }
 
-// Few distinct hashes in much memory: buckets too large to be sorted are merged row by row.
+// There are few distinct hashes but enough memory. Buckets that are too large to be sorted are
+// merged row by row.
 TEST(MergeMemory, BucketsOfFewHashesGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(5, 128);
   MergeHarness harness(7, 4);
@@ -104,7 +106,7 @@ TEST(MergeMemory, BucketsOfFewHashesGiveTheSameBytes) {
   }
 }
 
-// A budget that cannot hold two frames of two runs is refused, not exceeded.
+// A budget that cannot hold two frames of each of two runs is refused.
 TEST(MergeMemory, TooSmallABudgetIsAnError) {
   MergeHarness harness(6, 64);
   harness.add(noise_voxels(6, 64), equal_cubes(1));

@@ -1,5 +1,5 @@
-// An interrupted merge resumes from the state it saved, with the same bytes at the end. A damaged
-// state is detected, and the merge starts over or reports that its inputs are missing.
+// An interrupted merge resumes from its saved state and gives the same bytes. A damaged state is
+// detected; then the merge starts over, or reports that its inputs are missing.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,8 +24,8 @@ void change_byte(const std::string& path, uint64_t at, char change) {
   file.put(byte);
 }
 
-// Stores the state in memory; the process "dies" at the save of a given number, just before or just
-// after the state is durable.
+// Stores the state in memory. Simulates a killed process at the save of a given number, just before
+// or just after the state is durable.
 class DyingCheckpoint : public Checkpoint {
  public:
   explicit DyingCheckpoint(std::string segment = "") : segment_(std::move(segment)) {}
@@ -73,8 +73,8 @@ class MergeResume : public testing::TestWithParam<Case> {
   }
 };
 
-// Killed at every save in turn, also after it was resumed, a merge ends with the same bytes and the
-// same counts, although the bytes that it released were overwritten.
+// The merge is killed at every save in turn, also after it was resumed. It ends with the same bytes
+// and counts, although released bytes were overwritten.
 TEST_P(MergeResume, ResumesAfterEverySave) {
   const oracle::Voxels voxels = noise_voxels(31, 256);
   MergeHarness harness(8, GetParam().hash_bits);
@@ -106,7 +106,7 @@ TEST_P(MergeResume, ResumesAfterEverySave) {
   EXPECT_EQ(checkpoint.levels.back(), 0u);
 }
 
-// It resumes with more or less memory than before, also after passes that were finished.
+// The merge resumes with more or less memory than before, also after completed passes.
 TEST_P(MergeResume, ResumesWithOtherMemory) {
   const oracle::Voxels voxels = noise_voxels(32, 256);
   MergeHarness harness(8, GetParam().hash_bits);
@@ -126,7 +126,7 @@ TEST_P(MergeResume, ResumesWithOtherMemory) {
   }
 }
 
-// The same with states that are saved in the background, as many as there is time for.
+// As ResumesAfterEverySave, but states are saved in the background, as often as there is time.
 TEST_P(MergeResume, ResumesAfterBackgroundSaves) {
   const oracle::Voxels voxels = noise_voxels(35, 256);
   MergeHarness harness(8, GetParam().hash_bits);
@@ -151,7 +151,8 @@ TEST_P(MergeResume, ResumesAfterBackgroundSaves) {
   EXPECT_EQ(checkpoint.forgotten, 0u);
 }
 
-// The merge does not wait for a save: here the first save and the level above wait for each other.
+// The merge does not wait for a save. In this test, the first save waits until the next level is
+// merged, and this level waits until the save has begun.
 TEST(MergeCheckpoint, TheMergeContinuesWhileAStateIsSaved) {
   MergeHarness harness(8, 64);
   harness.add(noise_voxels(36, 256), equal_cubes(1));
@@ -201,8 +202,9 @@ INSTANTIATE_TEST_SUITE_P(Ways, MergeResume,
                                          Case{"ThreePasses", 8 * kMiB, 64, 3, 3}),
                          [](const auto& test) { return test.param.name; });
 
-// A state, a map, an intermediate artifact or a partial file that has a flipped bit or is missing:
-// never a wrong DAG. With the inputs at hand the merge starts over.
+// A bit is flipped in a state, a position map, an intermediate artifact or the partial file, or one
+// of them is missing. The merge never writes a wrong DAG. If the inputs are available, it starts
+// over.
 TEST(MergeDamage, DamageStartsOver) {
   const oracle::Voxels voxels = noise_voxels(33, 256);
   struct Way {
@@ -255,7 +257,8 @@ TEST(MergeDamage, DamageStartsOver) {
   }
 }
 
-// Another set of inputs is another merge; the same content at other places is the same.
+// A state does not match a different set of inputs. It matches the same content at different
+// places.
 TEST(MergeDamage, IdentifiesItsInputsByTheirContent) {
   const oracle::Voxels voxels = noise_voxels(34, 64);
   MergeHarness harness(6, 64);

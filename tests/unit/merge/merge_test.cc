@@ -10,8 +10,8 @@
 namespace voxdag {
 namespace {
 
-// Merging subvolumes of one size gives the DAG of the whole, byte for byte, whatever the hash bits,
-// the size and the number of threads.
+// Merging subvolumes of one size gives the bytes of the complete DAG, for any hash bits, sizes and
+// numbers of threads.
 TEST(Merge, EqualSubvolumesGiveTheDagOfTheWhole) {
   for (const uint32_t hash_bits : {4u, 16u, 64u})
     for (uint64_t seed = 0; seed < 3; ++seed) {
@@ -27,8 +27,8 @@ TEST(Merge, EqualSubvolumesGiveTheDagOfTheWhole) {
     }
 }
 
-// Subvolumes of different sizes: a level has roots of some, inner nodes of others and nodes of the
-// top tree.
+// Subvolumes have different sizes, so a level has roots of some subvolumes, inner nodes of others,
+// and nodes of the top tree.
 TEST(Merge, SubvolumesOfDifferentSizesGiveTheDagOfTheWhole) {
   for (const uint32_t hash_bits : {4u, 16u, 64u})
     for (uint64_t seed = 10; seed < 16; ++seed) {
@@ -40,7 +40,7 @@ TEST(Merge, SubvolumesOfDifferentSizesGiveTheDagOfTheWhole) {
     }
 }
 
-// The order in which the artifacts are named changes nothing.
+// The order in which the artifacts are given does not affect the bytes.
 TEST(Merge, AnyOrderOfArtifactsGivesTheSameBytes) {
   const oracle::Voxels voxels = mixed_voxels(20, 64);
   MergeHarness harness(6, 64);
@@ -72,16 +72,16 @@ TEST(Merge, NoArtifactsGiveAFileWithoutNodes) {
   EXPECT_EQ(merged.file.sha256, harness.expected({}).sha256);
 }
 
-// The merger that was published with the tutorial left the child mask out of the hash: two sub-DAGs
-// that are alike but stand in different octants of different parents became one parent, and
-// geometry moved. Here two such pairs must keep their places over two merge levels.
+// The merge that was published with the tutorial omitted the child mask from the hash. So two equal
+// sub-DAGs in different octants of different parents became one parent, and voxels moved. In this
+// test, two such pairs must keep their positions over two levels of the merge.
 TEST(Merge, EqualSubDagsInDifferentOctantsKeepTheirPlaces) {
   oracle::Voxels voxels(32);
   const auto blob = [&](int x, int y, int z) {
     for (int i = 0; i < 4; ++i) voxels.set(x + i, y + i % 2, z);
   };
-  // The blob's brick is child 0 of its 8-voxel cube in one parent and child 7 in the other; those
-  // stand in octants 0 and 5 of their 16-voxel cubes.
+  // The blob's brick is child 0 of its 8-voxel cube in one parent and child 7 in the other. These
+  // parents are octants 0 and 5 of their 16-voxel cubes.
   blob(0, 0, 0);
   blob(16 + 8 + 4, 16 + 4, 16 + 8 + 4);
   for (const uint32_t hash_bits : {4u, 64u})

@@ -1,4 +1,4 @@
-// Positions of one word and of two, as rows, maps and the output hold them.
+// Positions of one word and of two words, in rows, in position maps and in the output.
 #include "merge/load/position_maps.h"
 
 #include <gmock/gmock.h>
@@ -47,8 +47,8 @@ TEST(Positions, OfWideMapsKeepTheirHighHalf) {
   }
 }
 
-// The file has the low half of a pointer first, a row the high half, so that rows are compared by
-// their words.
+// In the file, the low half of a pointer is first. In a row, the high half is first, so that
+// comparing rows word by word compares pointers.
 TEST(Positions, AreWrittenLowHalfFirst) {
   MemoryBudget budget(uint64_t{1} << 20);
   MergedRows rows(budget, {.bricks = false, .wide = true}, {.rows = 2, .words = 8});

@@ -1,5 +1,6 @@
-// Levels with 64-bit pointers, on small scenes: whatever the memory and the number of threads, the
-// merge writes the file of the oracle's DAG, which verifies and has the voxels of the narrow file.
+// Levels with 64-bit pointers, on small scenes. With any memory and number of threads, the merge
+// writes the file of the oracle's DAG. The file passes `verify` and has the voxels of the narrow
+// file.
 #include <gtest/gtest.h>
 
 #include "core/format/global/diff.h"
@@ -12,10 +13,11 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// Words that a level may have before it is wide: all levels but the highest are, or the bricks.
+// The parameter is the number of words above which a level is wide. With one value all levels but
+// the highest are wide, with the other only the bricks.
 class WideLevels : public testing::TestWithParam<uint64_t> {
  protected:
-  // The merged file verifies, has wide levels, and the voxels of `narrow`.
+  // Checks that the merged file passes `verify`, has wide levels, and has the voxels of `narrow`.
   void check_file(MergeHarness& harness, const std::string& narrow) {
     const auto file = open_global_file(harness.merged_file());
     EXPECT_EQ(file->version(), 2u);
@@ -33,7 +35,8 @@ class WideLevels : public testing::TestWithParam<uint64_t> {
     EXPECT_EQ(difference.only_a + difference.only_b, 0u);
   }
 
-  // Merges the voxels, cut into cubes, under these budgets (MiB / 2).
+  // Merges the voxels, divided into cubes, with each of these budgets, which are in units of 1/2
+  // MiB.
   void merge(const oracle::Voxels& voxels, const std::vector<Cube>& cubes, uint32_t hash_bits,
              const std::vector<uint64_t>& half_mib) {
     MergeHarness wide(8, hash_bits, GetParam()), narrow(8, hash_bits);

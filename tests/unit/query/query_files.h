@@ -43,7 +43,8 @@ class QueryFile {
   Cells voxels_;
 };
 
-// A lookup finds these cells of the grid of 2^grid_levels, with one thread and with four.
+// Checks that lookups find these cells of the grid of 2^grid_levels cells per edge, with one thread
+// and with four.
 inline void expect_lookups(const voxdag::query::DagFile& dag, uint32_t grid_levels,
                            const std::vector<voxdag::query::Position>& points,
                            const QueryFile::Cells& cells) {

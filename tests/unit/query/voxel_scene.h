@@ -20,7 +20,8 @@ class VoxelScene {
     if (!voxels.empty()) add(0, {voxels.begin(), voxels.end()});
   }
 
-  // All voxels with x == `plane`: one node per level, shared by the four children of its parent.
+  // Returns all voxels with x == `plane`. There is one node per level, which four children of its
+  // parent share.
   static VoxelScene wall(uint32_t grid_levels, int64_t plane) {
     VoxelScene scene(grid_levels, {});
     for (uint32_t level = 0; level + 2 < grid_levels; ++level) {
@@ -53,7 +54,7 @@ class VoxelScene {
   }
 
  private:
-  // Returns the word offset of the new node or brick; `voxels` are those in its cube.
+  // Returns the word offset of the new node or brick. `voxels` are the voxels in its cube.
   uint32_t add(uint32_t level, const std::vector<Voxel>& voxels) {
     if (level + 2 == grid_levels_) return add_brick(voxels);
     const uint32_t shift = grid_levels_ - 1 - level;

@@ -10,7 +10,7 @@ using namespace voxdag::query;
 
 namespace {
 
-// At the depth of voxels every voxel is visited once, at its position; children that `select`
+// On the level of voxels, every voxel is visited once, at its position. Children that `select`
 // excludes are skipped.
 TEST(DagView, VisitsTheSelectedCells) {
   const std::set<VoxelScene::Voxel> voxels = {{3, 9, 30}, {20, 10, 1}, {4, 4, 4}, {31, 31, 31}};

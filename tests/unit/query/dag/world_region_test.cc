@@ -32,7 +32,8 @@ class WorldRegion : public testing::Test {
   std::unique_ptr<voxdag_reader::File> file_;
 };
 
-// The corner of a cell, computed in doubles, is in that cell, and a box of corners ends there.
+// The corner of a cell, computed in doubles, is in that cell, and a box that ends at the corner
+// does not contain the cell.
 TEST_F(WorldRegion, CornersOfCellsAreExact) {
   std::mt19937 random(5);
   const auto number = [&] { return static_cast<int64_t>(random() % kEdge); };
@@ -52,7 +53,7 @@ TEST_F(WorldRegion, CornersOfCellsAreExact) {
   }
 }
 
-// What is a little inside of a cell, or reaches a little into it, is not moved.
+// A coordinate that is slightly inside a cell is not moved to the cell's boundary.
 TEST_F(WorldRegion, OtherPlacesStay) {
   for (const double part : {1e-6, 0.001, 0.25}) {
     EXPECT_EQ(cell(0, world(0, 1000 - part)), 999);

@@ -1,4 +1,5 @@
-// The voxels and colors of exported files, read from descriptions of the formats alone.
+// Decoders that return the voxels and colors of exported files. They were written only from
+// descriptions of the formats.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -49,7 +50,8 @@ class FileNumbers {
   size_t at_;
 };
 
-// A .vox file: the color of each voxel, where (x, y, z) is (x, -z, y) in voxdag.
+// Returns the color of each voxel in a .vox file. Position (x, y, z) in the file is (x, -z, y) in
+// voxdag.
 inline std::map<Cell3, Color3> decode_vox(const std::string& bytes, int64_t resolution) {
   struct Model {
     int64_t edge = 0;
@@ -112,8 +114,8 @@ inline std::map<Cell3, Color3> decode_vox(const std::string& bytes, int64_t reso
   return cells;
 }
 
-// A .glb file of one mesh: the color of each face of a cell, by the cell and its direction
-// (x: 0, -x: 1, y: 2, ...). Colors are as stored, in 16 bits.
+// Returns the color of each face in a .glb file of one mesh, by the face's cell and direction (x:
+// 0, -x: 1, y: 2, ...). Colors are the stored 16-bit values.
 inline std::map<std::pair<Cell3, int>, Color3> decode_glb(const std::string& bytes,
                                                           const Cell3& region_low,
                                                           size_t& rectangles) {
@@ -181,8 +183,8 @@ inline std::map<std::pair<Cell3, int>, Color3> decode_glb(const std::string& byt
   return faces;
 }
 
-// The files of HashDAG: the color of a voxel is found as its viewer does, by counting the voxels
-// before it on the way down.
+// Reads the files of HashDAG. As HashDAG's viewer does, it finds a voxel's color by counting the
+// voxels before it while it descends the DAG.
 class HashDagColors {
  public:
   HashDagColors(const std::string& dag, const std::string& colors) {

@@ -1,4 +1,5 @@
-// Palettes: few colors are unchanged, many become the nearest of 255, for any order.
+// Palettes: few colors are unchanged, and many colors become the nearest of 255 colors. The order
+// of the colors does not matter.
 #include "query/export/color/color_palette.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@ std::vector<Rgb> some_colors(size_t count) {
   std::mt19937 random(11);
   std::vector<Rgb> colors;
   for (size_t i = 0; i < count; ++i) {
-    // A cloud of browns, a line of grays, and a few saturated ones.
+    // Colors are browns near each other, grays, and a few saturated colors.
     const auto part = [&](unsigned low, unsigned range) {
       return static_cast<uint8_t>(low + random() % range);
     };

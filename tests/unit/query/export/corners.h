@@ -1,5 +1,5 @@
-// Files of few voxels: two in opposite corners of the grid, which every format can hold, and one at
-// the low corner of each of many equal cubes.
+// Files of few voxels. One has two voxels in opposite corners of the grid, which every format can
+// hold. The other has a voxel at the low corner of each of many equal cubes.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +32,8 @@ inline void write_corners(const std::string& path, uint32_t levels) {
   write_corners(path, Grid::given({0, 0, 0}, 1, levels));
 }
 
-// In a grid of 2^levels 8^tile_levels cubes, one node for all of them.
+// Writes a grid of 2^levels voxels per edge that contains 8^tile_levels equal cubes, all of which
+// are one node of the DAG.
 inline void write_tiles(const std::string& path, uint32_t levels, uint32_t tile_levels) {
   GlobalFileWriter writer(system_files(), path, Grid::given({0, 0, 0}, 1, levels), 64);
   write_level(writer, levels - 2, 1, {1, 0});

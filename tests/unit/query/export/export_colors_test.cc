@@ -1,5 +1,5 @@
-// The colors of exported voxels are those that the reader has for them, in each format that has a
-// place for colors: of whole files, of regions and of coarser levels.
+// The colors of exported voxels equal the colors that the reader returns, in each format that
+// stores colors: for complete files, regions and coarser levels.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -56,7 +56,7 @@ class ExportColors : public testing::Test {
     return bytes;
   }
 
-  // The colors of the selected cells, as the reader finds them.
+  // Returns the colors of the selected cells as the reader finds them.
   std::map<Cell3, Color3> expected(const Selection& selection) const {
     std::map<Cell3, Color3> cells;
     const auto& [low, high] = selection.region;
@@ -69,8 +69,8 @@ class ExportColors : public testing::Test {
     return cells;
   }
 
-  // All of a file whose colors are as fine as its voxels and of one with coarser ones, a region and
-  // a coarser level.
+  // Calls check() with selections of two files, one whose colors are as fine as its voxels and one
+  // with coarser colors: all of the file, a region, and a coarser level.
   template <class Check>
   void for_each_case(const Check& check) {
     open(6, 6, smooth_colors(6, 20), 1);
@@ -98,7 +98,7 @@ TEST_F(ExportColors, VoxKeepsFewColorsExactly) {
   }
 }
 
-// With more than 255 colors each voxel has one near its own.
+// If there are more than 255 colors, each voxel has a color of the palette near its own color.
 TEST_F(ExportColors, VoxHasAPaletteOfManyColors) {
   for_each_case([&](const Selection& selection) {
     const auto cells = expected(selection);
@@ -115,7 +115,8 @@ TEST_F(ExportColors, VoxHasAPaletteOfManyColors) {
   });
 }
 
-// It numbers colored voxels with 32 bits: here all of a grid, whose colors are coarser.
+// HashDAG numbers colored voxels with 32 bits. Here the complete grid is exported, and its colors
+// are coarser than its voxels.
 TEST_F(ExportColors, HashDagNamesTheLevelThatFits) {
   constexpr uint32_t kLevels = 12;
   ColoredScene colors{2, 2, Codes(64), patches(2)};
@@ -152,7 +153,7 @@ TEST_F(ExportColors, ProgressIsReported) {
   }
 }
 
-// Grids of over 256 voxels have several models, one for each place.
+// A grid of over 256 voxels per edge has several models, one for each place.
 TEST_F(ExportColors, VoxHasAModelForEachPlace) {
   open(9, 9, patches(9), 4);
   const auto decoded = decode_vox(bytes_of("vox", {9, whole_grid(9)})[0], 512);
@@ -208,7 +209,7 @@ TEST_F(ExportColors, HashDagHasThemInTheOrderOfItsVoxels) {
   });
 }
 
-// A full cube of 2^33 voxels: HashDAG has 32 bits for the number of a color.
+// A full cube of 2^33 voxels is refused, because HashDAG has 32 bits for the number of a color.
 TEST_F(ExportColors, HashDagRefusesMoreThanItCanNumber) {
   const uint32_t levels = 11;
   const std::string path = folder_.file("full.vdag");
@@ -237,7 +238,8 @@ TEST_F(ExportColors, HashDagRefusesMoreThanItCanNumber) {
   EXPECT_EQ(bytes_of("hashdag", selection, true).size(), 2u);
 }
 
-// Damage of the colors or of the levels is an Error, or a file; never a crash.
+// An export of a file whose colors or levels are damaged gives an Error or a file, and never
+// crashes.
 TEST_F(ExportColors, DamageIsAnErrorOrHarmless) {
   open(6, 6, smooth_colors(6, 20), 6);
   file_.reset();

@@ -1,4 +1,5 @@
-// Exports of damaged files: an Error, or a file; never a crash, and nothing left behind.
+// An export of a damaged file gives an Error or a file. It never crashes, and leaves no temporary
+// files.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -55,7 +56,7 @@ TEST_P(ExportDamage, IsAnErrorOrHarmless) {
   int refused = 0;
   for (int round = 0; round < 60; ++round) {
     std::string damaged = intact;
-    // Such small levels have their words at the beginning of their pages.
+    // The levels are small, so their words are at the beginning of their pages.
     const size_t pages = (intact.size() - kPage) / kPage;
     const size_t at = kPage * (1 + random() % std::max<size_t>(pages, 1)) + 4 * (random() % 8);
     if (at + 4 > damaged.size()) continue;

@@ -1,5 +1,5 @@
-// Exports that are killed, and disks that are full: nothing that is half made, and nothing in the
-// way of the next export.
+// Exports that are killed, and full disks. No partial file has a final name, and leftovers do not
+// prevent the next export.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -56,7 +56,7 @@ class ExportDisks : public testing::TestWithParam<std::string> {
 using ExportKilled = ExportDisks;
 using ExportTruncated = ExportDisks;
 
-// The same command succeeds, unless the killed one had written a file to its end.
+// The same command succeeds after a kill, unless the killed command had completed a file.
 TEST_P(ExportKilled, IsRepeatedByTheSameCommand) {
   run(system_files(), "clean");
   const std::vector<std::string> clean = take("clean");
@@ -91,7 +91,8 @@ TEST_P(ExportKilled, IsNotConfusedWithARunningOne) {
   EXPECT_EQ(system_files().list(folder_.path()).size(), 2u);
 }
 
-// Without a lock a file of that name is somebody else's, as is a lock that has contents.
+// Without a lock, a file with the partial name was not made by voxdag and is kept. A lock file that
+// has contents was not made by voxdag either.
 TEST_P(ExportKilled, ButTheFilesOfOthersStay) {
   const std::string partial = output("out") + ".partial", lock = output("out") + ".lock";
   for (const bool has_lock : {false, true}) {
@@ -107,7 +108,8 @@ TEST_P(ExportKilled, ButTheFilesOfOthersStay) {
   }
 }
 
-// A disk that is full from any write on: that is the error, whatever a library makes of it.
+// The disk is full from some write on. The export reports this, even if a format's library reports
+// another error.
 TEST_P(ExportDisks, Full) {
   uint64_t failed = 0;
   for (;; ++failed) {
@@ -165,7 +167,7 @@ class Truncating : public ForwardingFiles {
   const std::string input_;
 };
 
-// An input that becomes shorter is an error, not the end of the process.
+// If the input is truncated during the export, this is an error. It does not end the process.
 TEST_P(ExportTruncated, IsAnError) {
   Truncating files(folder_.file("a.vdag"));
   const Error error = error_of([&] { run(files, "out"); });

@@ -1,6 +1,7 @@
-// Limits that only files of many gigabytes reach: the input is a header with such counts and a hole
-// in place of the levels' words, or a smaller limit. Each is refused at one more than the limit and
-// not at the limit, with a level that fits, and leaves nothing behind.
+// Limits that only files of many gigabytes reach. The input has a header with such counts and a
+// hole in place of the levels' words; some tests lower a limit instead. An export at the limit is
+// accepted. An export at one more than the limit is refused with a level that fits, and leaves no
+// files.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -18,7 +19,8 @@ namespace {
 
 using namespace global_layout;
 
-// Writes a file with these levels, the root's first, whose words are zeros that take no disk.
+// Writes a file with these levels, the root's level first. Their words are zeros in a hole of the
+// file, which takes no disk space.
 void write_hole(const std::string& path, const std::vector<GlobalLevel>& levels) {
   ByteString page(kPageBytes, '\0');
   const auto put = [&](size_t at, auto value) { std::memcpy(&page[at], &value, sizeof(value)); };
@@ -54,7 +56,7 @@ void write_hole(const std::string& path, const std::vector<GlobalLevel>& levels)
 
 class ExportHuge : public testing::Test {
  protected:
-  // The error of an export of all of a file, which leaves nothing.
+  // Returns the error of an export of a complete file. Checks that the export leaves no files.
   Error error(const std::vector<GlobalLevel>& levels, const ExportFormat& format) {
     write_hole(folder_.file("a.vdag"), levels);
     return error_of([&] { run(format, static_cast<uint32_t>(levels.size() + 1)); });
@@ -85,7 +87,8 @@ class ExportHuge : public testing::Test {
     EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
   }
 
-  // One node of one child per level of a grid of 2^grid_levels.
+  // Returns levels with one node each, which has one child, for a grid of 2^grid_levels voxels per
+  // edge.
   static std::vector<GlobalLevel> chain(uint32_t grid_levels) {
     return std::vector<GlobalLevel>(grid_levels - 1, {1, 2});
   }
@@ -120,7 +123,7 @@ TEST_F(ExportHuge, PlayCanvasVoxelsCountLeavesWith24Bits) {
                  "7 (128");
 }
 
-// Three levels of words, none of which is over the format's limit.
+// Divides `words` among three levels, so that no level exceeds the format's limit.
 std::vector<GlobalLevel> many_words(std::vector<GlobalLevel> levels, uint64_t words) {
   for (const size_t level : {4, 5, 6}) levels[level] = {k32Bits / 64, words / 3};
   levels[4].words += words - words / 3 * 3;
@@ -136,7 +139,8 @@ TEST_F(ExportHuge, HashDagCountsWordsWith32Bits) {
                  "9 (512");
 }
 
-// Below the top levels counts have 24 bits, so that nodes of the top levels have indices there.
+// HashDAG stores counts with 24 bits below its top levels. Nodes of the top levels have an index in
+// that place.
 TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
   std::vector<GlobalLevel> levels = chain(17);
   const uint64_t others = 9;
@@ -148,7 +152,7 @@ TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
                  "16 (65536");
 }
 
-// A brick has one word, and one for each non-empty octant; here all are empty.
+// A brick has one word, and one more word for each octant with voxels. Here all octants are empty.
 TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
   const uint64_t others = 2 * 5 + 1 + 255;
   expect_not_refused(many_words(chain(10), k32Bits - 1 - others), "svdag");
@@ -158,7 +162,7 @@ TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
                  "8 (256");
 }
 
-// All voxels of a checkerboard have six faces, and none of them can be merged.
+// Every voxel of a checkerboard has six faces, and no two faces can be merged.
 TEST_F(ExportHuge, GlbCountsBytesWith32Bits) {
   constexpr uint32_t kLevels = 6;
   GlobalFileWriter writer(system_files(), folder_.file("a.vdag"),
@@ -172,7 +176,7 @@ TEST_F(ExportHuge, GlbCountsBytesWith32Bits) {
   constexpr uint64_t kVoxels = uint64_t{1} << (3 * kLevels - 1), kQuadBytes = 72;
   writer.finish({kVoxels, svo_nodes});
 
-  // The largest file that is too small for the faces, and the smallest that is not.
+  // Tests the largest limit that the faces exceed, and the smallest limit that they do not exceed.
   ExportFormat format = export_format("glb");
   format.write = [](const ExportJob& job) {
     return write_glb_within(job, 4096 + 6 * kVoxels * kQuadBytes - 1);

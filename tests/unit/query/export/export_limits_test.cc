@@ -1,5 +1,6 @@
-// What a format or the memory cannot hold is refused with its size and with what would fit, and
-// leaves nothing behind. The scenes are full cubes: their files are small whatever the grid.
+// If the format or the memory cannot hold the selection, the export is refused. The message names
+// the size and a selection that fits, and no files remain. The scenes are full cubes, whose files
+// are small in any grid.
 #include <gtest/gtest.h>
 
 #include "core/base/clock.h"
@@ -35,7 +36,7 @@ class ExportLimits : public ::testing::Test {
     return open_global_file(path);
   }
 
-  // The message with which an export of all of the file is refused.
+  // Returns the message with which an export of the complete file is refused.
   std::string refusal(const voxdag_reader::File& file, const std::string& format,
                       const std::string& output, ErrorCode code, uint64_t memory_bytes) {
     const Selection all{file.grid_levels(), whole_grid(file.grid_levels())};
@@ -63,7 +64,8 @@ class ExportLimits : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-// With its cells in the grid that fits, where they have other numbers.
+// The message gives the region's cells in the grid that fits, where they have different
+// coordinates.
 TEST_F(ExportLimits, TheRegionThatFitsIsNamed) {
   const Selection part{11, {{3, 4, 5}, {2047, 1025, 2000}}};
   const std::string message =
@@ -84,8 +86,8 @@ TEST_F(ExportLimits, PlyNamesTheLevelThatFits) {
   }
 }
 
-// The search for a level that fits begins with the coarsest: for a full grid it would take
-// hours to count the voxels of a level that does not fit.
+// The search for a level that fits begins with the coarsest level. In a full grid, counting the
+// voxels of a level that does not fit would take hours.
 TEST_F(ExportLimits, AreFoundAtOnce) {
   const auto file = full_grid(20);
   const double start_s = process_cpu_seconds();
@@ -119,7 +121,8 @@ TEST_F(ExportLimits, OctoMapHas16Levels) {
   EXPECT_NE(message.find("--level 16 fits"), std::string::npos) << message;
 }
 
-// Below its top levels HashDAG counts voxels with 24 bits: at 2^18 a full cube of 2^8 has more.
+// HashDAG counts voxels with 24 bits below its top levels. At 2^18 voxels per edge, a full cube of
+// 2^8 has too many.
 TEST_F(ExportLimits, HashDagCountsVoxelsWith24Bits) {
   const std::string message =
       refusal(*full_grid(18), "hashdag", "a.basic_dag.dag.bin", ErrorCode::kLimit, kMemory);

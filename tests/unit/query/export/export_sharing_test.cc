@@ -1,5 +1,5 @@
-// Sharing of equal subtrees in each format, and the output for the user: 64 equal cubes of 256^3
-// voxels.
+// Sharing of equal subtrees in each format, and the notes for the user. The scene consists of 64
+// equal cubes of 256^3 voxels.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,5 @@
-// PLY and npz have the alpha, the normals and the materials of the cells, in their order.
+// PLY and npz files have the alpha, the normals and the materials of the cells, in the order of the
+// cells.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -30,7 +31,7 @@ class ExportValues : public testing::Test {
                progress, CancelToken{});
     return read_bytes(output);
   }
-  // What the reader finds, in the order of the export: alpha, normal, material.
+  // The reader's values for a cell, in the order of the export.
   struct Cell {
     uint8_t alpha;
     voxdag_reader::Normal normal;

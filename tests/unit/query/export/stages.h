@@ -21,8 +21,8 @@ class Stages : public NoProgress {
   }
   void advance(uint64_t count) override { stage_->done += count; }
 
-  // No stage is silent, and all but those that find out how much there is know that before; the
-  // bytes that the libraries of formats write are an estimate.
+  // Checks that every stage reports progress. All stages know their total at the start, except for
+  // stages that compute a total. The bytes that the libraries of formats write are an estimate.
   void expect_complete() const {
     for (const auto& [name, stage] : stages) {
       EXPECT_GT(stage.done, 0u) << name;

@@ -1,4 +1,5 @@
-// Compares the colors of an extract, decoded by code written from the document, with the input's.
+// Compares the colors of an extract with the input's colors. Both are decoded by code written from
+// docs/format.md.
 #include <cmath>
 #include <optional>
 
@@ -19,8 +20,8 @@ double stored_of(double linear) {
   return 255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055);
 }
 
-// Each cell has one of two colors, at random, so that a cell with the color of another one shows.
-// All blends of the two are on a line, which blocks encode well.
+// Each cell has one of two colors at random, so that a cell with another cell's color is noticed.
+// All mixtures of the two colors are on a line, which color blocks encode well.
 constexpr int kTolerance = 40;  // the two differ by 130
 SumOf two_colors() {
   return [](uint64_t code) {
@@ -43,7 +44,8 @@ class ExtractColors : public Extract {
     return selection.region.contains({x * edge, y * edge, z * edge}, edge);
   }
 
-  // The scene of the part, and the position of its grid in the input's grid.
+  // Returns the scene of the selected part. `cube` is the position of the part's grid in the
+  // input's grid.
   ColoredScene part_of_scene(const Selection& selection, const Cube& cube) const {
     ColoredScene part;
     part.levels = selection.grid_levels - cube.level;
@@ -75,7 +77,7 @@ class ExtractColors : public Extract {
     };
     const uint32_t finest = part.color_levels + cube.level;
     for (uint32_t level = cube.level; level <= finest; ++level) {
-      // The finest cells that are left of each cell, in linear light.
+      // Mean colors, in linear light, of the finest cells that remain in each cell.
       std::map<uint64_t, std::array<double, 4>> means;
       for (const uint64_t code : part.cells(part.color_levels)) {
         const uint64_t whole_code = code_of(cube) << 3 * part.color_levels | code;
@@ -102,7 +104,7 @@ class ExtractColors : public Extract {
     }
   }
 
-  // True if a cell of the input is in a region that the part has as it is.
+  // True if a cell of the input is in a color region that the extract copies unchanged.
   bool is_copied(const Selection& selection, const Cube& cube, uint32_t finest, uint32_t level,
                  uint64_t code) const {
     const uint32_t c = scene_.color_levels;
@@ -139,7 +141,7 @@ TEST_F(ExtractColors, OfLevels) {
   EXPECT_EQ(cut_, 0u);
 }
 
-// Boxes that cut cells and regions, in their place and cropped.
+// Boxes that cut cells and color regions, with the complete grid and cropped.
 TEST_F(ExtractColors, OfRegions) {
   for (const auto& [levels, color_levels] : {std::pair{8u, 8u}, {9u, 7u}, {8u, 3u}}) {
     write(levels, color_levels);
@@ -161,8 +163,8 @@ TEST_F(ExtractColors, OfRegions) {
   EXPECT_GT(cut_, 100u);
 }
 
-// The eighths of the grid, with separate regions and a color grid that ends with a tier, have the
-// bytes of a file with only that eighth.
+// The octants of the grid have separate color regions, and the color grid ends with a tier. So the
+// extract of an octant has the bytes of a file that contains only this octant.
 TEST_F(ExtractColors, OfAnAlignedCubeAreThoseOfItsScene) {
   for (const auto& [levels, color_levels] : {std::pair{9u, 7u}, {7u, 7u}}) {
     write(levels, color_levels, smooth_colors(color_levels, 20));

@@ -1,4 +1,5 @@
-// Damaged files, full disks and interruptions: an error, no output, and nothing left behind.
+// Damaged files, full disks and interruptions give an error. No output and no temporary files
+// remain.
 #include <algorithm>
 #include <filesystem>
 #include <optional>
@@ -29,7 +30,7 @@ class ExtractErrors : public Extract {
   }
 };
 
-// Any damaged byte of the levels or of the checksum table is found where it is read.
+// Any damaged byte of the levels or of the checksum table is detected when it is read.
 TEST_F(ExtractErrors, DamagedInput) {
   const std::string intact = bytes("in.vdag");
   const auto file = open_global_file(path("in.vdag"));
@@ -49,7 +50,7 @@ TEST_F(ExtractErrors, DamagedInput) {
   expect_files({"in.vdag"});
 }
 
-// Offsets that lead nowhere are refused, though every checksum is right.
+// Offsets that do not point to a node are refused, although every checksum is right.
 TEST_F(ExtractErrors, OffsetsThatLeadNowhere) {
   oracle::Voxels voxels(16);
   voxels.set(1, 2, 3);
@@ -107,8 +108,9 @@ TEST_F(ExtractErrors, FailingReads) {
   EXPECT_GT(failed, 5u);
 }
 
-// Whatever operation a process is killed at, the same extraction succeeds afterwards, unless it was
-// at its end, and removes the leftovers: temporary files and folders, but no files of other names.
+// The process is killed at any operation. The same extract succeeds afterwards, unless the killed
+// one had finished its output, and removes the temporary files and folders of the killed process.
+// Files with other names are kept.
 TEST_F(ExtractErrors, Killed) {
   std::filesystem::create_directory(path("out.vdag.work-"));
   std::filesystem::create_directory(path("out.vdag.work-1234567"));
@@ -134,7 +136,8 @@ TEST_F(ExtractErrors, Killed) {
   EXPECT_GT(repeated, 5u);
 }
 
-// A region around the middle of the grid cannot be cropped, and one on a side of it can.
+// A region around the middle of the grid cannot be cropped, and the command reports that. A region
+// on one side of the middle can be cropped.
 TEST_F(ExtractErrors, CropOfNothingIsSaid) {
   const auto is_said = [&](const Region& region, bool crop) {
     warnings_.texts.clear();
@@ -149,7 +152,7 @@ TEST_F(ExtractErrors, CropOfNothingIsSaid) {
   EXPECT_FALSE(is_said({{31, 0, 0}, {33, 64, 64}}, false));
 }
 
-// An existing file is replaced only with --force, whoever made it.
+// An existing file is replaced only with --force, even if voxdag made it.
 TEST_F(ExtractErrors, ExistingOutput) {
   ExtractSpec part = spec("out.vdag", {5, whole_grid(5)});
   const auto file = open_global_file(path("in.vdag"));

@@ -1,4 +1,4 @@
-// What is extracted has the bytes of the file that the oracle makes of the same voxels.
+// The extract has the bytes of the file that the oracle makes of the same voxels.
 #include <array>
 
 #include "tests/unit/query/extract/extract_fixture.h"
@@ -17,7 +17,7 @@ oracle::Voxels noise(uint64_t seed, int edge) {
   return voxels;
 }
 
-// An octree-aligned cube in 2^levels cells, or any box of them.
+// Returns an octree-aligned cube or a random box in a grid of 2^levels cells per edge.
 Region any_region(oracle::Random& random, uint32_t levels) {
   const int64_t edge = int64_t{1} << levels;
   Region region;
@@ -31,7 +31,7 @@ Region any_region(oracle::Random& random, uint32_t levels) {
   return region;
 }
 
-// Levels of the octree, down to its root brick and up to the file itself, whatever the hash bits.
+// Extracts all levels, from the root brick to the level of the file, for several hash bits.
 TEST_F(Extract, Levels) {
   const oracle::Voxels voxels = random_voxels(1, 128);
   for (const uint32_t hash_bits : {64u, 4u}) {
@@ -115,7 +115,8 @@ TEST_F(Extract, InSteps) {
   EXPECT_TRUE(bytes("box_in_box.vdag") == bytes("inner.vdag"));
 }
 
-// Many cubes, threads and merge passes, and cubes that do not fit their share: the same bytes.
+// The bytes are the same with many cubes, threads and merge passes, and if cubes do not fit their
+// share of the memory.
 TEST_F(Extract, MemoryAndThreads) {
   const oracle::Voxels voxels = noise(5, 128);
   write_global(path("in.vdag"), voxels);
@@ -161,7 +162,7 @@ TEST_F(Extract, WideLevels) {
   EXPECT_EQ(open_global_file(path("narrow.vdag"))->version(), 1u);
 }
 
-// A selection without voxels is a valid file without nodes, and a warning.
+// An extract of a selection without voxels is a valid file without nodes. The command warns.
 TEST_F(Extract, Nothing) {
   oracle::Voxels voxels(32);
   voxels.set(1, 1, 1);

@@ -1,5 +1,5 @@
-// Compares colors of batches of cells, from C++ and from C, with a decoder written from the
-// document.
+// Compares colors of batches of cells, from C++ and from C, with a decoder written from
+// docs/format.md.
 #include <gtest/gtest.h>
 
 #include "core/format/global/voxdag_reader.h"
@@ -56,7 +56,7 @@ TEST_F(Colors, OfEveryCell) {
   }
 }
 
-// In any order, including empty cells and cells outside the grid.
+// A batch can have the cells in any order, and can contain empty cells and cells outside the grid.
 TEST_F(Colors, InAnyOrder) {
   const DagFile dag(path_);
   std::vector<Position> points = cells(9);

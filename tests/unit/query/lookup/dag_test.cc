@@ -26,7 +26,8 @@ bool is_within(const Region& region, const Position& p) {
   return true;
 }
 
-// Whole, within, across the border, outside and empty regions of a grid.
+// Returns regions of a grid: the complete grid, boxes within it, across its boundary and outside
+// it, and empty boxes.
 std::vector<Region> regions_of(uint32_t grid_levels, uint64_t seed) {
   const int64_t edge = int64_t{1} << grid_levels;
   std::vector<Region> regions = {whole_grid(grid_levels),
@@ -46,8 +47,8 @@ std::vector<Region> regions_of(uint32_t grid_levels, uint64_t seed) {
   return regions;
 }
 
-// All functions against brute force, on every grid of files of three sizes, with narrow and with
-// wide levels.
+// Compares all functions with brute force, in every grid of files of three sizes, with narrow and
+// with wide levels.
 class DagFileTest : public testing::TestWithParam<std::tuple<int, uint64_t>> {
  protected:
   DagFileTest()
@@ -116,7 +117,7 @@ TEST_P(DagFileTest, CountsWithoutStoredCounts) {
       ASSERT_EQ(poor.count({levels, region}), dag_.count({levels, region}));
 }
 
-// A list that is too short is filled, and the number counts all cells.
+// If the caller's list is too short, it is filled, and the returned number counts all cells.
 TEST_P(DagFileTest, ListsAsManyAsFit) {
   const Selection all{dag_.grid_levels(), whole_grid(dag_.grid_levels())};
   std::vector<Position> some(3), every(dag_.count(all));
@@ -177,7 +178,8 @@ TEST_P(DagFileTest, FindsTheNearestCell) {
   }
 }
 
-// Many cells at equal distances: the lowest Morton code wins, whichever is found first.
+// If several cells have equal distances, the cell with the lowest Morton code wins, in any order of
+// the search.
 TEST(Dag, BreaksTiesByMortonCode) {
   oracle::Voxels voxels(16);
   for (const int x : {6, 10})
@@ -233,8 +235,8 @@ TEST(Dag, RefusesWrongArguments) {
   EXPECT_EQ(code_of([&] { DagFile nothing(file.path() + ".not"); }), ErrorCode::kNotFound);
 }
 
-// Flipped bytes give an error that names the file, or some answer; nothing outside the file is read
-// (the address sanitizer would say so).
+// Queries of a file with flipped bytes give an error that names the file, or some result. They read
+// nothing outside the file (the address sanitizer checks this).
 TEST(Dag, SurvivesDamage) {
   for (const uint64_t narrow_words : {global_layout::kNarrowLevelWords, uint64_t{2}}) {
     const QueryFile file(random_voxels(11, 32), narrow_words);

@@ -1,4 +1,4 @@
-// Lookups of so many points that their descents begin in a table of cells.
+// Lookups of so many points that the descents begin in a table of the cells of a coarse grid.
 #include "query/lookup/top_cells.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr size_t kManyPoints = 20'000;
 
-// Set cells, their neighbors, any cells, and points outside.
+// Returns set cells, their neighbors, random cells, and points outside the grid.
 std::vector<Position> points_of(const QueryFile::Cells& cells, uint32_t grid_levels) {
   std::vector<Position> points;
   for (const auto& [x, y, z] : cells)
@@ -61,7 +61,7 @@ TEST(TopCells, HaveTheNodesOfTheirGrid) {
       }
 }
 
-// Points that do not descend through damaged nodes have unchanged answers.
+// The results of points whose descents do not visit damaged nodes are unchanged.
 TEST(TopCells, LeaveDamageToThosePointsThatMeetIt) {
   const QueryFile file(random_voxels(6, 256));
   std::vector<Position> points;

@@ -37,8 +37,8 @@ TEST(RayCaster, HitsAVoxelOfABrick) {
   EXPECT_FALSE(caster.cast({{{-5, 1.5, 3.5}}, {{1, 0, 0}}}, {}, 0, kFar, hit));
 }
 
-// A ray that begins within a voxel hits it immediately; one that begins behind it misses it, and so
-// does one whose t_max is too small.
+// A ray that begins within a voxel hits it immediately. A ray that begins behind the voxel, or
+// whose t_max is too small, misses it.
 TEST(RayCaster, KeepsToItsInterval) {
   const VoxelScene scene(3, {{4, 4, 4}});
   const DagView dag = scene.view();
@@ -102,8 +102,8 @@ TEST(RayCaster, AgreesWithTryingEveryVoxel) {
   EXPECT_GT(hits, 300);
 }
 
-// A wall one voxel thick in a grid of 131072^3 has no cracks: rays at all angles through edges and
-// corners of cells of all sizes end on it.
+// A wall one voxel thick in a grid of 131072^3 has no cracks: rays at all angles, through edges and
+// corners of cells of all sizes, hit the wall.
 TEST(RayCaster, SeesNoCracksAtHighResolution) {
   constexpr uint64_t kSeed = 7;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
@@ -136,7 +136,7 @@ TEST(RayCaster, SeesNoCracksAtHighResolution) {
   }
 }
 
-// A cell no larger than the cone counts as one solid cell; the cone grows with distance.
+// A cell no wider than the ray's cone counts as solid. The cone's width grows with the distance.
 TEST(RayCaster, EndsAtTheConesWidth) {
   const VoxelScene scene(6, {{63, 63, 63}});
   const DagView dag = scene.view();

@@ -67,7 +67,8 @@ void expect_equal(WalkPacket walk, const DagView& dag, const std::vector<Ray>& r
   }
 }
 
-// Results equal the single-ray caster's to the last bit, in files of all shapes.
+// Checks that results equal the single-ray caster's results to the last bit, in files of different
+// shapes.
 void expect_single_rays(WalkPacket walk) {
   uint64_t hits = 0;
   for (const int edge : {4, 8, 64})
@@ -111,7 +112,7 @@ class DagRays : public testing::Test {
   const DagFile dag_{file_.path()};
 };
 
-// Distances are in voxels whatever the length of the direction; the normal looks at the ray.
+// Distances are in voxels for any length of the direction. The normal points against the ray.
 TEST_F(DagRays, MeasuresInVoxels) {
   for (const double length : {1e-300, 0.5, 1.0, 1e300}) {
     RayHit hit = cast({-3, 6.5, 7.5}, {length, 0, 0});

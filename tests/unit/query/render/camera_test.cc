@@ -18,7 +18,8 @@ void expect_near(const Vec& a, const Vec& b) {
   for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(a[axis], b[axis], 1e-12);
 }
 
-// Where a point appears, in pixels; inverts ray() by the camera's definition.
+// Computes the position of a point in the picture, in pixels. This is the inverse of ray(), written
+// from the camera's definition.
 void project(const Placement& p, const Vec& point, int width, int height, double& x, double& y) {
   const Vec forward = normalized(p.target - p.eye);
   const Vec right = normalized(cross(forward, {{0, 1, 0}})), up = cross(right, forward);
@@ -28,8 +29,8 @@ void project(const Placement& p, const Vec& point, int width, int height, double
   y = height / 2.0 - dot(d, up) * scale;
 }
 
-// The center of the picture looks at the target, and its edges are half the field of view away; x
-// runs to the right and y down.
+// The ray through the center of the picture points to the target. The angle to the rays at the
+// upper and lower edges is half the field of view. x increases to the right, y downward.
 TEST(Camera, RaysFollowTheFieldOfView) {
   const Camera camera({{{0, 0, 10}}, {{0, 0, 0}}, 90}, 200, 100);
   expect_near(camera.ray(100, 50).direction, {{0, 0, -1}});
@@ -52,7 +53,7 @@ TEST(Camera, RefusesInvalidPlacements) {
   EXPECT_THROW(Camera({{{1, 2, 3}}, {{0, 0, 0}}, 0}, 10, 10), Error);
 }
 
-// All of the points are in the picture, centered, and fill it in one direction.
+// All points are in the picture and centered, and they fill it in one direction.
 TEST(Camera, FitsThePointsIntoThePicture) {
   std::vector<Vec> points;
   for (int i = 0; i < 8; ++i)
@@ -79,8 +80,8 @@ TEST(Camera, FitsThePointsIntoThePicture) {
   }
 }
 
-// One outlier among thousands of points does not push the camera away; the corners of a cube are no
-// outliers.
+// One outlier among thousands of points does not move the camera away. The corners of a cube are
+// not outliers.
 TEST(Camera, IgnoresAnOutlier) {
   const auto distance = [](const std::vector<Vec>& points) {
     const Placement p = fit_camera(points, {{1, 0, 0}}, 32, 1);

@@ -58,7 +58,8 @@ TEST(SurfaceHit, StairsAreASlopeFromAfar) {
   EXPECT_LT(degrees_between(s.normal, {{0, 1, 0}}), 0.1);
 }
 
-// Too few cells to fit a plane: a lone voxel has the normal of the face that the ray entered.
+// If there are too few cells to fit a plane, the normal is the normal of the face that the ray
+// entered.
 TEST(SurfaceHit, ALoneVoxelShowsItsFace) {
   const VoxelScene scene(4, {{7, 7, 7}});
   const DagView dag = scene.view();
@@ -67,7 +68,7 @@ TEST(SurfaceHit, ALoneVoxelShowsItsFace) {
   EXPECT_LT(degrees_between(s.normal, {{0, 1, 0}}), 0.1);
 }
 
-// The box is exact in a grid this small, where its cells are voxels.
+// In such a small grid the box is exact, because its cells are voxels.
 TEST(Bounds, AreTheOccupiedVoxels) {
   const VoxelScene scene(5, {{3, 9, 30}, {20, 10, 1}, {4, 4, 4}});
   const Box box = occupied_box(scene.view());
@@ -80,7 +81,8 @@ TEST(Bounds, AreTheOccupiedVoxels) {
   EXPECT_EQ(occupied_cells(scene.view()).centers.size(), 3u);
 }
 
-// A view of a scene that is small in its grid has all of it in the picture, and little else.
+// If a scene is small relative to its grid, a view has the complete scene in the picture, and
+// little else.
 TEST(Views, OfASmallSceneShowIt) {
   for (const uint32_t grid_levels : {3u, 10u})
     for (const int edge : {1, 4}) {

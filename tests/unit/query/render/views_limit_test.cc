@@ -1,4 +1,4 @@
-// The work for named views is bounded, whatever the scene, and can be stopped.
+// The work for named views is limited for any scene, and can be canceled.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -51,7 +51,7 @@ TEST(RayCaster, StopsAfterItsSteps) {
   EXPECT_FALSE(caster.cast(ray, {}, 0, 4 * edge, limited_hit, left));
 }
 
-// Without a limit these take minutes. What is found is the same every time.
+// Without a limit, these views would take minutes. The result is the same every time.
 TEST(Views, OfDustTakeAFewSeconds) {
   const VoxelScene scene = dust();
   const DagView dag = scene.view();

@@ -1,5 +1,5 @@
-// Color pages: the cells and colors that a decoder written from docs/format.md finds in all pages
-// of a level equal those that another one finds in the file.
+// Tests color pages. A decoder of pages and a decoder of the file's color section, both written
+// from docs/format.md, must find the same cells and colors on each level.
 #include "query/tiles/color_page.h"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ Color3 color_in_block(const uint32_t* block, uint32_t i) {
   return color;
 }
 
-// The colors of the cells of a page, by their Morton codes within it.
+// Returns the colors of the cells of a page, by the cells' Morton codes within the page.
 std::map<uint32_t, Color3> decode(const Words& page) {
   std::map<uint32_t, Color3> colors;
   const uint32_t count = page.at(0) & 0x3ff, skip = page[0] >> 16 & 31;
@@ -134,7 +134,8 @@ TEST_F(ColorPagesTest, OfWhatIsNotThereAreEmptyOrRefused) {
   EXPECT_EQ(refusal({6, {0, 0, 0}}), ErrorCode::kNotFound);
 }
 
-// A section that does not fit the DAG gives an error, or other colors, and nothing worse.
+// If a color section does not match the DAG, the result is an error or wrong colors, but never a
+// crash.
 TEST_F(ColorPagesTest, OfDamagedColorsAreErrors) {
   const ColoredScene scene{8, 8, random_codes(3, 8, 1500), smooth_colors(8, 3)};
   write_colored(path_, scene);
@@ -146,7 +147,7 @@ TEST_F(ColorPagesTest, OfDamagedColorsAreErrors) {
   int refused = 0;
   for (int i = 0; i < 60; ++i) {
     ByteString bytes = whole;
-    // The tiers are the last 64 bytes, the directories precede them.
+    // The tier table is the last 64 bytes of the section. The directories are before it.
     for (int n = 0; n < 4; ++n)
       bytes[section + size - static_cast<uint64_t>(random.between(65, 1500))] ^=
           static_cast<char>(random.between(1, 255));

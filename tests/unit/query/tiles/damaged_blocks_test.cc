@@ -1,4 +1,4 @@
-// Tiles and color pages of a file with flipped bits: the original contents, or an error.
+// Tiles and color pages of a file with flipped bits have the original contents, or are an error.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -38,8 +38,8 @@ class DamagedBlocks : public testing::Test {
     ASSERT_GT(file->checksum_table_offset(), 4 * 65536u);
   }
 
-  // All tiles, then all pages; nothing where a block is damaged. Anything else that is thrown fails
-  // the test.
+  // Returns all tiles, then all pages; empty contents if a block is damaged. Any other exception
+  // fails the test.
   std::vector<Words> read(bool with_checks) {
     const auto file = open_global_file(path_);
     const query::DagView dag(*file);
@@ -91,7 +91,7 @@ TEST_F(DamagedBlocks, AreFoundBeforeTheyAreUsed) {
   EXPECT_GT(made, 1000u);
 }
 
-// A block that was damaged is compared again: whoever repairs the file is not asked to restart.
+// A damaged block is compared again at its next use, so a repaired file works without a restart.
 TEST_F(DamagedBlocks, AreComparedUntilTheyAreIntact) {
   const auto file = open_global_file(path_);
   const CheckedBlocks blocks(*file);

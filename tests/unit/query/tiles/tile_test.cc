@@ -22,7 +22,7 @@ namespace {
 
 using Words = std::vector<uint32_t>;
 
-// A tile as docs/format.md has it, read by other code than that which writes it.
+// Decodes a tile as docs/format.md describes it, independently of the code that encodes tiles.
 struct Tile {
   explicit Tile(Words all) : words(std::move(all)) {
     EXPECT_GE(words.size(), 4u);
@@ -138,7 +138,7 @@ class Comparison {
   std::map<uint64_t, size_t> leaves_;
 };
 
-// The word offsets of all nodes of each level above the bricks.
+// Returns the word offsets of all nodes, by level, for the levels above the bricks.
 std::vector<std::vector<uint64_t>> all_nodes(const File& file) {
   std::vector<std::vector<uint64_t>> levels(file.brick_level());
   for (uint32_t l = 0; l < file.brick_level(); ++l)
@@ -173,7 +173,7 @@ void check_tiles(const QueryFile& scene, uint64_t seed) {
     }
 }
 
-// The example in docs/format.md is the tile of the root of the file that is explained there.
+// The example of a tile in docs/format.md is the root tile of the example file in that document.
 TEST(Tile, IsTheExampleOfTheDocuments) {
   const std::string source = VOXDAG_SOURCE_DIR;
   std::ifstream document(source + "/docs/format.md");
@@ -189,7 +189,7 @@ TEST(Tile, IsTheExampleOfTheDocuments) {
   EXPECT_EQ(encode_tile(DagView(file), 3, {0, 0}), expected);
 }
 
-// Each tile, decoded by other code, is the part of the file that it stands for.
+// Each tile, decoded by independent code, equals the part of the file below its root.
 TEST(Tile, EqualsTheFile) {
   for (const int edge : {8, 16, 64, 128})
     for (const uint64_t seed : {1, 2})
@@ -219,7 +219,7 @@ TEST(Tile, OfABrickOrAnEmptySceneIsRefused) {
               ErrorCode::kInvalidInput);
 }
 
-// True if there is a tile at the address; it has the right size then.
+// True if the address gives a tile. Checks the tile's size.
 bool has_tile(const DagView& dag, uint32_t depth, const TileAddress& root) {
   try {
     const Tile tile(encode_tile(dag, depth, root));
@@ -230,7 +230,8 @@ bool has_tile(const DagView& dag, uint32_t depth, const TileAddress& root) {
   }
 }
 
-// A request may name any word of a level. It gets an answer or an error; nodes are always found.
+// A request may name any word of a level. The answer is a tile or an error; for the offset of a
+// node, it is always the node's tile.
 TEST(Tile, AnyOffsetIsAnsweredOrRefused) {
   const QueryFile scene(voxdag::random_voxels(5, 64));
   const File file(scene.path());
