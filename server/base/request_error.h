@@ -1,7 +1,7 @@
-// Errors of the queue, scenes, jobs and tiles. They throw a RequestError if the client can correct
-// the request, and an Error otherwise. server/api turns both into answers. The message of a
-// RequestError is written for clients and contains no path of the server. The message of an Error
-// may contain one, so public_error() replaces it.
+// The queue, scenes, jobs and tiles throw a RequestError if the client can correct the request, and
+// an Error otherwise. server/api converts both to answers. The message of a RequestError is written
+// for clients and contains no path of the server. The message of an Error may contain such a path,
+// so public_error() replaces the message.
 #pragma once
 
 #include <cstdint>

@@ -54,7 +54,7 @@ class Dispatcher {
   Job suspend(const std::string& id);
   Job resume(const std::string& id);
   Job retry(const std::string& id);
-  // Deletes a job. Removes its files before its record, so that this frees space even on a full
+  // Deletes a job. Removes its files before its record, so that the call frees space even on a full
   // disk. An interrupted removal is finished later; until then the job cannot be retried.
   void remove(const std::string& id);
 

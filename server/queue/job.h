@@ -64,7 +64,8 @@ struct Job {
   Preview preview = Preview::kNone;
 };
 
-// One change of a job's state. `number` numbers the events of all jobs in their order.
+// One change of a job's state. `number` is the number of the event among the events of all
+// jobs, in the order in which they occurred.
 struct JobEvent {
   int64_t number = 0;
   double at_s = 0;

@@ -1,4 +1,4 @@
-// Bearer tokens and their roles. The file holds hashes only:
+// Bearer tokens and their roles. The token file contains only the hashes of the tokens:
 //
 //     # role name sha256(token)
 //     admin  anna  9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08

@@ -74,8 +74,8 @@ TlsContext::TlsContext(const std::string& certificate_file, const std::string& k
     throw Error(ErrorCode::kInvalidInput, what);
   };
   if (!context_) fail("TLS: cannot initialize OpenSSL");
-  // If a client has closed its connection, OpenSSL's next write raises SIGPIPE, which would
-  // otherwise end the process.
+  // If a client has closed its connection, OpenSSL's next write raises SIGPIPE. The signal would
+  // end the process if it were not ignored.
   std::signal(SIGPIPE, SIG_IGN);
   SSL_CTX_set_min_proto_version(context_.get(), TLS1_2_VERSION);
   SSL_CTX_set_options(context_.get(), SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION);

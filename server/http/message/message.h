@@ -34,7 +34,7 @@ struct Request {
   using Sink = std::function<bool(std::string_view piece)>;
   std::function<BodyEnd(const Sink& sink)> read_body;
 
-  // True if the client has closed the connection. For handlers that take long.
+  // True if the client has closed the connection. Handlers that take long call it and then give up.
   std::function<bool()> client_has_left;
 
   std::string header(std::string_view name) const { return header_value(headers, name); }

@@ -30,8 +30,8 @@ export async function embedViewer(place, job, signal) {
   let viewer = null;
   const renderer =
       new Renderer(canvas, source, {budgetBytes: kBudgetBytes, onChange: () => viewer?.schedule()});
-  // Releases the context early, because a browser has only a few contexts and this page remains
-  // open.
+  // Releases the WebGL context early, because a browser has only a few contexts and this page
+  // remains open.
   const release = () => {
     renderer.dispose();
     if (!renderer.context.gl.isContextLost())

@@ -14,8 +14,8 @@ const kHeld = {
   KeyE: "rise",
   KeyQ: "sink",
 };
-// Keys identified by their character instead of their position, because they are elsewhere on other
-// keyboards.
+// Keys identified by their character instead of their position, because their positions differ
+// between keyboards.
 const kHeldCharacters = {
   "+": "zoomIn",
   "=": "zoomIn",

@@ -11,8 +11,9 @@ export const cross =
     (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 export const mix = (a, b, share) => add(scale(a, 1 - share), scale(b, share));
 
-// Returns the unit vectors of a picture that is taken in a direction. If the direction is straight
-// down or up, the picture's up vector is -z or z.
+// Returns the unit vectors {forward, right, up} of a picture that is taken in a direction. `above`
+// is the direction up in the scene. If `direction` is straight down or up, the picture's up vector
+// is -z or z.
 export function pictureAxes(direction, above = [0, 1, 0]) {
   const forward = normalize(direction),
         vertical = Math.abs(dot(forward, normalize(above))) > 1 - 1e-9;

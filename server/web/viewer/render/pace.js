@@ -1,5 +1,5 @@
-// Measures the speed of the GPU. From this it chooses the number of pixels per part of a sample,
-// and the resolution while the camera moves.
+// Measures the speed of the GPU. Chooses, from this speed, the number of pixels per part of a
+// sample and the resolution while the camera moves.
 
 const kTargetMs = 40;  // time of a frame while the camera moves
 const kPartMs = 120;   // time of a part of a sample

@@ -22,11 +22,12 @@ const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
 // the lowest bit of the pointer selects one.
 //
 // `shape` is the tileShape() of the level. Returns {level, levels, words, pointers, root,
-// leafBegin, addresses, coarse}. `words` are the words of complete blocks for the pool, at virtual
-// addresses from 0. `pointers` are the positions in `words` of pointers with virtual addresses,
-// which the pool makes absolute; `root` is such a pointer. `leafBegin` is the texel of the first
-// leaf. `addresses` are the word offsets of the cut-off nodes in the file, and `coarse` their
-// coarse bricks; both are null for a tile with bricks.
+// leafBegin, addresses, coarse}. `words` are the words of complete blocks for the pool. Their
+// virtual addresses are the numbers of their texels, from 0. `pointers` are the positions in
+// `words` of pointers with virtual addresses, which the pool replaces with absolute addresses;
+// `root` is also a pointer with a virtual address. `leafBegin` is the texel of the first leaf.
+// `addresses` are the word offsets of the cut-off nodes in the file, and `coarse` their coarse
+// bricks; both are null for a tile with bricks.
 export function decodeTile(tile, level, shape) {
   checkHead(tile, level, shape);
   const {levels, bricks} = shape, nodeWords = tile[2], leafCount = tile[3];
