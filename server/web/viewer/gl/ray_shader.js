@@ -74,7 +74,7 @@ ivec3 hit_cell = ivec3(0);   // low corner of the cell that was hit
 uint picked_slots[21];
 #endif
 
-// Begins a ray at cell + part, in voxels. Components of the direction nearer to 0 count as 1e-18.
+// Begins a ray at cell + part, in voxels. Direction components below 1e-18 in size count as 1e-18.
 void set_ray(ivec3 cell, vec3 part, vec3 direction) {
   ivec3 negative = ivec3(lessThan(direction, vec3(0)));
   ray_base = cell + negative * ((1 << u_levels) - 2 * cell);
