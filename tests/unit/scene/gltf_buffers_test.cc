@@ -30,7 +30,7 @@ Error error_among(const std::map<std::string, std::string>& contents) {
   return Error(ErrorCode::kInvalidInput, "");
 }
 
-// An external buffer is found in the folder of the scene, its name percent-encoded.
+// An external buffer is a file in the folder of the scene; its name is percent-encoded.
 TEST(GltfBuffers, External) {
   const SceneBuilder scene = one_triangle();
   EXPECT_EQ(triangles_among({{"folder/scene", scene.gltf("sub%20dir/my%2fb.bin")},
@@ -73,7 +73,7 @@ TEST(GltfBuffers, ExternalThatIsReplacedWhileTheSceneIsRead) {
       << error.message();
 }
 
-// A buffer that makes no triangles (of normals here) may be anywhere.
+// A buffer that is not needed for triangles (here it has normals) may be missing.
 TEST(GltfBuffers, ExternalThatIsNotRead) {
   SceneBuilder scene = one_triangle();
   scene.root["bufferViews"].push_back({{"buffer", 1}, {"byteLength", 36}});
@@ -97,8 +97,8 @@ TEST(GltfBuffers, UrisThatAreNotFollowed) {
   }
 }
 
-// Strings of many megabytes, read or not, take no memory: the budget here is far smaller. Only
-// strings with escapes, which the parser collects, are charged and refused if they do not fit.
+// Strings of many megabytes take no memory; the budget of this test is far smaller. Only strings
+// with escapes are collected by the parser. They are charged, and refused if they do not fit.
 TEST(GltfBuffers, LongStringsTakeNoMemory) {
   SceneBuilder scene = one_triangle();
   const std::string picture = "data:image/png;base64," + std::string(3000000, 'A');
@@ -111,7 +111,7 @@ TEST(GltfBuffers, LongStringsTakeNoMemory) {
   EXPECT_EQ(OpenScene(scene.glb(), {}, uint64_t{1} << 20).triangles().size(), 1u);
 }
 
-// Thousands of nodes, meshes and accessors are read in their order within a small budget.
+// Thousands of nodes, meshes and accessors are read within a small budget, and keep their order.
 TEST(GltfBuffers, LargeStructure) {
   constexpr int kCount = 20000;
   SceneBuilder scene;

@@ -1,5 +1,5 @@
-// The shared conformance set and real scenes: the triangles, bounds and refusals that their
-// manifests ask for.
+// Tests the files of the conformance set and real scenes, which are stored outside of this
+// repository. Their manifests list the expected triangles, bounds and refusals.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -91,7 +91,7 @@ std::vector<Corners> read_obj(const fs::path& path) {
   return triangles;
 }
 
-// The largest difference of a coordinate, the corners paired as fits best.
+// Returns the largest difference between coordinates, for the best pairing of the corners.
 double distance(const Corners& a, const Corners& b) {
   double best = INFINITY;
   std::array<size_t, 3> order = {0, 1, 2};
@@ -105,9 +105,9 @@ double distance(const Corners& a, const Corners& b) {
   return best;
 }
 
-// Equality of the two as multisets, whatever their order and winding: every expected triangle takes
-// the nearest remaining found one. They are indexed by the cell of their centroid and the cells
-// around it, so that rounding cannot hide one.
+// Compares two multisets of triangles in any order and winding. Each expected triangle is paired
+// with the nearest remaining triangle. Triangles are indexed by the cell of their centroid; the
+// search includes the neighboring cells, so that rounding does not hide a triangle.
 void expect_same_triangles(const std::vector<Corners>& found,
                            const std::vector<Corners>& expected) {
   ASSERT_EQ(found.size(), expected.size());
@@ -209,7 +209,7 @@ TEST_F(GltfConformance, WithoutScenes) {
                         read_obj(kScenes / "conformance" / "expected" / "c23_base64.obj"));
 }
 
-// Real scenes: counts, and bounds where the manifest has them.
+// Real scenes: compares the counts, and the bounds if the manifest has them.
 TEST_F(GltfConformance, RealScenes) {
   size_t read = 0;
   for (const Entry& entry : read_manifest(kScenes / "MANIFEST.tsv", 0, 11)) {
@@ -226,7 +226,8 @@ TEST_F(GltfConformance, RealScenes) {
   EXPECT_EQ(read, 10u);
 }
 
-// Files that real programs compressed, read with the library and refused by name without it.
+// Compressed files made by real programs. They are read if voxdag has the library; otherwise the
+// message names the extension.
 TEST_F(GltfConformance, RealCompressed) {
   const fs::path draco_box = kScenes / "gltf_real" / "Box_Draco.glb";
   const fs::path draco = kScenes / "conformance" / "c25_draco.glb";

@@ -1,5 +1,5 @@
-// KHR_draco_mesh_compression: a compressed primitive gives the triangles of the same scene with
-// what Draco's own decoder makes of it stored uncompressed.
+// KHR_draco_mesh_compression: a scene with a compressed primitive gives the same triangles as a
+// scene that stores the output of Draco's own decoder uncompressed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ std::vector<uint32_t> faces_of(const draco::Mesh& mesh) {
   return all;
 }
 
-// The scene with everything as Draco decodes it, uncompressed.
+// Returns the scene with all data uncompressed, as Draco's own decoder returns them.
 SceneBuilder plain_scene(const draco::Mesh& mesh) {
   SceneBuilder scene;
   const int positions = scene.add_positions(values_of<float>(mesh, 0));
@@ -73,8 +73,8 @@ void add_texture_coordinates(draco::Mesh& mesh) {
   }
 }
 
-// Every speed of the encoder: with edgebreaker and valences, all predictions, raw and tagged
-// symbols.
+// Tests every speed of the encoder. So the data have edgebreaker connectivity with valences, all
+// predictions, and raw and tagged symbols.
 TEST(GltfDraco, AllEncodersAreRead) {
   for (const uint32_t n : {3u, 40u})
     for (const bool with_normals : {false, true})
@@ -213,7 +213,8 @@ TEST(GltfDraco, SkinsAreCompressed) {
   EXPECT_EQ(triangles_of_file(compressed.glb()), triangles_of_file(plain.glb()));
 }
 
-// The triangles of a strip are faces in the Draco data; those that only join two strips are not.
+// The triangles of a strip are faces in the Draco data, except for triangles that only connect two
+// strips.
 TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   SceneBuilder scene = compressed_scene(data, 25, 4 * 10 + 3 * 2);
@@ -228,7 +229,7 @@ TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
   EXPECT_EQ(strip, faces);
 }
 
-// Any number of readers decode each primitive once, and can begin anywhere.
+// Each primitive is decoded once for any number of readers. A reader can begin at any triangle.
 TEST(GltfDraco, ReadersShareWhatIsDecoded) {
   const auto data = encode_draco(*bumpy_grid(60, false), draco::MESH_EDGEBREAKER_ENCODING, 12);
   OpenScene scene(compressed_scene_of(data).glb());
@@ -293,7 +294,8 @@ TEST(GltfDraco, WhatDoesNotFitIsRefusedByName) {
               HasSubstr("its data do not begin with DRACO"));
 }
 
-// Whatever is cut off or changed, the scene has triangles or an error, and no others than declared.
+// The data are truncated or changed anywhere. The scene then gives an error, or as many triangles
+// as it declares.
 TEST(GltfDraco, DamagedDataAreErrors) {
   for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {
     const auto data = encode_draco(*bumpy_grid(6, true), method, 10);
@@ -327,8 +329,8 @@ Error error_within(const std::string& file, uint64_t budget_bytes) {
   return Error(ErrorCode::kInvalidInput, "");
 }
 
-// One byte can declare 64 symbols of the entropy coder, and each takes 12 bytes of tables: a file
-// of 400 KB would take 293 MiB.
+// One byte of a file can declare 64 symbols of the entropy coder, each of which takes 12 bytes in
+// tables. So the tables of a file of 400 KB would take 293 MiB.
 void expect_tables_in_the_budget(const std::vector<char>& data_before_the_table) {
   std::vector<char> data = data_before_the_table;
   data.insert(data.end(), {1, 18});  // raw symbols of 18 bits
@@ -350,7 +352,7 @@ TEST(GltfDraco, TablesOfIndicesArePartOfTheBudget) {
                                1, 3, 0});  // faces, vertices, compressed indices
 }
 
-// Draco makes the objects of each attribute before it decodes any.
+// Draco allocates an object for each attribute before it decodes any attribute.
 TEST(GltfDraco, AttributesArePartOfTheBudget) {
   std::vector<char> data = {'D', 'R',    'A',    'C', 'O', 2, 2, 1, 0, 0, 0,  // sequential
                             1,   3,      1,      0,   1,   2,  // face, vertices, plain indices
@@ -377,7 +379,7 @@ TEST(GltfDraco, TablesOfAttributesArePartOfTheBudget) {
        '\xfe', 1});                                   // without prediction, compressed
 }
 
-// What a file claims is compared with the budget before memory is allocated for it.
+// The sizes that a file declares are compared with the budget before memory is allocated.
 TEST(GltfDraco, WhatDoesNotFitTheBudgetIsRefused) {
   const auto data = encode_draco(*bumpy_grid(150, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   try {
@@ -405,7 +407,8 @@ TEST(GltfDraco, IsRefusedWithoutTheLibrary) {
 
 #endif
 
-// Uncompressed geometry next to the compressed one is read, with and without the library.
+// If a file also has the geometry uncompressed, this geometry is read, with and without the
+// library.
 TEST(GltfDraco, AFallbackIsRead) {
   SceneBuilder scene = one_triangle();
   const auto expected = triangles_of_file(scene.glb());

@@ -1,4 +1,4 @@
-// The files of a scene: containers, and reading them in windows within a budget.
+// The containers of a scene (GLB and JSON), and reading a scene in windows within a memory budget.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -41,7 +41,8 @@ TEST(GltfContainer, LyingHeaders) {
   EXPECT_NE(with(0, 0x58585858).find("neither a GLB"), std::string::npos);
 }
 
-// Bytes after the end that the header names, and a BIN chunk longer than its buffer, do no harm.
+// Bytes after the length given in the header, and a BIN chunk that is longer than its buffer, are
+// ignored.
 TEST(GltfContainer, TrailingBytes) {
   EXPECT_EQ(triangles_of_file(one_triangle().glb() + "trailing").size(), 1u);
   SceneBuilder scene = one_triangle();
@@ -49,7 +50,7 @@ TEST(GltfContainer, TrailingBytes) {
   EXPECT_EQ(triangles_of_file(scene.glb()).size(), 1u);
 }
 
-// A file that says it has more than 1 GiB of JSON is refused before any of it is read.
+// A file whose header declares more than 1 GiB of JSON is refused before the JSON is read.
 TEST(GltfContainer, JsonOfMoreThanTheLimit) {
   class HugeFile : public ReadableFile {
    public:
@@ -95,8 +96,8 @@ TEST(GltfContainer, ImagesAreNeverRead) {
   EXPECT_EQ(triangles_of_file(scene.glb()).size(), 1u);
 }
 
-// A mesh far larger than the budget, whose triangles use vertices all over it, gives the same
-// triangles as with a budget that it fits; the budget's peak never exceeds its limit.
+// A mesh is far larger than the budget, and its triangles use vertices from all parts of it. The
+// triangles are the same as with a sufficient budget, and the peak never exceeds the limit.
 TEST(GltfWindows, LargerThanTheBudget) {
   constexpr uint32_t kVertices = 120000;
   constexpr size_t kTriangles = 20000;
@@ -138,7 +139,8 @@ TEST(GltfWindows, ChargesAreReleased) {
   EXPECT_EQ(open.budget.used(), 0u);
 }
 
-// The error that a scene of this JSON ends with under a budget of `budget_bytes`, which must hold.
+// Returns the message of the error that a scene with this JSON causes under a budget of
+// `budget_bytes`. Checks that the budget is not exceeded.
 std::string out_of_memory_message(std::string json, uint64_t budget_bytes) {
   MemoryFiles files;
   files.contents["folder/scene"] = std::move(json);
@@ -159,8 +161,8 @@ std::string repeated(const std::string& text, size_t count) {
   return all;
 }
 
-// Every array whose length a file chooses is charged: JSON of a few megabytes took many times its
-// size in memory, unnoticed by the budget.
+// Every array whose length the file determines is charged. Earlier, JSON of a few megabytes took
+// many times its size in memory without a charge.
 TEST(GltfMemory, ArraysAreCharged) {
   const std::pair<const char*, const char*> arrays[] = {
       {"buffers", R"({"byteLength":1})"},
@@ -194,7 +196,7 @@ TEST(GltfMemory, ElementsAreCharged) {
   }
 }
 
-// The parser collects what stands between strings and numbers, and all digits of a number.
+// The parser collects strings, and the digits of a number. Both are limited.
 TEST(GltfMemory, WhatTheParserCollectsIsBounded) {
   const std::string rest = R"("asset":{"version":"2.0"}})", blanks(4 << 20, ' ');
   EXPECT_EQ(out_of_memory_message("{" + blanks + rest, uint64_t{2} << 20), "");
@@ -214,7 +216,7 @@ TEST(GltfMemory, SkippedStringsAreNotCharged) {
   EXPECT_EQ(open.triangles().size(), 1u);
 }
 
-// The matrices of a skin with hundreds of thousands of joints were not charged.
+// The matrices of a skin with hundreds of thousands of joints are charged. Earlier they were not.
 TEST(GltfMemory, JointMatricesAreCharged) {
   SceneBuilder scene = one_triangle();
   Json& attributes = scene.root["meshes"][0]["primitives"][0]["attributes"];
@@ -234,8 +236,8 @@ TEST(GltfMemory, JointMatricesAreCharged) {
   }
 }
 
-// Materials, textures, samplers and images arrive in tinygltf's model; images are not loaded, and a
-// data: URI is found in the file.
+// tinygltf's model contains materials, textures, samplers and images. Images are not loaded; a
+// data: URI is replaced by its position in the file.
 TEST(GltfModel, HasTheMaterials) {
   SceneBuilder scene = one_triangle();
   const std::string uri = "data:image/png;base64," + std::string(100000, 'A');

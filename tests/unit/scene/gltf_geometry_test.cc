@@ -1,4 +1,4 @@
-// How the vertices and indices of a primitive become triangles, over small files made here.
+// Tests how the vertices and indices of a primitive become triangles, with small generated files.
 #include <gtest/gtest.h>
 
 #include "tests/unit/scene/scene_files.h"
@@ -24,7 +24,7 @@ std::vector<Corners> indexed(int component_type) {
       scene_of(scene, {{"attributes", {{"POSITION", positions}}}, {"indices", indices}}).glb());
 }
 
-// The three widths of indices and no indices at all name the same corners.
+// Indices of three widths, and vertices without indices, give the same triangles.
 TEST(GltfGeometry, IndicesOfEveryWidth) {
   const std::vector<Corners> expected = {kLower, kUpper};
   EXPECT_EQ(indexed<uint8_t>(kU8), expected);
@@ -74,7 +74,7 @@ TEST(GltfGeometry, LongStripAndFanCrossWindows) {
   }
 }
 
-// Vertices in steps of 20 bytes from an offset on, with rubbish in between.
+// Vertices are 20 bytes apart and begin at an offset. The bytes between them are unused.
 TEST(GltfGeometry, InterleavedVertices) {
   SceneBuilder scene;
   const float x = 1e30f;
@@ -140,8 +140,8 @@ TEST(GltfGeometry, ManySparseVertices) {
   }
 }
 
-// Normalized integers are divided by the largest of their type in doubles, and the most negative
-// one is -1 like its neighbor; others are taken as they are.
+// A normalized integer is divided, in doubles, by the largest value of its type. The most negative
+// value becomes -1, as does its neighbor. Other integers are used unchanged.
 TEST(GltfGeometry, QuantizedPositions) {
   const auto first_corner = [](auto values, int type, bool normalized) {
     SceneBuilder scene;
@@ -189,7 +189,7 @@ TEST(GltfGeometry, LeftoverCornersAreNamedInAWarning) {
             std::string::npos);
 }
 
-// The mesh's weights move vertices by default, a node's own weights instead of them.
+// Vertices are moved by the mesh's weights, or by the node's weights if it has any.
 TEST(GltfGeometry, MorphTargetsAtRest) {
   SceneBuilder scene;
   const int positions = scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
@@ -207,8 +207,8 @@ TEST(GltfGeometry, MorphTargetsAtRest) {
   EXPECT_EQ(triangles_of_file(scene.glb()), (std::vector<Corners>{by_mesh, by_node}));
 }
 
-// A skinned vertex is placed by its joints' global transforms and inverse bind matrices alone; the
-// transform of the node that draws it plays no part.
+// The joints' global transforms and inverse bind matrices alone determine the position of a skinned
+// vertex. The transform of the node that has the mesh has no effect.
 TEST(GltfGeometry, SkinAtRest) {
   SceneBuilder scene;
   const int positions = scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
@@ -232,7 +232,7 @@ TEST(GltfGeometry, SkinAtRest) {
   EXPECT_EQ(triangles_of_file(scene.glb()), (std::vector<Corners>{expected}));
 }
 
-// A skeleton of 20 000 joints in one chain takes the time of its joints, not of their square.
+// The time for a skeleton of 20 000 joints in one chain is proportional to the number of joints.
 TEST(GltfGeometry, LongSkeleton) {
   constexpr int kJoints = 20000;
   SceneBuilder scene;

@@ -1,5 +1,5 @@
-// EXT_meshopt_compression: compressed views give the triangles of the same scene with the decoded
-// bytes stored as they are.
+// EXT_meshopt_compression: a scene with compressed views gives the same triangles as a scene that
+// stores the decoded bytes uncompressed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -87,7 +87,8 @@ TEST(GltfMeshopt, EqualsTheDecodedScene) {
   }
 }
 
-// What gltfpack makes: positions of 16 bits with KHR_mesh_quantization, and a strip's sequence.
+// The data are in the form that gltfpack writes: 16-bit positions with KHR_mesh_quantization, and
+// the sequence of a strip.
 TEST(GltfMeshopt, QuantizedPositionsAndStrips) {
   const auto positions = grid_positions<uint16_t>(1);
   std::vector<uint32_t> strip;
@@ -212,7 +213,7 @@ TEST(GltfMeshopt, DamagedDataAreErrors) {
   EXPECT_GT(refused, 0u);
 }
 
-// A count of a few bytes can be huge; it is refused before anything is allocated.
+// A few bytes can declare a huge count. It is refused before memory is allocated.
 TEST(GltfMeshopt, WhatDoesNotFitTheBudgetIsRefused) {
   SceneBuilder scene;
   const size_t count = size_t{1} << 24;
@@ -243,7 +244,7 @@ TEST(GltfMeshopt, IsRefusedWithoutTheLibrary) {
 
 #endif
 
-// Views whose own buffer has the bytes are read from there, with and without the library.
+// If a view's own buffer has the uncompressed bytes, they are read, with and without the library.
 TEST(GltfMeshopt, AFallbackIsRead) {
   SceneBuilder scene = one_triangle();
   const auto expected = triangles_of_file(scene.glb());

@@ -8,7 +8,8 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-// The corner (1 2 3) of a degenerate triangle, where the scene puts it.
+// Returns a scene with a degenerate triangle at the point (1 2 3), so that tests see to which
+// position the nodes move it.
 SceneBuilder corner_scene() {
   SceneBuilder scene;
   scene.add_mesh(
@@ -34,7 +35,8 @@ TEST(GltfNodes, ScaleThenRotateThenTranslate) {
             (std::vector<Point>{{100 + 0.5 * 2 + 0.5 * 6, 200 + 0.5 * 2 - 0.5 * 6, 315}}));
 }
 
-// A parent that scales unevenly over a child that turns shears the mesh; mirrored ones mirror it.
+// A parent with an uneven scale above a rotated child shears the mesh. A negative scale mirrors the
+// mesh.
 TEST(GltfNodes, ShearedAndMirrored) {
   SceneBuilder scene = corner_scene();
   const int child = scene.add("nodes", {{"mesh", 0}, {"rotation", {0.5, 0.5, 0.5, 0.5}}});
@@ -50,7 +52,7 @@ TEST(GltfNodes, Matrix) {
   EXPECT_EQ(corners_of(scene), (std::vector<Point>{{12, 10, 6}}));
 }
 
-// A chain of 5000 nodes neither overflows the stack nor loses one of its steps.
+// A chain of 5000 nodes does not overflow the stack, and all of its transforms are applied.
 TEST(GltfNodes, DeepChain) {
   constexpr int kDepth = 5000;
   SceneBuilder scene = corner_scene();
@@ -66,7 +68,8 @@ TEST(GltfNodes, DeepChain) {
   EXPECT_EQ(corners_of(scene), (std::vector<Point>{{kDepth + 1, 2, 3}}));
 }
 
-// Nodes that share a mesh each draw it, parents before children, in the order of the file.
+// The mesh of several nodes is read once for each node: parents before children, in the order of
+// the file.
 TEST(GltfNodes, SharedMesh) {
   SceneBuilder scene = corner_scene();
   scene.add("nodes", {{"mesh", 0}, {"translation", {10, 0, 0}}});
@@ -76,7 +79,8 @@ TEST(GltfNodes, SharedMesh) {
   EXPECT_EQ(corners_of(scene), (std::vector<Point>{{1, 2, 3}, {21, 2, 3}, {11, 2, 3}, {31, 2, 3}}));
 }
 
-// Every instance's T * R * S comes before the node's own transform; the triangles are declared.
+// An instance's T * R * S is applied before the node's transform. All instances count as declared
+// triangles.
 TEST(GltfNodes, GpuInstances) {
   SceneBuilder scene = corner_scene();
   std::vector<float> translations, scales;
@@ -103,7 +107,7 @@ TEST(GltfNodes, GpuInstances) {
     ASSERT_EQ(corners[static_cast<size_t>(i)], (Point{10.0 * (i + 1), i % 2 ? -20.0 : 20.0, 30}));
 }
 
-// The default scene is drawn; without one the first; without scenes every root.
+// The default scene is read. Without it the first scene is read, and without scenes all root nodes.
 TEST(GltfNodes, WhichSceneIsDrawn) {
   SceneBuilder scene = corner_scene();
   for (int x : {10, 20, 30}) scene.add("nodes", {{"mesh", 0}, {"translation", {x, 0, 0}}});
@@ -117,8 +121,8 @@ TEST(GltfNodes, WhichSceneIsDrawn) {
   EXPECT_EQ(corners_of(scene), (std::vector<Point>{{11, 2, 3}, {31, 2, 3}, {51, 2, 3}}));
 }
 
-// A rotation far from unit length is taken as it is, with a warning; a thousand of them do not make
-// a thousand warnings.
+// A rotation whose length is far from 1 is used unchanged, with a warning. A thousand such
+// rotations do not cause a thousand warnings.
 TEST(GltfNodes, RotationsThatAreNone) {
   SceneBuilder scene = corner_scene();
   for (int i = 0; i < 1000; ++i) scene.add_root({{"mesh", 0}, {"rotation", {0, 0, 0, 2}}});

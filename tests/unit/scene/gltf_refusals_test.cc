@@ -1,5 +1,5 @@
-// What breaks the rules of glTF 2.0 is refused with an error that names the node, mesh, primitive
-// or accessor: never a crash, never a wrong picture.
+// Files that break the rules of glTF 2.0 are refused with an error that names the node, mesh,
+// primitive or accessor.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -122,7 +122,8 @@ const Refusal kRefusals[] = {
      "ROTATION: accessor 0 has 3 components, expected 4"},
 };
 
-// One triangle out of a sparse accessor, a second unused node, and an accessor of two vectors.
+// Returns a scene with one triangle from a sparse accessor, a second unused node, and an accessor
+// of two vectors.
 SceneBuilder valid_scene() {
   SceneBuilder scene = one_triangle();
   scene.root["nodes"][0]["name"] = "it";
@@ -163,8 +164,8 @@ std::string test_name(const testing::TestParamInfo<Refusal>& info) {
 
 INSTANTIATE_TEST_SUITE_P(All, GltfRefusal, testing::ValuesIn(kRefusals), test_name);
 
-// What a scene contains cannot steer a terminal or forge a line of a log, wherever an error shows
-// it.
+// Control characters in a scene's names must not reach a terminal or a log, where they could send
+// commands or forge a line.
 TEST(GltfMessages, ControlCharactersOfASceneAreNotShown) {
   const std::string hostile =
       "A\n2026-11-21T00:00:00Z done\x1b[31m\x1b]0;title\x07\xc2\x9b"
@@ -213,7 +214,7 @@ TEST(GltfRefusals, TwoParents) {
             std::string::npos);
 }
 
-// A cycle far from the scene's roots would never be walked; it is an error all the same.
+// A cycle of nodes is an error even if it cannot be reached from the scene's roots.
 TEST(GltfRefusals, LongCycle) {
   SceneBuilder scene = valid_scene();
   scene.root["nodes"][1]["children"] = {2};
@@ -222,7 +223,7 @@ TEST(GltfRefusals, LongCycle) {
   EXPECT_NE(error_of_file(scene.glb()).message().find("is its own ancestor"), std::string::npos);
 }
 
-// Sparse indices must increase and exist: found when the accessor is read.
+// Sparse indices must increase and be in range. This is checked when the accessor is read.
 TEST(GltfRefusals, SparseIndices) {
   for (const std::vector<uint8_t>& indices :
        {std::vector<uint8_t>{1, 1}, std::vector<uint8_t>{2, 1}, std::vector<uint8_t>{1, 3}}) {
@@ -236,7 +237,7 @@ TEST(GltfRefusals, SparseIndices) {
   }
 }
 
-// Sparse indices may stand on their own, without a view of zeros under them.
+// A sparse accessor does not need a base view; its other elements are then 0.
 TEST(GltfRefusals, SparseIndicesWithoutBase) {
   SceneBuilder scene = one_triangle();
   scene.root["accessors"][1].erase("bufferView");
@@ -306,8 +307,8 @@ TEST(GltfRefusals, ExtensionsThatAreNot) {
   EXPECT_NE(open.source->warnings()[0].find("ACME_bent"), std::string::npos);
 }
 
-// Invalid triangles end the build, or are dropped and counted if the user said so; vertices that no
-// triangle uses may be anything.
+// Invalid triangles end the build, or are dropped and counted with --skip-invalid. Vertices that no
+// triangle uses may have any value.
 TEST(GltfRefusals, InvalidTriangles) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float inf = std::numeric_limits<float>::infinity();

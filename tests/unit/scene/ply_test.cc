@@ -1,5 +1,5 @@
-// PLY files made here: every format and layout gives the triangles of the same mesh, and broken
-// files are refused by name.
+// PLY files made by the tests. Every format and layout gives the triangles of the same mesh, and
+// the errors of broken files name the problem.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -13,7 +13,7 @@ namespace {
 
 enum class PlyFormat { kAscii, kLittle, kBig };
 
-// A file in the making: numbers appended by the type that a header line names.
+// Writes a file: appends numbers in the types that the header lines name.
 class PlyWriter {
  public:
   explicit PlyWriter(PlyFormat format, std::string line_end = "\n")
@@ -83,8 +83,9 @@ TEST(Ply, TriangleInEveryFormatAndLineEnding) {
       EXPECT_EQ(triangles_of_file(plain_triangle(format, line_end)), std::vector<Corners>{kLower});
 }
 
-// Properties in another order and of other types, elements before and between, lists of any width
-// before and behind the indices; doubles keep their digits.
+// Properties are in another order and of other types, other elements come before and between the
+// needed ones, and lists of any width come before and after the indices. Doubles keep all their
+// digits.
 TEST(Ply, OtherElementsAndPropertiesAreSkipped) {
   for (const PlyFormat format : kFormats) {
     PlyWriter ply(format);
@@ -123,7 +124,8 @@ PlyWriter mesh_header(PlyFormat format, size_t vertices, size_t faces, const cha
   return ply;
 }
 
-// Thousands of faces of 0 to 9 corners: the fan of each, in order, from whatever triangle on.
+// Thousands of faces have 0 to 9 corners. The triangles are the faces' fans in order, from any
+// first triangle.
 TEST(Ply, PolygonsAreFansFromAnyTriangleOn) {
   constexpr uint32_t kVertices = 5000, kFaces = 5000;
   for (const PlyFormat format : kFormats) {
@@ -257,7 +259,8 @@ TEST(Ply, ColorsOfVertices) {
   EXPECT_EQ(colors_of(file)[1], (Color{65535, 65535, 65535, 65535}));
 }
 
-// All 256 bytes, and blocks of vertices that take turns in a cache too small for them.
+// Colors take all 256 values. Blocks of vertices displace each other in a cache that is too small
+// for them.
 TEST(Ply, ColorsOfManyVertices) {
   constexpr uint32_t kVertices = 50000;
   PlyWriter ply(PlyFormat::kLittle);
@@ -303,7 +306,8 @@ TEST(Ply, FilesOfBothFormatsAreOneScene) {
   EXPECT_EQ(scene->files()[3].path, "c");
 }
 
-// A file that is cut anywhere is refused, whole words of its last line aside.
+// A file that is truncated anywhere is refused, unless only complete words of its last line are
+// missing.
 TEST(Ply, TruncatedFilesAreRefused) {
   for (const PlyFormat format : kFormats) {
     const std::string whole = plain_triangle(format);

@@ -11,8 +11,8 @@ namespace {
 
 constexpr uint32_t kBeyond = 1000;  // no vertex has that index
 
-// A mesh of two primitives, each with an invalid triangle, drawn by a node, by one with five
-// instances, and by a third.
+// Returns a scene with a mesh of two primitives, each of which has an invalid triangle. Three nodes
+// have this mesh; the second node has five instances.
 SceneBuilder repeated_meshes() {
   SceneBuilder scene;
   std::vector<float> corners;
@@ -68,8 +68,8 @@ std::vector<Corners> triangles_between(TriangleCursor& cursor, uint64_t first, u
   return all;
 }
 
-// Every range of the declared triangles, in any order: the same triangles as when each is read
-// alone.
+// Reads ranges of the declared triangles in any order, and compares them with triangles that are
+// read one by one.
 TEST(SceneRanges, AnyTriangleMayBeTheFirst) {
   OpenScene open(repeated_meshes().glb(), {true});
   const uint64_t declared = open.source->declared_triangles();
@@ -91,9 +91,9 @@ TEST(SceneRanges, AnyTriangleMayBeTheFirst) {
     }
 }
 
-// Pieces of a scene of several windows, instances and files, read by two cursors in turn. Most of
-// its triangles use vertices near each other, the last ones use some that are far away, and none
-// uses those between.
+// Two cursors take turns reading pieces of a scene with several windows, instances and files. Most
+// triangles use vertices near each other, the last ones use vertices far away, and no triangle uses
+// the vertices between.
 TEST(SceneRanges, CursorsDoNotDisturbEachOther) {
   SceneBuilder scene;
   constexpr int kNear = 3000, kFar = 80'000, kVertices = kFar + kNear;

@@ -1,5 +1,5 @@
-// What the scene tests make their scenes from: a builder of small glTF files, and the triangles
-// that a scene gives.
+// Helpers for the tests of scenes: a builder of small glTF files, and functions that read the
+// triangles of a scene.
 #pragma once
 
 #include <algorithm>
@@ -71,7 +71,7 @@ struct SceneBuilder {
     bin.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
     return add("bufferViews", std::move(more));
   }
-  // An accessor with a separate view. `more` adds to or overrides its members.
+  // Adds an accessor with a separate view. `more` adds members or overrides them.
   template <class T>
   int add_accessor(const char* type, int component_type, const std::vector<T>& values,
                    Json more = Json::object()) {
@@ -134,7 +134,8 @@ inline std::vector<Corners> triangles_of(TriangleSource& source) {
   return all;
 }
 
-// The same with texture coordinates and a base color texture, of this image.
+// Returns the scene of one_triangle() with texture coordinates and this image as base color
+// texture.
 inline SceneBuilder textured(const std::string& image) {
   SceneBuilder scene = one_triangle();
   scene.root["images"] = {{{"uri", "data:image/png;base64," + base64(image)}, {"name", "wood"}}};
@@ -178,7 +179,7 @@ inline std::vector<Corners> triangles_of_file(std::string file) {
   return OpenScene(std::move(file)).triangles();
 }
 
-// The error that opening and streaming the file ends with; "" as its message if it does not.
+// Returns the error of opening and streaming the file. If there is no error, its message is empty.
 inline Error error_of_file(std::string file) {
   try {
     OpenScene(std::move(file)).triangles();

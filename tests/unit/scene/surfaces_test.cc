@@ -28,8 +28,9 @@ TEST(Surfaces, TextureCoordinatesAndColorsOfCorners) {
   EXPECT_EQ(all[0].position.v[1][0], 1);
 }
 
-// The front of every second triangle of a strip is where its corners run clockwise, as for every
-// triangle of a mirrored node.
+// The front of a triangle is the side on which its corners are counterclockwise. It is the other
+// side for every second triangle of a strip, and for triangles of a mirrored node. If both apply,
+// it is the first side again.
 TEST(Surfaces, FlippedInStripsAndMirrors) {
   const auto flips_of = [](int mode, Json node) {
     SceneBuilder scene = one_triangle();
@@ -102,7 +103,7 @@ TEST(Surfaces, ColorsOfEveryComponentType) {
   EXPECT_EQ(with_colors(scene, transparent).corners[0].color, (Channels{0, 65535, 32768, 16384}));
 }
 
-// What cannot be read is left out with a warning; the geometry is the same.
+// Colors that cannot be read are omitted with a warning. The geometry is the same.
 TEST(Surfaces, BrokenColorsAreLeftOut) {
   SceneBuilder scene = one_triangle();
   const int too_few = scene.add_accessor<float>("VEC3", kF32, {0, 1, 0.5});
@@ -235,8 +236,8 @@ TEST(Materials, OfSeveralFiles) {
   EXPECT_EQ(material(2).number, 3u);
 }
 
-// Triangles without material have the number after the last. A material that lost its image keeps
-// its number.
+// Triangles without a material have the number after the last material. A material that lost its
+// image keeps its number.
 TEST(Materials, NumbersOfThoseThatAreNotListed) {
   SceneBuilder scene = textured("");
   const Json primitive = only_primitive(scene);

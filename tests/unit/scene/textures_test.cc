@@ -65,8 +65,8 @@ struct Textures {
 
 uint64_t channel(uint64_t texel, int c) { return texel >> 16 * c & 0xffff; }
 
-// Every level of an image of odd sizes is the mean over the areas of its texels, in memory and by
-// pages of the scratch file.
+// In an image whose sizes are odd, every texel of every level is the mean over the texel's area,
+// both in memory and in pages of the scratch file.
 TEST(Textures, PyramidOfOddSizes) {
   const uint32_t width = 67, height = 45;
   const std::string glb = textured(png_of(width, height, noise(4 * width * height))).glb();
@@ -139,8 +139,8 @@ TEST(Textures, LinearLight) {
   EXPECT_EQ(channel(reader->texel(0, 0, 0, 0), 3), 128u * 257);
 }
 
-// An image in a buffer view of a data: URI, whose slashes JSON may escape, is found whatever the
-// buffer begins with; in base64 the byte 't' begins with "dA".
+// An image is in a buffer view of a data: URI. JSON may escape the URI's slashes. The image is
+// found whatever the first bytes of the buffer are; in base64 the byte 't' begins with "dA".
 TEST(Textures, InBase64Buffers) {
   SceneBuilder scene = textured("");
   const std::string png = png_of(1, 1, "\xff\xff\xff\x80");
@@ -160,7 +160,8 @@ TEST(Textures, InBase64Buffers) {
   }
 }
 
-// What cannot be read costs a warning that names image and material, and the image alone.
+// An image that cannot be read causes a warning that names the image and a material. Other images
+// are not affected.
 TEST(Textures, BrokenImages) {
   const std::string good = png_of(9, 9, noise(4 * 81));
   std::string huge = good, flipped = good;

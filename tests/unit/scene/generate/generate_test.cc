@@ -1,5 +1,5 @@
-// What every generated scene must be: valid glTF, the same bytes for the same options, made in
-// little memory, whole or not there.
+// Requirements for every generated scene: it is valid glTF, has the same bytes for the same
+// options, takes little memory to generate, and its file is complete or missing.
 #include "scene/generate/generate.h"
 
 #include <gtest/gtest.h>
@@ -84,7 +84,7 @@ TEST_P(EveryKind, SameSeedSameBytes) {
   EXPECT_EQ(make(small(GetParam())).bytes, make(small(GetParam())).bytes);
 }
 
-// The seed changes the scene, but for the sponge, which has nothing random.
+// Another seed gives another scene, except for the sponge, which has nothing random.
 TEST_P(EveryKind, AnotherSeedAnotherScene) {
   GenerateOptions options = small(GetParam());
   const Made first = make(options);
@@ -92,7 +92,8 @@ TEST_P(EveryKind, AnotherSeedAnotherScene) {
   EXPECT_EQ(make(options).bytes == first.bytes, GetParam() == SceneKind::kMenger);
 }
 
-// A scene that outgrows one block is split into several, none of them with too many vertices.
+// A scene that is too large for one primitive is divided into several, none of which has too many
+// vertices.
 TEST_P(EveryKind, LargeScenesAreSplitIntoBlocks) {
   GenerateOptions options = small(GetParam());
   options.level = 3;
@@ -109,7 +110,7 @@ TEST_P(EveryKind, LargeScenesAreSplitIntoBlocks) {
   EXPECT_GT(primitives, 1u);
 }
 
-// A file that cannot be written leaves nothing behind, and says why.
+// If the file cannot be written, no file remains, and the error gives the reason.
 TEST_P(EveryKind, AFullDiskLeavesNothing) {
   MemoryFiles files;
   files.capacity = 10'000;
@@ -138,8 +139,8 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EveryKind,
                                          SceneKind::kSoup, SceneKind::kSpheres),
                          [](const auto& test) { return std::string(scene_kind(test.param).name); });
 
-// The bytes are a promise to everybody who stores results made from them: a change here is one to
-// announce. Any machine, any compiler.
+// The bytes are the same on every machine and with every compiler. Users store results of builds of
+// these scenes, so a change of the bytes must be announced.
 TEST(GenerateGolden, DigestsOfEveryKind) {
   const struct {
     GenerateOptions options;
@@ -160,7 +161,8 @@ TEST(GenerateGolden, DigestsOfEveryKind) {
   }
 }
 
-// Written as instances, a city is the same triangles to the last bit, in much less space.
+// A city that is written as instances has the same triangles to the last bit, and its file is much
+// smaller.
 TEST(GenerateInstances, ACityOfInstancesIsTheSameCity) {
   const Made plain = make(small(SceneKind::kCity)), shared = make(small(SceneKind::kCity, true));
   EXPECT_EQ(plain.report.triangles, shared.report.triangles);
@@ -172,7 +174,8 @@ TEST(GenerateInstances, ACityOfInstancesIsTheSameCity) {
   EXPECT_TRUE(a == b);
 }
 
-// Colors are the vertex colors times the material's, and the triangles are the same.
+// The colors are the vertex colors times the material's color. The triangles are the same as
+// without colors.
 TEST(GenerateColors, ACityWithColorsIsTheSameCity) {
   GenerateOptions options = small(SceneKind::kCity);
   const Made plain = make(options);
@@ -228,8 +231,8 @@ TEST(GenerateSoup, HoldsDegeneratesAndSlivers) {
   EXPECT_GT(wide, 5);
 }
 
-// Terrain is one connected sheet: as many triangles as the largest square that fits, and tiles that
-// meet at equal heights.
+// A terrain is one connected sheet. It has as many triangles as the largest square that fits, and
+// neighboring tiles have equal heights where they meet.
 TEST(GenerateTerrain, IsASquareWithoutGaps) {
   GenerateOptions options = small(SceneKind::kTerrain);
   options.triangles = 2 * 300 * 300 + 5;
@@ -244,7 +247,7 @@ TEST(GenerateTerrain, IsASquareWithoutGaps) {
   EXPECT_EQ(heights.size(), 301u * 301);
 }
 
-// City and spheres come within a quarter of the requested triangles.
+// The numbers of triangles of a city and of spheres differ from the request by at most a quarter.
 TEST(GenerateSize, IsAboutWhatWasAsked) {
   for (SceneKind kind : {SceneKind::kCity, SceneKind::kSpheres}) {
     SCOPED_TRACE(scene_kind(kind).name);
@@ -254,7 +257,7 @@ TEST(GenerateSize, IsAboutWhatWasAsked) {
   }
 }
 
-// A scene of 50 MB goes through a buffer of one: memory does not grow with the scene.
+// A scene of 50 MB is written through a buffer of 1 MB, so memory does not grow with the scene.
 TEST(GenerateMemory, StaysSmallForALargeScene) {
   if (kSanitized) GTEST_SKIP() << "sanitizers retain freed memory";
   MemoryFiles files;
@@ -286,7 +289,7 @@ ErrorCode refusal(const GenerateOptions& options) {
   return ErrorCode::kIo;
 }
 
-// A scene that cannot fit a .glb however it is packed is refused immediately.
+// A scene that cannot fit in a .glb file in any encoding is refused immediately.
 TEST(GenerateLimit, MoreThanAGlbHoldsIsRefused) {
   GenerateOptions menger = small(SceneKind::kMenger);
   menger.level = 6;
@@ -296,7 +299,7 @@ TEST(GenerateLimit, MoreThanAGlbHoldsIsRefused) {
   EXPECT_EQ(refusal(terrain), ErrorCode::kLimit);
 }
 
-// Other scenes are refused while they are counted, with the limit in the message.
+// Other scenes that are too large are refused while they are counted. The message gives the limit.
 TEST(GenerateLimit, CountingStopsAtTheLimit) {
   MeshBuilder full;
   while (full.vertices() < MeshBuilder::kMaxVertices) full.add_vertex({1, 2, 3});
@@ -316,7 +319,7 @@ TEST(GenerateLimit, CountingStopsAtTheLimit) {
   }
 }
 
-// Options that a kind does not have are refused, not ignored.
+// An option that a kind does not have is refused.
 TEST(GenerateOptions, WhatDoesNotApplyIsRefused) {
   EXPECT_EQ(refusal(small(SceneKind::kSoup, true)), ErrorCode::kInvalidInput);
   EXPECT_EQ(refusal(small(SceneKind::kTerrain, true)), ErrorCode::kInvalidInput);

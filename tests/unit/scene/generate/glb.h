@@ -1,5 +1,5 @@
-// A small, strict reader of the .glb files that voxdag generates: checks what glTF asks of them on
-// the way. Not the product's reader.
+// A small, strict reader of the .glb files that voxdag generates. It shares no code with voxdag's
+// reader, and checks the rules of glTF while it reads.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -44,7 +44,8 @@ struct File {
     EXPECT_EQ(json["asset"]["version"], "2.0");
   }
 
-  // The elements of an accessor, which must be inside its view, and the view inside the buffer.
+  // Returns the elements of an accessor. Checks that the accessor is inside its view, and the view
+  // inside its buffer.
   template <class Element>
   std::vector<Element> elements(size_t accessor, int component_type, const char* type) const {
     const auto& a = json["accessors"].at(accessor);
@@ -80,7 +81,7 @@ struct File {
     return out;
   }
 
-  // All triangles of the scene in its own space, instances written out.
+  // Returns all triangles in the space of the scene, including the triangles of instances.
   std::vector<Triangle> triangles() const {
     std::vector<Triangle> out;
     for (size_t node_index : json["scenes"][json["scene"].get<size_t>()]["nodes"]) {

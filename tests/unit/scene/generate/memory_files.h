@@ -1,4 +1,5 @@
-// Files in memory, as much of FileSystem as writing a scene needs; the disk can be full.
+// Files in memory. Implements the part of FileSystem that is needed to write a scene. The simulated
+// disk can be full.
 #pragma once
 
 #include <map>

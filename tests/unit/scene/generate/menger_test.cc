@@ -1,5 +1,5 @@
-// The sponge's voxels and DAG, known beforehand: in the grid whose voxels are the unit cells
-// (--bounds 0,0,0,R) each unit face is on the low side of a layer of voxels.
+// The voxels and the DAG of the sponge are known from its definition. In the grid whose voxels are
+// the unit cells (--bounds 0,0,0,R), each unit face is on the low side of a layer of voxels.
 #include <gtest/gtest.h>
 
 #include "scene/generate/generate.h"
@@ -35,9 +35,9 @@ bool solid(int x, int y, int z, int size) {
   return true;
 }
 
-// Straight from the definition: a corner at coordinate k snaps just above it, so the face between
-// cells x - 1 and x sets the voxels at x, from y to y + 1 and z to z + 1, and so for the other
-// axes.
+// Computes the voxels from the definition. A corner at coordinate k snaps to just above k. So the
+// face between the cells x - 1 and x sets the voxels at x, from y to y + 1 and from z to z + 1. The
+// same holds for the other axes.
 oracle::Voxels expected_voxels(uint32_t level, int resolution) {
   const int size = power(3, level);
   oracle::Voxels voxels(resolution);
@@ -55,7 +55,8 @@ oracle::Voxels expected_voxels(uint32_t level, int resolution) {
   return voxels;
 }
 
-// 2 * 20^n + 4 * 8^n faces, two triangles each, none degenerate, corners on the integer lattice.
+// There are 2 * 20^n + 4 * 8^n faces of two triangles each. No triangle is degenerate, and all
+// corners are integers.
 TEST(Menger, HasTheKnownNumberOfFaces) {
   for (uint32_t level = 0; level <= 3; ++level) {
     SCOPED_TRACE(level);
@@ -68,7 +69,7 @@ TEST(Menger, HasTheKnownNumberOfFaces) {
   }
 }
 
-// The triangles set just the voxels that the definition says.
+// The triangles set exactly the voxels that follow from the definition.
 TEST(Menger, TrianglesSetTheKnownVoxels) {
   for (uint32_t level = 0; level <= 2; ++level) {
     SCOPED_TRACE(level);
@@ -85,7 +86,7 @@ TEST(Menger, TrianglesSetTheKnownVoxels) {
   }
 }
 
-// The table of docs/generate.md, from the definition and the oracle's DAG.
+// Computes the table of docs/generate.md from the definition and the oracle's DAG.
 TEST(Menger, DagIsAsDocumented) {
   const struct {
     uint32_t level;
