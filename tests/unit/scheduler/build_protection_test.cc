@@ -50,8 +50,8 @@ class BuildProtection : public testing::Test {
   CancelToken cancel_;
 };
 
-// A killed build holds its locks until the system has removed its process. The next one reports
-// that it waits for each of them.
+// A killed build holds its locks until the system has removed its process. The next build reports
+// for each lock that it waits.
 TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
   for (const std::string& path : {OutputLock::path_of(output()), output() + ".work/lock"}) {
     SCOPED_TRACE(path);
@@ -69,7 +69,7 @@ TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
   }
 }
 
-// A persistent lock is a transient error: the service tries again.
+// A lock that is not released is a transient error, so the service tries the job again.
 TEST_F(BuildProtection, ALockThatStaysIsATransientError) {
   BuildSpec impatient = spec();
   impatient.run.lock_wait_s = 0.1;
@@ -96,8 +96,8 @@ TEST_F(BuildProtection, WaitingCanBeCanceled) {
   EXPECT_EQ(error.code(), ErrorCode::kCanceled);
 }
 
-// A few bytes can describe billions of triangles: what neither memory nor disk can hold is refused
-// before it is read, by `plan` as well.
+// A few bytes can describe billions of triangles. If neither memory nor disk can hold them, the
+// scene is refused before it is read. `plan` also refuses it.
 TEST_F(BuildProtection, TrianglesThatFitNowhereAreRefusedBeforeTheyAreRead) {
   write_spheres(scene(), 700000);
   BuildSpec tight = spec();
@@ -113,7 +113,7 @@ TEST_F(BuildProtection, TrianglesThatFitNowhereAreRefusedBeforeTheyAreRead) {
   EXPECT_NO_THROW(plan_build(tight, context()));
 }
 
-// The device of two folders decides whether one disk must hold everything, not their free space.
+// Two folders are on the same disk if their devices are equal; equal free space does not matter.
 TEST_F(BuildProtection, DisksAreToldApartByTheirDevice) {
   BuildSpec large = spec();
   large.geometry.resolution = 4096;
@@ -124,13 +124,13 @@ TEST_F(BuildProtection, DisksAreToldApartByTheirDevice) {
   EXPECT_NE(refusal().find("the build's work folder is"), std::string::npos) << refusal();
 }
 
-// A build that waits for another one's output holds a lock that has a name once it gets it, even if
-// the other one has published its file: a third one has to wait.
+// A build waits for the lock of an output. When it gets the lock, the lock's file has a name, even
+// if the preceding build has published its file. So a third build has to wait.
 TEST_F(BuildProtection, ALockOfTheOutputHasAName) {
   auto first = std::make_unique<OutputLock>(files_, output());
   std::unique_ptr<OutputLock> second;
   std::thread waiting([&] { second.reset(new OutputLock(lock_output(context(), output(), 30))); });
-  // What the first build does at its end, and before that if its merge restarts.
+  // A build does this at its end, and also earlier if its merge restarts.
   for (int file = 0; file < 2; ++file) {
     std::ofstream(output() + ".partial") << "levels";
     if (file) std::filesystem::rename(output() + ".partial", output());
@@ -144,8 +144,8 @@ TEST_F(BuildProtection, ALockOfTheOutputHasAName) {
   EXPECT_FALSE(std::filesystem::exists(OutputLock::path_of(output())));
 }
 
-// The same with whole builds: the second waits, the third waits for the second, and the file is
-// the third one's.
+// The same with complete builds: the second build waits for the first, the third waits for the
+// second, and the file is the third build's.
 TEST_F(BuildProtection, ABuildHoldsItsOutputUntilItEnds) {
   // Holds the lock while it looks, as the third build would.
   class Looking : public NoProgress {
@@ -175,7 +175,8 @@ TEST_F(BuildProtection, AForeignFileOfTheLocksNameStays) {
   EXPECT_EQ(read_small_file(files_, OutputLock::path_of(output()), 10), "mine");
 }
 
-// A link in a work folder, or a pipe, does not lead a build to a file of somebody else.
+// A symbolic link or a pipe in a work folder does not make a build write to a file that it does not
+// own.
 TEST_F(BuildProtection, LinksInTheWorkFolderAreNotFollowed) {
   const std::string victim = folder_.file("victim.txt"), work = output() + ".work";
   std::ofstream(victim) << "precious";
@@ -196,7 +197,8 @@ TEST_F(BuildProtection, LinksInTheWorkFolderAreNotFollowed) {
   EXPECT_EQ(error_of([&] { run_build(spec(), context()); }).code(), ErrorCode::kInvalidInput);
 }
 
-// The folder of a plan is made for it and seen by nobody else, whatever names others have taken.
+// A plan creates a new temporary folder that only its user can read, even if other names are
+// already in use.
 TEST_F(BuildProtection, APlanTakesAFolderOfItsOwn) {
   const std::string temporary = folder_.file("tmp"), victim = folder_.file("victim.txt");
   const std::string foreseen = temporary + "/voxdag-plan-" + std::to_string(getpid());
@@ -232,7 +234,8 @@ TEST_F(BuildProtection, APlanTakesAFolderOfItsOwn) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temporary), {}), 1);
 }
 
-// Rows that got lost are an error, not a file without their voxels.
+// If rows of the job store are lost, the build is an error. It does not write a file without their
+// voxels.
 TEST_F(BuildProtection, ABuildNoticesMissingRows) {
   const std::string expected = run_build(spec(), context()).sha256;
   std::filesystem::remove(output());
@@ -256,7 +259,7 @@ TEST_F(BuildProtection, ADamagedJobStartsOver) {
   EXPECT_EQ(run_build(again, context()).subvolumes_reused, 0u);
 }
 
-// A scene whose files have names of the build's files is refused, and they are kept.
+// A scene whose files have the names of files of the build is refused, and its files are kept.
 TEST_F(BuildProtection, ABuildDoesNotDestroyItsScene) {
   BuildSpec inside = spec();
   inside.run.work_folder = folder_.file("w");
@@ -294,7 +297,7 @@ TEST_F(BuildProtection, ABuildDoesNotDestroyItsScene) {
   }
 }
 
-// Options that cannot be met are refused before anything is read or made.
+// Invalid options are refused before any file is read or written.
 TEST_F(BuildProtection, OptionsAreCheckedFirst) {
   BuildSpec wrong = spec();
   wrong.geometry.voxel_size = 0;

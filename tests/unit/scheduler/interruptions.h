@@ -1,4 +1,4 @@
-// Builds that are stopped as Ctrl-C would, at a point that the test chooses.
+// Builds that are canceled, as by Ctrl-C, at a point that the test chooses.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,5 +1,6 @@
 // The machine's files, with counters of reads and writes, and a disk that is full or fails on
-// request. Syncs are only counted: no test cuts the power. Counters are read when no build runs.
+// request. Syncs are only counted, because no test cuts the power. Tests read the counters only
+// while no build runs.
 #pragma once
 
 #include <algorithm>

@@ -103,8 +103,8 @@ TEST_F(ResumeTest, ProgressIsThatOfTheWholeBuild) {
   }
 }
 
-// Interrupted in any stage, the same call resumes, reuses built subvolumes and ends with the same
-// bytes; afterwards only the result and its report remain.
+// A build that is interrupted in any stage is resumed by the same call. It reuses built subvolumes
+// and gives the same bytes. Afterwards only the result and its report exist.
 TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   const std::string expected = build(spec()).sha256;
   std::filesystem::remove(output());
@@ -128,8 +128,8 @@ TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   }
 }
 
-// Another scene, resolution or hash is another job: refused, with what differs, unless the
-// build is to start over. Run options may change between the runs.
+// A build with a different scene, resolution or hash is refused with the difference, unless it is
+// to start over. Run options may change between the runs.
 TEST_F(ResumeTest, RefusesAnotherJobInTheSameFolder) {
   build_until(spec(), "build", 5);
   BuildSpec other = spec();
@@ -186,8 +186,8 @@ TEST_F(ResumeTest, RebuildsDamagedArtifacts) {
   }
 }
 
-// Only one build uses a folder; a second one gets an error that names the first. Files not created
-// by voxdag are not touched.
+// Only one build can use a work folder. A second build gets an error that names the first. Files
+// not created by voxdag are not changed.
 TEST_F(ResumeTest, OwnsItsFolderAlone) {
   {
     CancelToken cancel;
@@ -211,7 +211,8 @@ TEST_F(ResumeTest, OwnsItsFolderAlone) {
   EXPECT_TRUE(std::filesystem::exists(work() + "/letter.txt"));
 }
 
-// A folder not created by voxdag with one of its names is refused and unchanged.
+// A folder that has the name of a work folder but was not created by voxdag is refused and not
+// changed.
 TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
   std::filesystem::create_directories(work() + "/merge");
   std::ofstream(work() + "/merge/thesis.txt") << "not ours";
@@ -220,7 +221,7 @@ TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(work()), {}), 1);
 }
 
-// A process that holds the lock for an instant, to read the status, does not prevent a build.
+// A process that briefly holds the lock to read the status does not prevent a build.
 TEST_F(ResumeTest, WaitsForThoseWhoLook) {
   std::filesystem::create_directories(work());
   auto looking = system_files().try_lock(work() + "/lock");
@@ -234,8 +235,8 @@ TEST_F(ResumeTest, WaitsForThoseWhoLook) {
   EXPECT_EQ(sha256.size(), 64u);
 }
 
-// Two builds with separate work folders cannot write one output; the first one's file so far is
-// not touched.
+// Two builds with separate work folders cannot write to one output. The first build's unfinished
+// file is not changed.
 TEST_F(ResumeTest, OwnsItsOutputAlone) {
   BuildSpec first = spec();
   first.run.work_folder = folder_.path() + "/first";
@@ -251,7 +252,8 @@ TEST_F(ResumeTest, OwnsItsOutputAlone) {
   EXPECT_GT(build(first).subvolumes_reused, 0u);
 }
 
-// A merge that is resumed writes where it began to; its output cannot be changed any more.
+// After the merge has begun, the output of a build cannot be changed. The resumed merge writes to
+// the same file.
 TEST_F(ResumeTest, KeepsTheOutputOfAMergeThatBegan) {
   BuildSpec checkpointed = spec();
   checkpointed.run.work_folder = folder_.path() + "/work";
@@ -265,7 +267,7 @@ TEST_F(ResumeTest, KeepsTheOutputOfAMergeThatBegan) {
   EXPECT_EQ(build(checkpointed).sha256, expected);
 }
 
-// A work folder that cannot be made or written is an error that names it, before any work.
+// If a work folder cannot be created or written, the error names the folder, and no work is done.
 TEST_F(ResumeTest, NeedsAFolderToWriteIn) {
   BuildSpec nowhere = spec();
   nowhere.run.work_folder = scene() + "/work";  // below a file
@@ -278,7 +280,8 @@ TEST_F(ResumeTest, NeedsAFolderToWriteIn) {
   EXPECT_FALSE(std::filesystem::exists(output() + ".partial"));
 }
 
-// A job of another program's version is refused with its number, unless the build is to start over.
+// A job of another version of voxdag is refused with the version's number, unless the build is to
+// start over.
 TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
   const std::string expected = build(spec()).sha256;
   for (const bool of_store : {true, false}) {
@@ -306,8 +309,8 @@ TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
   }
 }
 
-// A file that is no job store any more does not prevent starting over in a folder that an earlier
-// build had. In any other folder it belongs to somebody else.
+// If the job store of an earlier build is replaced by another file, --restart works in its folder.
+// In any other folder, such a file is not voxdag's, and is kept.
 TEST_F(ResumeTest, StartsOverInAFolderOfItsOwnOnly) {
   build_until(spec(), "build", 5);
   const std::string store = work() + "/job.db";

@@ -1,4 +1,4 @@
-// The build that tests of interruptions interrupt: spheres in some hundred subvolumes, by one
+// The build that tests interrupt: a scene of spheres in some hundred subvolumes, built by one
 // worker.
 #pragma once
 

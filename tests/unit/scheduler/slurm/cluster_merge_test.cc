@@ -1,4 +1,4 @@
-// Cluster builds whose merge is a job of the cluster, with a Slurm that is played by the test.
+// Cluster builds whose merge is a job of the cluster. The test simulates Slurm.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -49,7 +49,7 @@ TEST_F(ClusterMergeJob, ItsReportIsThatOfTheCommand) {
   ASSERT_NE(submitted, slurm_.commands.end());
   for (const char* word : {"--mem=1G", "--chdir=/"})
     EXPECT_NE(std::ranges::find(*submitted, word), submitted->end()) << word;
-  // The same command again finds the result; another scene or a restart does not.
+  // The same command finds the existing result. With another scene, or with --restart, it builds.
   slurm_.commands.clear();
   EXPECT_EQ(report_json(build(merging_spec())), report_json(report));
   EXPECT_EQ(count("sbatch"), 2u);  // tests the options of the tasks, and of the job

@@ -140,8 +140,7 @@ TEST_F(Cluster, WaitsForASlurmThatTakesNoTasksNow) {
   EXPECT_NE(warnings_.text.find("Slurm accepts no tasks now"), std::string::npos) << warnings_.text;
 }
 
-// For some seconds after its start Slurm knows no nodes, and refuses tasks that it will accept
-// later.
+// For some seconds after its start Slurm knows no nodes, and refuses tasks that it accepts later.
 TEST_F(Cluster, WaitsForASlurmThatHasJustBeenStarted) {
   slurm_.test_refusal = "allocation failure: Requested node configuration is not available";
   slurm_.refusal = "Batch job submission failed: Requested node configuration is not available";
@@ -168,8 +167,8 @@ TEST_F(Cluster, AnArrayThatIsTooLargeForSlurmIsHalved) {
   EXPECT_NE(warnings_.text.find("QOSMaxSubmitJobPerUserLimit"), std::string::npos);
 }
 
-// Numbers of segments are not reused when the state is lost or has a different version: the job
-// store's rows name the existing ones.
+// If the state of the cluster build is lost or has a different version, numbers of segments are not
+// used again, because rows of the job store name the existing segments.
 TEST_F(Cluster, ALostStateCostsNothingThatIsBuilt) {
   for (const bool is_lost : {true, false}) {
     SCOPED_TRACE(is_lost);
@@ -189,7 +188,7 @@ TEST_F(Cluster, ALostStateCostsNothingThatIsBuilt) {
   }
 }
 
-// What was cut for another plan of the same scene is not taken for this one's.
+// Batches that were made for another plan of the same scene are not used for this plan.
 TEST_F(Cluster, BatchesOfAnotherPlanAreNotTakenOver) {
   BuildSpec fine = spec(4);
   fine.run.cluster->max_retries = 0;
@@ -236,7 +235,7 @@ TEST_F(Cluster, ThisMachineTakesOverWhatTasksHaveBuilt) {
   EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
 }
 
-// A batch whose file is damaged is cut again by the next run.
+// A batch whose file is damaged is made again by the next run.
 TEST_F(Cluster, ADamagedBatchIsCutAgain) {
   BuildSpec hasty = spec(2);
   hasty.run.cluster->max_retries = 1;
@@ -249,7 +248,7 @@ TEST_F(Cluster, ADamagedBatchIsCutAgain) {
   EXPECT_GT(build(hasty).subvolumes_reused, 0u);
 }
 
-// How tasks ended while nobody followed them counts as if somebody had.
+// If a task times out while no process follows the build, the next run notices the timeout.
 TEST_F(Cluster, ATimeoutIsNoticedByTheNextRun) {
   BuildSpec two = spec(2);
   slurm_.fates = {"", "TIMEOUT"};
@@ -283,7 +282,7 @@ TEST_F(Cluster, LeftoversThatCannotBeRemovedDoNotStopABuild) {
   EXPECT_EQ(report.sha256, expected_);
 }
 
-// A task that was killed leaves its temporary folder: the next one removes it, but not the folder
+// A killed task leaves its temporary folder. The next task removes this folder, but not the folder
 // of a running task.
 TEST_F(Cluster, TemporaryFoldersOfKilledTasksAreRemoved) {
   const std::string killed = folder_.file("tmp/voxdag-batch-killed");
@@ -351,7 +350,7 @@ TEST_F(Cluster, DamagedBatchesAndRecordsDoNotCount) {
       << warnings_.text;
 }
 
-// An artifact of a task that turns out damaged in the merge is built again, by tasks.
+// If the merge finds that a task's artifact is damaged, tasks build it again.
 TEST_F(Cluster, ADamagedSegmentIsBuiltAgain) {
   BuildSpec twice = spec(3);
   bool was_damaged = false;

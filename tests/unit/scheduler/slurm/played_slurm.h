@@ -1,5 +1,5 @@
-// A Slurm that is played by a test: its tasks run in this process, and end as the test says. And
-// the fixture of tests that build with it.
+// A simulated Slurm. Its tasks run in the process of the test and end as the test specifies. Also
+// the fixture of the tests that build with it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -27,8 +27,8 @@ namespace voxdag {
 
 inline constexpr const char* kVersion = "1.2.3";
 
-// Runs each task immediately, unless it has a fate: then it ends in that state without doing
-// anything, or, for kHeld, waits until it is canceled.
+// Runs each task immediately. If the task has a fate, it does nothing and ends in that state; with
+// kHeld, it waits until it is canceled.
 class PlayedSlurm : public CommandRunner {
  public:
   static constexpr const char* kHeld = "held";
@@ -80,7 +80,7 @@ class PlayedSlurm : public CommandRunner {
   }
 
  private:
-  // A merge job does its work at the first query, and has ended afterwards.
+  // The merge job runs completely at the first query, and has ended afterwards.
   CommandResult show_merge_job() {
     if (waiting_merge_job.empty()) return ok("");
     const std::string id = std::exchange(waiting_merge_job, "");
@@ -195,7 +195,7 @@ class Cluster : public testing::Test {
     return cluster;
   }
   BuildContext context() { return {system_files(), warnings_, cancel_}; }
-  // Builds on the cluster, and expects the bytes of this machine.
+  // Builds on the simulated cluster, and checks that the bytes equal a local build's.
   BuildReport build(const BuildSpec& cluster_spec) {
     BuildReport report = run_build(cluster_spec, context());
     EXPECT_EQ(report.sha256, expected_);

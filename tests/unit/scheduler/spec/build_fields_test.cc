@@ -12,7 +12,8 @@
 namespace voxdag {
 namespace {
 
-// The help is a constant; the endings come from the table of formats.
+// The help text is a constant, but the file endings come from the table of formats. The text must
+// list all of them.
 TEST(BuildFields, SceneHelpListsAllEndings) {
   EXPECT_THAT(std::string(kSceneField.help),
               testing::HasSubstr("(" + list_scene_endings(", ", ", ") + ")"));

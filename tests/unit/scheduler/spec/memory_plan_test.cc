@@ -12,7 +12,8 @@ constexpr uint64_t kMiB = uint64_t{1} << 20, kGiB = uint64_t{1} << 30;
 constexpr uint64_t kBudgets[] = {64 * kMiB, 100'000'000, kGiB, 12 * kGiB};
 constexpr unsigned kThreads[] = {1, 2, 16, 1000};
 
-// The division of a few budgets is fixed: another one is another trade of speed against memory.
+// The division of some budgets is fixed here, because a change shifts the balance between speed and
+// memory.
 TEST(MemoryPlan, DividesTheBudgetBetweenStages) {
   struct Expected {
     uint64_t budget, top_tree, triangles, partition, pilot;
@@ -28,7 +29,8 @@ TEST(MemoryPlan, DividesTheBudgetBetweenStages) {
   }
 }
 
-// Workers get equal shares, fewer of them where the shares would be too small for any subvolume.
+// Workers get equal shares. If the shares would be too small for any subvolume, there are fewer
+// workers.
 TEST(MemoryPlan, DividesWhatIsFreeBetweenWorkers) {
   struct Expected {
     uint64_t free;
@@ -47,7 +49,7 @@ TEST(MemoryPlan, DividesWhatIsFreeBetweenWorkers) {
   }
 }
 
-// The parts fit in a worker's share, next to its retained pages.
+// All parts fit in a worker's share, in addition to its retained pages.
 TEST(MemoryPlan, DividesAWorkersShare) {
   EXPECT_EQ(WorkerMemory::key_bytes(64 * kMiB), 56 * kMiB);
   EXPECT_EQ(BackendMemory::page_bytes(10 * kMiB), 8 * kMiB);
@@ -73,7 +75,7 @@ TEST(MemoryPlan, DividesTheMergesBudget) {
   EXPECT_EQ(large.partition_bytes, 5 * kGiB - 5 * kGiB / 16);
 }
 
-// What is taken at the same time never adds up to more than there is.
+// Parts that are in use at the same time never exceed the budget together.
 TEST(MemoryPlan, PartsFitTheWhole) {
   for (const uint64_t budget : kBudgets) {
     const MemoryPlan plan = MemoryPlan::divide(budget);

@@ -1,4 +1,5 @@
-// Subvolumes shared between builds: earlier results are copied, and the bytes are the same.
+// Builds that share subvolumes through a cache: earlier results are copied, and the bytes are the
+// same.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -23,7 +24,8 @@ class CacheTest : public testing::Test {
     grid_ = build(spec()).grid;
   }
 
-  // A triangle of a hundredth of the scene's edge, its node moved by `steps` of its edges.
+  // Adds a triangle whose edges are a hundredth of the scene's edge. Its node is moved by `steps`
+  // of these edges.
   void write_chair(double steps) const {
     const double edge = grid_.edge / 100;
     const auto number = [](double value) { return std::to_string(value); };
@@ -68,8 +70,8 @@ class CacheTest : public testing::Test {
   Grid grid_;
 };
 
-// One node moved: all but the few subvolumes that it left or entered are taken from the cache, and
-// the bytes equal a build from scratch.
+// One node is moved. All subvolumes except the few that it left or entered come from the cache, and
+// the bytes equal a build without a cache.
 TEST_F(CacheTest, AMovedNodeCostsItsOwnSubvolumes) {
   const std::string cache = folder_.file("cache");
   write_chair(0);

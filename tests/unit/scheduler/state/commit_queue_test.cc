@@ -1,4 +1,5 @@
-// Groups of artifacts become durable in the background, and rows never come before their bytes.
+// Groups of artifacts become durable in the background. A row is never recorded before its bytes
+// are durable.
 #include "scheduler/state/commit_queue.h"
 
 #include <gtest/gtest.h>
@@ -159,7 +160,7 @@ TEST_F(CommitQueueTest, TheWorkerContinuesWhileTheDiskWrites) {
   EXPECT_EQ(recorded(), begun_with + 2);
 }
 
-// A group does not grow for ever behind a disk that does not keep up.
+// If the disk is too slow, the worker waits, so that a group does not grow without limit.
 TEST_F(CommitQueueTest, WaitsForADiskThatFallsBehind) {
   disk_.block_syncs();
   build_a_group();
@@ -176,7 +177,7 @@ TEST_F(CommitQueueTest, WaitsForADiskThatFallsBehind) {
   EXPECT_EQ(recorded(), next_);
 }
 
-// A sync that failed is not tried again: the second one would succeed without the lost bytes.
+// A failed sync is not repeated, because the second sync would succeed without the lost bytes.
 TEST_F(CommitQueueTest, WhatAFailedSyncLostIsNotRecorded) {
   disk_.fail_next_sync();
   bool reported = false;
@@ -209,7 +210,7 @@ TEST_F(CommitQueueTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
   EXPECT_EQ(recorded(), 3u);
 }
 
-// A queue that fails does not stop the others from becoming durable.
+// If one queue fails, the other queues still become durable.
 TEST_F(CommitQueueTest, FinishedQueuesBecomeDurableEachForItself) {
   CommitQueues queues;
   for (uint32_t id = 1; id <= 3; ++id) {
@@ -227,7 +228,7 @@ TEST_F(CommitQueueTest, FinishedQueuesBecomeDurableEachForItself) {
   EXPECT_EQ(recorded(), 2u);
 }
 
-// What is durable while the job store cannot be written is recorded once it can.
+// Artifacts that become durable while the job store cannot be written are recorded later.
 TEST_F(CommitQueueTest, WhatTheJobStoreCannotStoreIsRecordedLater) {
   SqlDatabase store(folder_.file("job.db"), SqlDatabase::Mode::kReadWrite);
   store.execute(

@@ -52,8 +52,8 @@ class BlockingProgress : public NoProgress {
   int ended_ = 0;
 };
 
-// A thread that waited for its turn writes the current state, not the state at the beginning of its
-// wait; otherwise an old row could remain at the end of a stage.
+// A thread that waited for its turn writes the present state, not the state at the beginning of its
+// wait. Otherwise an old row could remain at the end of a stage.
 TEST(JobProgressTest, WritesTheNewestSnapshot) {
   const TemporaryFolder folder;
   CancelToken cancel;

@@ -34,7 +34,8 @@ class JobStoreTest : public testing::Test {
   const JobIdentity job_{"abc", "{\"resolution\":4}", 1};
 };
 
-// Recorded rows exist when the store is opened again, with every bit of every number.
+// Rows that were recorded exist when the store is opened again, and all of their numbers are
+// unchanged.
 TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   {
     JobStore store(path(), JobStore::Access::kBuild);
@@ -72,7 +73,8 @@ TEST_F(JobStoreTest, ForgetsWhatIsBuiltInMemoryOnly) {
   EXPECT_EQ(store.leaves()[1].state, SubvolumeState::kPlanned);
 }
 
-// A split subvolume is replaced by its parts; a lost one is planned again; both survive.
+// A split subvolume is replaced by its parts, and a lost subvolume is planned again. Both changes
+// are durable.
 TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(2));

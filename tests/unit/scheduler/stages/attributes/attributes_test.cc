@@ -1,4 +1,5 @@
-// Builds with alpha, normals and materials: the cells' values, and the same bytes from every route.
+// Builds with alpha, normals and materials: tests the cells' values, and that every way to build
+// gives the same bytes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -95,7 +96,8 @@ TEST_F(Attributes, AreThoseOfTheScene) {
   EXPECT_GT(sample.cells, 1000u);
 }
 
-// No section depends on which others are built with it, and the levels on none.
+// No section depends on the other attributes that are built with it, and the levels depend on no
+// attribute.
 TEST_F(Attributes, AreIndependent) {
   build(spec(64, 64, kAll));
   std::string sections[5];
@@ -118,7 +120,7 @@ TEST_F(Attributes, AreIndependent) {
   }
 }
 
-// A change of these is a new version of the format or of the rule.
+// If one of these digests changes, the format or the rule needs a new version.
 TEST_F(Attributes, HaveTheBytesThatTheyAlwaysHad) {
   EXPECT_EQ(build(spec(128, 32, kAll)).sha256,
             "16972932e21dc5dd85a4b0a56dac3cb61857cf9b9b21624c4952ade7de2a560a");
@@ -160,7 +162,8 @@ TEST_F(Attributes, AHalfStoredCubeIsBakedAgain) {
   EXPECT_EQ(report.colors->cubes_reused + 1, report.colors->cubes);
 }
 
-// Names are in the file: a finished build does not answer for others.
+// The names of materials are in the file. So the file of a finished build is not reused if the
+// names have changed.
 TEST_F(Attributes, FollowTheNamesOfMaterials) {
   BuildSpec s = spec(32, 32, {Attribute::kMaterial});
   s.run.keep_work = true;

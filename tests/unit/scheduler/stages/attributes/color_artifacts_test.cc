@@ -86,7 +86,7 @@ TEST_F(ColorArtifacts, AChangedImageRepeatsTheCubesThatShowIt) {
   PaintedScene::write(folder_.path(), 128);
   expected_ = changed;
   const ColorReport colors = *resume().colors;
-  // Those of the triangle, which is far from the sheet, are used again.
+  // The cubes of the triangle, which is far from the sheet, are reused.
   EXPECT_GE(colors.cubes_reused, 4u);
   EXPECT_LE(colors.cubes_reused + 16, colors.cubes);
 }
@@ -132,7 +132,8 @@ TEST_F(ColorArtifacts, WhatIsDamagedIsBakedAgain) {
   EXPECT_EQ(warnings_.text, "");
 }
 
-// Cubes of an earlier scene are dropped when they exceed this scene's.
+// Stored cubes of an earlier scene are dropped when there are more of them than of this scene's
+// cubes.
 TEST_F(ColorArtifacts, DoNotGrowWithoutEnd) {
   BuildSpec s = spec();
   s.run.keep_work = true;

@@ -56,7 +56,7 @@ Counts count_colors(const voxdag_reader::File& file, uint32_t level) {
       for (int64_t z = 0; z < edge; ++z) {
         const auto color = cursor.color(x, y, z, level);
         if (!color) continue;
-        // The sheet is in the lower half of the grid's middle, the triangle above it.
+        // The sheet is in the lower half of the grid, and the triangle is above it.
         if (*color == voxdag_reader::Rgb{255, 0, 0} && x <= edge / 2)
           ++counts.red;
         else if (*color == voxdag_reader::Rgb{0, 0, 255} && x >= edge / 2 - 1)
@@ -83,7 +83,8 @@ TEST_F(ColorStage, AreThoseOfTheMaterials) {
   EXPECT_GT(counts.red, 4000u);
   EXPECT_GT(counts.blue, 4000u);
   EXPECT_GT(counts.green, 500u);
-  // Where both halves, or sheet and triangle, share a block of colors.
+  // Other colors occur where the two halves of the image, or the sheet and the triangle, share a
+  // color block.
   EXPECT_LT(counts.other, file->voxels() / 10);
   NoProgress progress;
   MemoryBudget budget(uint64_t{64} << 20);

@@ -175,7 +175,7 @@ class SlowFiles : public ForwardingFiles {
   std::atomic<int> syncs{0};
 };
 
-// While the file is synced in the background, again and again.
+// Several threads write parts while the file is repeatedly synced in the background.
 TEST_F(ColorStoreTest, TakesPartsFromSeveralThreads) {
   constexpr uint64_t kArtifacts = 200;
   const auto part_of = [](uint64_t artifact, uint64_t part) {

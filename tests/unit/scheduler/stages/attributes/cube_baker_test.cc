@@ -1,4 +1,4 @@
-// Cubes of the color grid are the same colors, whatever the memory they are baked in.
+// Cubes of the color grid have the same colors for any amount of memory.
 #include "scheduler/stages/attributes/cube_baker.h"
 
 #include <gtest/gtest.h>
@@ -85,7 +85,7 @@ class CubeBaking : public testing::Test {
   std::vector<FixedSurface> surfaces_;
 };
 
-// Surfaces that do not fit the memory are divided among cubes, down to regions.
+// Surfaces that do not fit in memory are divided among smaller cubes, down to regions.
 TEST_F(CubeBaking, DividesSurfaces) {
   for (int i = 0; i < 3000; ++i) {
     FixedSurface surface;
@@ -101,7 +101,7 @@ TEST_F(CubeBaking, DividesSurfaces) {
   for (RegionRecords records(whole.records[0]); records.next();) ++regions;
   EXPECT_GT(regions, 100u);
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 60 << 10).records, whole.records);
-  // Not even the surfaces of one region fit: they come in parts.
+  // Not even the surfaces of one region fit in memory, so they are processed in parts.
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 1 << 10).records, whole.records);
 }
 
@@ -110,7 +110,8 @@ class SolidCubes : public CubeBaking {
   SolidCubes() : CubeBaking(7) {}
 };
 
-// Regions whose cells are all set, which fit the memory only by their children.
+// All cells of the regions are set, so a region fits in memory only if it is baked as its eight
+// children.
 TEST_F(SolidCubes, AreBakedByChildren) {
   constexpr int64_t kEnd = int64_t{1} << (7 + kUnitBits);
   for (int64_t z = kUnitsPerVoxel / 2 | 1; z < kEnd; z += kUnitsPerVoxel)

@@ -1,4 +1,4 @@
-// Files whose colors are damaged, where the reader does not look before it needs them.
+// Files with damaged colors. The reader detects the damage only when it reads the colors.
 #include <gtest/gtest.h>
 
 #include <cstring>

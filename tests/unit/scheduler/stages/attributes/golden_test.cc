@@ -1,5 +1,6 @@
-// The bytes of colored files: those that every version, compiler and distribution must make of the
-// same scene, its images' decoders included. A change of them is a new version of the format.
+// Digests of files with colors. Every version of voxdag, compiler and distribution must make these
+// bytes of the same scene; this includes the decoders of images. If a digest changes, the format
+// needs a new version.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -12,7 +13,8 @@
 namespace voxdag {
 namespace {
 
-// The painted scene, with one of tests/golden in place of its image unless that is "".
+// Returns the digest of a build of the painted scene. If `image` is not empty, this image of
+// tests/golden replaces the scene's image.
 std::string digest_of(const std::string& image, uint64_t color_resolution) {
   TemporaryFolder folder;
   BuildSpec spec;

@@ -1,5 +1,5 @@
-// A scene of glTF with what colors come from: a bumpy sheet with an image of two halves, red and
-// blue, and a triangle with green corners in front of it.
+// A glTF scene with everything that determines colors: a bumpy sheet with an image whose halves are
+// red and blue, and a triangle with green vertices in front of it.
 #pragma once
 
 #include <cmath>
@@ -80,7 +80,7 @@ class PaintedScene {
     return static_cast<int>(json_["accessors"].size()) - 1;
   }
 
-  // Over x and z from 0 to 1, its image from left to right along x.
+  // Adds the sheet over x and z from 0 to 1. The image extends from left to right along x.
   void add_sheet() {
     std::vector<float> positions, coordinates;
     std::vector<uint32_t> indices;

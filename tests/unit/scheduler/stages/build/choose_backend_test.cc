@@ -19,7 +19,8 @@ class Warnings : public NoProgress {
   std::vector<std::string> all;
 };
 
-// The CPU backend, but one voxel is missing: the last brick with more than one loses its lowest.
+// The CPU backend with a defect: it omits the lowest voxel of the last brick that has more than one
+// voxel.
 class Forgetful : public Backend {
  public:
   std::string_view name() const override { return "forgetful"; }
@@ -43,7 +44,7 @@ class Forgetful : public Backend {
 
 std::unique_ptr<Backend> right_gpu(int) { return make_parallel_host_backend(Method::kFast); }
 
-// The check lets every right backend pass, and sees one wrong voxel.
+// The check accepts every right backend, and detects a single wrong voxel.
 TEST(BackendCheck, FindsOneVoxel) {
   for (const Method method : {Method::kFast, Method::kPointers, Method::kHashes})
     EXPECT_EQ(difference_from_cpu(*make_parallel_host_backend(method)), "");
@@ -51,7 +52,8 @@ TEST(BackendCheck, FindsOneVoxel) {
   EXPECT_NE(difference_from_cpu(forgetful), "");
 }
 
-// Without a GPU there is no warning. GPUs that are right are chosen, several in turn.
+// Without a GPU there is no warning. GPUs that pass the check are chosen, and workers use them in
+// turn.
 TEST(ChooseBackend, AutoChoosesGpusThatAreRight) {
   Warnings warnings;
   EXPECT_EQ(choose_automatically({}, kPlenty, warnings).name, "cpu");
@@ -70,8 +72,8 @@ TEST(ChooseBackend, AutoChoosesGpusThatAreRight) {
   EXPECT_TRUE(warnings.all.empty());
 }
 
-// A GPU that is wrong, cannot be opened or has too little memory leaves the build to the CPU, with
-// one warning that says why.
+// If a GPU gives wrong results, cannot be opened or has too little memory, the build uses the CPU
+// and prints one warning with the reason.
 TEST(ChooseBackend, AutoFallsBackToTheCpu) {
   const auto expect_cpu = [](const Gpus& gpus, uint64_t memory_bytes, const std::string& why) {
     SCOPED_TRACE(why);
@@ -92,7 +94,7 @@ TEST(ChooseBackend, AutoFallsBackToTheCpu) {
   expect_cpu({1, broken}, kPlenty, "cudaStreamCreate failed");
 }
 
-// A pair that does not go together is refused, and so are names that do not exist.
+// A method that the backend does not have is refused, and so are unknown names.
 TEST(ChooseBackend, RefusesWhatDoesNotGoTogether) {
   const auto refused = [](const std::string& backend, const std::string& method) {
     RunOptions options;

@@ -16,8 +16,8 @@
 namespace voxdag {
 namespace {
 
-// Small triangles along a diagonal, every tenth far outside the grid, every hundredth invalid;
-// `fails_at` and `too_far_at` are numbers of triangles.
+// Small triangles along a diagonal. Every tenth is far outside the grid, and every hundredth is
+// invalid. `fails_at` and `too_far_at` are indices of triangles.
 class Diagonal : public TriangleSource {
  public:
   static constexpr uint64_t kTriangles = 200'000;
@@ -73,7 +73,7 @@ class IngestTest : public testing::TestWithParam<unsigned> {
     const BuildContext build{system_files(), progress_, cancel_};
     ingest(scene_, state_, triangles_, top_, {build, threads, budget_}, after_piece);
   }
-  // The triangles, their order and the results are always the same.
+  // Checks the triangles, their order and the results of the complete scene.
   void expect_whole_scene() {
     ASSERT_EQ(triangles_.count(kSceneBin), state_.counts.triangles);
     std::vector<FixedTriangle> triangles(state_.counts.triangles);
@@ -111,7 +111,7 @@ TEST_P(IngestTest, ReadsTheSceneInOrder) {
   expect_whole_scene();
 }
 
-// From any piece on, ingest ends with the state of a whole one.
+// Ingest that resumes at any piece ends in the same state as uninterrupted ingest.
 TEST_P(IngestTest, Continues) {
   std::vector<IngestState> states;
   std::vector<std::vector<std::byte>> cells;
@@ -130,7 +130,7 @@ TEST_P(IngestTest, Continues) {
   }
 }
 
-// What was read before the scene failed is ingested, and the state covers it.
+// Triangles that were read before an error of the scene are ingested and are part of the state.
 TEST_P(IngestTest, ASceneThatFailsIsAnError) {
   scene_.fails_at = 5 * kPiece + 7;
   EXPECT_EQ(error_of_ingest([] {}).code(), ErrorCode::kIo);
@@ -146,7 +146,7 @@ TEST_P(IngestTest, ATriangleFromTooFarIsNamed) {
       << error.message();
 }
 
-// An error at a checkpoint, say of a full disk, ends the reading of the scene.
+// An error at a checkpoint, such as a full disk, stops the reading of the scene.
 TEST_P(IngestTest, AnErrorAtACheckpointStopsReading) {
   EXPECT_THROW(ingest_on(GetParam(),
                          [&] {
@@ -158,7 +158,7 @@ TEST_P(IngestTest, AnErrorAtACheckpointStopsReading) {
   EXPECT_LE(scene_.read, (2 + GetParam()) * kPiece);
 }
 
-// A scene whose readers need more memory than there is for several is read by one.
+// If memory is insufficient for several readers of a scene, a single reader reads it.
 TEST_P(IngestTest, OneReaderIsEnough) {
   scene_.max_cursors = 1;
   ingest_on(GetParam(), [] {});

@@ -51,7 +51,7 @@ void add(TopTree& top, const FixedTriangle& t) {
   top.add(tally);
 }
 
-// Neighboring triangles counted together give the sum of separate counts.
+// Counting neighboring triangles together gives the sum of their separate counts.
 TEST(TopTree, OneTallyOrMany) {
   MemoryBudget budget(uint64_t{1} << 30);
   TopTree one(kLevels, budget, 5), many(kLevels, budget, 5);
@@ -81,8 +81,8 @@ TEST(TopTree, OneTallyOrMany) {
   }
 }
 
-// Every triangle reaches every subvolume that it touches, wherever the cuts are, and the plan has a
-// subvolume wherever a triangle is.
+// Every triangle goes to all subvolumes that it touches, for any division into subvolumes. The plan
+// has a subvolume at every place that a triangle touches.
 TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
   MemoryBudget budget(uint64_t{1} << 30);
   for (const int64_t size : {int64_t{600}, int64_t{40000}, int64_t{900000}}) {
@@ -103,7 +103,8 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
         std::vector<size_t> got;
         tree.for_each_touched(t, hint, [&](size_t leaf) { got.push_back(leaf); });
         std::sort(got.begin(), got.end());
-        // The tree may name a leaf too many (a box inside one cube is not tested), never too few.
+        // The tree may give a leaf that the triangle does not touch, because a box inside one cube
+        // is not tested. It must not omit a leaf.
         const auto touched = touched_by_brute_force(t, leaves);
         EXPECT_TRUE(std::includes(got.begin(), got.end(), touched.begin(), touched.end()));
         // Voxels of the triangle inside the grid are in some leaf.
@@ -116,7 +117,7 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
   }
 }
 
-// The same for the parts of a cube that is split, of triangles that reach beyond it.
+// The same for the parts of a cube that is split, with triangles that extend beyond the cube.
 TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
   const Cube whole{2, {1, 2, 1}};
   std::vector<SubvolumePlan> parts;
@@ -150,7 +151,7 @@ TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
   EXPECT_GT(beyond, 20);
 }
 
-// What a triangle weighs goes to the cells that it touches, and to no others, however large it is.
+// A triangle's weight is counted in exactly the cells that the triangle touches, whatever its size.
 TEST(TopTree, CountsTheCellsThatTrianglesTouch) {
   constexpr uint32_t kDepth = 4;
   std::mt19937_64 random(11);
@@ -201,16 +202,16 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   EXPECT_NEAR(sum, top.total_weight(), 0.01 * top.total_weight());
 }
 
-// The expectation is the volume of a Minkowski sum: for one right triangle along the axes it is
-// known in closed form.
+// The expected number of voxels is the volume of a Minkowski sum. For a right triangle along the
+// axes, this volume is known in closed form.
 TEST(TopTree, ExpectedVoxelsOfAnAxisAlignedTriangle) {
   FixedTriangle t{{{1, 1, 1}, {1 + 256 * 100, 1, 1}, {1, 1 + 256 * 50, 1}}};
   EXPECT_NEAR(expected_work(t).voxels, 0.5 * 100 * 50 + 100 + 50 + 1, 1e-6);
   EXPECT_NEAR(expected_work(t).bricks, 0.5 * 25 * 12.5 + 25 + 12.5 + 1, 1e-6);
 }
 
-// A tally of many triangles, used again after clear(), adds the same as tallies of single
-// triangles.
+// A tally of many triangles, even if it is reused after clear(), gives the sum of tallies of
+// single triangles.
 TEST(TopTree, TalliesAddUp) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(5);
@@ -236,8 +237,7 @@ TEST(TopTree, TalliesAddUp) {
   }
 }
 
-// Filled with the cells of another, a top tree continues as that one would have: the plans are
-// equal.
+// A top tree that is filled with the cells of another top tree gives the same plans as that one.
 TEST(TopTree, ContinuesFromTheCellsOfAnother) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(4);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint32_t kShift = 6;
 
-// Small triangles in the order of a grid, many of which fall together on a coarser one.
+// Stores small triangles in the order of a grid. Many of them are equal on a coarser grid.
 void fill(MemoryStore& store, int rows) {
   std::mt19937 random(7);
   BinWriter writer(store, {kSceneBin}, 1 << 20);

@@ -7,7 +7,8 @@
 namespace voxdag {
 namespace {
 
-// Another grid, other pieces, another order of them: another digest. It continues from a copy.
+// A different grid, different pieces, or a different order of the pieces give a different digest. A
+// copy of a digest can be continued.
 TEST(ContentDigest, TellsContentsApart) {
   const Checksum128 a{1, 2}, b{3, 4};
   std::set<std::string> all;

@@ -1,4 +1,4 @@
-// Scan, ingest and partition of a large scene survive an interruption: finished work is not
+// Scan, ingest and partition of a large scene survive an interruption. Finished work is not
 // repeated, and is never used for another scene.
 #include "scheduler/state/checkpoint/ingest_checkpoint.h"
 
@@ -69,7 +69,8 @@ class IngestCheckpointTest : public testing::Test {
     std::filesystem::remove(output());
     return report;
   }
-  // Bytes read of the scene, as a fraction of a build that reads all of it.
+  // Returns the bytes that were read of the scene, as a fraction of the bytes that a complete build
+  // reads.
   double part_read() {
     return static_cast<double>(files_.bytes_read[scene()]) / static_cast<double>(whole_);
   }
@@ -82,8 +83,8 @@ class IngestCheckpointTest : public testing::Test {
   uint64_t whole_ = 0;
 };
 
-// Interrupted at any point, a build resumes there: it reads the rest of the scene, and nothing once
-// the scene is ingested.
+// A build that is interrupted at any point resumes there: it reads only the remaining part of the
+// scene, and nothing after the scene was ingested.
 TEST_F(IngestCheckpointTest, ResumesWhereItWas) {
   struct Moment {
     const char* stage;
@@ -119,8 +120,8 @@ TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   }
 }
 
-// Run options may change in between: subvolumes that were split later find their triangles, and so
-// do subvolumes built before.
+// Run options may change between the runs. Subvolumes that are split later find their triangles, as
+// do subvolumes that were built before.
 TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
   for (const char* stage : {"ingest", "build"}) {
     SCOPED_TRACE(stage);
@@ -149,8 +150,8 @@ TEST_F(IngestCheckpointTest, FreesWhatIsBuilt) {
   expect_to_resume(spec());
 }
 
-// Another scene under the same name is refused, and does no harm to the job, which resumes once the
-// first scene is back, though its times have changed.
+// Another scene under the same name is refused. The job is not changed, and resumes when the first
+// scene is back, even if the times of its files are different.
 TEST_F(IngestCheckpointTest, KnowsItsSceneByContent) {
   build_until(spec(), "build", 20);
   std::filesystem::rename(scene(), folder_.file("first.glb"));
@@ -168,8 +169,8 @@ TEST_F(IngestCheckpointTest, KnowsItsSceneByContent) {
   EXPECT_GE(part_read(), 1);
 }
 
-// A byte that changes in place, the time of modification set back, is a change; so is one that
-// comes during ingest.
+// A changed byte is detected even if the modification time is set back, or if the byte changes
+// during ingest.
 TEST_F(IngestCheckpointTest, NoticesAChangeInPlace) {
   for (const char* stage : {"scan", "ingest"}) {
     SCOPED_TRACE(stage);
@@ -212,9 +213,9 @@ TEST_F(IngestCheckpointTest, NoticesAChangeOfABuffer) {
   EXPECT_GT(files_.bytes_read[buffer], std::filesystem::file_size(buffer));
 }
 
-// Damage is named in a warning, and the scene is read again.
+// A warning names the damage, and the scene is read again.
 TEST_F(IngestCheckpointTest, DamageIsHealed) {
-  // Flips one bit in every `distance` bytes, but for the last few.
+  // Flips one bit in every `distance` bytes, except for the last few bytes.
   const auto flip = [&](uint64_t distance) {
     std::fstream file(durable(), std::ios::in | std::ios::out | std::ios::binary);
     for (int64_t at = static_cast<int64_t>(std::filesystem::file_size(durable())) - 5; at > 0;
@@ -246,7 +247,7 @@ TEST_F(IngestCheckpointTest, DamageIsHealed) {
     }
 }
 
-// For an artifact that is damaged after the triangles were removed, the scene is read again.
+// If an artifact turns out to be damaged after its triangles were removed, the scene is read again.
 TEST_F(IngestCheckpointTest, ReadsTheSceneForADamagedArtifact) {
   build_until(spec(), "merge", 0);
   std::filesystem::resize_file(work() + "/segment-0.vdseg", 1000);
@@ -254,8 +255,8 @@ TEST_F(IngestCheckpointTest, ReadsTheSceneForADamagedArtifact) {
   EXPECT_GE(part_read(), 1);
 }
 
-// Without disk space for triangles that memory can hold, there are no checkpoints; if the disk
-// fills up later, the triangles are read again into memory.
+// If the disk has no space for triangles that memory can hold, there are no checkpoints. If the
+// disk becomes full later, the triangles are read again into memory.
 TEST_F(IngestCheckpointTest, DoesWithoutDiskSpace) {
   files_.free_bytes = 3'000'000;
   expect_to_resume(spec());
@@ -279,7 +280,7 @@ TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
   EXPECT_FALSE(files_.bytes_written.contains(durable()));
 }
 
-// A file's times are trusted once the clock of the file system has advanced since.
+// The times of a file are trusted once the file system's clock has advanced beyond them.
 TEST(TrustedFiles, AreOlderThanATickOfTheirClock) {
   constexpr int64_t kSecond = 1'000'000'000;
   const auto file = [](int64_t modified_ns, int64_t changed_ns) {
