@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Cluster builds under a real Slurm: usage cluster_test.py VOXDAG [unittest arguments].
 
-Tests that wait for Slurm to notice a lost node, or build long enough for many kills, run only with
-VOXDAG_LONG=1 in the environment (tools/test-long cluster).
+Tests that wait until Slurm notices a lost node, or that build long enough for many kills, run only
+with VOXDAG_LONG=1 in the environment (tools/test-long cluster).
 
-Exits with 77, which ctest shows as skipped, where Slurm is not installed (tools/packages cluster).
+Exits with 77, which ctest reports as skipped, if Slurm is not installed (tools/packages cluster).
 """
 
 import json
@@ -32,7 +32,7 @@ class ClusterTest(unittest.TestCase):
     def setUpClass(cls):
         # Slurm's paths of sockets are short.
         cls.folder = Path(tempfile.mkdtemp(prefix="vdslurm-", dir="/tmp"))
-        # Where a daemon that crashes leaves its core.
+        # A daemon that crashes writes its core dump here.
         os.chdir(cls.folder)
         cls.scene = cls.folder / "city.glb"
         subprocess.run([VOXDAG, "generate", "city", cls.scene, "--triangles", "60000"], check=True,
@@ -62,7 +62,7 @@ class ClusterTest(unittest.TestCase):
             shutil.rmtree(self.work)
 
     def sha256(self, resolution, *options):
-        """Digest of the file that this machine builds alone."""
+        """Returns the digest of the file of a build without a cluster."""
         key = (self.scene, resolution, *options)
         if key not in self.expected:
             out = self.folder / "local.vdag"
@@ -83,7 +83,7 @@ class ClusterTest(unittest.TestCase):
         return self.build
 
     def end(self, build, timeout=150):
-        """What it has printed; no wait counts on it any more."""
+        """Waits until the build ends, and returns its output and messages. Later waits ignore it."""
         self.build = None
         try:
             return build.communicate(timeout=timeout)
@@ -106,7 +106,7 @@ class ClusterTest(unittest.TestCase):
         return "\n".join(texts[-5:])
 
     def state(self):
-        """What a test that waits in vain has to say."""
+        """Returns the state of the cluster, for the message of a test whose wait timed out."""
         commands = [["sinfo", "--long", "--Node"], ["scontrol", "show", "job"]]
         states = [self.cluster.command(*command, check=False).stdout for command in commands]
         return "\n".join([*states, self.logs(), self.cluster.logs()])
@@ -124,7 +124,7 @@ class ClusterTest(unittest.TestCase):
             time.sleep(0.05)
 
     def tasks(self):
-        """Process ids of running tasks, by node."""
+        """Returns the process ids of the running tasks by node."""
         found = {}
         for entry in Path("/proc").iterdir():
             try:
@@ -155,7 +155,7 @@ class ClusterTest(unittest.TestCase):
         self.scene = self.folder / "colored.glb"
         subprocess.run([VOXDAG, "generate", "city", self.scene, "--triangles", "4000", "--colors"],
                        check=True, capture_output=True)
-        # What merges adds the colors: this process, or a job of the cluster.
+        # The process that merges also bakes the colors: this process, or a job of the cluster.
         for tasks, options in [(3, []), (16, ["--cluster-merge"])]:
             with self.subTest(tasks=tasks):
                 build = self.start(512, tasks, "--color", "--subvolume", "64", *options)
@@ -177,7 +177,7 @@ class ClusterTest(unittest.TestCase):
     def test_a_batch_that_always_fails_ends_the_build(self):
         build = self.start(2048, 2, "--cluster-options", "--export=NONE,PATH=/nowhere --chdir=/",
                            "--cluster-retries", "1")
-        # A file in the place of the batch: every attempt finds it damaged.
+        # Another file replaces the batch's file, so every attempt reports it as damaged.
         batch = self.wait_for(lambda: sorted(self.work.glob("cluster/batch-*.vdbatch")), "batch")[0]
         batch.write_bytes(b"vdbatch2" + bytes(100))
         _, messages = self.end(build)
@@ -203,7 +203,7 @@ class ClusterTest(unittest.TestCase):
             os.kill(pid, signal.SIGSTOP)
         self.cluster.kill(node)
         try:
-            # Slurm starts its batch elsewhere; then it wakes up.
+            # Slurm starts the batch on another node. Then the stopped tasks continue.
             self.wait_for(lambda: self.cluster.command(
                 "sinfo", "--noheader", f"--nodes={node}", "--format=%t").stdout.startswith("down"),
                 "lost node", 90)
@@ -224,7 +224,7 @@ class ClusterTest(unittest.TestCase):
         self.cluster.restart_nodes()
 
     def test_a_node_that_cannot_start_tasks(self):
-        # Slurm holds the tasks of such a node forever.
+        # Slurm would hold the tasks of such a node without a limit of time.
         spool = self.folder / "slurm" / "spool-n1"
         away = spool.rename(f"{spool}.away")
         spool.touch()
@@ -259,24 +259,24 @@ class ClusterTest(unittest.TestCase):
         report, _ = self.finish(self.start(16384, 8), 16384)
         self.assertEqual(report["cluster"]["batches"], 8)
         self.assertEqual(report["cluster"]["failed_attempts"], 0)
-        # The running tasks were taken over: nothing was submitted twice.
+        # The second command took the running tasks over, so no task was submitted twice.
         self.wait_for_tasks(name, {"COMPLETED": 8})
 
     def queue(self):
         return self.cluster.command("squeue", "--noheader", "--array").stdout
 
     def task_name(self):
-        """Name of the tasks of this build."""
+        """Returns the name of this build's tasks."""
         return "voxdag-" + json.loads((self.work / "cluster/cluster.json").read_text())["build"]
 
     def submitted(self, name):
-        """How many tasks or jobs of this name were ever submitted, by their states."""
+        """Returns the number of tasks or jobs of this name that were ever submitted, by state."""
         states = self.cluster.command("squeue", "--noheader", "--array", "--states=all",
                                       f"--name={name}", "--format=%T").stdout.split()
         return {state: states.count(state) for state in set(states)}
 
     def wait_for_tasks(self, name, expected):
-        """Slurm learns a little later than the build that a task has ended."""
+        """Waits for these states, because Slurm can notice a task's end after the build does."""
         self.wait_for(lambda: self.submitted(name) == expected,
                       lambda: f"{expected} of {self.submitted(name)}", 15)
 
@@ -306,7 +306,7 @@ class ClusterTest(unittest.TestCase):
 
     def test_the_rest_can_be_built_here(self):
         build = self.start(16384, 8)
-        # A task that does not end is left for this machine.
+        # A task does not end, so this machine builds its batch.
         stopped = self.a_task()
         os.kill(stopped, signal.SIGSTOP)
         self.wait_for(lambda: list(self.work.glob("segment-*.vdseg")), "accepted batch")
@@ -319,7 +319,7 @@ class ClusterTest(unittest.TestCase):
         self.assertGreater(report["subvolumes"]["reused"], 0)
 
     def test_torn_and_foreign_records_do_not_count(self):
-        # The tasks begin only once the records exist.
+        # The tasks begin only after the records exist.
         build = self.start(16384, 4, "--cluster-options", "--begin=now+4")
         folder = self.work / "cluster"
         self.wait_for(lambda: list(folder.glob("batch-3.vdbatch")), "batch")
@@ -362,7 +362,7 @@ class ClusterTest(unittest.TestCase):
     def test_the_service_builds_on_the_cluster(self):
         folder = self.folder / "service"
         with Service(VOXDAG, folder, self.scene, self.cluster.environment) as service:
-            # Long enough for the service to ask Slurm while tasks run.
+            # The build takes so long that the service queries Slurm while tasks run.
             job = service.submit(131072)
             self.wait_for(lambda: service.tasks(job), lambda: f"tasks in {service.job(job)}", 20)
             shown = service.job(job)["progress"]["cluster"]

@@ -1,6 +1,6 @@
-"""A Slurm cluster on this machine, in a separate folder: munged, slurmctld and some slurmd, each
-with its name and port. No systemd, no extra privileges for the tests; everything ends with the
-context."""
+"""Runs a Slurm cluster on this machine, in a separate folder: munged, slurmctld and some slurmd,
+each with a separate name and port. It needs neither systemd nor privileges. All processes end with
+the context."""
 
 import os
 import pwd
@@ -15,7 +15,7 @@ PROGRAMS = ["munged", "slurmctld", "slurmd", "sbatch", "squeue", "scontrol", "sc
 
 
 def missing_programs():
-    """The programs of Slurm and munge that are not installed."""
+    """Returns the required programs of Slurm and munge that are not installed."""
     path = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"
     return [program for program in PROGRAMS if shutil.which(program, path=path) is None]
 
@@ -31,7 +31,7 @@ def free_ports(count):
 
 
 class SlurmCluster:
-    """`nodes` machines of `cpus` CPUs each, all of them this one."""
+    """A cluster of `nodes` nodes with `cpus` CPUs each, all of them on this machine."""
 
     def __init__(self, folder, nodes=4, cpus=2, settings=""):
         self.folder = Path(folder)
@@ -56,7 +56,7 @@ class SlurmCluster:
 
     def start(self):
         self.folder.mkdir(parents=True, exist_ok=True)
-        # munged refuses to work in a folder that others may write to.
+        # munged refuses a folder to which other users may write.
         self.folder.chmod(0o755)
         for name in ["munge", "state", "log"] + [f"spool-{node}" for node in self.nodes]:
             (self.folder / name).mkdir(exist_ok=True)
@@ -159,7 +159,7 @@ class SlurmCluster:
     def restart_nodes(self):
         for node in self.nodes:
             self.kill_machine(node)
-        # Otherwise a completing job keeps its node until Slurm polls it a minute later.
+        # Without this setting, a completing job keeps its node for a minute, until Slurm polls it.
         self.command(
             "scontrol", "update", f"nodename={','.join(self.nodes)}", "state=down", "reason=restart"
         )
@@ -168,7 +168,7 @@ class SlurmCluster:
         self.wait_for_idle_nodes()
 
     def resume_nodes(self):
-        """Makes nodes that Slurm has ceased to trust work again."""
+        """Resumes nodes that Slurm has marked as down or drained."""
         drained = self.command(
             "sinfo",
             "--noheader",
@@ -192,13 +192,13 @@ class SlurmCluster:
         self.wait_for(are_idle, "idle nodes", 150)
 
     def kill(self, name, how=signal.SIGKILL):
-        """Ends a daemon; the node's tasks keep running (as on a machine that lost its network)."""
+        """Kills a daemon. The node's tasks keep running, as on a machine that lost its network."""
         process = self.processes.pop(name)
         process.send_signal(how)
         process.wait()
 
     def kill_machine(self, node):
-        """Ends a node's daemon and all that it runs."""
+        """Kills a node's daemon and all processes that it started."""
         self.kill(node)
         marker = f"SLURMD_NODENAME={node}".encode()
         for entry in Path("/proc").iterdir():
@@ -237,7 +237,7 @@ class SlurmCluster:
             f"--- {log.name}\n{log.read_text(errors='replace')[-1500:]}"
             for log in sorted((self.folder / "log").iterdir())
         ]
-        # What the nodes and the jobs are doing says most, so it comes last.
+        # The states of the nodes and jobs are most useful, so they are printed last.
         for command in (["sinfo", "--Node", "--long"], ["squeue"]):
             shown = self.command(*command, check=False)
             parts.append(f"--- {command[0]}\n{shown.stdout}{shown.stderr}")

@@ -77,6 +77,6 @@ class Service:
         self.get(f"/api/v1/jobs/{job}/{name}", method="POST")
 
     def tasks(self, job):
-        """The tasks that run now, by node."""
+        """Returns the running tasks by node."""
         cluster = (self.job(job)["progress"] or {}).get("cluster")
         return cluster and {n["name"]: n["running"] for n in cluster["nodes"] if n["running"]}

@@ -1,7 +1,7 @@
 """Decoders of the formats that `voxdag export` writes, from the formats' descriptions.
 
-Each takes the path of the file and the resolution of the exported grid, and returns an array of the
-cells, n x 3, in any order. They share nothing with the exporter.
+Each decoder takes the path of the file and the resolution of the exported grid, and returns the
+set cells as an n x 3 array, in any order. The decoders share no code with the exporter.
 """
 
 import json
@@ -17,7 +17,7 @@ except ImportError:
 
 
 def child_bits(masks):
-    """For an array of 8-bit masks the pairs (row, bit) of all set bits, by row and bit."""
+    """Returns the pairs (row, bit) of all set bits of an array of 8-bit masks, by row and bit."""
     return numpy.nonzero(masks.astype(numpy.uint8)[:, None] >> numpy.arange(8) & 1)
 
 
@@ -60,7 +60,7 @@ def words_of(data, count, at):
 
 
 def expand(words, roots, depth, children_of):
-    """The leaves `depth` levels below the root, and their corners in units of their edge."""
+    """Returns the leaves `depth` levels below the root, with corners in units of a leaf's edge."""
     nodes, corners = roots, numpy.zeros((len(roots), 3), numpy.int64)
     for level in range(depth):
         masks, pointer = children_of(words, nodes, level)
@@ -71,7 +71,7 @@ def expand(words, roots, depth, children_of):
 
 
 def voxels_of_bricks(bricks, corners):
-    """The voxels of 64-bit masks with bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0."""
+    """Returns the voxels of 64-bit masks with bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0."""
     rows, bits = numpy.nonzero(
         bricks[:, None] >> numpy.arange(64, dtype=numpy.uint64) & numpy.uint64(1)
     )
@@ -105,7 +105,7 @@ def hashdag(path, grid):
     leaves, corners = expand(words, numpy.array([0]), levels - 2, children_of)
     bricks = (words[leaves] | words[leaves + 1] << 32).view(numpy.uint64)
     cells = voxels_of_bricks(bricks, corners)
-    # The voxels that a node says it encloses are as many as are found below all of its occurrences.
+    # On every level, the numbers of voxels stored in the visited nodes add up to all voxels.
     for _, counts in visited:
         assert counts.sum() == len(cells)
     return cells
@@ -293,13 +293,13 @@ def nvdb(path, grid, reader):
 
 
 def srgb_of(linear):
-    """The bytes of sRGB that are nearest to linear light."""
+    """Returns the sRGB bytes nearest to linear light."""
     low, high = 12.92 * linear, 1.055 * numpy.maximum(linear, 0) ** (1 / 2.4) - 0.055
     return numpy.rint(255 * numpy.where(linear <= 0.0031308, low, high)).astype(numpy.int64)
 
 
 def vdb_colors(path, grid):
-    """Cells, and red, green and blue of each."""
+    """Returns the cells, and red, green and blue of each cell."""
     read = pyopenvdb.read(path, "Cd")
     low, high = read.evalActiveVoxelBoundingBox()
     values = numpy.zeros((*(numpy.array(high) - low + 1), 3), numpy.float32)
@@ -318,7 +318,7 @@ def nvdb_colors(path, grid, reader):
 
 
 def glb_rectangles(path, grid):
-    """Corners of all rectangles, n x 4 x 3, in cells of the grid."""
+    """Returns the corners of all rectangles, n x 4 x 3, in cells of the grid."""
     with open(path, "rb") as file:
         data = file.read()
     magic, version, size, json_size, json_type = struct.unpack_from("<4sIII4s", data)
@@ -382,7 +382,7 @@ def glb(path, grid):
 
 
 def missing(name, tools):
-    """The library that decoding needs and that is not here, or nothing."""
+    """Returns the missing library that the decoder needs, or None."""
     if name == "bt" and not tools:
         return "liboctomap-dev"
     if name == "nvdb" and not tools:

@@ -3,10 +3,10 @@
 
     export_test.py VOXDAG LIST_VOXELS FORMAT [TOOLS...]
 
-At three resolutions, at a coarser level, for one region, and for a region of a coarser level; and
-the colors of a scene, for formats whose libraries unit tests do not have. TOOLS are programs of
-this folder that the decoder of the format starts. Exits with 77, which ctest counts as skipped,
-where the library that decodes is missing, and with 1 if VOXDAG_SKIP_NOTHING is set.
+Exports at three resolutions, at a coarser level, of one region, and of a region of a coarser level.
+For formats whose libraries the unit tests do not use, also compares the colors of a scene. TOOLS
+are programs of this folder that the decoder of the format starts. If the decoder's library is
+missing, exits with 77, which ctest reports as skipped, or with 1 if VOXDAG_SKIP_NOTHING is set.
 """
 
 import json
@@ -49,7 +49,7 @@ CASES = [
 
 
 class Grid:
-    """The exported grid: the world coordinates of its cells."""
+    """The exported grid. Converts between its cells and world coordinates."""
 
     def __init__(self, info, levels, region):
         self.levels = levels
@@ -61,7 +61,7 @@ class Grid:
         self.high = numpy.array(region[3:] if region else [self.resolution] * 3)
 
     def cells(self, centers):
-        """The cells that have these centers in world space."""
+        """Returns the cells that have these centers in world space."""
         cells = (centers - self.origin) / self.voxel - 0.5
         rounded = numpy.rint(cells)
         assert numpy.abs(cells - rounded).max() < 1e-3, "positions are not centers of voxels"
@@ -87,7 +87,7 @@ class Test:
         return done.stdout if status == 0 else done.stderr
 
     def scene(self, resolution):
-        """A .vdag file of the generated city."""
+        """Builds the generated city. Returns the .vdag file."""
         if resolution not in self.files:
             if not os.path.exists("city.glb"):
                 self.run("generate", "city", "city.glb", "--triangles", "20000")
@@ -127,7 +127,7 @@ class Test:
         print(f"{resolution} {' '.join(options)}: {len(expected)} voxels, {report['bytes']} bytes")
 
     def colored_scene(self):
-        """A .vdag file of a bumpy sheet with colored corners."""
+        """Builds a bumpy sheet with colored corners. Returns the .vdag file."""
         corners = []
         for i in range(21):
             for j in range(21):
@@ -176,7 +176,7 @@ class Test:
             print(f"colors of level {level}: {len(expected)} voxels, {colored_bytes} bytes")
 
     def check_refusals(self):
-        """What exists, or has no voxels, is refused, and nothing is left behind."""
+        """Checks that existing files and empty selections are refused, and leave no other files."""
         path, _ = self.scene(64)
         output = "refused" + SUFFIXES.get(self.name, "." + self.name)
         nothing = ["--region", "0,63,0,1,64,1"]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whole files exported to every format, decoded by other code and compared voxel by voxel.
+"""Exports complete files to every format, decodes them by other code, and compares every voxel.
 
     tests/long/exports_whole.py [--voxdag build/cpu/voxdag] [--digest build/cpu/tests/digest_voxels]
                                 [--folder DIR] [--memory 4GiB] [--formats bt,vdb,...]

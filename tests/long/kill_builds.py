@@ -59,7 +59,7 @@ class Builds:
         )
 
     def end(self, process):
-        """The SHA-256 that a build reports; None if it failed."""
+        """Waits for a build. Returns the SHA-256 that it reports, or None if it failed."""
         out, err = process.communicate()
         self.waits += err.count("is in use by another build: waiting")
         if process.returncode == 0:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A binary PLY of many times --memory.
+"""Builds a binary PLY file that is many times larger than --memory.
 
     tests/long/large_ply.py [--voxdag build/cpu/voxdag] [--folder DIR] [--edge 5000]
                             [--resolution 2048]
@@ -38,7 +38,7 @@ def write_vertices(file, edge):
 
 
 def write_faces(file, edge):
-    """Neighbors in the sheet are far apart in the file, and their vertices as well."""
+    """Writes the faces. Neighbors in the sheet are far apart in the file, as are their vertices."""
     face = struct.Struct("<BIII")
     shuffled = random.Random(1)
     columns = list(range(edge - 1))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Colors of a scene of 600 million texels, within little memory.
+"""Builds a scene of 600 million texels with colors, within little memory.
 
     tests/long/large_textures.py [--voxdag build/cpu/voxdag] [--folder DIR] [--resolution 2048]
 
@@ -24,7 +24,8 @@ SIZES = [16384] + [4096] * 20
 
 
 def write_png(path, edge, seed):
-    """Ramps in all channels, shifted per row: small, and no two texels nearby are equal."""
+    """Writes a PNG with ramps in all channels, shifted from row to row. The file is small, although
+    no two neighboring texels are equal."""
 
     def chunk(kind, data):
         checksum = zlib.crc32(kind + data)
@@ -49,7 +50,7 @@ def write_png(path, edge, seed):
 
 
 def write_scene(folder):
-    """Tilted walls one behind the other, each with all of its image."""
+    """Writes a scene of tilted walls, one behind the other. Each wall shows its complete image."""
     scene = folder / "walls.gltf"
     if scene.exists():
         return scene

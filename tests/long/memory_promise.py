@@ -1,4 +1,4 @@
-"""Builds of one scene with several budgets: what --memory promises."""
+"""Builds one scene with several budgets, to test that --memory is never exceeded."""
 
 import json
 import os
@@ -34,7 +34,7 @@ def holds(build_command, budgets):
 
 
 def _build(command, memory):
-    """The report, and the peak of resident memory that the system measured."""
+    """Returns the report, and the peak of resident memory that the system measured."""
     command = [*command, "--force", "--json", *(["--memory", str(memory)] if memory else [])]
     with tempfile.TemporaryFile() as out:
         process = subprocess.Popen(command, stdout=out)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Many clients use one service for a long time, and the service is killed now and then.
+"""Many clients use one service for a long time, and the service is killed repeatedly.
 
     tests/long/soak.py [--voxdag build/cpu/voxdag] [--minutes 60] [--clients 20] [--kill-every 5]
 
@@ -37,7 +37,7 @@ ENDED = ("succeeded", "failed", "canceled")
 
 
 class SoakError(Exception):
-    """Something that must hold does not."""
+    """A requirement that the soak test checks is not met."""
 
 
 class Service:
@@ -74,7 +74,7 @@ class Service:
         self.start()
 
     def usage(self):
-        """Resident KiB and open file descriptors."""
+        """Returns the service's resident memory in KiB and its number of open file descriptors."""
         status = Path(f"/proc/{self.process.pid}/status").read_text()
         return (
             int(re.search(r"VmRSS:\s+(\d+)", status)[1]),
@@ -212,7 +212,7 @@ class Client(threading.Thread):
 
 
 def prepare(voxdag, folder):
-    """The scenes' bytes, and the SHA-256 of each at each resolution."""
+    """Returns the scenes' bytes, and the SHA-256 of the result for each scene and resolution."""
     scenes, expected = {}, {}
     for name, arguments in SCENES.items():
         path = folder / f"{name}.glb"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`pip install .` as a user does it, into a virtual environment without anything else.
+"""Tests `pip install .` as a user runs it, in an empty virtual environment.
 
     tests/long/wheel.py [--folder DIR]
 
@@ -24,14 +24,14 @@ import zipfile
 from pathlib import Path
 
 REPO = Path(__file__).resolve().parents[2]
-# What is only in the repository must not be found.
+# Python must not find modules in the repository instead of the installed package.
 ENVIRONMENT = {
     name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
 } | {"MPLBACKEND": "Agg"}
 
 
 def run(command, folder, status=0):
-    """The output of a command, which must end with this status."""
+    """Runs a command, which must end with this status. Returns its output."""
     done = subprocess.run(
         [str(part) for part in command],
         cwd=folder,
@@ -55,7 +55,7 @@ def field(name):
 
 
 def expected_tags():
-    """The tags of a wheel, and the suffix of its modules' names."""
+    """Returns the expected tags of the wheel, and the suffix of its modules' names."""
     platform = re.sub("[-.]", "_", sysconfig.get_platform())
     if sys.version_info >= (3, 12):
         return f"cp312-abi3-{platform}", ".abi3.so"
@@ -96,7 +96,7 @@ def check_wheel(wheel):
 
 
 def check_program(python, folder):
-    """The first program of the guide, and what its picture shows."""
+    """Runs the first program of docs/python.md, and checks the contents of its picture."""
     program = re.search(
         r"^```python\n(.*?)^```",
         (REPO / "docs" / "python.md").read_text(),
@@ -120,7 +120,7 @@ def check_program(python, folder):
         folder,
     ).split()
     assert shown[:2] == ["300", "400"], shown
-    # The tetrahedron takes a part of the picture, and light makes its sides different.
+    # The tetrahedron covers a part of the picture, and its sides have different brightness.
     assert int(shown[2]) > 20 and float(shown[3]) < 0.95, f"a blank picture: {shown}"
     print(f"the program of docs/python.md: a picture of {shown[2]} colors", flush=True)
 
