@@ -79,7 +79,7 @@ TEST_F(BuildCommand, OnlyGeometryOptionsChangeTheBytes) {
   EXPECT_GT(part["dropped"]["outside"], 0);
 }
 
-// Options may come from a file; the command line takes precedence.
+// Options can come from a file. Options on the command line take precedence.
 TEST_F(BuildCommand, ReadsOptionsFromAFile) {
   put("options.toml", "resolution = 32\nhash-bits = 16\n");
   const Json report = run_json({"build", "m.glb", "-o", "m.vdag", "--config", "options.toml"});
@@ -152,13 +152,13 @@ TEST_F(BuildCommand, RefusesWrongFiles) {
   expect_error(2, "truncated.glb", {"build", "truncated.glb", "-r", "64", "-o", "x.vdag"});
   EXPECT_FALSE(exists("x.vdag"));
   EXPECT_FALSE(exists("x.vdag.work"));
-  // A folder under the name of the output is an error before the build starts.
+  // If the output's name is a folder's name, this is an error before the build starts.
   ASSERT_EQ(mkdir(folder_.file("taken").c_str(), 0777), 0);
   expect_error(2, "taken", {"build", "m.glb", "-r", "64", "-o", "taken"});
   EXPECT_FALSE(exists("taken.work"));
 }
 
-// A work folder with files not created by voxdag is not touched.
+// A work folder that contains files not created by voxdag is not changed.
 TEST_F(BuildCommand, LeavesForeignWorkFoldersAlone) {
   ASSERT_EQ(mkdir(folder_.file("mine").c_str(), 0777), 0);
   put("mine/letter.txt", "dear");

@@ -1,4 +1,4 @@
-// submit, jobs, watch, cancel, suspend, resume and download against a real server.
+// Tests submit, jobs, watch, cancel, suspend, resume and download with a real server.
 #include <gmock/gmock.h>
 #include <signal.h>
 
@@ -71,7 +71,7 @@ class Client : public CommandLine {
   std::unique_ptr<ServeProcess> server_;
 };
 
-// From a local scene to a verified file, with the bytes of a local build.
+// From a local scene to a verified file: the file has the bytes of a local build.
 TEST_F(Client, BuildsTheSameBytesAsTheBuildCommand) {
   const Json job = run_json({"submit", "m.glb", "-r", "128", "--hash-bits", "16", "--name",
                              "sponge", "--memory", "256MiB", "--wait"});
@@ -100,7 +100,8 @@ TEST_F(Client, BuildsTheSameBytesAsTheBuildCommand) {
   EXPECT_NE(watched.out.find(report["sha256"].get<std::string>()), std::string::npos);
 }
 
-// The same file is sent once; of a file that the server has in part, the rest is sent.
+// A file is uploaded only once. If the server has a part of the file, only the remaining part is
+// sent.
 TEST_F(Client, UploadsTheMissingPart) {
   const std::string scene = contents("m.glb");
   const Json job = run_json({"submit", "m.glb", "-r", "64"});
@@ -125,7 +126,7 @@ TEST_F(Client, UploadsTheMissingPart) {
   EXPECT_EQ(metric("voxdag_uploaded_bytes_total"), 2 * scene.size());
 }
 
-// A download resumes a partial file, and detects one with other bytes.
+// A download resumes a partial file, and detects a partial file with wrong bytes.
 TEST_F(Client, ResumesADownload) {
   const Json job = run_json({"submit", "m.glb", "-r", "128", "--wait"});
   const std::string id = job["id"], sha256 = job["result"]["sha256"];
@@ -148,7 +149,7 @@ TEST_F(Client, ResumesADownload) {
   EXPECT_TRUE(contents("got.vdag") == whole);
 }
 
-// Jobs in the queue behind a long one can be suspended, canceled and resumed.
+// Jobs that wait in the queue behind a long job can be suspended, canceled and resumed.
 TEST_F(Client, SuspendsCancelsAndResumes) {
   const std::string first = submit_long();
   const std::string suspended = submit("64"), canceled = submit("32");
@@ -165,7 +166,7 @@ TEST_F(Client, SuspendsCancelsAndResumes) {
   for (const std::string& id : {suspended, canceled}) EXPECT_EQ(run({"watch", id}).status, 0);
 }
 
-// A watcher waits for a server that restarts; and the job continues.
+// `watch` waits while the server restarts, and the job continues.
 TEST_F(Client, WatchesAcrossARestart) {
   const std::string first = submit_long(), id = submit("64");
   const std::string url = server_->url();
@@ -188,7 +189,7 @@ TEST_F(Client, WatchesAcrossARestart) {
   EXPECT_EQ(Json::parse(answer.out)["state"], "succeeded");
 }
 
-// The server decides which formats it reads: the client sends any of them.
+// The server decides which formats it reads, so the client sends every format.
 TEST_F(Client, SubmitsEverySceneFormat) {
   put("square.ply",
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
@@ -214,7 +215,8 @@ TEST_F(Client, ReportsErrors) {
   expect_error(2, "--server", {"jobs"});
 }
 
-// With a token file: no token, one with the role read, one with the role submit.
+// The service has a token file. The client sends no token, a token with the role read, and one with
+// the role submit.
 TEST_F(Client, SendsAToken) {
   std::string lines;
   for (const std::string role : {"read", "submit"}) {
@@ -235,8 +237,8 @@ TEST_F(Client, SendsAToken) {
   EXPECT_EQ(answer.status, 0) << answer.err;
 }
 
-// The health of a service is the exit status; a service that is not there or is no voxdag is not
-// waited for.
+// The exit status gives the health of a service. The command does not wait if there is no service,
+// or if the server is not voxdag.
 TEST_F(Client, Health) {
   const Answer answer = run({"health"});
   EXPECT_EQ(answer.status, 0) << answer.err;

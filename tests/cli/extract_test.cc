@@ -1,4 +1,4 @@
-// extract: the options, the report, and files that equal the builds' files.
+// Tests the options and the report of extract, and compares extracts with builds.
 #include <filesystem>
 
 #include "tests/cli/command_line.h"
@@ -18,7 +18,8 @@ class Extract : public CommandLine {
   Json report_;
 };
 
-// A cube of a build is the build of that cube, and the whole is the file itself.
+// The extract of an octree cube equals a build of this cube. The extract of the complete grid
+// equals the input.
 TEST_F(Extract, EqualsBuilds) {
   const Json whole = run_json({"extract", "s.vdag", "-o", "whole.vdag", "--memory", "64MiB"});
   EXPECT_EQ(whole["sha256"], report_["sha256"]);
@@ -32,7 +33,7 @@ TEST_F(Extract, EqualsBuilds) {
   EXPECT_EQ(world["sha256"], cube["sha256"]);
 }
 
-// --memory holds for a result larger than the limit plus its tolerance.
+// --memory is kept even if the result is larger than the limit plus its tolerance.
 TEST_F(Extract, LargeResultsWithinLittleMemory) {
   constexpr uint64_t kMemory = 64 << 20, kAllowed = kMemory + (64 << 20);
   ASSERT_EQ(run({"generate", "soup", "large.glb", "--triangles", "45000"}).status, 0);
@@ -60,7 +61,7 @@ TEST_F(Extract, Report) {
   EXPECT_TRUE(contents("c.vdag") == contents("d.vdag"));
 }
 
-// Nothing but the output is left, and nothing is overwritten that should not be.
+// A refused extract leaves no files, and overwrites no file that it must not overwrite.
 TEST_F(Extract, Refusals) {
   put("mine.txt", "not a DAG");
   expect_error(2, "mine.txt", {"extract", "s.vdag", "-o", "mine.txt"});

@@ -1,4 +1,4 @@
-// info, verify, diff, render, plan, status and generate on small files.
+// Tests info, verify, diff, render, plan, status and generate on small files.
 #include <cmath>
 
 #include "tests/cli/command_line.h"
@@ -59,7 +59,8 @@ TEST_F(FileCommands, VerifyAgainstAnotherScene) {
   EXPECT_EQ(answer.status, 4) << answer.err;
 }
 
-// Colors are baked again in some regions: equal for the same scene, an error for another one.
+// `verify` bakes the colors of some regions again. They are equal for the same scene; another scene
+// is an error.
 TEST_F(FileCommands, VerifyComparesColors) {
   for (const char* colors : {"--colors", "--json"}) {
     const std::string name = colors == std::string("--json") ? "plain.glb" : "city.glb";
@@ -82,7 +83,8 @@ TEST_F(FileCommands, VerifyComparesColors) {
   EXPECT_NE(other.err.find("differ from the scene"), std::string::npos) << other.err;
 }
 
-// Equal files are exit status 0, different ones 1, files on different grids an error.
+// The exit status is 0 for equal files and 1 for different files. Files with different grids are an
+// error.
 TEST_F(FileCommands, Diff) {
   run_json({"build", "m.glb", "-r", "128", "-o", "truncated.vdag", "--hash-bits", "4"});
   const Json same = run_json({"diff", "m.vdag", "truncated.vdag"});
@@ -102,7 +104,8 @@ TEST_F(FileCommands, Diff) {
   expect_error(2, "", {"diff", "m.vdag", "a.vdag"});
 }
 
-// Compares the same voxels with other colors, and a part that keeps its colors.
+// Compares a file with a file of the same voxels but other colors, and with a part that has the
+// same colors.
 TEST_F(FileCommands, DiffOfColors) {
   const std::string head =
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
@@ -164,7 +167,7 @@ TEST_F(FileCommands, RenderMakesAPicture) {
   EXPECT_FALSE(exists("x.png"));
 }
 
-// A size that takes too much memory is refused before anything is read or written.
+// A picture size that needs too much memory is refused before any file is read or written.
 TEST_F(FileCommands, RenderRefusesWhatTakesTooMuchMemory) {
   const auto expect = [&](int status, const std::string& part, const std::string& size,
                           const std::string& memory, const std::string& option = "-o") {

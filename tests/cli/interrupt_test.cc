@@ -32,9 +32,9 @@ class Interrupt : public CommandLine {
                                           "s.vdag", "--threads", "1",  "--subvolume", "128"};
 };
 
-// Either signal stops a build with status 130 and nothing under the final name; the same command
-// then writes the bytes of an uninterrupted build. A build may finish before its signal arrives,
-// but at least one of them must be interrupted.
+// SIGINT and SIGTERM stop a build with status 130, and the output file does not exist. The same
+// command then writes the bytes of an uninterrupted build. A build may finish before its signal
+// arrives, but at least one build must be interrupted.
 TEST_F(Interrupt, StopsAndResumes) {
   std::vector<std::string> clean = args_;
   clean[5] = "clean.vdag";
@@ -61,8 +61,8 @@ TEST_F(Interrupt, StopsAndResumes) {
   }
 }
 
-// Extracts and exports, stopped when they have made their first file. A run may end before its
-// signal comes, but not every time.
+// Stops extracts and exports after they have created their first file. A run may finish before its
+// signal arrives, but at least one run must be interrupted.
 class InterruptExport : public Interrupt {
  protected:
   void SetUp() override {
@@ -70,7 +70,7 @@ class InterruptExport : public Interrupt {
     ASSERT_EQ(run({"build", "s.glb", "-r", "1024", "-o", "s.vdag"}).status, 0);
     std::signal(SIGHUP, SIG_DFL);  // whatever runs the tests
   }
-  // The answer of a run that receives the signal once the file `first` exists.
+  // Sends the signal once the file `first` exists. Returns the result of the run.
   Answer interrupt_at(const std::string& first, int signal, const std::vector<std::string>& args) {
     Answer answer;
     for (int attempt = 0; attempt < 10; ++attempt) {

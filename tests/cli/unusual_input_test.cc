@@ -1,4 +1,4 @@
-// Defects that an attack on the program found; each test is named for the entry of the report.
+// Regression tests for defects that an attack on the program found.
 #include <sys/stat.h>
 
 #include <cstdlib>
@@ -14,7 +14,8 @@ class UnusualInput : public CommandLine {
  protected:
   void SetUp() override { make_scene(); }
   void build() { run_json({"build", "m.glb", "-r", "64", "-o", "m.vdag"}); }
-  // Runs a command that would overwrite `name`, which it must refuse and leave as it is.
+  // Runs a command that would overwrite `name`. Checks that it refuses and does not change the
+  // file.
   void expect_refused(const std::string& name, const std::vector<std::string>& args) {
     SCOPED_TRACE(name);
     const std::string before = contents(name);
@@ -25,7 +26,8 @@ class UnusualInput : public CommandLine {
 
 constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, for a byte that is not UTF-8
 
-// A path is bytes. In JSON, bytes that are not UTF-8 are replaced; the file has the exact name.
+// A path is a sequence of bytes. In JSON, U+FFFD replaces bytes that are not UTF-8. The file itself
+// has the exact name.
 TEST_F(UnusualInput, PathsNeedNotBeUtf8) {
   build();
   const auto expect_output = [&](std::vector<std::string> args, const std::string& suffix) {
@@ -41,8 +43,8 @@ TEST_F(UnusualInput, PathsNeedNotBeUtf8) {
   run_json({"diff", "p\xff.vdag", "m.vdag"});
 }
 
-// In a request there is no replacement for such bytes: they are invalid input, not an invalid
-// answer.
+// A request cannot contain bytes that are not UTF-8, so the client reports them as invalid input
+// before it sends the request.
 TEST_F(UnusualInput, ClientsRefuseNamesThatAreNotUtf8) {
   std::filesystem::create_directory(folder_.file("server"));
   ServeProcess server(folder_.file("server"));
@@ -64,14 +66,16 @@ TEST_F(UnusualInput, ClientsRefuseNamesThatAreNotUtf8) {
   EXPECT_EQ(server.stop(), 0);
 }
 
-// Without --force only files made by the same command are replaced, and never the input.
+// Without --force, a command replaces only files made by the same command. It never replaces its
+// input.
 TEST_F(UnusualInput, ForeignFilesAreNotOverwritten) {
   build();
   const std::vector<std::string> render = {"render", "m.vdag", "--size", "32x32", "-o"};
   const std::vector<std::string> generate = {"generate", "menger", "--level", "1"};
   for (std::vector<std::string> args : {render, generate}) {
     SCOPED_TRACE(args[0]);
-    // Neither text, nor a picture and a scene of another program, nor a file cut short.
+    // Not replaced: a text, the beginning of a picture or a scene that another program made, and a
+    // truncated file.
     for (const char* bytes : {"mine", "\x89PNG\r\n\x1a\n", "glTF", "g"}) {
       put("mine", bytes);
       args.push_back("mine");
@@ -109,7 +113,7 @@ TEST_F(UnusualInput, ABuildRefusesToOverwriteItsNeighbors) {
   run_json({"build", "m.glb", "-r", "128", "-o", "q"});
 }
 
-// What is no file is invalid input, whichever command reads it.
+// An input that is not a file, such as a folder, is invalid input for every command.
 TEST_F(UnusualInput, InputsThatAreNoFilesHaveOneStatus) {
   build();
   ASSERT_EQ(mkfifo(folder_.file("pipe").c_str(), 0600), 0);
@@ -126,7 +130,7 @@ TEST_F(UnusualInput, InputsThatAreNoFilesHaveOneStatus) {
     }
 }
 
-// A folder that is missing is noticed before the work is done.
+// A missing output folder is reported before the work begins.
 TEST_F(UnusualInput, AMissingOutputFolderIsNoticedFirst) {
   build();
   expect_error(3, "the folder none does not exist",
@@ -160,8 +164,8 @@ TEST_F(UnusualInput, NumbersAndMessages) {
   }
 }
 
-// Only the command that has the option --force names it. The scene is a triangle, 1000 times
-// 2^32 - 1 times at the same place: more than disks hold.
+// Only a message of a command that has the option --force names this option. The scene is one
+// triangle, 1000 * (2^32 - 1) times at the same place, which no disk can hold.
 TEST_F(UnusualInput, OnlyBuildNamesForce) {
   Json nodes = Json::array(), roots = Json::array();
   for (int i = 0; i < 1000; ++i) {
@@ -191,7 +195,7 @@ TEST_F(UnusualInput, OnlyBuildNamesForce) {
   EXPECT_EQ(plan.err.find("--force"), std::string::npos) << plan.err;
 }
 
-// A plan spills to a writable folder, wherever TMPDIR points.
+// A plan spills to a writable folder, even if TMPDIR does not name one.
 TEST_F(UnusualInput, PlanNeedsNoTmpdir) {
   for (const char* folder : {"/proc/none", ""}) {
     SCOPED_TRACE(folder);
@@ -202,7 +206,7 @@ TEST_F(UnusualInput, PlanNeedsNoTmpdir) {
   }
 }
 
-// What cannot be written to the standard output is an error, not an empty file and a success.
+// If the standard output cannot be written, this is an error.
 TEST_F(UnusualInput, OutputThatCannotBeWrittenIsAnError) {
   build();
   for (const char* command :

@@ -1,4 +1,4 @@
-// `voxdag view`: the page of one file on this machine, until Ctrl-C.
+// Tests `voxdag view`, which serves the page of one file on this machine until Ctrl-C.
 #include <signal.h>
 
 #include <chrono>

@@ -83,7 +83,7 @@ class ClusterTest(unittest.TestCase):
         return self.build
 
     def end(self, build, timeout=150):
-        """Waits until the build ends, and returns its output and messages. Later waits ignore it."""
+        """Waits until the build ends. Returns its output and messages. Later waits ignore it."""
         self.build = None
         try:
             return build.communicate(timeout=timeout)

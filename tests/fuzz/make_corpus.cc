@@ -1,9 +1,9 @@
-// Writes the first inputs of the fuzz targets below a folder:
+// Writes the first inputs of the fuzz targets to a folder:
 //
 //     fuzz_make_corpus tests/fuzz/corpus
 //
-// Run it again when a format gets a new version. What the fuzzers found in addition is committed
-// next to these, under names that are hashes.
+// Run it again when a format gets a new version. Inputs that fuzzers found are committed in the
+// same folders; their names are hashes.
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -49,7 +49,8 @@ void add_scenes(const Corpus& corpus) {
   for (const auto& [name, file] : compressed_scenes()) corpus.add("gltf_document", name, file);
 }
 
-// The index without its file, and the frames with the prefix that the target expects.
+// Adds the index without the rest of its file, and the frames after the prefix that the target
+// expects.
 void add_artifacts(const Corpus& corpus) {
   TemporaryFolder folder;
   constexpr uint32_t kGridLevels = 6, kHashBits = 64;
@@ -88,7 +89,7 @@ void add_artifacts(const Corpus& corpus) {
   }
 }
 
-// The first bytes of the header, and all between it and the checksum table.
+// Adds the first bytes of the header, and all bytes between the header page and the checksum table.
 void add_global_file(const Corpus& corpus, const char* name, const std::string& path,
                      size_t header_bytes) {
   const std::string file = read_bytes(path);
@@ -99,7 +100,7 @@ void add_global_file(const Corpus& corpus, const char* name, const std::string& 
              file.substr(0, header_bytes) + file.substr(page, table_at - page));
 }
 
-// The used part of the header page and the levels, without the checksum table.
+// The inputs have the used part of the header page and the levels, but no checksum table.
 void add_global_files(const Corpus& corpus) {
   TemporaryFolder folder;
   struct Input {
@@ -118,7 +119,7 @@ void add_global_files(const Corpus& corpus) {
   }
 }
 
-// The same with colors and other attributes, and the header up to the end of the attribute table.
+// The same for files with colors and other attributes; their headers end with the attribute table.
 void add_colored_files(const Corpus& corpus) {
   TemporaryFolder folder;
   struct Input {

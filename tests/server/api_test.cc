@@ -55,7 +55,7 @@ uint64_t red_pixels(const std::string& png) {
   return red;
 }
 
-// From the upload to the result, with the bytes of `voxdag build`.
+// From the upload of a scene to the result, which has the bytes of `voxdag build`.
 TEST_F(Api, TurnsASceneIntoADag) {
   start();
   ASSERT_EQ(put_scene("m.glb", scene_bytes()).status, 201);
@@ -133,7 +133,7 @@ TEST_F(Api, ServesRanges) {
   part = get({{"Range", "bytes=100-"}, {"If-Range", tag}});
   EXPECT_EQ(part.body, whole.body.substr(100));
   EXPECT_EQ(get({{"Range", "bytes=100-"}, {"If-Range", "\"other\""}}).status, 200);
-  // cpp-httplib 0.11 takes the rest of the connection for the content of a 304.
+  // cpp-httplib 0.11 reads all further bytes of the connection as the body of a 304.
   EXPECT_EQ(get({{"If-None-Match", tag}, {"Connection", "close"}}).status, 304);
   part = get({{"Range", "bytes=0-3,8-11"}});
   EXPECT_EQ(part.status, 206);
@@ -280,7 +280,8 @@ TEST_F(Api, ReportsWhyAJobFailed) {
   EXPECT_EQ(not_problem(http_->get("/api/v1/jobs/" + id + "/dag"), 404, "not_found"), "");
 }
 
-// What clients see of failures names the scene as they did, and no folder of the service's machine.
+// Messages for clients name the scene as the clients did. They contain no folder of the service's
+// machine.
 TEST_F(Api, NamesNoFolderOfItsMachine) {
   start();
   const auto expect_no_path = [&](const std::string& id) {
@@ -345,7 +346,7 @@ TEST_F(Api, AcceptsScenesInsideItsRootsOnly) {
   EXPECT_EQ(status("/etc/passwd"), 404);
 }
 
-// The API document, the pages and the messages have the endings of the table of formats.
+// The OpenAPI document, the pages and the messages list the endings of the table of formats.
 TEST_F(Api, ListsTheEndingsOfTheSceneFormats) {
   start();
   std::string suffixes = list_scene_endings("|", "|");

@@ -1,4 +1,4 @@
-// Viewers of files that are damaged, and clients that are slow, leave, or come from other sites.
+// Viewers of damaged files, and clients that are slow, disconnect, or come from other sites.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -168,7 +168,8 @@ class TilePermits : public RunningService {
   std::string base_, version_;
 };
 
-// However a request ends, the next request gets its permit, even while an answer is not read.
+// However a request ends, its permit becomes free for the next request, even if a client does not
+// read its answer.
 TEST_F(TilePermits, AreFreeWhenTheWorkIsDone) {
   const std::string tile = base_ + "/0/0" + version_;
   const std::string tag = http_->get(tile).header("ETag");

@@ -1,4 +1,5 @@
-// Uploads that are interrupted by a disk, by another client or by the end of the service.
+// Uploads that are interrupted by an error of the disk, by another client, or by the end of the
+// service.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -15,8 +16,8 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// A disk of a size set by the test, filled only by scenes, and a hook on reads of the parts of
-// uploads.
+// A disk whose size the test sets. Only scenes use its space. Tests can set a hook for reads of
+// unfinished uploads.
 class TestDisk : public ForwardingFiles {
  public:
   TestDisk() : ForwardingFiles(system_files()) {}
@@ -99,7 +100,8 @@ class InterruptedUpload : public RunningService {
   TestDisk disk_;
 };
 
-// The mark of a deletion that failed halfway does not take the scene that is uploaded next.
+// If a deletion fails halfway, its mark does not cause the deletion of the next scene with the same
+// name.
 TEST_F(InterruptedUpload, SurvivesADeletionThatFailed) {
   start();
   const std::string path = "/api/v1/scenes/m.glb", bytes = scene_bytes();
@@ -187,8 +189,8 @@ TEST_F(InterruptedUpload, IsRefusedByAServiceThatStops) {
   EXPECT_EQ(put_part("0123456789", 5, 10).status, 201);
 }
 
-// A job that is submitted while the last bytes arrive uses the scene as it was; the upload is
-// finished once the job has ended.
+// A job that is submitted while the last bytes arrive uses the old scene. The upload is finished
+// after the job has ended.
 TEST_F(InterruptedUpload, IsFinishedAfterAJobThatUsedTheScene) {
   config_.jobs.min_free_disk_bytes = 100 * kMiB;
   start();
@@ -236,7 +238,7 @@ TEST_F(InterruptedUpload, IsNotAcknowledgedWithoutTheDatabase) {
   EXPECT_EQ(put_scene("m.glb", "x").status, 201);
 }
 
-// A clock that was ahead for a while must not make all uploads old.
+// A clock that is temporarily ahead must not make all uploads count as old.
 TEST_F(InterruptedUpload, OutlivesAClockThatJumped) {
   const auto age = [&](const std::string& seconds) {
     SqlDatabase(data("scenes/scenes.db"), SqlDatabase::Mode::kReadWrite)

@@ -1,5 +1,5 @@
-// Regression tests for defects that lost the results of jobs, or left jobs in a state that did not
-// end.
+// Regression tests for defects that lost the results of jobs, or left jobs in a state that never
+// ended.
 #include <condition_variable>
 #include <csignal>
 #include <filesystem>
@@ -38,7 +38,8 @@ class JobRecovery : public RunningService {
     return http_->send("DELETE", "/api/v1/jobs/" + id, "");
   }
 
-  // The first step of this name waits until release(); with `when_armed`, the first after arm().
+  // Makes the first step with this beginning wait until release(). With `when_armed`, it is the
+  // first such step after arm().
   void hold_step(const std::string& beginning, bool when_armed = false) {
     armed_ = !when_armed;
     config_.before_step = [this, beginning](const std::string& step) {
@@ -198,7 +199,7 @@ TEST_F(JobRecovery, AJobThatWaitsForAnotherAttemptIsCanceledToo) {
   release();
 }
 
-// A process that was made, but has not begun the job's program, inherits the service's handler.
+// A new process that has not yet started the job's program inherits the service's signal handler.
 TEST_F(JobRecovery, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
   use_program(R"(sleep 1; echo '{"json":"{}","message":"result"}')");
   hold_step("run ");
@@ -214,7 +215,8 @@ TEST_F(JobRecovery, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
   std::signal(SIGTERM, before);
 }
 
-// A job started after all others were stopped would run to its end, and so would the service.
+// If a job were started after all others were stopped, it would run to its end, and the service
+// would wait for it.
 TEST_F(JobRecovery, AServiceThatStopsStartsNoOtherJob) {
   use_program("exec sleep 10");
   config_.jobs.max_concurrent = 2;

@@ -165,7 +165,7 @@ TEST_F(KilledService, DrainsAndResumes) {
   EXPECT_EQ(end(SIGTERM), 0);
 }
 
-// Idle clients do not use up the files that a service may open.
+// Idle clients do not use up the number of files that the service may open.
 TEST_F(KilledService, FewOpenFilesLeaveConnections) {
   max_files_ = 64;
   prepare();

@@ -36,8 +36,8 @@ class ServiceFailures : public RunningService {
   }
 };
 
-// Every step of the service and every handler fails when it is first called, with different
-// exceptions.
+// Every step of the service and every handler throws when it is first called. The exceptions are of
+// different types.
 TEST_F(ServiceFailures, NoFailureEndsTheService) {
   std::mutex mutex;
   std::set<std::string> failed;
@@ -89,7 +89,7 @@ TEST_F(ServiceFailures, NoFailureEndsTheService) {
     EXPECT_TRUE(failed.contains(step)) << step;
 }
 
-// A step that always fails, as on a broken disk, stops only the steps that depend on it.
+// A step that always fails, as on a broken disk, prevents only the steps that depend on it.
 TEST_F(ServiceFailures, StepsMayFailForEver) {
   std::atomic<bool> fails{true};
   config_.before_step = [&](const std::string& step) {
@@ -124,7 +124,7 @@ TEST_F(ServiceFailures, RetentionMeetsADeletion) {
   EXPECT_EQ(log().find("failed to remove old job"), std::string::npos) << log();
 }
 
-// A job that another version of the program queued fails, and the next one runs.
+// A job that another version of the program queued fails, and the next job runs.
 TEST_F(ServiceFailures, AJobThatCannotBeReadFails) {
   start();
   const std::string first = finished_job(), second = finished_job();

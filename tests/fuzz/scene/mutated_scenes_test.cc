@@ -1,5 +1,6 @@
-// Scenes with bytes changed at random either work or end with an Error: no crash, no hang, no
-// allocation by a count that the bytes do not bear out (the sanitizers and the budget watch).
+// Scenes with random changed bytes either work or end with an Error. They cause no crash, no
+// endless loop, and no allocation that the size of the file does not justify. Sanitizers and the
+// memory budget check this.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -14,10 +15,11 @@
 namespace voxdag::test {
 namespace {
 
-// A mutation may turn a count of instances into a large one; that is no reason to draw them all.
+// A mutation may declare a huge number of instances. The test does not read all of them.
 constexpr uint64_t kMaxTriangles = 200000;
 
-// Changes one to eight bytes: to anything, to a digit, to another byte of the file; or cuts it.
+// Truncates the file, or changes one to eight bytes: to a random byte, to a digit, or to another
+// byte of the file.
 std::string mutate(std::string file, std::mt19937& random) {
   const size_t changes = 1 + random() % 8;
   for (size_t i = 0; i < changes && !file.empty(); ++i) {
@@ -42,7 +44,8 @@ std::string mutate(std::string file, std::mt19937& random) {
   return file;
 }
 
-// Outcomes of the mutations. A fuzzer whose files all fail immediately, or all work, tests little.
+// Counts the outcomes of mutations. If all files fail immediately, or all work, the test is of
+// little use.
 struct Outcomes {
   int worked = 0;
   int refused = 0;
@@ -123,7 +126,7 @@ TEST(FuzzScene, MutatedMaterials) {
   EXPECT_GT(outcomes.refused, 100);
 }
 
-// Only numbers of the JSON change, so that most mutations reach the checks behind the parser.
+// Changes only numbers of the JSON, so that most mutations reach the checks after the parser.
 void run_with_numbers(SceneBuilder scene, uint32_t seed, Outcomes& outcomes) {
   const std::vector<uint64_t> kNumbers{0,
                                        1,
@@ -173,7 +176,8 @@ TEST(FuzzScene, MutatedNumbersOfMaterials) {
 }
 
 #if defined(VOXDAG_HAS_DRACO) && defined(VOXDAG_HAS_MESHOPT)
-// The decoders of compressed geometry: each file decodes as it is, and so do some mutations.
+// Tests the decoders of compressed geometry. Each unchanged file is decoded, and so are some
+// mutations.
 TEST(FuzzScene, MutatedCompressedGeometry) {
   uint32_t seed = 30;
   for (const auto& [name, file] : compressed_scenes()) {

@@ -1,5 +1,4 @@
-// A small scene that has every feature of glTF that voxdag reads or passes over: what fuzzers start
-// from.
+// A small scene for fuzzers to start from. It has every feature of glTF that voxdag reads or skips.
 #pragma once
 
 #include "core/image/png_writer.h"
