@@ -286,9 +286,9 @@ TEST_F(ServiceFailures, LimitsOfOneClient) {
   EXPECT_TRUE(until([&] { return put_scene("m.glb", "x").status == 201; }));
 }
 
-// A plan ends with the connection of the client that wants it.
+// A plan is stopped when the client that requested it disconnects.
 TEST_F(ServiceFailures, APlanEndsWithItsClient) {
-  // In place of the program: a plan that takes longer than this test.
+  // This script replaces the program: a plan that takes longer than the test.
   write_file_atomically(system_files(), folder_.file("slow"), "#!/bin/sh\nexec sleep 600\n");
   std::filesystem::permissions(folder_.file("slow"), std::filesystem::perms::owner_all);
   config_.program = folder_.file("slow");
@@ -352,7 +352,7 @@ TEST_F(ServiceFailures, ReadyzNoticesThatTheQueueIsGone) {
   }
 }
 
-// A clock that was ahead for a while must not make all results old.
+// A clock that is temporarily ahead must not make all results count as old.
 TEST_F(ServiceFailures, AClockThatJumpedDeletesNothing) {
   start();
   const std::string id = finished_job();

@@ -24,7 +24,7 @@ class SlowClients : public RunningService {
   }
 
   int port() const { return std::stoi(url().substr(url().rfind(':') + 1)); }
-  // Opens a connection and sends these bytes, as far as the service accepts them.
+  // Opens a connection and sends these bytes, until the service accepts no more of them.
   int open_with(const std::string& bytes) {
     sockets_.push_back(raw_connect(port()));
     send(sockets_.back(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -109,7 +109,7 @@ TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   EXPECT_EQ(answered(), 20);
 }
 
-// A blank before a colon must not hide the end of the body: the rest would be read as a request.
+// If a blank before a colon hid the length of the body, the body's end would be read as a request.
 TEST_F(SlowClients, ABlankBeforeTheColonIsRejected) {
   start();
   const std::string answer = raw_exchange(
@@ -145,7 +145,7 @@ TEST_F(SlowClients, ReadinessDoesNotDependOnWhoElseAsks) {
   }
 }
 
-// What is refused before it is a request is counted as well.
+// Malformed requests, which are refused before they reach a route, are also counted.
 TEST_F(SlowClients, MalformedRequestsAreCounted) {
   start();
   raw_exchange(port(), "hello\r\n\r\n");

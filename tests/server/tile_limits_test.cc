@@ -18,8 +18,7 @@
 namespace voxdag::server {
 namespace {
 
-// Returns the bytes of a tile of this number of levels that has everything a tile can have
-// (docs/format.md).
+// Returns the size of a tile with this number of levels and the maximum contents (docs/format.md).
 uint64_t bytes_of_fullest_tile(uint32_t levels) {
   uint64_t nodes = 0, of_level = 1;
   for (uint32_t l = 0; l < levels; ++l, of_level *= 8) nodes += of_level;
@@ -41,7 +40,8 @@ void make_soup(const std::string& path) {
   ASSERT_EQ(std::system(command.c_str()), 0);
 }
 
-// A service whose clients may have one request for tiles each, and all together two.
+// A service in which each client may have one tile request in progress, and all clients together
+// two.
 class TileLimits : public RunningService {
  protected:
   void SetUp() override {
@@ -87,7 +87,8 @@ class TileLimits : public RunningService {
       if (HasFailure()) return -1;
     }
   }
-  // Returns "" if the answer says that no permit was free; otherwise the difference.
+  // Returns "" if the answer reports that no permit was free; otherwise a description of the
+  // answer.
   static std::string not_busy(const ClientResponse& answer) {
     if (answer.status == 503 && answer.header("Retry-After") != "1") return "no Retry-After";
     if (answer.status == 503 && answer.header("Cache-Control") != "no-store") return "it is cached";
@@ -149,7 +150,7 @@ TEST_F(TileLimits, TilesAreNoLargerThanDocumented) {
     EXPECT_LE(query::encode_tile(dag, depth, {0, 0}).size() * 4, bytes_of_fullest_tile(depth));
 }
 
-// The file of `voxdag view` changes every time the service has checked its identity.
+// Changes the file of `voxdag view` each time the service has checked its identity.
 class ChangingFiles : public ForwardingFiles {
  public:
   using ForwardingFiles::ForwardingFiles;
@@ -176,8 +177,8 @@ class ChangingFiles : public ForwardingFiles {
   };
 };
 
-// What is made of a file that is being written may be of neither state: it is no answer, and no
-// browser keeps it. Afterwards there are answers again.
+// Tiles made while the file is written may mix old and new contents. So they are not sent, and no
+// browser stores them. When the writing ends, requests are answered again.
 TEST(OverwrittenFile, IsGoneWhileItsTilesAreMade) {
   const TemporaryFolder folder;
   const std::string path = folder.file("m.vdag"), scene = folder.file("m.glb");

@@ -93,7 +93,7 @@ TEST_F(Tiles, HaveAManifest) {
   EXPECT_EQ(http_->get(base_).header("Cache-Control"), "no-store");
 }
 
-// What a URL with a digest names never changes, so that it is sent once.
+// The contents of a URL with a digest never change, so they are sent once.
 TEST_F(Tiles, AreSentOnce) {
   finish_job();
   const std::string path = base_ + "/0/0" + version_, root = tile_bytes(result_, levels_, 0, 0);
@@ -132,7 +132,7 @@ TEST_F(Tiles, AreCompressedForClientsThatAcceptIt) {
   EXPECT_LT(packed.size(), whole.size());
 }
 
-// A batch is all of its tiles, in the requested order, or an error.
+// The answer to a batch has all of its tiles in the requested order, or is an error.
 TEST_F(Tiles, ComeInBatches) {
   finish_job();
   const auto file = open_global_file(result_);
@@ -203,7 +203,7 @@ TEST_F(Tiles, NeedTheRoleRead) {
   }
 }
 
-// What is built can be seen while the job runs, and not after it: then there is the result.
+// While a job runs, its built part can be viewed. Afterwards the result is viewed instead.
 TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
   start();
   put_scene("m.glb", scene_bytes());
@@ -323,7 +323,7 @@ TEST_F(View, NoticesThatTheFileWasReplaced) {
   EXPECT_EQ(status("0/0", m["digest"]), 404);
 }
 
-// Somebody truncates the file between a request's look at it and its reads.
+// The file is truncated after a request has checked it and before the request reads it.
 TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   build("64");
   const FileTileSource file(path_, system_files().open_read(path_)->identity());
@@ -337,7 +337,7 @@ TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   EXPECT_THROW(file.expect_readable(), Error);
 }
 
-// Somebody truncates the file after it is mapped, before or while its header and tables are read.
+// The file is truncated after it is mapped, before or while its header and tables are read.
 TEST_F(View, AFileThatIsTruncatedWhileItIsOpenedIsAnErrorAndNoCrash) {
   build("64");
   const FileIdentity identity = system_files().open_read(path_)->identity();

@@ -44,8 +44,8 @@ bool fits(DiskSpace& space, uint64_t announced) {
   }
 }
 
-// An upload that cannot fit is refused when it begins, an upload of unknown size when only the
-// reserve of the disk is left.
+// An upload that cannot fit is refused when it begins. An upload of unknown size is refused when
+// only the reserve of the disk is free.
 TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -67,8 +67,8 @@ TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   EXPECT_FALSE(space.is_low());
 }
 
-// Clients that announce the complete disk and send little do not exclude others; their next bytes
-// have reserved space.
+// Clients that announce the complete disk and send few bytes do not exclude others. Space for their
+// next bytes is reserved.
 TEST(DiskReservations, UploadsThatSendSlowlyKeepNobodyOut) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -123,7 +123,8 @@ TEST(DiskReservations, ABallastGivesRoomForDeletions) {
   EXPECT_FALSE(disk.exists(folder.file("ballast"))) << "the databases need room to open";
 }
 
-// A ballast that could be written in part only would be too small.
+// If the ballast file cannot be written completely, it is removed, because a part of it would be
+// too small.
 TEST(DiskReservations, ABallastIsWholeOrAbsent) {
   class FailingDisk : public SmallDisk {
    public:

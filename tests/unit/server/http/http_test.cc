@@ -32,7 +32,7 @@ TEST(ByteRanges, OutsideTheFileAreUnsatisfiable) {
   }
 }
 
-// A malformed or excessive header is ignored: the answer is the whole file.
+// A malformed or excessive Range header is ignored, so the answer is the complete file.
 TEST(ByteRanges, MalformedOrExcessiveHeadersAreIgnored) {
   for (const char* header :
        {"", "bytes", "bytes=", "bytes=-", "bytes=5-4", "bytes=a-b", "bytes=1", "items=0-1",
@@ -114,8 +114,8 @@ TEST(ConnectionTable, EvictsTheLongestWaiting) {
   EXPECT_EQ(table.size(), 2u);
 }
 
-// Connections that wait for their client within a body or an answer are also closed, unless they
-// wait only briefly.
+// Connections that wait for their client within a body or an answer are also closed, but only if
+// they have waited for some time.
 TEST(SlowConnections, SlowTransfersAreEvicted) {
   HttpLimits limits;
   limits.max_connections = 4;
@@ -135,7 +135,7 @@ TEST(SlowConnections, SlowTransfersAreEvicted) {
   EXPECT_FALSE(table.admit(-1, "10.0.0.3", slow)) << "only the fast one waits";
 }
 
-// New connections do not pile up while the threads of the evicted ones have no time to end.
+// The number of evicted connections whose threads have not ended is limited.
 TEST(SlowConnections, EvictedConnectionsAreBounded) {
   HttpLimits limits;
   limits.max_connections = 8;

@@ -1,4 +1,4 @@
-// How requests are read: the head from a text, whole exchanges over a socket pair.
+// Tests how requests are read: the head from a text, and complete exchanges over a socket pair.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -24,7 +24,7 @@ int status_of(const std::string& head) {
   return 200;
 }
 
-// A head that begins with these lines and is otherwise right.
+// Returns the status for a head that begins with these lines and is otherwise valid.
 int status_of_fields(const std::string& fields) {
   return status_of("GET / HTTP/1.1\r\nHost: a\r\n" + fields + "\r\n");
 }
@@ -131,7 +131,7 @@ class Client {
   }
 
   Connection& connection() { return *connection_; }
-  // The status that reading the next request's head ends with, 0 for none.
+  // Reads the head of the next request. Returns the status of its error, or 0.
   int next_request() {
     body_.clear();
     if (!connection_->wait_for_request()) return 0;
@@ -176,7 +176,7 @@ std::string put(const std::string& fields, const std::string& body) {
 }
 std::string chunked(const std::string& body) { return put("Transfer-Encoding: chunked\r\n", body); }
 
-// Requests follow each other on a connection, whatever way their bodies end.
+// A connection has several requests, whatever way their bodies end.
 TEST(Exchange, ReadsOneRequestAfterTheOther) {
   Client client("\r\n\r\n" + put("Content-Length: 3\r\n", "abc") +
                 chunked("3;x=y\r\nabc\r\n0A \r\n0123456789\r\n0\r\nTrailer: x\r\n\r\n") +
@@ -266,7 +266,7 @@ TEST(Exchange, TimesOut) {
   EXPECT_EQ(idle.next_request(), 0);
 }
 
-// A client that was fast for a while may not be silent for longer than another one.
+// A client that was fast before may not be silent for longer than other clients.
 TEST(HostileRequests, PastBytesDoNotExcuseSilence) {
   Client client(put("Content-Length: 1000000\r\n", std::string(100000, 'x')), true);
   ASSERT_EQ(client.next_request(), 200);
@@ -276,7 +276,8 @@ TEST(HostileRequests, PastBytesDoNotExcuseSilence) {
   EXPECT_LT(wall_seconds() - start, 20);
 }
 
-// An answer without content has no length; that to HEAD has the length of the content it omits.
+// An answer without content has no length. The answer to HEAD has the length of the content that it
+// omits.
 TEST(Exchange, WritesAnswers) {
   const auto answer_to = [](const std::string& request, Response response) {
     Client client(request);

@@ -203,7 +203,7 @@ TEST(Messages, AreLinesOfNamedMembers) {
   EXPECT_EQ(encode(Warning{"two\nlines"}), R"({"message":"warning","text":"two\nlines"})");
 }
 
-// A job's process is trusted no more than a file: its lines are checked.
+// The service checks the lines of a job's process, because it trusts them no more than a file.
 TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
   for (const char* line :
        {"", "hello", "[]", "null", "{", "{\"a\":1}", "[0,1,2,3,4,5,6,7,8,9,10]", R"({"message":1})",
@@ -257,7 +257,7 @@ TEST(Progress, IsPutTogetherFromMessages) {
               {"name":"n1","running":2,"built":1},{"name":"n3","running":0,"built":1}]})"));
 }
 
-// What earlier attempts did is done, but not at this one's rate.
+// The progress includes the work of earlier attempts, but the rate does not.
 TEST(Progress, GoesOnWhereAnEarlierAttemptEnded) {
   LiveJob live(0);
   live.apply(StageBegun{"build", "subvolumes", 4'000'000});
@@ -346,7 +346,7 @@ TEST(ConfinedFilesTest, OpensNothingOutside) {
   EXPECT_THROW(one.open_read(folder.file("in/side/b")), Error);
 }
 
-// An answer reveals neither the existence of a file outside nor a path of the machine.
+// An answer does not reveal whether a file outside exists, and contains no path of the machine.
 TEST(ConfinedFilesTest, DoesNotTellWhatIsOutside) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder.file("in"));
@@ -428,7 +428,7 @@ TEST_F(JobOutcome, ACrashIsReported) {
   EXPECT_EQ(job_.error->code, "out_of_memory");
 }
 
-// The signal to stop arrives before the process can handle it, or a second one does.
+// The signal to stop arrives before the process can handle it, or a second signal arrives.
 TEST_F(JobOutcome, AProcessThatWasStoppedAtOnceRunsAgain) {
   live_.stop();
   for (const ChildProcess::End& end :
@@ -456,7 +456,8 @@ TEST_F(JobOutcome, AStoppedRunGetsTheStateThatWasAskedFor) {
   EXPECT_EQ(job_.state, JobState::kSuspended);
 }
 
-// A run that ended by itself, in whatever way, shows that the job does not end the service.
+// A run that ended by itself, with any outcome, shows that the job does not cause the end of the
+// service.
 TEST_F(JobOutcome, ForgetsInterruptions) {
   job_.interruptions = 4;
   fail("no_space");

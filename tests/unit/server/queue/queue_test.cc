@@ -204,7 +204,7 @@ TEST_F(Queue, LetsEndedJobsExpire) {
   EXPECT_EQ(queue_->expired(1e12, 100).size(), 2u);
 }
 
-// Whoever may post jobs must not be able to remove the results of others with them.
+// A client that may post jobs must not be able to remove other clients' results by posting many.
 TEST_F(Queue, JobsExpireForThoseOfTheSamePosterOnly) {
   const auto end = [&](const std::string& poster, JobState state, double finished_s) {
     const std::string id = post().id;
@@ -222,7 +222,7 @@ TEST_F(Queue, JobsExpireForThoseOfTheSamePosterOnly) {
   EXPECT_EQ(std::count(expired.begin(), expired.end(), result), 0);
 }
 
-// A long job was posted before many short ones, and ends after them.
+// A long job was posted before many short jobs and ends after them, so it is kept longest.
 TEST_F(Queue, TheJobThatEndedLastStays) {
   const std::string lengthy = post().id, quick = post().id;
   const auto succeed = [&](const std::string& id, double finished_s) {
@@ -236,7 +236,7 @@ TEST_F(Queue, TheJobThatEndedLastStays) {
   EXPECT_EQ(queue_->expired(0, 1), (std::vector<std::string>{quick}));
 }
 
-// A clock that was set back does not make a job wait for as long.
+// If the clock was set back, a job does not wait for the difference.
 TEST_F(Queue, DoesNotWaitForAClockThatWasSetBack) {
   const std::string id = post().id;
   queue_->change(id, [](Job& j) { j.not_before_s = 1e6 + 900; });
@@ -244,7 +244,8 @@ TEST_F(Queue, DoesNotWaitForAClockThatWasSetBack) {
   EXPECT_TRUE(queue_->next(1e6 - 1, 900, {}));
 }
 
-// A job that takes the machine down with it is not tried for ever, and soon not first either.
+// A job that ends the service with every run is not run without limit. After some runs it is no
+// longer the first to run.
 TEST_F(Queue, InterruptedRunsCountInTheEnd) {
   const std::string id = post().id, other = post().id;
   int runs = 0;
@@ -274,7 +275,7 @@ TEST_F(Queue, RecoversNothingThatRuns) {
   EXPECT_EQ(queue_->find(id)->state, JobState::kRunning);
 }
 
-// A damaged row can be read, listed and deleted, and hides no other one.
+// A damaged row can be read, listed and deleted, and does not hide other rows.
 TEST_F(Queue, ReadsADamagedRow) {
   const std::string id = post().id, other = post().id;
   const auto damage = [&](const std::string& set) {
@@ -299,7 +300,8 @@ TEST_F(Queue, ReadsADamagedRow) {
   EXPECT_FALSE(queue_->find(id));
 }
 
-// A queue that is removed or replaced under the service is noticed before a job is lost in it.
+// If the queue's file is removed or replaced while the service runs, this is detected before a job
+// is lost.
 TEST_F(Queue, NoticesThatItsFileIsGone) {
   post();
   queue_->check_file();

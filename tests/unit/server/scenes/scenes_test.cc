@@ -88,7 +88,7 @@ TEST_F(Scenes, ArriveInOneGo) {
   EXPECT_FALSE(store_->upload("a.glb"));
 }
 
-// What arrived before the connection broke is not lost, even if the service restarts.
+// Bytes that arrived before the connection broke are kept, even if the service restarts.
 TEST_F(Scenes, ContinueWhereTheyBrokeOff) {
   {
     SceneUpload upload(*store_, "a.glb", 0, 10);
@@ -164,7 +164,7 @@ TEST_F(Scenes, AreListedByNameAndRemoved) {
   EXPECT_FALSE(store_->find("a.glb"));
 }
 
-// Neither the bytes that arrive nor the record of them may disappear under a request.
+// While an upload arrives, neither its bytes nor its record can be removed.
 TEST_F(Scenes, AreNotRemovedWhileTheyArrive) {
   SceneUpload upload(*store_, "a.glb", 0, 5);
   upload.write("hel");
@@ -209,7 +209,7 @@ TEST_F(Scenes, AreNotCompleteWithoutTheirBytes) {
   }
 }
 
-// The file of an upload that was lost, or is shorter than recorded, is sent again.
+// If the file of an upload is lost, or shorter than recorded, the upload starts over.
 TEST_F(Scenes, StartOverIfTheirBytesAreLost) {
   const std::string part = folder_.file("parts/a.glb");
   for (const char* left : {"", "0123"}) {
@@ -230,7 +230,7 @@ TEST_F(Scenes, StartOverIfTheirBytesAreLost) {
   EXPECT_EQ(contents("a.glb"), "ok");
 }
 
-// A lost database costs no scene, and files not created by an upload are not touched.
+// After the database is lost, all scenes remain. Files not created by an upload are not changed.
 TEST_F(Scenes, StayWithoutTheirDatabase) {
   put("a.glb", "hello");
   store_.reset();
@@ -260,7 +260,7 @@ TEST_F(Scenes, StayWithoutTheirDatabase) {
     EXPECT_TRUE(system_files().exists(folder_.file(name))) << name;
 }
 
-// A crash in the middle of a removal: the next start finishes it.
+// A removal that a crash interrupted is finished at the next start.
 TEST_F(Scenes, AreRemovedInTheEnd) {
   put("a.glb", "hello");
   system_files().rename(store_->path("a.glb"), store_->path("a.glb") + kDeleted);
@@ -344,7 +344,7 @@ TEST_F(Scenes, AreFinishedByAnEmptyPart) {
   }
 }
 
-// Nothing is acknowledged that is recorded in a database without a name.
+// A record in a database whose file was removed is not acknowledged.
 TEST_F(Scenes, AreNotRecordedInADatabaseThatIsGone) {
   put("b.glb", "old");
   { SceneUpload(*store_, "old.glb", 0, 5).write("x"); }

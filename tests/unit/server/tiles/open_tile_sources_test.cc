@@ -1,4 +1,4 @@
-// Files that several viewers look at, and what happens to them then.
+// Files that several viewers open, and changes of these files in the meantime.
 #include "server/tiles/open_tile_sources.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ class ViewedFilesTest : public testing::Test {
     token.cancel();
     return token;
   }
-  // True if the cameras have to be looked for, which a canceled token forbids.
+  // True if the cameras are not yet known, because their search fails with a canceled token.
   static bool needs_work(const FileTileSource& file) {
     try {
       file.manifest(canceled());
@@ -47,7 +47,8 @@ class ViewedFilesTest : public testing::Test {
   const std::string path_ = folder_.file("m.vdag");
 };
 
-// Concurrent openers of a file get the same object: its manifest is made once.
+// If several viewers open a file concurrently, they get the same object, so its manifest is made
+// once.
 TEST_F(ViewedFilesTest, AreOneForAllThatComeAtOnce) {
   for (int round = 0; round < 20; ++round) {
     OpenTileSources files(system_files(), 4);

@@ -21,8 +21,8 @@ class HandlesTerm {
   void (*before_)(int);
 };
 
-// What is sent between fork and exec would go to the handler of this program, which does nothing
-// for the next one.
+// A signal sent between fork and exec would call this program's handler, and the new program would
+// never receive it.
 TEST(ChildProcesses, AreStoppedBeforeTheirProgramBegins) {
   const TemporaryFolder folder;
   const HandlesTerm handler;
@@ -35,7 +35,7 @@ TEST(ChildProcesses, AreStoppedBeforeTheirProgramBegins) {
   }
 }
 
-// The thread that starts a child still gets its own signals.
+// The thread that starts a child process still receives its own signals.
 TEST(ChildProcesses, LeaveTheSignalsOfTheirParentAsTheyWere) {
   const TemporaryFolder folder;
   sigset_t before, after;

@@ -1,5 +1,5 @@
-// The process of a job on a failing machine: whatever fails, its reports and logs name no folder of
-// the machine, and a failed job names the faulty scene.
+// The process of a job on a failing machine. Whatever fails, its reports and logs name no folder of
+// the machine, and the failure of a scene names the scene.
 #include "server/jobs/process/job_process.h"
 
 #include <gtest/gtest.h>
@@ -67,7 +67,8 @@ class JobProcess : public testing::Test {
   struct Run {
     int exit_status = -1;
     std::string output, log;
-    // The text of the failure that was reported last, after its code; "" if none was.
+    // Returns the message of the last reported failure, without its code; "" if there was no
+    // failure.
     std::string failure() const {
       std::string found, line;
       for (std::istringstream lines(output); std::getline(lines, line);)
@@ -180,7 +181,7 @@ TEST_F(JobProcess, NamesNoFolderOfABrokenJob) {
   expect_failure("the job's folder", run());
 }
 
-// A disk that is full, or broken, from its n-th operation on.
+// The disk is full, or fails, from its n-th operation on.
 TEST_F(JobProcess, NamesNoFolderOfABrokenDisk) {
   for (const Fault fault : {Fault::kNoSpace, Fault::kIoError, Fault::kReadError}) {
     for (const JobTask::Kind kind : {JobTask::Kind::kBuild, JobTask::Kind::kPlan}) {

@@ -13,7 +13,7 @@
 namespace voxdag {
 namespace {
 
-// The occupied cells of a quarter of the cube's edge, from the finished file.
+// The occupied cells of the finished file. A cell's edge is a quarter of the cube's edge.
 class Cells {
  public:
   Cells(const voxdag_reader::File& file, const Cube& cube)

@@ -10,7 +10,7 @@
 namespace voxdag::server {
 namespace {
 
-// True if a voxel of the DAG is set, read from its words alone.
+// True if a voxel of the DAG is set. Reads only the DAG's words.
 bool is_set(const PartialDag& dag, uint32_t levels, uint64_t root, uint32_t x, uint32_t y,
             uint32_t z) {
   uint64_t at = root;
