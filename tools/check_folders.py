@@ -98,6 +98,8 @@ LAYERS = {
         "scene/gltf/document",
         "scene/gltf/json",
         "scene/ply",
+        "scene/indexed",
+        "scene/text",
         "scene/textures",
         "scene/vertices",
         "scene/generate",

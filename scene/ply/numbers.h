@@ -55,11 +55,8 @@ uint32_t as_index(T value) {
   return value < 0 ? kNoVertex : static_cast<uint32_t>(value);
 }
 
-// parse_integer() returns the integer that the complete text denotes. parse_real() returns the
-// number of type `type` that it denotes. Both return nullopt for any other text. For real types,
-// parse_real() rounds to nearest, accepts "nan" and "inf", and returns infinity for a number that
-// is too large.
-std::optional<int64_t> parse_integer(std::string_view text);
-std::optional<double> parse_real(std::string_view text, Type type);
+// Returns the number of type `type` that the complete text denotes, as parse_integer() or
+// parse_real() read it, or nullopt.
+std::optional<double> parse_number(std::string_view text, Type type);
 
 }  // namespace voxdag::ply

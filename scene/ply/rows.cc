@@ -2,9 +2,10 @@
 
 #include "core/base/error.h"
 #include "scene/messages.h"
-#include "scene/ply/ascii_text.h"
-#include "scene/ply/file_window.h"
 #include "scene/ply/numbers.h"
+#include "scene/text/file_window.h"
+#include "scene/text/numbers.h"
+#include "scene/text/word_scanner.h"
 
 namespace voxdag::ply {
 namespace {
@@ -150,7 +151,7 @@ class AsciiRows : public Rows {
   }
 
   const size_t list_;
-  AsciiText text_;
+  WordScanner text_;
 };
 
 }  // namespace

@@ -80,7 +80,7 @@ void VertexReader::read_line(uint64_t vertex, double* out) {
     const std::string_view word = text_->word();
     for (size_t p = 0; p < properties_.size(); ++p) {
       if (properties_[p] != i) continue;
-      const auto value = parse_real(word, properties[i].type);
+      const auto value = parse_number(word, properties[i].type);
       if (!value)
         refuse(ply_.file().path(), "vertex " + std::to_string(vertex) + " has " + printable(word) +
                                        ", expected a number");

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "scene/ply/ascii_text.h"
-#include "scene/ply/file_window.h"
 #include "scene/ply/ply_file.h"
+#include "scene/text/file_window.h"
+#include "scene/text/word_scanner.h"
 #include "scene/vertices/position_source.h"
 
 namespace voxdag::ply {
@@ -31,7 +31,7 @@ class VertexReader : public PositionSource {
 
   const PlyFile& ply_;
   std::optional<FileWindow> window_;
-  std::optional<AsciiText> text_;
+  std::optional<WordScanner> text_;
   const std::vector<size_t> properties_;
   std::vector<size_t> offsets_;  // offset of each property in a row
   size_t row_bytes_ = 0;

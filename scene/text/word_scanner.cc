@@ -1,18 +1,17 @@
-#include "scene/ply/ascii_text.h"
+#include "scene/text/word_scanner.h"
 
-namespace voxdag::ply {
+#include "scene/text/characters.h"
+
+namespace voxdag {
 namespace {
 
 // Maximum length of a word. No program writes longer numbers. A longer word is returned in pieces,
 // so the row has too many words and is refused.
 constexpr size_t kMaxWord = 64;
 
-bool is_line_end(char c) { return c == '\n' || c == '\r'; }
-bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
-
 }  // namespace
 
-void AsciiText::begin_row(uint64_t offset) {
+void WordScanner::begin_row(uint64_t offset) {
   offset_ = offset;
   skip_blanks();
   while (is_line_end(peek())) {
@@ -21,7 +20,7 @@ void AsciiText::begin_row(uint64_t offset) {
   }
 }
 
-std::string_view AsciiText::word() {
+std::string_view WordScanner::word() {
   skip_blanks();
   const auto bytes = window_.at(offset_, kMaxWord);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()),
@@ -32,7 +31,7 @@ std::string_view AsciiText::word() {
   return text.substr(0, size);
 }
 
-bool AsciiText::end_row() {
+bool WordScanner::end_row() {
   skip_blanks();
   const char c = peek();
   if (c != '\0' && !is_line_end(c)) return false;
@@ -42,13 +41,13 @@ bool AsciiText::end_row() {
 
 // Returns 0 at the end of the file. A byte with the value 0 is neither a blank nor a digit, so it
 // is refused as a word.
-char AsciiText::peek() {
+char WordScanner::peek() {
   const auto bytes = window_.at(offset_, 1);
   return bytes.empty() ? '\0' : static_cast<char>(bytes[0]);
 }
 
-void AsciiText::skip_blanks() {
+void WordScanner::skip_blanks() {
   while (is_blank(peek())) ++offset_;
 }
 
-}  // namespace voxdag::ply
+}  // namespace voxdag

@@ -11,7 +11,7 @@
 #include "core/base/page_buffer.h"
 #include "core/io/file_system.h"
 
-namespace voxdag::ply {
+namespace voxdag {
 
 class FileWindow {
  public:
@@ -44,4 +44,4 @@ class FileWindow {
   uint64_t begin_ = 0, end_ = 0;  // range of the file in bytes_
 };
 
-}  // namespace voxdag::ply
+}  // namespace voxdag

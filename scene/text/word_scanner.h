@@ -1,18 +1,18 @@
-// The rows of an ASCII PLY file, read word by word. Each row is one line; blank lines are skipped.
-// Not thread-safe.
+// Reads the lines of a text file word by word, such as the rows of an ASCII PLY file. Blank lines
+// are skipped. Not thread-safe.
 #pragma once
 
 #include <cstdint>
 #include <string_view>
 
-#include "scene/ply/file_window.h"
+#include "scene/text/file_window.h"
 
-namespace voxdag::ply {
+namespace voxdag {
 
-class AsciiText {
+class WordScanner {
  public:
-  // The file must outlive the text.
-  AsciiText(const ReadableFile& file, MemoryBudget& budget) : window_(file, budget) {}
+  // The file must outlive the scanner.
+  WordScanner(const ReadableFile& file, MemoryBudget& budget) : window_(file, budget) {}
 
   // Moves to the line at `offset` or, if this line is blank, to the next line with text.
   void begin_row(uint64_t offset);
@@ -30,4 +30,4 @@ class AsciiText {
   uint64_t offset_ = 0;
 };
 
-}  // namespace voxdag::ply
+}  // namespace voxdag

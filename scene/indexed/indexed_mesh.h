@@ -1,0 +1,47 @@
+// A mesh whose triangles are vertex indices, as one thread reads it from a scene file. It is the
+// input of an IndexedCursor, so that a format implements only what its files store. Not
+// thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "core/color/surface.h"
+#include "scene/vertices/position_source.h"
+
+namespace voxdag {
+
+class IndexedMesh {
+ public:
+  virtual ~IndexedMesh() = default;
+
+  // The path of the scene file, for messages.
+  virtual const std::string& path() const = 0;
+  // The vertices. There are fewer than 2^32 - 1.
+  virtual PositionSource& positions() = 0;
+  // Writes the vertex indices of triangles [first, first + count) to `corners`, three per triangle.
+  // The triangles must exist, but their vertex indices may be out of range. An index that is
+  // negative or needs more than 32 bits is UINT32_MAX.
+  virtual void read_corners(uint64_t first, uint64_t count, uint32_t* corners) = 0;
+
+  // Prepares read_surfaces(). `cursors` is the number of cursors that share the memory. Returns
+  // false if all triangles are white, with material 0.
+  virtual bool open_surfaces(unsigned /*cursors*/) { return false; }
+  // Sets material and corners of out[i], for triangle first + numbers[i] of the last call of
+  // read_corners(), which wrote `corners`. The vertices of these triangles exist.
+  virtual void read_surfaces(std::span<const uint32_t> /*numbers*/, const uint32_t* /*corners*/,
+                             SurfaceTriangle* /*out*/) {}
+
+  // Returns the place of a triangle in the file for messages, such as "face 5".
+  virtual std::string place_of(uint64_t triangle) = 0;
+  // Returns corner `corner` of a triangle, whose vertex index is out of range, for messages.
+  virtual std::string name_index(uint64_t /*triangle*/, int /*corner*/, uint32_t index) {
+    return index == UINT32_MAX ? "an index that is negative or too large"
+                               : "index " + std::to_string(index);
+  }
+  // Returns a vertex for messages.
+  virtual std::string name_vertex(uint32_t index) { return "vertex " + std::to_string(index); }
+};
+
+}  // namespace voxdag
