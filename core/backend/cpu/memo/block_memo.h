@@ -7,7 +7,8 @@
 //
 // The cache is direct-mapped: a new block replaces the block in its slot. All bytes of a block are
 // compared, so a hit is correct even if different blocks have the same key. When most lookups miss,
-// the cache is not used for a while. This happens in scans, where almost no blocks are equal.
+// the cache is not used for a while. This happens for scanned 3D models, where almost no blocks are
+// equal.
 //
 // The cache is charged to the budget. It grows beyond its minimum size only up to a sixteenth of
 // the memory that is still free in the budget. Throws OutOfBudget if not even the minimum size

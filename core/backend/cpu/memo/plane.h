@@ -57,7 +57,8 @@ std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t) {
 // Returns the plane of a triangle, which must not be degenerate.
 Plane plane_of(const NarrowTriangle& t);
 
-// The range of n.k for the voxels k that a plane with offset f crosses: low <= n.k <= high.
+// The range of n.k for the voxels that a plane with offset f crosses: low <= n.k <= high, where k
+// is the position of the voxel's low corner in the cube, in voxels.
 struct PlaneRange {
   int64_t low, high;
 
@@ -67,8 +68,10 @@ struct PlaneRange {
       rising += x > 0 ? x : 0;
       size += x > 0 ? x : -x;
     }
-    // At the corners of voxel k, the plane's largest value is n.k + f + rising. Its smallest value
-    // is `size` less.
+    // Over the corners x of voxel k, the maximum of n.x + f is n.k + f + rising, and the minimum is
+    // `size` less. The plane crosses the voxel if the maximum is >= 0 and the minimum <= 0. If
+    // `fractional`, the exact value at each corner is greater than n.x + f by less than 1, so the
+    // minimum must be <= -1.
     low = -(f + rising);
     high = low + size - (fractional ? 1 : 0);
   }

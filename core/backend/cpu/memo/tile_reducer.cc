@@ -85,7 +85,8 @@ NodeRef TileReducer::reduce(int words, int count, int from_log2, int size_log2) 
         rest &= ~(uint64_t{0xff} << 8 * byte);
         above |= uint64_t{1} << byte;
       }
-      // Word w / 8 of the next level has already been read.
+      // Overwrites word w / 8 with bits of the next level. Its old bits have already been
+      // processed, because w / 8 <= w.
       existing_.words[w / 8] = w % 8 == 0 ? above : existing_.words[w / 8] | above << 8 * (w % 8);
     }
     look_up(parents_, tables_.nodes(s), hashes_, ids_);

@@ -74,14 +74,15 @@ class TileReducer {
   static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
 
   static constexpr int kMaxBricks = kTileBlocks * kBlockBricks;
-  // Max children of a node. A table reads this many ids from a node's first child on, even if the
-  // node has fewer children, so the arrays of ids have as many elements more.
+  // Max children of a node. NodeTable::find_or_add() may read this many ids, beginning with the id
+  // of a node's first child. So the arrays of ids have this many spare elements at their ends.
   static constexpr int kChildren = 8;
 
   SubDagTables& tables_;
   const Kernels& kernels_;
   BlockMemo memo_;
-  // The current level: the set of non-empty cubes, and their ids and hashes in this order.
+  // The current level: the bit set of its non-empty cubes, and the ids and hashes of their nodes,
+  // in the order of the bits.
   union {
     uint64_t words[kTileBlocks / 64];
     uint8_t bytes[kTileBlocks / 8];

@@ -21,8 +21,8 @@ constexpr uint64_t line_along(int axis) {
          uint64_t{1} << (low_bit(axis) + high_bit(axis));
 }
 
-// For each of the 64 voxels of a brick: the plane's value there minus its value at the brick's
-// first voxel.
+// For each of the 64 voxels of a brick: n.k (tile_triangle.h) at this voxel minus n.k at the
+// brick's first voxel.
 template <class Int>
 struct VoxelOffsets {
   Int of[64];
@@ -45,9 +45,9 @@ uint64_t plane_mask(const VoxelOffsets<Int>& offsets, Int at_first, Int width) {
   return mask;
 }
 
-// Removes the voxels whose column along `axis` is on the outer side of an edge. An edge whose
-// smallest value over the brick is not negative removes nothing and is skipped. This is the usual
-// case, because most edges cross few bricks.
+// Removes the voxels whose column along `axis` is on the outer side of an edge. If the value of an
+// edge (TileTriangle::Edge) is not negative anywhere in the brick, the edge removes nothing and is
+// skipped. This is the usual case, because most edges cross few bricks.
 template <class Edge>
 void cut_by_edges(const Edge (&edges)[3], int axis, const int (&brick)[3], uint64_t& mask) {
   const int p = (axis + 1) % 3, q = (axis + 2) % 3;

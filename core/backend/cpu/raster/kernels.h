@@ -40,10 +40,11 @@ struct Kernels {
   // other bits of the last word are 0.
   void (*find_in_range)(const int64_t* values, int count, int64_t low, int64_t high,
                         uint64_t* bits);
-  // Finds the non-empty blocks among the first 8 * groups voxel blocks of the tile and returns
-  // their number. Writes their numbers in the tile and their keys (block_key()) in Morton order,
-  // and sets their bits in the 8 * groups bits of `existing`. Clears the touched marks of all these
-  // blocks. `numbers` and `keys` need space for one more element.
+  // Finds the non-empty blocks among the first 8 * groups voxel blocks of the tile, and returns the
+  // number of these blocks. Writes their indexes in TileBricks::blocks to `numbers` and their keys
+  // (block_key()) to `keys`, in Morton order. Sets their bits in the 8 * groups bits of `existing`.
+  // Clears TileBricks::touched of all 8 * groups blocks. `numbers` and `keys` need space for one
+  // element more than the number that is returned.
   int (*list_blocks)(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
                      uint64_t* keys);
   // Copies the non-empty bricks of a voxel block to the front of `bricks`, which has space for

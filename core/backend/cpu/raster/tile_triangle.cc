@@ -47,8 +47,8 @@ bool TileTriangle<Coordinate>::set_plane(const int64_t (&v)[3][3], int64_t (&hal
   dominant = size[1] > size[0] ? 1 : 0;
   if (size[2] > size[dominant]) dominant = 2;
   if (normal[dominant] < 0) {
-    // The normal is negated together with the half-edges, so that the edges in set_edges() are the
-    // same.
+    // Also negates the half-edges. set_edges() multiplies them by the sign of the normal, so the
+    // edges remain the same.
     for (int a = 0; a < 3; ++a) {
       normal[a] = -normal[a];
       for (int i = 0; i < 3; ++i) half[a][i] = -half[a][i];
@@ -71,8 +71,8 @@ void TileTriangle<Coordinate>::set_edges(const int64_t (&v)[3][3], const int64_t
   constexpr int64_t kClamp = int64_t{1} << 60;
   for (int d = 0; d < 3; ++d) {
     const int p = (d + 1) % 3, q = (d + 2) % 3;
-    // If set_plane() has negated the half-edges, it has also negated the normal, so `sign`
-    // compensates for it.
+    // If set_plane() has negated the half-edges, it has also negated the normal, and therefore
+    // `sign`. So a and b are the same in both cases.
     const int64_t sign = normal[d] < 0 ? -1 : 1;
     for (int i = 0; i < 3; ++i) {
       const int64_t a = -half[q][i] * sign, b = half[p][i] * sign;

@@ -1,4 +1,5 @@
-// The DAG of a subvolume in a space, as level arrays in the total order (core/dag/level_array.h).
+// The DAG of a subvolume in the memory of a space (space.h), as level arrays in the total order
+// (core/dag/level_array.h).
 #pragma once
 
 #include <cstdint>

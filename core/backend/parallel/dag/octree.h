@@ -59,8 +59,8 @@ struct MakeParent {
   }
 };
 
-// Creates `level_count` levels above the bricks. `bricks` must be merged and not empty; its arrays
-// are moved out.
+// Creates `level_count` levels above the bricks. `bricks` must be sorted by code, without
+// duplicates (see BrickList::merge()), and not empty; its arrays are moved out.
 template <class Space>
 Octree<Space> make_octree(Space& space, BrickList<Space>& bricks, uint32_t level_count) {
   Octree<Space> tree;

@@ -11,8 +11,9 @@
 
 namespace voxdag::parallel {
 
-// Flags the first code in each larger cube. Codes are sorted. The codes in one larger cube have
-// equal bits from bit `shift` up.
+// Sets flags[i] to 1 if codes[i] is the first code of its cube, otherwise to 0. Two codes are in
+// the same cube if their bits from `shift` up are equal. The codes are sorted, so the codes of a
+// cube are consecutive.
 struct MarkFirstOfCube {
   const uint64_t* codes;
   int shift;

@@ -106,8 +106,8 @@ class HostSpace {
   template <bool kWithValues>
   void radix_sort(Array<uint64_t>& keys, Array<uint64_t>& key_scratch, Array<uint32_t>* values,
                   Array<uint32_t>* value_scratch, uint32_t n, BitRange bits);
-  // Returns the number of parts into which functions divide n items if they count in each part
-  // separately.
+  // Returns the number of parts into which functions such as scan() divide n items: one for each
+  // thread, or fewer if parts would have less than 4096 items.
   uint32_t part_count(uint32_t n) const;
   // Calls body(part, begin, end) for the items of each part.
   template <class Body>

@@ -55,8 +55,8 @@ class Order {
   uint32_t count() const { return count_; }
   const uint32_t* items() const { return items_.data(); }
 
-  // Sorts the items stably by a range of the bits of key(item). Both host and device can call the
-  // functor `key`.
+  // Sorts the items stably by a range of the bits of key(item). The functor `key` must have a
+  // host+device operator(), because the space may call it on the device.
   template <class Key>
   void sort_by(Key key, BitRange bits) {
     SpaceArray<Space, uint64_t> key_scratch(space_, count_);

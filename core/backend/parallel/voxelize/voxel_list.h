@@ -64,18 +64,18 @@ class VoxelList {
   SpaceArray<Space, uint64_t> codes_, scratch_, bits_, packed_;
 };
 
-// Returns the number of items of `bytes_each` that fit in 1/share of the available memory: at least
-// `min_count`, at most 64 windows of the space.
+// Returns the number of items of `bytes_each` bytes that fit in 1/share of the available memory,
+// but at least `min_count` and at most 64 * Space::kWindow.
 template <class Space>
 uint32_t fitting_count(Space& space, uint64_t share, uint64_t bytes_each, uint64_t min_count) {
   return static_cast<uint32_t>(
       std::clamp(space.available() / share / bytes_each, min_count, 64 * Space::kWindow));
 }
 
-// Copies up to `max_count` of the next triangles to `out`, in the space. Returns their number, 0 at
-// the end of the stream. The triangles pass through a staging area on the host. A GPU has two
-// areas, so that one is filled while the other is copied. On the host the staging area is the
-// destination itself.
+// Copies up to `max_count` of the next triangles to `out`, which is in the memory of the space.
+// Returns their number, 0 at the end of the stream. The triangles pass through a staging area on
+// the host. A GPU has two areas, so that one is filled while the other is copied. On the host the
+// staging area is the destination itself.
 template <class Space>
 uint32_t upload_triangles(Space& space, TriangleStream& stream, FixedTriangle* out,
                           uint32_t max_count) {

@@ -7,8 +7,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// A brick's 64 voxels as bytes of two vectors: bit 5 of a voxel's number chooses the vector, bit 4
-// its half.
+// A brick's 64 voxels as bytes of two vectors. Bit 5 of a voxel's number selects the vector, and
+// bit 4 selects the half of the vector.
 template <int D>
 struct ByteOrder {
   alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel column's number
@@ -33,8 +33,9 @@ inline constexpr ByteOrder<D> kByteOrder;
 template <int D>
 class Spread {
  public:
-  // The high bit of a column's q tells which half of `bounds` has the column. For D = 1 this bit
-  // selects the vector of the column's voxels, otherwise the half of a vector.
+  // The high bit of a voxel column's q selects the half of `bounds` that has the bounds of the
+  // voxel column. For D = 1, this bit also selects the vector that has the voxels of the voxel
+  // column. Otherwise it selects the half of each vector.
   VOXDAG_INLINE explicit Spread(HeightBounds bounds) {
     const __m256i halves[2] = {D == 1 ? _mm256_permute4x64_epi64(bounds, 0x44) : bounds,
                                D == 1 ? _mm256_permute4x64_epi64(bounds, 0xee) : bounds};

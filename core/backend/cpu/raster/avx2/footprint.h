@@ -3,7 +3,8 @@
 // Exact: these are the overlap test's edge and box tests in this projection.
 //
 // A row of bricks is processed as four rows of 64 voxel columns, one bit for each voxel column. In
-// each of the four rows, the edges bound the coordinate p.
+// each of the four rows, the triangle's edges and box give the first and the last voxel column of
+// the footprint (edge_bounds.h).
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -64,7 +65,8 @@ struct Footprint {
   static VOXDAG_INLINE void store(uint16_t (&row)[16], __m256i bits) {
     _mm256_store_si256(reinterpret_cast<__m256i*>(row), bits);
   }
-  // Returns the number of voxels to shift out. Shifting by 64 leaves none.
+  // Converts the bounds of four rows to shift counts, at most 64. Shifting a row by this count
+  // clears the voxels outside the bound.
   static VOXDAG_INLINE __m256i count(__m256d x) {
     return _mm256_cvtepi32_epi64(_mm256_cvttpd_epi32(_mm256_min_pd(x, _mm256_set1_pd(64.0))));
   }

@@ -34,7 +34,7 @@ Octants test_octants(const NarrowTriangle& triangle, const LatticeCube& cube, bo
 
 const __m256i* halves(const VoxelBlock& block) { return reinterpret_cast<const __m256i*>(&block); }
 
-// block_key() for four bricks per step.
+// Computes block_key() of a block, four bricks per step, and tests whether the block has voxels.
 BlockSummary summarize(const VoxelBlock& block) {
   const __m256i low = _mm256_load_si256(halves(block));
   const __m256i high = _mm256_load_si256(halves(block) + 1);

@@ -40,8 +40,8 @@ constexpr SideOrder kSideOrder;
 
 // Sides stores bounds of heights in the tile, with kBelowFloor added to `below` and kOverFloor
 // added to `over`, so that no bound is negative. To get the HeightBounds of a column of bricks that
-// begins in `brick`, it subtracts byte[brick + kLowestBrick]. `brick` can be negative, because a
-// column can begin up to ten voxels below the tile (heights.h).
+// begins in `brick`, Sides subtracts BrickFloors::byte[brick + kLowestBrick]. `brick` can be
+// negative, because a column can begin up to ten voxels below the tile (heights.h).
 constexpr int kBelowFloor = 16, kOverFloor = 64, kLowestBrick = 4;
 struct BrickFloors {
   alignas(16) uint8_t byte[16 + kLowestBrick][16] = {};

@@ -7,7 +7,7 @@
 namespace voxdag::cpu {
 namespace {
 
-// block_key() for eight bricks per step.
+// Computes block_key() of a block, eight bricks per step, and tests whether the block has voxels.
 BlockSummary summarize(const VoxelBlock& block) {
   const __m512i bricks = _mm512_load_si512(&block);
   const __m512i sums = _mm512_add_epi32(bricks, _mm512_load_si512(kBlockKeys.add));
