@@ -22,8 +22,8 @@ class AttributeEncoder {
         colors_(levels) {}
 
   // Adds baked cells in increasing order of their codes, to which `first_code` is added. `values`
-  // has an element for each cell if the attribute is one of AttributeSums. Otherwise it may be
-  // empty.
+  // has an element for each cell if the attribute is in the list of AttributeSums
+  // (attribute_sums.h). Otherwise it may be empty.
   void add(std::span<const ColoredCell> cells, std::span<const CellValues> values,
            uint32_t first_code);
   bool empty() const { return traits_.is_color() ? colors_.empty() : values_.empty(); }

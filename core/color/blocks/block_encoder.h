@@ -96,7 +96,8 @@ class BlockEncoder {
     if (b.error == 0) return pack_b(b);
     Fit a;
     fit<BlockModeA>(block, count, projection, a);
-    // With different ends, the first end is greater than 0, which distinguishes mode A from mode B.
+    // A decoder recognizes mode B by 0 in the first 16 bits, where mode A stores its first end. The
+    // first end is the larger one, so it is not 0 if the ends differ.
     return a.error < b.error && a.ends[0] != a.ends[1] ? pack_a(a) : pack_b(b);
   }
 

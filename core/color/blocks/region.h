@@ -19,8 +19,9 @@
 
 namespace voxdag {
 
-// To find a cell's rank among all cells of its level, a reader adds its rank within the ancestor
-// this many levels above it to the ancestor's entry in `prefix`.
+// The entries of EncodedRegion::prefix are for cubes this many levels above the cells of a table's
+// level. A reader adds the entry of a cell's ancestor to the cell's rank within this ancestor. The
+// sum is the cell's rank among all cells of its level in the region.
 inline constexpr uint32_t kPrefixLevels = 4;
 
 struct EncodedRegion {

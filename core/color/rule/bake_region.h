@@ -107,7 +107,7 @@ class RegionBaker {
 
  private:
   static constexpr size_t kMaxWaiting = 1 << 16;
-  // A triangle that touches a cell and covers no column of it.
+  // A triangle that touches a cell and covers no column (cell_triangle.h) of the cell.
   struct Waiting {
     uint32_t triangle, code;
   };
@@ -280,7 +280,7 @@ class RegionBaker {
   int64_t first_[3] = {}, last_[3] = {};  // cells of the region
   color::RegionCells cells_;
   std::vector<Waiting> waiting_;
-  std::vector<CellValues> values_;  // always empty
+  std::vector<CellValues> values_;  // values that finish(cells) discards
 };
 
 // RegionBaker::bake() for a single region.

@@ -63,7 +63,7 @@ class MaterialSums {
   struct FurtherMaterial {
     uint32_t cell = 0;
     uint32_t material = 0;
-    uint64_t weight = 0;  // twice the weight, plus 1 if it was added after the reset
+    uint64_t weight = 0;  // twice the weight, plus 1 if it was added after reset(cell)
 
     bool is_like(const FurtherMaterial& other) const {
       return cell == other.cell && material == other.material && !((weight ^ other.weight) & 1);
@@ -76,7 +76,7 @@ class MaterialSums {
   };
 
   // Sorts further_ and adds up the weights that belong together: same cell, same material, and both
-  // before or both after the reset.
+  // added before or both added after the call of reset() for the cell.
   void add_up() {
     std::sort(further_.begin(), further_.end());
     size_t count = 0;

@@ -49,7 +49,7 @@ VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& t
     du[i] = static_cast<double>(c[j].texture[0] - c[i].texture[0]);
     dv[i] = static_cast<double>(c[j].texture[1] - c[i].texture[1]);
   }
-  double texels;  // number of texels, times 2^(2 kTextureBits)
+  double texels;  // in the triangle, counted twice like `area`, times 2^(2 kTextureBits)
   if (area > 0) {
     const double determinant = du[0] * dv[1] - du[1] * dv[0];
     texels = (determinant < 0 ? -determinant : determinant) * (width * height);
@@ -71,7 +71,7 @@ VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& t
   }
   const double cell = static_cast<double>(int64_t{1} << cell_bits);
   const double available = texels * (cell * cell);
-  double needed = area * 0x1p50;  // 2^(2 kTextureBits), times 4 for level 1
+  double needed = area * 0x1p50;  // for level 1: 4 * area * 2^(2 kTextureBits)
   const uint32_t levels = textures.levels(image);
   uint32_t level = 0;
   for (; level + 1 < levels && needed <= available; ++level) needed *= 4;
@@ -104,7 +104,7 @@ VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, 
   const auto add = [](__m128i* to, __m128i more) {
     _mm_storeu_si128(to, _mm_add_epi64(_mm_loadu_si128(to), more));
   };
-  // 1 as the fourth channel, for the sums of weights.
+  // The fourth channel is 1, so that the same products also give the sums of weights.
   const Texel with_one = (texel & 0xffffffffffffull) | Texel{1} << 48;
   const __m128i zero = _mm_setzero_si128();
   const __m128i all = _mm_unpacklo_epi16(_mm_cvtsi64_si128(static_cast<int64_t>(with_one)), zero);

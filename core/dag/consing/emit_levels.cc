@@ -1,10 +1,11 @@
 // Converts tables to level arrays, from the bricks up. Each level of nodes takes three passes:
 //
-//   1. Replace the child ids in the level's records by the children's positions in the next level's
-//      array. This pass visits the records in the order in which they were added, which is also
-//      their order in memory.
+//   1. Replace the child ids in the level's records by the children's positions in the array of the
+//      level below. This pass visits the records in the order in which they were added, which is
+//      also their order in memory.
 //   2. Sort the slots.
-//   3. Copy the records in the sorted order, and store the position of each record in it.
+//   3. Copy the records to the level's array in the order of the slots. Store in each record its
+//      position in the array, for pass 1 of the level above.
 #include <algorithm>
 #include <cstring>
 
