@@ -20,7 +20,7 @@ namespace voxdag {
 void* allocate_pages(size_t bytes, std::string_view what);
 // Grows an allocation from `bytes` to `new_bytes` bytes and returns its address, which may have
 // changed. The new pages are zero-filled. Pages may move to other addresses, but their bytes are
-// not copied. Throws like allocate_pages().
+// not copied (except in builds with ThreadSanitizer). Throws like allocate_pages().
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what);
 void free_pages(void* pages, size_t bytes);
 

@@ -56,7 +56,7 @@ class Progress {
   // set_subvolumes().
   virtual void set_grid(const std::array<double, 3>& /*origin*/, double /*edge*/) {}
   // Reports all subvolumes of the build, including subvolumes built by an earlier run. `resolution`
-  // is the grid's, in voxels per edge. Replaces all earlier reports of subvolumes.
+  // is the number of voxels along an edge of the grid. Replaces all earlier reports of subvolumes.
   virtual void set_subvolumes(uint64_t /*resolution*/, std::span<const SubvolumeStatus> /*all*/) {}
   // A worker has begun to build a planned subvolume. The subvolume is finished when
   // subvolume_built() or subvolume_split() is called.

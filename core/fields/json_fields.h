@@ -212,7 +212,8 @@ FieldJson record_json(const T& record) {
   return json_fields::encode(record);
 }
 
-// Throws a FieldError that names the member if the JSON is not such a record.
+// Returns the record that the JSON describes. If the JSON is not valid for a T, throws a FieldError
+// that names the member.
 template <class T>
 T record_from_json(const FieldJson& json) {
   T record;
@@ -220,8 +221,8 @@ T record_from_json(const FieldJson& json) {
   return record;
 }
 
-// Throws Error{kCorrupt} if the text is not the JSON of such a record. The message begins with
-// `what`, which says where the text is from.
+// Returns the record that the JSON text describes. Throws Error{kCorrupt} if the text is not JSON
+// or not valid for a T. The message begins with `what`, which names the text's origin.
 template <class T>
 T record_from_text(std::string_view text, const std::string& what) {
   try {

@@ -2,7 +2,8 @@
 // "Frame", documents the byte layout.
 //
 //   bricks:   column(mask byte planes)
-//   nodes:    plane count, hashes, column(masks), column(children, byte plane 0), ...
+//   nodes:    number of byte planes of the children (1 to 4), hashes, column(masks),
+//             column(children, byte plane 0), ...
 //   column:   [stored size, high bit: zstd] [bytes]
 //
 // Byte plane i of a column has byte i of each of its values; plane 0 is the lowest. Hashes and byte

@@ -8,9 +8,10 @@
 // children in the next level. An offset is one word, or two (low half first) if the next level is
 // wide. Nothing in the file depends on the time, the place or the machine.
 //
-// Checksums are computed from the words that the merge passes in, never from a file. seal() reads
-// the file back and compares it with these checksums. It throws Error{kCorrupt} if the disk returns
-// wrong bytes.
+// Checksums are computed from the words and bytes that the caller passes in, not from the file.
+// (resume() reads the last incomplete checksum block back, but first compares it with its saved
+// checksum.) seal() reads the file back and compares it with these checksums. It throws
+// Error{kCorrupt} if the disk returns wrong bytes.
 //
 // Only one thread may use a writer, except for write_words() and sync().
 #pragma once

@@ -1,6 +1,6 @@
-// Protects work on a mapped file. Without it, a truncated file or a failing disk would end the
-// process with SIGBUS. While the file is watched, unreadable pages read as zeros, and
-// check_readable() reports them as an error.
+// Protects work on a mapped file. Without this protection, a truncated file or a failing disk would
+// end the process with SIGBUS. While a WatchedFile exists, unreadable pages of the file read as
+// zeros, and check_readable() reports them as an error.
 #pragma once
 
 #include "core/base/error.h"
@@ -23,9 +23,9 @@ class WatchedFile {
                   file_.path() + ": it became shorter, or its disk failed, while it was read");
   }
 
-  // Returns the result of work(). If work() throws an Error, it may be caused by pages of zeros;
-  // run() then throws the error of check_readable() instead. work() must call check_readable()
-  // before it publishes a result.
+  // Returns the result of work(). If work() throws an Error, pages of zeros may be the cause. So
+  // run() then calls check_readable(), whose error replaces the error of work(). If work() does not
+  // throw, it must call check_readable() itself before it publishes a result.
   template <class Work>
   auto run(const Work& work) const {
     try {
