@@ -132,7 +132,7 @@ void compare(const Arguments& arguments) {
                                          edge, arguments.points);
     const auto by_rule = rule.color(cell, near_fixed);
     const auto in_file = stored.color(cell[0], cell[1], cell[2], file->color_levels());
-    if (!in_file) file->broken_colors("a cell has none");
+    if (!in_file) file->broken_section(file->colors(), "a cell has no color");
     of_blocks.add(by_rule, {in_file->r, in_file->g, in_file->b});
     if (!mean) {
       ++without_area;

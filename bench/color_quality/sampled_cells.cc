@@ -20,7 +20,8 @@ uint64_t count_colored(const voxdag_reader::File& file) {
   voxdag_reader::ColorRegion region;
   for (uint64_t i = 0; i < tier.region_count; ++i) {
     if (!voxdag_reader::ColorSection::region(tier, i, region))
-      file.broken_colors("a region is damaged");
+      file.broken_section(file.colors(),
+                          "region " + std::to_string(i) + " of the finest tier is damaged");
     cells += region.counts[0];
   }
   return cells;

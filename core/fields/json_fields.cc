@@ -1,11 +1,41 @@
 #include "core/fields/json_fields.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace voxdag::json_fields {
 
+namespace {
+
+constexpr size_t kMaxShownBytes = 64;  // of a text
+constexpr size_t kMaxShownItems = 8;   // of an array
+
+// Returns a value as text for messages: printable ASCII of limited length. Does not show the
+// contents of an object or of a nested array, because formatting nested JSON recurses.
+std::string shown(const FieldJson& json) {
+  if (json.is_object()) return "an object";
+  if (json.is_array() &&
+      (json.size() > kMaxShownItems || std::ranges::any_of(json, [](const FieldJson& item) {
+         return item.is_structured() || item.is_string();
+       })))
+    return "an array of " + std::to_string(json.size()) + " items";
+  const auto text_of = [](const FieldJson& value) {
+    return value.dump(-1, ' ', true, FieldJson::error_handler_t::replace);
+  };
+  if (!json.is_string()) return text_of(json);
+  const auto& text = json.get_ref<const std::string&>();
+  return text.size() <= kMaxShownBytes ? text_of(json)
+                                       : text_of(text.substr(0, kMaxShownBytes)) + "...";
+}
+
+}  // namespace
+
 void refuse(const std::string& name, const std::string& expected) {
   throw FieldError(name, expected);
+}
+
+void refuse(const std::string& name, const std::string& expected, const FieldJson& found) {
+  throw FieldError(name, expected + ", not " + shown(found));
 }
 
 bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,

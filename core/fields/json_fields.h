@@ -19,6 +19,9 @@ using FieldJson = nlohmann::ordered_json;
 namespace json_fields {
 
 [[noreturn]] void refuse(const std::string& name, const std::string& expected);
+// Also shows the refused value, shortened, in the message.
+[[noreturn]] void refuse(const std::string& name, const std::string& expected,
+                         const FieldJson& found);
 // Reads a whole number, which may be written as 64.0. Calls `take_unsigned` or `take_signed` with
 // the number and returns the result of this call. Returns false if `json` is not a whole number.
 bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,
@@ -105,13 +108,13 @@ void decode_integer(const Field& field, const FieldJson& json, T& value) {
   } else if (whole_number(json, take, take)) {
     return;
   }
-  refuse(field.name, expectation<T>(field));
+  refuse(field.name, expectation<T>(field), json);
 }
 
 template <class T>
 void decode_value(const Field& field, const FieldJson& json, Members members, T& value) {
   const auto expect = [&](bool is_valid) {
-    if (!is_valid) refuse(field.name, expectation<T>(field));
+    if (!is_valid) refuse(field.name, expectation<T>(field), json);
   };
   if constexpr (IsOptional<T>::value) {
     decode_value(field, json, members, value.emplace());
@@ -138,7 +141,8 @@ void decode_value(const Field& field, const FieldJson& json, Members members, T&
     std::vector<std::string> names;
     const size_t max_items = members == Members::kGiven ? kMaxNames : 0;
     decode_value(Field(field.name).items(max_items), json, members, names);
-    for (const std::string& name : names) expect(NameSetTraits<T>::add(value, name));
+    for (const std::string& name : names)
+      if (!NameSetTraits<T>::add(value, name)) refuse(field.name, expectation<T>(field), name);
   } else if constexpr (IsVector<T>::value) {
     // In options, a list of limited length may be written as a single item. The item is not copied
     // into an array first, because copying nested JSON recurses, and a request may be nested
@@ -164,7 +168,7 @@ class Decoder {
  public:
   Decoder(const FieldJson& object, const std::string& name, Members members)
       : object_(object), members_(members) {
-    if (!object.is_object()) refuse(name, "an object");
+    if (!object.is_object()) refuse(name, "an object", object);
   }
 
   template <class T>
@@ -175,7 +179,7 @@ class Decoder {
     const bool may_lack = members_ == Members::kGiven
                               ? !field.is_required
                               : IsOptional<T>::value || field.is_left_if_empty;
-    if (!may_lack) refuse(field.name, expectation<T>(field));
+    if (!may_lack) refuse(field.name, expectation<T>(field) + ", but the member is missing");
   }
   void object(const char* name, const auto& visit_members) {
     known_.emplace_back(name);

@@ -168,11 +168,11 @@ class PartColors {
       uint64_t i;
       morton_decode(cell.code, x, y, z);
       const ColorRegion* const region = cursor.find(x, y, z, finest_, i);
-      if (!region) file_.broken_colors("a cell of the DAG has none");
+      if (!region) broken_cell(finest_, cell.code, "has no value");
       bytes = region->block_bytes / 32;
       const uint32_t value = region->value(i);
       if (const char* expected = value_error(traits_.encoding, value, section_.names().size()))
-        file_.broken_colors("a value of the " + std::string(traits_.plural) + ": " + expected);
+        broken_cell(finest_, cell.code, "has the value " + std::to_string(value) + ": " + expected);
       cells.push_back({static_cast<uint32_t>(cell.code - first), value});
     });
     cancel_.check();
@@ -254,7 +254,8 @@ class PartColors {
     ColorRegion region;
     if (at == stored.region_count || !ColorSection::region(stored, at, region) ||
         region.morton != code)
-      file_.broken_colors("a region is missing or damaged");
+      file_.broken_section(section_,
+                           voxdag_reader::region_text(stored, code) + " is missing or damaged");
     EncodedRegion copied;
     copied.morton = morton_in_part(region_level(tier), code);
     std::copy(std::begin(region.counts), std::end(region.counts), copied.counts.begin());
@@ -282,7 +283,10 @@ class PartColors {
       const uint64_t end = within ? begin + 1 : (code + 1) << 3 * between;
       for (uint64_t i = ColorSection::lower_bound(tier, begin); i < tier.region_count; ++i) {
         ColorRegion region;
-        if (!ColorSection::region(tier, i, region)) file_.broken_colors("a region is damaged");
+        if (!ColorSection::region(tier, i, region))
+          file_.broken_section(section_, "entry " + std::to_string(i) +
+                                             " of the directory of level " +
+                                             std::to_string(tier.region_level) + " is damaged");
         if (region.morton >= end) break;
         source_.check(offset_of(region.blocks), region.units() * color_layout::kUnitBytes, block);
       }
@@ -293,8 +297,12 @@ class PartColors {
     uint32_t x, y, z;
     morton_decode(code, x, y, z);
     const auto rgb = colors.color(x, y, z, level);
-    if (!rgb) file_.broken_colors("a cell of the DAG has none");
+    if (!rgb) broken_cell(level, code, "has no color");
     return *rgb;
+  }
+  [[noreturn]] void broken_cell(uint32_t level, uint64_t code, const std::string& what) const {
+    file_.broken_section(section_, "the cell of level " + std::to_string(level) +
+                                       " with Morton code " + std::to_string(code) + " " + what);
   }
 
   EncodedRegion encode_cells(uint32_t tier, uint64_t code, std::span<const ColoredCell> cells) {

@@ -137,6 +137,12 @@ std::vector<uint32_t> ColorPages::encode(const ColorPageAddress& address) {
   return words;
 }
 
+// Returns the name of a cell for messages.
+static std::string cell_text(uint32_t level, const std::array<int64_t, 3>& cell) {
+  return "cell " + std::to_string(cell[0]) + " " + std::to_string(cell[1]) + " " +
+         std::to_string(cell[2]) + " of level " + std::to_string(level);
+}
+
 // Appends the colors of the page's cells. If the page is in one region, its colors are consecutive
 // there, and their encoded blocks are copied. A page that is larger than a region gets one word per
 // color.
@@ -150,7 +156,8 @@ void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_
     check_region(tier, level, first);
     const auto* const region = cursor_.find(first[0], first[1], first[2], level, index);
     if (!region || count > region->cells - index)
-      file_->broken_colors("a region has fewer colors than cells");
+      file_->broken_section(file_->colors(),
+                            cell_text(level, first) + ": its region has fewer colors than cells");
     const uint64_t skip = index % kBlockCells,
                    blocks = (skip + count + kBlockCells - 1) / kBlockCells;
     words[0] |= static_cast<uint32_t>(skip) << kSkipShift;
@@ -164,7 +171,7 @@ void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_
     const std::array<int64_t, 3> cell = cell_of(address, code);
     check_region(tier, level, cell);
     const auto rgb = cursor_.color(cell[0], cell[1], cell[2], level);
-    if (!rgb) file_->broken_colors("a cell has no color");
+    if (!rgb) file_->broken_section(file_->colors(), cell_text(level, cell) + " has no color");
     words.push_back(rgb->r | uint32_t{rgb->g} << 8 | uint32_t{rgb->b} << 16);
   }
 }

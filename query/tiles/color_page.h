@@ -67,7 +67,10 @@ class ColorPages {
     static uint64_t child(const voxdag_reader::Node& node, int index) {
       return voxdag_reader::File::child(node, index);
     }
-    [[noreturn]] void broken_colors(const char* what) const { file.broken_colors(what); }
+    [[noreturn]] void broken_section(const voxdag_reader::ColorSection& section,
+                                     const std::string& what) const {
+      file.broken_section(section, what);
+    }
   };
 
   void set_mask(const ColorPageAddress& page, uint32_t* mask) const;

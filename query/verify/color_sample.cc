@@ -47,7 +47,8 @@ std::vector<SampledRegion> draw_regions(const voxdag_reader::File& file, const C
     for (const Attribute attribute : attributes)
       if (!ColorSection::region(section_of(file, attribute).tier(0), drawn[i],
                                 region.stored[index_of(attribute)]))
-        file.broken_colors("a region is damaged");
+        file.broken_section(section_of(file, attribute), "region " + std::to_string(drawn[i]) +
+                                                             " of the finest tier is damaged");
     region.cube.level = grid.region_level();
     auto& [x, y, z] = region.cube.position;
     morton_decode(region.stored[index_of(attributes.front())].morton, x, y, z);
@@ -161,7 +162,9 @@ ColorGrid sampled_grid(const voxdag_reader::File& file) {
     if (section_of(file, attribute).color_levels() != levels ||
         section_of(file, attribute).tier(0).region_count !=
             section_of(file, attributes.front()).tier(0).region_count)
-      file.broken_colors("attributes belong to different cells");
+      file.broken_section(section_of(file, attribute),
+                          std::string("expected the same cells as the ") +
+                              section_of(file, attributes.front()).name());
   return {file.grid_levels(), levels};
 }
 

@@ -32,8 +32,7 @@ class LimitChecker {
   void operator()(const Field& field, T& value) {
     const FieldJson given = json_fields::encode_value(value);
     if (given == defaults_.value(field.name, FieldJson())) return;
-    if (!fits(field, value))
-      json_fields::refuse(field.name, expectation<T>(field) + ", not " + given.dump());
+    if (!fits(field, value)) json_fields::refuse(field.name, expectation<T>(field), given);
     if (given_.contains(field.excluded))
       json_fields::refuse(field.name, std::string("no ") + field.excluded + " at the same time");
     given_.insert(field.name);
@@ -66,12 +65,13 @@ void check_options(const BuildSpec& spec) {
   fields(checker, copy);
   const GeometryOptions& g = spec.geometry;
   if (g.resolution == 0)
-    json_fields::refuse(kResolutionField.name, expectation<uint64_t>(kResolutionField));
+    json_fields::refuse(kResolutionField.name, expectation<uint64_t>(kResolutionField), 0);
   if (g.color_resolution && !g.attributes.any())
     json_fields::refuse("color_resolution", "color or attributes as well");
   if (g.color_resolution > g.resolution)
-    json_fields::refuse("color_resolution",
-                        "at most the resolution, " + std::to_string(g.resolution));
+    json_fields::refuse("color_resolution", "at most the resolution, " +
+                                                std::to_string(g.resolution) + ", not " +
+                                                std::to_string(g.color_resolution));
 }
 
 }  // namespace voxdag

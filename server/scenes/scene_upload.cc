@@ -44,7 +44,10 @@ SceneUpload::SceneUpload(SceneStore& store, std::string name, uint64_t first,
   }
   if (known->total && total_ != known->total)
     throw RequestError(RequestError::Kind::kInvalid,
-                       "Content-Range: the total differs from the first part's");
+                       "Content-Range: the total of this part is " +
+                           (total_ ? std::to_string(*total_) : std::string("missing")) +
+                           ": expected " + std::to_string(*known->total) +
+                           ", the total of the first part");
   file_ = store_.files_.open_write(path);
 }
 

@@ -44,8 +44,9 @@ int runtime_device(int device) {
   const std::vector<int> usable = usable_devices(problem);
   if (usable.empty()) throw Error(ErrorCode::kDevice, problem);
   if (device < 0 || static_cast<size_t>(device) >= usable.size())
-    throw Error(ErrorCode::kDevice, "no CUDA device " + std::to_string(device) +
-                                        ": this machine has " + std::to_string(usable.size()));
+    throw Error(ErrorCode::kDevice, "no usable CUDA device has the number " +
+                                        std::to_string(device) + ": expected 0 to " +
+                                        std::to_string(usable.size() - 1));
   return usable[static_cast<size_t>(device)];
 }
 

@@ -111,7 +111,9 @@ uint64_t finest_cells(const File& file) {
   uint64_t cells = 0;
   for (uint64_t i = 0; i < tier.region_count; ++i) {
     ColorRegion region;
-    if (!ColorSection::region(tier, i, region)) file.broken_colors("a region is damaged");
+    if (!ColorSection::region(tier, i, region))
+      file.broken_section(file.colors(),
+                          "region " + std::to_string(i) + " of the finest tier is damaged");
     cells += region.counts[0];
   }
   return cells;
@@ -148,7 +150,9 @@ ColorDiff diff_colors(const File& a, const File& b, unsigned threads, const Canc
                   file->path() + " has no colors: expected files that were built with --color");
   if (a.grid_levels() != b.grid_levels())
     throw Error(ErrorCode::kInvalidInput,
-                "only colors of the same grid can be compared: " + a.path() + ", " + b.path());
+                "only colors of the same grid can be compared: " + a.path() + " has 2^" +
+                    std::to_string(a.grid_levels()) + " voxels per edge, " + b.path() + " has 2^" +
+                    std::to_string(b.grid_levels()));
   return with_reader_errors([&] {
     if (same_words(a, b) && same_sections(a, b))
       return ColorDiff{.levels = a.color_levels(), .cells = finest_cells(a)};

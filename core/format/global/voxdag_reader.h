@@ -156,8 +156,9 @@ class Bytes {
       const ssize_t n = ::read(fd, to + done, static_cast<size_t>(size_ - done));
       if (n < 0 && errno == EINTR) continue;
       if (n <= 0) {
+        const std::string why = n < 0 ? strerror(errno) : "the file is shorter now";
         ::close(fd);
-        throw Error(Problem::kIo, "read " + path + " at offset " + std::to_string(done));
+        throw Error(Problem::kIo, "read " + path + ", byte " + std::to_string(done) + ": " + why);
       }
       done += static_cast<uint64_t>(n);
     }
@@ -227,13 +228,13 @@ class File {
     const uint32_t mask = nodes.words[offset];
     const bool wide = levels_[l + 1].pointer_bits == 64;
     if (mask == 0 || mask > 255 ||
-        static_cast<uint64_t>(count_bits(mask)) << wide >= nodes.word_count - offset)
+        static_cast<uint64_t>(count_set_bits(mask)) << wide >= nodes.word_count - offset)
       outside(l, offset);
     return {mask, nodes.words + offset + 1, wide};
   }
   // Returns the word offset of child `index` (0 to 7) in the next level. The child must exist.
   static uint64_t child(const Node& node, int index) {
-    return node.child(count_bits(node.child_mask & ((1u << index) - 1)));
+    return node.child(count_set_bits(node.child_mask & ((1u << index) - 1)));
   }
   // Returns the number of a voxel's bit in the mask of its brick. Only the two low bits of each
   // coordinate count.
@@ -288,12 +289,15 @@ class File {
   std::optional<uint32_t> material(int64_t x, int64_t y, int64_t z, uint32_t level) const {
     const auto index = BasicColorCursor<File>(*this, materials()).value(x, y, z, level);
     if (index && *index >= material_names().size())
-      broken_colors("a cell's material is not in the list of materials");
+      broken_section(materials(), "value " + str(*index) + ", expected less than " +
+                                      str(material_names().size()));
     return index;
   }
   const std::vector<std::string>& material_names() const { return materials().names(); }
-  // Throws an Error for attributes that do not fit the DAG. `what` is the end of its message.
-  [[noreturn]] void broken_colors(const std::string& what) const { corrupt("colors: " + what); }
+  // Throws an Error for values of an attribute that do not fit the DAG. `what` ends its message.
+  [[noreturn]] void broken_section(const ColorSection& section, const std::string& what) const {
+    corrupt(section.name() + (": " + what));
+  }
 
   // Walks the octree depth first, children in child order, and calls
   //     bool visitor.node(level, x, y, z, offset)   returns false to skip the subtree
@@ -328,28 +332,20 @@ class File {
   static constexpr uint32_t kMaxBrickLevel = 18;
   static constexpr uint64_t kWideLevels = 1, kAttributes = 2;  // feature bits
 
-  template <class T>
-  static T get(const unsigned char* at) {
-    T value;
-    std::memcpy(&value, at, sizeof(T));
-    return value;
-  }
-  static int count_bits(uint32_t mask) {
-    int count = 0;
-    for (; mask; mask &= mask - 1) ++count;
-    return count;
-  }
+  static std::string str(uint64_t number) { return std::to_string(number); }
   uint64_t block_count() const { return (bytes_->size() - table_offset_) / 8; }
 
   [[noreturn]] void corrupt(const std::string& what) const {
     throw Error(Problem::kCorrupt, path_ + ": " + what);
   }
-  [[noreturn]] void outside(uint32_t l, uint64_t offset) const {
-    corrupt("level " + std::to_string(l) + ", word " + std::to_string(offset) +
-            ": no node begins here");
+  [[noreturn]] void unsupported(const std::string& what) const {
+    throw Error(Problem::kUnsupportedVersion, path_ + ": " + what);
   }
-  void expect(bool right, const char* what) const {
-    if (!right) throw Error(Problem::kCorrupt, path_ + ": header: " + what);
+  [[noreturn]] void outside(uint32_t l, uint64_t offset) const {
+    corrupt("level " + str(l) + ", word " + str(offset) + ": no node begins here");
+  }
+  void expect(bool right, const std::string& what) const {
+    if (!right) corrupt("header: " + what);
   }
 
   template <class Visitor>
@@ -374,23 +370,21 @@ class File {
     if (bytes_->size() < kPageBytes) corrupt("the file ends within its header");
     version_ = get<uint32_t>(page + 8);
     if (version_ != 1 && version_ != 2)
-      throw Error(Problem::kUnsupportedVersion,
-                  path_ + ": format version " + std::to_string(version_) + ", expected 1 or 2");
+      unsupported("format version " + str(version_) + ", expected 1 or 2");
     expect(xxh64(page, kPageBytes - 8) == get<uint64_t>(page + kPageBytes - 8),
-           "its checksum is wrong");
+           "fails its checksum");
     const uint64_t features = version_ == 1 ? 0 : get<uint64_t>(page + 2176);
     if (features & ~(kWideLevels | kAttributes))
-      throw Error(
-          Problem::kUnsupportedVersion,
-          path_ + ": feature bits " + std::to_string(features) + ", expected none but 1 and 2");
+      unsupported("feature bits " + str(features) + ", expected none but 1 and 2");
     max_pointer_bits_ = features & kWideLevels ? 64 : 32;
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
     expect(
         get<uint32_t>(page + 12) == kPageBytes && get<uint32_t>(page + 28) == kChecksumBlockBytes,
         "expected pages of 4096 bytes and checksum blocks of 65536");
-    expect(grid_levels_ >= 2 && grid_levels_ <= 20, "expected a resolution of 2^2 to 2^20");
-    expect(hash_bits_ >= 4 && hash_bits_ <= 64, "expected 4 to 64 hash bits");
+    expect(grid_levels_ >= 2 && grid_levels_ <= 20,
+           "resolution 2^" + str(grid_levels_) + ", expected 2^2 to 2^20");
+    expect(hash_bits_ >= 4 && hash_bits_ <= 64, str(hash_bits_) + " hash bits, expected 4 to 64");
     std::memcpy(origin_, page + 32, sizeof(origin_));
     edge_ = get<double>(page + 56);
     expect(std::isfinite(origin_[0]) && std::isfinite(origin_[1]) && std::isfinite(origin_[2]) &&
@@ -400,8 +394,8 @@ class File {
     svo_nodes_ = get<uint64_t>(page + 72);
     dag_nodes_ = get<uint64_t>(page + 80);
     if (get<uint64_t>(page + 88) != bytes_->size())
-      corrupt("the file has " + std::to_string(bytes_->size()) + " bytes, expected " +
-              std::to_string(get<uint64_t>(page + 88)));
+      corrupt("the file has " + str(bytes_->size()) + " bytes, expected " +
+              str(get<uint64_t>(page + 88)));
     read_levels(page);
     if (features & kAttributes) read_attributes(page);
     read_table(page);
@@ -412,6 +406,7 @@ class File {
   void read_levels(const unsigned char* page) {
     uint64_t end = kPageBytes, nodes = 0;
     for (uint32_t l = brick_level() + 1; l-- > 0;) {
+      const std::string where = "level " + str(l) + ": ";
       const unsigned char* const entry = page + 128 + 32 * l;
       Level& level = levels_[l];
       level.file_offset = get<uint64_t>(entry);
@@ -420,28 +415,30 @@ class File {
       level.words = reinterpret_cast<const uint32_t*>(data() + kPageBytes);
       if (dag_nodes_ == 0) {
         expect(level.file_offset == 0 && level.node_count == 0 && level.word_count == 0,
-               "a level of an empty scene has nodes");
+               where + "expected no nodes, because the scene is empty");
         continue;
       }
-      expect(level.file_offset == end, "a level does not follow the one below it");
+      expect(level.file_offset == end,
+             where + "begins at byte " + str(level.file_offset) + ", expected " + str(end));
       if (version_ != 1) level.pointer_bits = get<uint32_t>(entry + 24);
-      const uint32_t bits = level.pointer_bits;
-      if (bits != 32 && bits != max_pointer_bits_)
-        corrupt("header: level " + std::to_string(l) + ": pointers of " + std::to_string(bits) +
-                " bits, expected 32" + (max_pointer_bits_ == 64 ? " or 64" : ""));
-      if (level.word_count > uint64_t{1} << (bits == 32 ? 32 : 40))
-        corrupt("header: level " + std::to_string(l) + ": " + std::to_string(level.word_count) +
-                " words, more than pointers of " + std::to_string(bits) +
-                " bits into it can count" + (bits == 32 ? "" : ", or over 2^40"));
-      expect(4 * level.word_count <= bytes_->size() - end, "a level ends beyond the file");
+      const uint32_t bits = level.pointer_bits, limit_bits = bits == 32 ? 32 : 40;
+      expect(bits == 32 || bits == max_pointer_bits_,
+             where + "pointers of " + str(bits) + " bits, expected 32" +
+                 (max_pointer_bits_ == 64 ? " or 64" : ""));
+      expect(level.word_count <= uint64_t{1} << limit_bits,
+             where + str(level.word_count) + " words, expected at most 2^" + str(limit_bits) +
+                 " with pointers of " + str(bits) + " bits");
+      expect(4 * level.word_count <= bytes_->size() - end, where + "ends beyond the file");
       expect(level.node_count > 0 && level.node_count <= level.word_count / 2,
-             "a level has more nodes than its words hold");
+             where + str(level.node_count) + " nodes in " + str(level.word_count) +
+                 " words, expected 1 to half as many");
       level.words = reinterpret_cast<const uint32_t*>(data() + level.file_offset);
       nodes += level.node_count;
       end = (end + 4 * level.word_count + kPageBytes - 1) / kPageBytes * kPageBytes;
-      expect(end <= bytes_->size(), "a level ends beyond the file");
+      expect(end <= bytes_->size(), where + "ends beyond the file");
     }
-    expect(nodes == dag_nodes_, "the nodes of the levels do not add up to the DAG's nodes");
+    expect(nodes == dag_nodes_,
+           "the levels have " + str(nodes) + " nodes, expected " + str(dag_nodes_));
     table_offset_ = end;
   }
 
@@ -449,24 +446,25 @@ class File {
   // kinds. Sections of unknown kinds are skipped.
   void read_attributes(const unsigned char* page) {
     const uint64_t count = get<uint64_t>(page + 120);
-    expect(count >= 1 && count <= 16 && dag_nodes_ > 0, "expected 1 to 16 attribute sections");
+    expect(count >= 1 && count <= 16, str(count) + " attribute sections, expected 1 to 16");
+    expect(dag_nodes_ > 0, "expected no attribute sections, because the scene is empty");
     uint32_t last_kind = 0;
     for (uint64_t i = 0; i < count; ++i) {
       const unsigned char* const entry = page + 1152 + 64 * i;
       const uint32_t kind = get<uint32_t>(entry), levels = get<uint32_t>(entry + 4);
       const uint64_t bytes = get<uint64_t>(entry + 16);
-      expect(kind > last_kind, "attribute sections are not in the order of their kinds");
-      expect(get<uint64_t>(entry + 8) == table_offset_ && bytes > 0 &&
-                 bytes <= bytes_->size() - table_offset_,
-             "an attribute section does not follow the preceding data, or ends beyond the file");
-      expect(levels >= 2 && levels <= grid_levels_, "expected attributes of a level of the grid");
-      if (kind < kEndOfKinds) {
-        const char* const wrong = sections_[kind - 1].open(data() + table_offset_, bytes, levels,
-                                                           kind, get<uint32_t>(entry + 40));
-        expect(!wrong, wrong);
-      }
+      const std::string where = "attribute section " + str(i) + ": ";
+      expect(kind > last_kind, where + "kind " + str(kind) + ", expected over " + str(last_kind));
+      expect(get<uint64_t>(entry + 8) == table_offset_, where + "does not follow the data before");
+      expect(bytes > 0 && bytes <= bytes_->size() - table_offset_, where + "is not in the file");
+      expect(levels >= 2 && levels <= grid_levels_,
+             where + "level " + str(levels) + ", expected 2 to " + str(grid_levels_));
+      if (kind < kEndOfKinds)
+        if (const char* const wrong = sections_[kind - 1].open(
+                data() + table_offset_, bytes, levels, kind, get<uint32_t>(entry + 40)))
+          expect(false, where + wrong);
       table_offset_ = (table_offset_ + bytes + kPageBytes - 1) / kPageBytes * kPageBytes;
-      expect(table_offset_ <= bytes_->size(), "an attribute section ends beyond the file");
+      expect(table_offset_ <= bytes_->size(), where + "ends beyond the file");
       last_kind = kind;
     }
   }
@@ -474,10 +472,13 @@ class File {
   void read_table(const unsigned char* page) const {
     const uint64_t blocks =
         (table_offset_ - kPageBytes + kChecksumBlockBytes - 1) / kChecksumBlockBytes;
-    expect(
-        get<uint64_t>(page + 96) == table_offset_ && get<uint64_t>(page + 104) == blocks &&
-            bytes_->size() - table_offset_ == 8 * blocks,
-        "the checksum table does not begin after the last level or section, or has the wrong size");
+    const uint64_t begin = get<uint64_t>(page + 96), count = get<uint64_t>(page + 104);
+    expect(begin == table_offset_,
+           "the checksum table begins at byte " + str(begin) + ", expected " + str(table_offset_));
+    expect(count == blocks, str(count) + " checksum blocks, expected " + str(blocks));
+    expect(bytes_->size() - table_offset_ == 8 * blocks, "the checksum table has " +
+                                                             str(bytes_->size() - table_offset_) +
+                                                             " bytes, expected " + str(8 * blocks));
     expect(
         xxh64(data() + table_offset_, static_cast<size_t>(8 * blocks)) == get<uint64_t>(page + 112),
         "the checksum table fails its own checksum");

@@ -36,6 +36,14 @@ class Error : public std::runtime_error {
   Problem problem_;
 };
 
+// Returns the number at `at`, which need not be aligned.
+template <class T>
+T get(const unsigned char* at) {
+  T value;
+  std::memcpy(&value, at, sizeof(T));
+  return value;
+}
+
 // A color in sRGB, with 8 bits per channel, ready for display.
 struct Rgb {
   unsigned char r = 0, g = 0, b = 0;
@@ -121,6 +129,12 @@ struct ColorTier {
   uint32_t block_bytes = 16;  // bytes for 32 cells
 };
 
+// Returns the name of a region for messages.
+inline std::string region_text(const ColorTier& tier, uint64_t morton) {
+  return "the region of level " + std::to_string(tier.region_level) + " with Morton code " +
+         std::to_string(morton);
+}
+
 // The colors, or other values, of a region. The memory of the values belongs to the File.
 struct ColorRegion {
   uint64_t morton = 0;      // Morton code of the region among the cubes of the tier's region level
@@ -178,9 +192,10 @@ class ColorSection {
     const bool is_width = has_names ? block_bytes == 32 || block_bytes == 64 || block_bytes == 128
                                     : block_bytes == kKindBlockBytes[kind];
     if (!is_width) return "expected blocks of the size that the kind of attribute requires";
+    kind_ = kind;
     color_levels_ = color_levels;
     tier_count_ = color_levels / 7 + 1;
-    if (bytes < 32 * tier_count_) return "an attribute section is too short for its tier table";
+    if (bytes < 32 * tier_count_) return "is too short for its tier table";
     const uint64_t tables = bytes - 32 * tier_count_;
     uint64_t end = 0;
     for (uint32_t t = 0; t < tier_count_; ++t) {
@@ -191,25 +206,28 @@ class ColorSection {
       tier.cell_count = get<uint64_t>(entry + 24);
       tier.finest_level = color_levels - 7 * t;
       tier.region_level = tier.finest_level - std::min<uint32_t>(tier.finest_level, 6);
-      if (get<uint64_t>(entry) != end)
-        return "a tier of an attribute section does not follow the tier before it";
-      if (tier.units > (tables - end) / 16)
-        return "the data of a tier end beyond the attribute section";
+      if (get<uint64_t>(entry) != end) return "a tier does not follow the tier before it";
+      if (tier.units > (tables - end) / 16) return "the data of a tier end beyond the section";
       tier.block_bytes = block_bytes;
       tier.data = section + end;
       end += 16 * tier.units;
       if (tier.region_count == 0 || tier.region_count > (tables - end) / 32)
-        return "a directory has no regions, or ends beyond the attribute section";
+        return "a directory has no regions, or ends beyond the section";
       tier.directory = section + end;
       end += 32 * tier.region_count;
     }
     if (has_names) return read_names(section + end, tables - end, block_bytes / 32);
-    return end == tables ? nullptr : "an attribute section is longer than its tiers";
+    return end == tables ? nullptr : "is longer than its tiers";
   }
   // Returns the names of the materials. The value of a cell is an index in this list. The last name
   // is "", for triangles without a material.
   const std::vector<std::string>& names() const { return names_; }
 
+  // Returns the plural of the attribute's name, for messages.
+  const char* name() const {
+    constexpr const char* kNames[kEndOfKinds] = {"", "colors", "alphas", "normals", "materials"};
+    return kNames[kind_];
+  }
   uint32_t color_levels() const { return color_levels_; }
   uint32_t tier_count() const { return tier_count_; }
   const ColorTier& tier(uint32_t t) const { return tiers_[t]; }
@@ -254,12 +272,6 @@ class ColorSection {
   }
 
  private:
-  template <class T>
-  static T get(const unsigned char* at) {
-    T value;
-    std::memcpy(&value, at, sizeof(T));
-    return value;
-  }
   const char* read_names(const unsigned char* at, uint64_t bytes, uint32_t value_bytes) {
     const char* const kBroken = "the list of materials does not fit between tiers and tier table";
     const uint64_t count = bytes < 4 ? 0 : get<uint32_t>(at);
@@ -282,7 +294,7 @@ class ColorSection {
   // Limits of the list of materials, which is read when the file is opened.
   static constexpr uint64_t kMaxMaterials = uint64_t{1} << 20, kMaxNamesBytes = uint64_t{64} << 20;
 
-  uint32_t color_levels_ = 0, tier_count_ = 0;
+  uint32_t kind_ = kColors, color_levels_ = 0, tier_count_ = 0;
   ColorTier tiers_[3];
   std::vector<std::string> names_;
 };
@@ -414,11 +426,14 @@ class BasicColorCursor {
              static_cast<unsigned>(count_set_bits(masks_[parent] & ((1u << (code & 7)) - 1)));
     }
     if (rank >= region_.counts[tier.finest_level - level])
-      dag_->broken_colors("a region has more cells than colors");
+      broken_region(tier, region_.morton, "has fewer values than cells");
     uint64_t before = 0;
     for (uint32_t finer = level + 1; finer <= tier.finest_level; ++finer)
       before += region_.counts[tier.finest_level - finer];
     return before + rank;
+  }
+  [[noreturn]] void broken_region(const ColorTier& tier, uint64_t morton, const char* what) const {
+    dag_->broken_section(*section_, region_text(tier, morton) + " " + what);
   }
   void enter_region(const ColorTier& tier, uint64_t morton) {
     if (region_tier_ == &tier && region_.morton == morton) return;
@@ -426,7 +441,7 @@ class BasicColorCursor {
     const uint64_t i = ColorSection::lower_bound(tier, morton);
     if (i == tier.region_count || !ColorSection::region(tier, i, region_) ||
         region_.morton != morton)
-      dag_->broken_colors("a region is missing or damaged");
+      broken_region(tier, morton, "is missing or damaged");
     region_tier_ = &tier;
   }
   // Enters the group whose cube is `above` levels above the cell on the path: sets starts_ and
@@ -439,7 +454,7 @@ class BasicColorCursor {
       from = level - 4;
       const uint64_t entry = count_before(tier.region_level, from, from);
       if (entry >= region_.prefix_count(table))
-        dag_->broken_colors("a region has too few prefixes");
+        broken_region(tier, region_.morton, "has too few prefixes");
       rank = region_.prefix(table, entry);
     }
     rank += count_before(from, group, level);

@@ -38,8 +38,9 @@ Chunk read_chunk(const ReadableFile& file, uint64_t offset, uint64_t end) {
   const uint64_t length = read_u32(file, offset);
   const uint64_t begin = offset + kChunkHeaderBytes;
   if (length > end - begin)
-    refuse(file.path(), "a GLB chunk claims " + std::to_string(length) + " bytes, " +
-                            std::to_string(end - begin) + " are left");
+    refuse(file.path(), "the GLB chunk at byte " + std::to_string(offset) + " claims " +
+                            std::to_string(length) + " bytes, " + std::to_string(end - begin) +
+                            " are left");
   return {read_u32(file, offset + 4), {begin, length}};
 }
 

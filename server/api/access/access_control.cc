@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/clock.h"
+#include "scene/messages.h"
 #include "server/http/connection/connection_table.h"
 #include "server/http/message/problem.h"
 
@@ -55,7 +56,8 @@ void AccessControl::check_site(const Request& request) const {
   };
   const std::string host = request.header("Host");
   if (!host.empty() && !is_ours(without_port(host)))
-    throw Problem(403, "forbidden", "the Host header does not name this service");
+    throw Problem(403, "forbidden",
+                  "the Host header '" + printable(host) + "' does not name this service");
   // A browser hides the answer to a cross-site request from the page. But the page could still
   // waste the service's time, and could infer existing names from response times.
   const auto& segments = request.target.segments;
@@ -67,7 +69,10 @@ void AccessControl::check_site(const Request& request) const {
   const bool foreign =
       !origin.empty() && (scheme == std::string::npos || origin.substr(scheme + 3) != host);
   if (foreign)
-    throw Problem(403, "forbidden", "cross-site request: the Origin is not this service");
+    throw Problem(403, "forbidden",
+                  "cross-site request: the Origin is '" + printable(origin) +
+                      "': expected a page of this service, whose Host is '" + printable(host) +
+                      "'");
 }
 
 Caller AccessControl::identify(const Request& request) {

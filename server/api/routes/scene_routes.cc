@@ -76,14 +76,15 @@ struct Part {
 
 // Returns TOTAL of the Content-Range "bytes */TOTAL", which finishes an upload that has all its
 // bytes; nullopt for a different form of the header.
-std::optional<uint64_t> total_of_empty_part(std::string_view header) {
+std::optional<uint64_t> total_of_empty_part(const std::string& text) {
   constexpr std::string_view kBegin = "bytes */";
+  std::string_view header = text;
   if (!header.starts_with(kBegin)) return {};
   header.remove_prefix(kBegin.size());
   uint64_t total = 0;
   const auto [end, error] = std::from_chars(header.data(), header.data() + header.size(), total);
   if (error != std::errc{} || end != header.data() + header.size() || total == 0)
-    throw bad_request("Content-Range: expected bytes */TOTAL with a TOTAL above 0");
+    throw bad_request("Content-Range: '" + text + "': expected bytes */TOTAL with a TOTAL above 0");
   return total;
 }
 
@@ -102,7 +103,8 @@ Part part_of(const Request& request) {
   ByteRange range;
   uint64_t total = 0;
   if (!parse_content_range(header, range, total))
-    throw bad_request("Content-Range: expected bytes FIRST-LAST/TOTAL");
+    throw bad_request("Content-Range: '" + header +
+                      "': expected bytes FIRST-LAST/TOTAL with FIRST <= LAST < TOTAL");
   if (request.content_length && *request.content_length != range.size())
     throw bad_request("Content-Length is " + std::to_string(*request.content_length) +
                       ": expected " + std::to_string(range.size()) +

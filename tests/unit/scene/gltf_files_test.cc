@@ -36,7 +36,7 @@ TEST(GltfContainer, LyingHeaders) {
   EXPECT_NE(with(8, 0xffffffff).find("cut off"), std::string::npos);
   EXPECT_NE(with(8, 3).find("shorter than its header"), std::string::npos);
   EXPECT_NE(with(8, 15).find("inside the header of a chunk"), std::string::npos);
-  EXPECT_NE(with(12, 0xfffffff0).find("a GLB chunk claims"), std::string::npos);
+  EXPECT_NE(with(12, 0xfffffff0).find("the GLB chunk at byte 12 claims"), std::string::npos);
   EXPECT_NE(with(16, 0x004E4942).find("not JSON"), std::string::npos);
   EXPECT_NE(with(0, 0x58585858).find("neither a GLB"), std::string::npos);
 }

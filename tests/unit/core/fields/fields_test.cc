@@ -117,20 +117,21 @@ TEST(OptionsJson, SetsWhatIsGiven) {
 
 TEST(OptionsJson, IsRefusedByNameAndExpectation) {
   const std::pair<const char*, const char*> bodies[] = {
-      {"[]", "'the body': expected an object"},
-      {"{}", "'edge': expected a power of two from 4 to 64"},
+      {"[]", "'the body': expected an object, not an array of 0 items"},
+      {"{}", "'edge': expected a power of two from 4 to 64, but the member is missing"},
       {R"({"edge":12})", "'edge': expected a power of two"},
       {R"({"edge":4.5})", "'edge'"},
       {R"({"edge":4,"memory":"1MiB"})", "'memory': expected a size of at least 64MiB"},
-      {R"({"edge":4,"memory":"much"})", "'memory': expected a size"},
+      {R"({"edge":4,"memory":"much"})",
+       "'memory': expected a size of at least 64MiB, such as 8GiB, not \"much\""},
       {R"({"edge":4,"rank":4})", "'rank': expected a whole number from -3 to 3"},
       {R"({"edge":4,"names":[]})", "'names': expected 1 to 2 items"},
       {R"({"edge":4,"names":["abcdef"]})", "'names': expected 1 to 5 characters"},
       {R"({"edge":4,"names":["a\n"]})", "'names'"},
       {R"({"edge":4,"options":{"cube":[0,0,0,0]}})",
-       "'cube': expected 4 finite numbers X,Y,Z,EDGE, the last one above 0"},
-      {R"({"edge":4,"options":{"speed":""}})", "'speed': expected one of slow, fast"},
-      {R"({"edge":4,"options":{"loud":1}})", "'loud': expected true or false"},
+       "'cube': expected 4 finite numbers X,Y,Z,EDGE, the last one above 0, not [0,0,0,0]"},
+      {R"({"edge":4,"options":{"speed":""}})", "'speed': expected one of slow, fast, not \"\""},
+      {R"({"edge":4,"options":{"loud":1}})", "'loud': expected true or false, not 1"},
       {R"({"edge":4,"options":{"color":1}})", "'color': expected a documented member of options"},
       {R"({"edge":4,"speed":"slow"})", "'speed': expected a documented member of the body"},
   };

@@ -51,8 +51,8 @@ TEST(GoldenTest, CorruptVariantsAreNamed) {
   const Variant variants[] = {
       {"magic", 1, 'v', ErrorCode::kCorrupt, "not a voxdag file"},
       {"version", 8, 3, ErrorCode::kUnsupportedVersion, "format version 3, expected 1 or 2"},
-      {"levels", 16, 4, ErrorCode::kCorrupt, "header: its checksum is wrong"},
-      {"reserved", 3000, 1, ErrorCode::kCorrupt, "header: its checksum is wrong"},
+      {"levels", 16, 4, ErrorCode::kCorrupt, "header: fails its checksum"},
+      {"reserved", 3000, 1, ErrorCode::kCorrupt, "header: fails its checksum"},
       {"brick", 4096, 1, ErrorCode::kCorrupt, "bytes 4096 to 12287: the block fails its checksum"},
       {"padding", 8191, 1, ErrorCode::kCorrupt, "bytes 4096 to 12287: the block fails"},
       {"root", 8192, 0x36, ErrorCode::kCorrupt, "bytes 4096 to 12287: the block fails"},

@@ -227,7 +227,8 @@ TEST_F(ValueSectionTest, SectionsThatDoNotFitAreRefused) {
   EXPECT_THAT(refusal(1152 + 64 + 24, uint64_t{1}), HasSubstr("1 normals, the section has"));
   EXPECT_THAT(refusal(1152 + 128 + 32, uint64_t{1}), HasSubstr("materials, the section has"));
   EXPECT_THAT(refusal(1152 + 128, uint32_t{5}), HasSubstr("3 attribute sections, expected"));
-  EXPECT_THAT(refusal(1152 + 64, uint32_t{2}), HasSubstr("not in the order of their kinds"));
+  EXPECT_THAT(refusal(1152 + 64, uint32_t{2}),
+              HasSubstr("attribute section 1: kind 2, expected over 2"));
   EXPECT_THAT(refusal(1152 + 64 + 50, uint8_t{1}), HasSubstr("reserved"));
 }
 

@@ -194,7 +194,8 @@ TEST_F(ColorStage, WithoutVoxelsAreNone) {
 }
 
 TEST_F(ColorStage, RefusesOptionsThatDoNotFit) {
-  EXPECT_EQ(refusal(spec(64, 128)), "'color_resolution': expected at most the resolution, 64");
+  EXPECT_EQ(refusal(spec(64, 128)),
+            "'color_resolution': expected at most the resolution, 64, not 128");
   EXPECT_NE(refusal(spec(64, 48)).find("'color_resolution': expected a power of two from 4"),
             std::string::npos);
   BuildSpec s = spec(64, 32);

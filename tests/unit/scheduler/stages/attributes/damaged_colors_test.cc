@@ -60,7 +60,9 @@ TEST(DamagedColors, EndARender) {
   std::ofstream(damaged, std::ios::binary) << bytes;
   const Error error = error_of([&] { render(damaged); });
   EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
-  EXPECT_NE(error.message().find("colors: a region is missing or damaged"), std::string::npos)
+  EXPECT_NE(error.message().find("colors: the region of level 0 with Morton code 0 is missing or "
+                                 "damaged"),
+            std::string::npos)
       << error.message();
 }
 
