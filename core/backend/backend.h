@@ -46,7 +46,7 @@ class TriangleStream {
 
 // Everything that defines a subvolume task except its triangles.
 struct SubvolumeTask {
-  uint32_t grid_levels = 2;  // L
+  uint32_t grid_levels = 2;  // L: the grid has 2^L voxels per edge
   Cube cube;                 // its level is at most L-2
   uint32_t hash_bits = 64;   // 4 to 64
 

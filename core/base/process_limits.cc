@@ -17,7 +17,7 @@ namespace {
 uint64_t number_in(const std::string& path) {
   std::ifstream file(path);
   uint64_t bytes = 0;
-  return file >> bytes ? bytes : UINT64_MAX;  // "max" does not parse, which means no limit
+  return file >> bytes ? bytes : UINT64_MAX;  // "max", which is not a number, means no limit
 }
 
 // Returns the lowest limit of the cgroup `path` and its ancestors, up to the mount point `root`.

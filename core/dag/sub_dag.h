@@ -10,7 +10,7 @@
 
 namespace voxdag {
 
-// Properties that all parts of one DAG share. Write them with names: `{.grid_levels = 11,
+// Properties that all sub-DAGs of one DAG share. Write them with names: `{.grid_levels = 11,
 // .hash_bits = 64}`.
 struct DagShape {
   uint32_t grid_levels = 2;  // L; bricks are level L-2
@@ -50,7 +50,7 @@ class SubDagSink {
   virtual void nodes(const NodeLevelView& level) = 0;
 };
 
-// A complete sub-DAG in memory, for tests and small subvolumes.
+// A complete sub-DAG in memory, for tests, benchmarks and the check of a backend.
 struct SubDag : SubDagSink {
   struct Nodes {
     uint32_t level = 0;

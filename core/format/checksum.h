@@ -50,8 +50,9 @@ class Checksum64 {
 };
 
 // Returns a checksum of 32-bit words that can be computed in parts, in any order and by any number
-// of threads. It is the sum of all words, weighted by their indices, modulo 2^64. So the checksum
-// of all words is the sum of the parts' checksums. `first` is the index of words[0].
+// of threads. It is a sum modulo 2^64. The sum has one term for each word, which depends on the
+// word and on its index. So the checksum of all words is the sum of the parts' checksums. `first`
+// is the index of words[0].
 uint64_t indexed_checksum(uint64_t first, std::span<const uint32_t> words);
 
 // Computes SHA-256 over bytes that are added in parts.

@@ -67,7 +67,8 @@ void WorldBounds::add(const WorldBounds& other) {
 
 WorldBounds bounds_of(std::span<const WorldTriangle> triangles) {
   if (triangles.empty()) return {};
-  WorldTriangle low = triangles[0], high = triangles[0];  // bounds of each of the three vertices
+  // Separate bounds of all first, all second and all third vertices.
+  WorldTriangle low = triangles[0], high = triangles[0];
   for (const WorldTriangle& triangle : triangles)
     for (int i = 0; i < 3; ++i)
       for (int a = 0; a < 3; ++a) {

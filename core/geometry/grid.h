@@ -59,8 +59,8 @@ struct Grid {
 };
 
 enum class SnapResult {
-  kInside,   // may touch the grid
-  kOutside,  // the triangle's bounding box misses the grid; a build drops and counts the triangle
+  kInside,   // the triangle's bounding box touches the grid
+  kOutside,  // the bounding box misses the grid; a build drops and counts the triangle
   kTooFar,   // the box touches the grid, but a coordinate exceeds kCoordinateLimit; a build fails
 };
 

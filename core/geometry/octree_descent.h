@@ -82,7 +82,7 @@ inline uint32_t touched_children(const FixedTriangle& triangle, const Cube& cube
   uint32_t mask = 0xff;
   bool inside = true;
   int64_t low[3];
-  static constexpr uint32_t kLowHalf[3] = {0x0f, 0x33, 0x55};  // children at 0 along each axis
+  static constexpr uint32_t kLowHalf[3] = {0x0f, 0x33, 0x55};  // lower children along each axis
   for (int a = 0; a < 3; ++a) {
     low[a] = static_cast<int64_t>(cube.position[a]) * parent_units;
     const int64_t middle = low[a] + half;

@@ -48,7 +48,7 @@ class SubvolumeBuild {
   TriangleSet triangles_;
   // A stack: for each cube from the root to the current cube, the triangles that may touch it. For
   // each of the current cube's entries, octants_ has two masks: bits 0-7 are the children that the
-  // triangle may touch, bits 8-15 are the children that it covers.
+  // triangle may touch, bits 8-15 are the children that it covers (see Entry in triangle_set.h).
   PooledArray<Entry> entries_;
   PooledArray<uint16_t> octants_;
   size_t entries_used_ = 0;

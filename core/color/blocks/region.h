@@ -46,8 +46,8 @@ using CellColor = std::function<Color(uint32_t up, const ColoredCell& cell)>;
 class RegionEncoder {
  public:
   // `levels` is the number of levels from the region down to its finest cells: kRegionLevels, or
-  // less if the grid has fewer remaining levels. If `color` is not null, it returns the colors of
-  // the cells. Otherwise colors are computed from the cells' sums.
+  // less if fewer levels are above the finest cells. If `color` is not null, it returns the colors
+  // of the cells. Otherwise colors are computed from the cells' sums.
   explicit RegionEncoder(uint32_t levels, CellColor color = nullptr)
       : levels_(levels), color_(std::move(color)) {}
   // Adds cells of the finest level in increasing order of their codes, to which `first_code` is

@@ -49,7 +49,7 @@ VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& t
     du[i] = static_cast<double>(c[j].texture[0] - c[i].texture[0]);
     dv[i] = static_cast<double>(c[j].texture[1] - c[i].texture[1]);
   }
-  double texels;  // in the triangle, counted twice like `area`, times 2^(2 kTextureBits)
+  double texels;  // twice the texels in the triangle, times 2^(2 kTextureBits)
   if (area > 0) {
     const double determinant = du[0] * dv[1] - du[1] * dv[0];
     texels = (determinant < 0 ? -determinant : determinant) * (width * height);

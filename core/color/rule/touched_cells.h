@@ -59,7 +59,7 @@ class TouchedCells {
         following ? climb() : find_plane(p, q);
         visit_column(p, q, at, visit);
       } else if (following) {
-        return;  // the shadow is convex
+        return;  // the shadow is convex, so it touches no later square of the row
       }
       following = touched;
       for (int i = 0; i < 3; ++i) at[i] += t_.edges[2][i].b;

@@ -10,7 +10,8 @@ namespace voxdag {
 struct ConsingMemory {
   // Maximum size of the free pages that are retained for the next sub-DAG. They are not charged,
   // and are freed before an allocation that would not fit next to them in the budget. A budget of
-  // less than eight times kMinPageBytes can be exceeded by kMinPageBytes.
+  // less than eight times kMinPageBytes can be exceeded by kMinPageBytes; the division of the
+  // memory among workers allows for this (scheduler/spec/memory_plan.h).
   static constexpr uint64_t kMinPageBytes = uint64_t{8} << 20;
   static constexpr uint64_t kMaxPageBytes = uint64_t{128} << 20;
   static constexpr uint64_t page_bytes(uint64_t budget_bytes) {

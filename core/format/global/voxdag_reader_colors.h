@@ -405,9 +405,10 @@ class BasicColorCursor {
   }
 
   // Makes region_ the region of a cell on the path, and returns the index of the cell's value in
-  // it. The cursor remembers a group for this: the cells below the ancestor `above` levels up (at
-  // most three). For each parent of the group's cells, it has the mask of the children, and the
-  // number of the region's cells before them.
+  // the region. For this, the cursor remembers a *group*: the cells of one level in the cube
+  // `above` levels above them (at most three). For each parent of the group's cells, masks_ has the
+  // mask of its children, and starts_ the number of cells of the group's level that come before
+  // these children in the region.
   uint64_t stored_index(uint32_t level, uint64_t code) {
     const ColorTier& tier = section_->tier_of(level);
     // Number of levels from the cell up to the group's cube.
@@ -486,7 +487,7 @@ class BasicColorCursor {
   // The current group; see stored_index().
   uint32_t group_level_ = kNone;  // level of the group's cells
   uint64_t group_code_ = 0;       // Morton code of the group's cube
-  uint64_t starts_[64] = {};      // by parent: number of the region's cells before its children
+  uint64_t starts_[64] = {};      // by parent: rank of its first child in the region
   uint32_t masks_[64] = {};       // by parent: mask of its children
 };
 

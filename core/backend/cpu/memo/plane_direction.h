@@ -16,7 +16,7 @@ namespace voxdag::cpu {
 // Trivially copyable, 24 KiB. Only for planes with Plane::fractional. Not thread-safe.
 class PlaneDirection {
  public:
-  static constexpr int kSizeLog2 = 3;  // size of the nodes
+  static constexpr int kSizeLog2 = 3;  // log2 of the edge of the nodes' cubes, in voxels
   static constexpr int kCorners = 9 * 9 * 9;
 
   // A node of 8^3 voxels, and the numbers of voxels and octree nodes in it.

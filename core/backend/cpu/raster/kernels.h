@@ -59,7 +59,7 @@ const Kernels* avx512_kernels();
 
 // The rasterizers: each sets exactly the voxels of the tile that the triangle touches.
 //
-// Plain integer code, for narrow, wide and degenerate triangles.
+// Plain integer code, for narrow, wide (triangle_set.h) and degenerate triangles.
 template <class Coordinate>
 void draw_exactly(const TileTriangle<Coordinate>& triangle, TileBricks& tile);
 // Requires a machine with AVX2, FMA and BMI2.

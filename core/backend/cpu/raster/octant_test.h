@@ -53,7 +53,7 @@ struct OctantTest {
   const LatticeCube& cube;
   double half;        // edge of a child
   double reach;       // max |coordinate| of vertices and cube, relative to the cube's low corner
-  int long_axes = 0;  // number of axes along which the triangle is as long as a child
+  int long_axes = 0;  // number of axes along which the triangle is at least as long as a child
   double normal[3];
 
   OctantTest(const Triangle<Coordinate>& triangle, const LatticeCube& box)

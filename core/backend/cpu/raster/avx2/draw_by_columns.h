@@ -96,8 +96,8 @@ VOXDAG_INLINE uint32_t in_layer(uint32_t columns) {
   return kP<D> < kQ<D> ? transposed(columns) : columns;
 }
 
-// Draws a triangle perpendicular to axis D. It touches one layer of voxels, limited only by the
-// edge tests.
+// Draws a triangle whose plane is perpendicular to axis D. All its voxels are in one layer, so only
+// the edge tests decide which voxels of the layer are set.
 template <int D>
 VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
   const Footprint<D> footprint(t);
@@ -118,8 +118,9 @@ VOXDAG_INLINE void draw_along(const TileTriangle<int32_t>& t, TileBricks& tile) 
     ColumnWalk<D, Spread>(t, tile).run();
 }
 
-// Spread<D> is constructed from HeightBounds. Its mask(up) is the set of voxels of the brick that
-// is `up` bricks above the brick in which the column begins; up < 4.
+// Spread<D> is constructed from the HeightBounds (sides.h) of a column of bricks. Its mask(up) is
+// the set of touched voxels in one brick of the column: the brick that is `up` bricks above the
+// column's first brick; up < 4.
 template <template <int> class Spread>
 VOXDAG_INLINE void draw_by_columns(const TileTriangle<int32_t>& t, TileBricks& tile) {
   if (t.normal[t.dominant] == 0) return draw_exactly(t, tile);

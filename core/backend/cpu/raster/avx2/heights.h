@@ -86,8 +86,8 @@ class Heights {
             static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1)};
   }
 
-  // Returns the bounds of the heights in the 16 voxel columns. Columns whose lane of `outer` is all
-  // ones have no voxels.
+  // Returns the HeightBounds (sides.h) of the 16 voxel columns. Voxel columns whose lane of `outer`
+  // is all ones have no voxels.
   VOXDAG_INLINE HeightBounds bounds(const Column& c, __m256i outer) const {
     const __m256i base = _mm256_set1_epi16(static_cast<int16_t>(c.within));
     __m256i below = _mm256_add_epi16(base, below_lanes_);

@@ -43,7 +43,7 @@ constexpr Layers kLayers;
 // the length of a separate loop for each row.
 struct ColumnList {
   int count = 0;
-  uint8_t numbers[256 + 16];  // add() writes 16
+  uint8_t numbers[256 + 16];  // 16 spare elements, because add() always writes 16 numbers
 
   // Adds the columns of bricks `first` to `last` of row q, 0 <= first <= last <= 15.
   VOXDAG_INLINE void add(int q, int first, int last) {
