@@ -97,7 +97,9 @@ class Merger {
     }
     segment.finish();
     ++context_.report.passes;
-    recovery_.wait();  // so that the bytes merged by this pass are released soon
+    // Waits, because is_due() is false during a save. The save after this pass releases the bytes
+    // that the pass has merged.
+    recovery_.wait();
     const bool is_due = recovery_.is_due();
     const std::vector<SurveyedArtifact> before = pending_.replace_all(merged, segment);
     if (is_due) recovery_.save_pass(segment, merged, before);
@@ -160,8 +162,7 @@ ArtifactRef merge_to_artifact(const MergeInputs& inputs, FileSystem& files, Segm
   MergeProgress rows_merged(progress);
   const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
                              rows_merged, cancel, report};
-  // Positions in an artifact count rows. An artifact has fewer rows than a level of the file has
-  // words.
+  // UINT64_MAX: no level is wide, because positions in an artifact are row indices of 32 bits.
   const ArtifactRef merged = Merger(inputs, context, UINT64_MAX, nullptr).run(out);
   report.scratch_bytes += scratch.bytes_written();
   return merged;

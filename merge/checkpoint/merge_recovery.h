@@ -29,13 +29,14 @@ class MergeRecovery {
   // Resumes the saved state if there is one and it belongs to the same inputs: changes the pending
   // artifacts, the report and `out`, and returns the progress of the final pass. A damaged state,
   // or a state of other inputs, is discarded with a warning. Throws Error{kInvalidInput} if the
-  // state was saved for another output path, Error{kOutOfMemory} if the interrupted merge had more
-  // memory.
+  // state was saved for another output path, Error{kOutOfMemory} if the artifacts of an interrupted
+  // final pass do not fit the memory of this merge.
   PassProgress restore(GlobalFileWriter& out);
 
   // True if it is time to save a state. Rethrows the last save's error.
   bool is_due() { return saver_.is_due(); }
-  // Call it within a pass: `merged`, in `segment`, replace the pending artifacts before `next`.
+  // Call it within a pass: `merged`, in `segment`, replace the pending artifacts before
+  // index `next`.
   void save_in_pass(PassSegment& segment, std::vector<ArtifactRef> merged, size_t next);
   // Call it after a pass: `merged`, in `segment`, have replaced all artifacts of `before`.
   void save_pass(const PassSegment& segment, std::vector<ArtifactRef> merged,

@@ -21,7 +21,8 @@ namespace voxdag {
 
 class StateSaver {
  public:
-  // Without a checkpoint, load() returns nothing, is_due() returns false and save() does nothing.
+  // If `checkpoint` is null, load() returns nothing, is_due() returns false, and save() must not be
+  // called.
   StateSaver(Checkpoint* checkpoint, double interval_s)
       : checkpoint_(checkpoint), interval_s_(interval_s) {}
   // Does not remove the files that the durable state names: they outlive the merge.
@@ -48,8 +49,8 @@ class StateSaver {
             std::function<void()> sync, std::vector<SegmentRange> merged);
   // Waits for the running save and rethrows its error.
   void wait();
-  // Like wait(), at the end of the merge. Does not release the remaining bytes, because their files
-  // are removed soon.
+  // Like wait(), at the end of the merge. The running save skips the input ranges that it has not
+  // released yet, because the input files are removed soon.
   void finish();
 
  private:

@@ -80,8 +80,8 @@ class HashPartition {
   static std::optional<HashInterval> widest_interval(std::span<const LevelRun* const> runs,
                                                      uint64_t first, uint64_t bytes,
                                                      uint32_t position_words);
-  // Returns one slice for each run that has frames within the interval. The constructor of
-  // HashPartition sets their other members.
+  // Returns one slice for each run that has frames within the interval, with `run` and `frames`
+  // set. The constructor of HashPartition sets the other members of the slices.
   static std::vector<RunSlice> slices_within(std::span<const LevelRun* const> runs,
                                              const HashInterval& interval);
 
@@ -91,8 +91,8 @@ class HashPartition {
                 const HashInterval& interval, uint64_t bucket_rows, uint32_t position_words,
                 PartitionMemory& memory, MemoryBudget& budget);
 
-  // Reads the rows and replaces their children by positions. `child_maps` may be null if no run
-  // needs them.
+  // Reads the rows and replaces their children by positions, which `child_maps` has for the level
+  // below. `child_maps` may be null if the rows are bricks or all runs are already rewired.
   void load(const PositionMaps* child_maps, const PartitionWorkers& workers, MemoryBudget& budget,
             const CancelToken& cancel);
 

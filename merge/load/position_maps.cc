@@ -7,7 +7,7 @@
 namespace voxdag {
 namespace {
 
-// Returns the first row of each run's map, and the end of the last map.
+// Returns, for each run, the number of rows of all runs before it, and finally the total.
 std::vector<uint64_t> begins_of(std::span<const uint64_t> rows) {
   std::vector<uint64_t> begins{0};
   for (const uint64_t count : rows) begins.push_back(begins.back() + count);

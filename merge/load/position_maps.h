@@ -26,7 +26,8 @@ class PositionMaps {
   // if all of them together take at most `resident_bytes`.
   PositionMaps(std::span<const uint64_t> rows, bool wide, uint64_t resident_bytes,
                ScratchFolder& scratch, MemoryBudget& budget);
-  // Opens the maps that an earlier merge left in `file`, with one or two words per row.
+  // Opens the maps that an earlier merge left in `file`. They are wide if the file has two words
+  // per row. Reads them into memory if they take at most `resident_bytes`.
   PositionMaps(std::span<const uint64_t> rows, std::unique_ptr<ScratchFile> file,
                uint64_t resident_bytes, MemoryBudget& budget);
 
@@ -39,7 +40,8 @@ class PositionMaps {
   std::vector<uint64_t> rows() const;
   // Returns the number of rows of the longest map.
   uint64_t max_rows() const;
-  // Returns the words of a complete map. Requires is_resident().
+  // Returns the words of the run's whole map, for reading or storing positions. Requires
+  // is_resident().
   uint32_t* words(size_t run) { return words_.data() + first_word(run); }
   const uint32_t* words(size_t run) const { return words_.data() + first_word(run); }
 
@@ -48,14 +50,15 @@ class PositionMaps {
   void load(size_t run, uint64_t first, std::span<uint32_t> words) const;
   uint64_t at(size_t run, uint64_t row) const;
 
-  // Returns a file with all maps: the file they are in, or a copy.
+  // Returns a file with all maps: the file that they are in, or, if they are in memory, a new file
+  // to which they are copied.
   std::shared_ptr<ScratchFile> file(ScratchFolder& scratch) const;
 
  private:
   uint64_t first_word(size_t run) const { return first_[run] << wide_; }
   uint64_t total_words() const { return first_.back() << wide_; }
 
-  std::vector<uint64_t> first_;  // first row of each run's map, and the end of the last map
+  std::vector<uint64_t> first_;  // for each run, the rows of all runs before it; then the total
   bool wide_;
   PageBuffer<uint32_t> words_;
   std::shared_ptr<ScratchFile> file_;

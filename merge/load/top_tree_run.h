@@ -19,9 +19,9 @@ struct PlacedNode {
 
 class TopTreeRun : public LevelRun {
  public:
-  // Creates the parents of `children`, which are all top nodes and roots of the level below.
-  // `wide`: the children's positions take two words. Throws Error{kCorrupt} if two children have
-  // the same cube, because then their subvolumes overlap.
+  // Creates the parents of `children`, which are all top nodes and all subvolume roots of the
+  // level below. `wide`: the children's positions take two words. Throws Error{kCorrupt} if two
+  // children have the same cube, because then their subvolumes overlap.
   TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children, bool wide);
   void read_frame(size_t index, Frame& out) const override;
 

@@ -176,8 +176,8 @@ uint64_t bucket_rows(const MergeContext& context, const LevelTask& task) {
   return std::min(rows, context.plan.worker_bytes / (2 * row_bytes));
 }
 
-// Returns how many words a partition holds for the position of each row until the partition is
-// merged.
+// Returns the number of words per row that a partition holds for the row's position. It is 0 if the
+// position maps are in memory, because then positions are written directly to the maps.
 uint32_t held_position_words(const LevelTask& task) {
   return task.maps.is_resident() ? 0 : task.maps.position_words();
 }

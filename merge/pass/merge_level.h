@@ -11,7 +11,8 @@ namespace voxdag {
 // Returns the memory of the workers, in addition to the partition and the maps.
 uint64_t bytes_for_workers(const MergeMemory& plan);
 
-// Merges the level of `task`. Adds the numbers of its partitions, groups and rows to the report.
+// Merges the level of `task`. Adds its numbers of partitions, streamed groups and rows to the
+// report.
 LevelExtent merge_level(const MergeContext& context, const LevelTask& task);
 
 }  // namespace voxdag

@@ -119,8 +119,8 @@ class Pass {
         if (root.cube.level != level) continue;
         const uint64_t position = maps.at(run, root.index);
         done_.placed.push_back({root.cube, root.hash, position});
-        // The cast can truncate a position in the global file, but an index into this file is never
-        // used.
+        // A position in the global file can have over 32 bits, and the cast truncates it. This is
+        // harmless: nothing uses the `index` of a root in the global file.
         root.index = static_cast<uint32_t>(position);
         done_.roots.push_back(root);
       }

@@ -38,8 +38,10 @@ class Opener {
     for (const ArtifactRoot& root : reader.roots()) {
       const ArtifactLevel* const level = reader.level(root.cube.level);
       if (!level || root.index >= level->rows)
-        throw Error(ErrorCode::kCorrupt, where + "a root on level " +
-                                             std::to_string(root.cube.level) + " does not exist");
+        throw Error(ErrorCode::kCorrupt, where + "the root on level " +
+                                             std::to_string(root.cube.level) + " is row " +
+                                             std::to_string(root.index) + ", but the level has " +
+                                             std::to_string(level ? level->rows : 0) + " rows");
     }
   }
 

@@ -38,8 +38,8 @@ struct ArtifactSurvey {
 class ArtifactSet {
  public:
   // Opens the artifacts, each segment file once, and charges their indexes to the budget. Throws
-  // Error{kCorrupt} for an artifact with a different grid or different hash bits, or with missing
-  // roots.
+  // Error{kCorrupt} for an artifact with a different grid or different hash bits, without a root,
+  // or with a root whose row does not exist.
   ArtifactSet(std::span<const SurveyedArtifact> artifacts, const OpenSegment& open,
               const DagShape& shape, MemoryBudget& budget);
 
@@ -51,7 +51,7 @@ class ArtifactSet {
 };
 
 // Reads the indexes of all artifacts, one after another. `wide`: computes the minimum memory for
-// wide levels.
+// wide levels. Throws Error{kCorrupt} for the same reasons as the constructor of ArtifactSet.
 ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
                                 const DagShape& shape, bool wide);
 

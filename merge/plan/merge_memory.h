@@ -7,8 +7,8 @@
 //   hash partition   all remaining memory, at least partition_bytes
 //
 // The hash partition limits the number of runs that one pass merges, because it must hold two
-// frames of every run. Then the rows of any single hash fit, unless some run has more of them than
-// two frames.
+// frames of every run. Then all rows of one hash fit, unless they extend over more than two frames
+// of some run.
 #pragma once
 
 #include <algorithm>

@@ -3,7 +3,7 @@
 //
 // Unless hashes are truncated, they are spread evenly. So one pass that distributes the rows by the
 // hash bits below the bucket's bits leaves almost nothing to sort. Rows with equal hashes are then
-// compared completely. One thread uses a sorter.
+// compared completely. Not thread-safe: each thread has its own sorter.
 #pragma once
 
 #include <cstdint>
