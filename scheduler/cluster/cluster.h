@@ -57,7 +57,8 @@ class MergeJob {
   // True if the work folder still has a job store although the build does not keep its work folder:
   // the merge job is still removing the folder, or was stopped before it removed the folder.
   virtual bool has_remaining_work() const = 0;
-  // Removes the report of an earlier merge job.
+  // Removes the report that finished() returns, if any, so that it is not taken for the report of a
+  // new merge job.
   virtual void forget_finished() = 0;
   // True if the work folder's merge job is waiting or running. Repeats the query until Slurm
   // answers.

@@ -20,14 +20,15 @@ uint64_t morton_place(const Cube& cube);
 // weight, each with at least one item. Returns the end index of each part.
 std::vector<size_t> cut_into_batches(std::span<const double> weights, uint64_t batches);
 
-// Batches of subvolumes, in the given order.
+// New batches, and their subvolumes as make_batches() divided them.
 struct CutBatches {
   std::vector<Batch> batches;
   std::vector<OpenBatch> open;      // the state of the same batches
   std::vector<size_t> first_items;  // index of the first subvolume of each batch
 };
-// Makes at most `most` batches, numbered from `first_number`. Each batch gets its other fields (all
-// except its number and subvolumes) from `like`.
+// Divides the subvolumes, in the given order, into at most `most` batches, numbered from
+// `first_number`. Each batch gets its other fields (all except its number and subvolumes) from
+// `like`.
 CutBatches make_batches(const Batch& like, std::span<const BatchSubvolume> subvolumes,
                         uint64_t most, uint32_t first_number);
 

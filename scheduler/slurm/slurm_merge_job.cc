@@ -18,8 +18,8 @@ namespace {
 constexpr uint64_t kMaxReportBytes = uint64_t{1} << 24;
 // Pause between two searches for files.
 constexpr double kFilesPauseS = 0.5;
-// Maximum time until an NFS client sees a new file after it has found it missing (acdirmax,
-// nfs(5)), with a margin.
+// Maximum time until an NFS client sees a new file, if it looked for the file before the file
+// existed (acdirmax, nfs(5)). Includes a margin.
 constexpr double kMaxDelayS = 75;
 // Bytes from the end of a log that are quoted in a message.
 constexpr uint64_t kMaxTailBytes = 600;
@@ -167,8 +167,8 @@ BuildReport SlurmMergeJob::follow(const std::string& submitted) {
         cancel_held(jobs->front());
         gone_since_s = 0;
       } else if (jobs) {
-        // On a shared file system the job's files can become visible after Slurm reports that it
-        // ended.
+        // On a shared file system the job's files can become visible after Slurm reports that the
+        // job has ended.
         if (gone_since_s == 0) gone_since_s = now_s;
         const double gone_s = now_s - gone_since_s;
         if (gone_s >= options_.grace_s) {

@@ -14,7 +14,8 @@
 namespace voxdag {
 namespace {
 
-// Increased with every change that produces different artifacts from the same triangles.
+// Version of the artifacts, a part of every key. Increase it with every change that produces
+// different artifacts from the same triangles.
 constexpr uint64_t kContentVersion = 1;
 
 using Corner = std::array<int64_t, 3>;

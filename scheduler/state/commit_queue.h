@@ -1,7 +1,11 @@
 // A worker's segment, and the built subvolumes that are not recorded yet. Artifacts become durable
 // in groups and are then recorded in the job store, on a separate thread, so that the worker does
-// not wait for the disk. The last group becomes durable only by commit(), because a short build
-// ends before a sync of its artifacts is worthwhile. Not thread-safe.
+// not wait for the disk. The last group is different:
+//   - With a MemoryStore of triangles, the group is merged before it is durable. Only commit()
+//     makes it durable. A short build does not call commit(), which saves the wait for the disk.
+//   - With a DurableStore, finish() makes the group durable, because the bins of its triangles may
+//     be released only after that.
+// Not thread-safe.
 #pragma once
 
 #include <future>
@@ -41,9 +45,10 @@ class CommitQueue {
   // Makes all built artifacts durable. Throws each error once; the next call retries the remaining
   // artifacts.
   void commit();
-  // Called when the worker has no more subvolumes. Completes the segment and makes the job store
-  // return the last group as built. This group becomes durable only by commit(). The triangle store
-  // is not used after this call.
+  // Called when the worker has no more subvolumes. Makes the last group durable if it has bins to
+  // release. Otherwise only makes the job store return the group as built; the group becomes
+  // durable by a later commit(). Completes the segment. The triangle store is not used after this
+  // call.
   void finish();
 
  private:

@@ -2,8 +2,9 @@
 // Both triangle stores use these chunks. No function locks: one thread writes a list of chunks, and
 // any number of threads may read the list when it is complete.
 //
-// A record has nine coordinates of 32 bits (36 bytes). If the build's options define the grid,
-// triangles may extend far beyond it. Their coordinates then have 64 bits ("wide", 72 bytes).
+// A record has nine coordinates of 32 bits (36 bytes). If the build's options give the grid's
+// bounds, triangles may extend far beyond the grid. Their coordinates then have 64 bits ("wide", 72
+// bytes).
 #pragma once
 
 #include <cstddef>

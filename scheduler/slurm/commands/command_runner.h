@@ -27,9 +27,9 @@ class CommandRunner {
 
 CommandRunner& system_commands();
 
-// True for variables that change the behavior of Slurm's commands, and for variables that describe
-// the Slurm job of this process. Submitted tasks must not inherit the description of this job.
-// `variable` is NAME=value.
+// True for an environment variable that commands do not get: one that changes the behavior of
+// Slurm's commands or describes the Slurm job of this process. Submitted tasks must not inherit the
+// description of this job. `variable` is NAME=value.
 bool is_hidden_variable(std::string_view variable);
 
 }  // namespace voxdag

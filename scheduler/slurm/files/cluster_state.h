@@ -1,8 +1,8 @@
 // The state of the submitting process of a cluster build, in cluster.json: open batches with their
 // tasks and failures, and totals. Only the submitting process writes the file, by an atomic rename;
 // `voxdag status` reads it. No other file lists the open batches and their subvolumes, which a run
-// needs to accept records. So if cluster.json is lost, all batches are built again whose records no
-// run has accepted.
+// needs to accept records. So if cluster.json is lost, every batch is built again unless its record
+// has been accepted.
 #pragma once
 
 #include <cstdint>

@@ -23,8 +23,8 @@ struct BuiltSubvolume {
 };
 
 struct CompletionRecord {
-  std::string program;  // same meaning as in Batch
-  std::string build;
+  std::string program;  // voxdag version; must be the same as the batch's (batch_file.h)
+  std::string build;    // id of the build, as in the batch
   uint32_t batch = 0;
   std::string attempt;
   std::string node;      // the machine that built the batch

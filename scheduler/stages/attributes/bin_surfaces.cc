@@ -62,8 +62,9 @@ class SurfacePiece {
     uint32_t bin, record;
   };
   static constexpr size_t kNone = ~size_t{0};
-  // Maximum number of places in memory. A piece of triangles that touch many bins has more places.
-  // copy() finds the bins of records from late_ on, whose places were not added.
+  // Maximum number of places in memory. A piece whose triangles touch many bins needs more. Then
+  // the places of the records from late_ on are not added, and copy() finds the bins of these
+  // records.
   static constexpr size_t kMaxPlaces = 4 * kPieceTriangles;
 
   std::span<const std::byte> bytes_of(const Record& record) const {

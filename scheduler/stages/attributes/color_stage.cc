@@ -71,11 +71,11 @@ void check_list(std::span<const std::string> materials) {
                                        " bytes; leave out --attributes material");
 }
 
-// A baker and the records of one cube.
+// What a thread uses to bake cubes, and the result for the cube that it processes.
 struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;
-  CubeBaker::Records records;  // the cube's last parts
+  CubeBaker::Records records;  // for each attribute, the cube's last part
   bool is_baked = false;       // baked in this run; otherwise its records are in the ColorStore
 };
 
@@ -199,7 +199,7 @@ std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& a
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kOutOfMemory) throw;
   }
-  // Large images may need the memory of the surfaces.
+  // The images did not fit in memory. Moves the surfaces to their spill file and tries again.
   store->move_to_file(surfaces.bins);
   trim_heap();
   return prepare();
@@ -272,7 +272,8 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
 
 // Adds the section of an attribute other than the first one. The first attribute's section is
 // written while cubes are baked. Sections are contiguous in the output, so the records of the other
-// attributes are stored in the work folder until then. This function reads them.
+// attributes wait in the work folder until the first section is complete. This function reads these
+// records.
 void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute,
                                    GlobalFileWriter& out, const ColorReport& report) {
   const BuildContext& build = context.build;

@@ -1,11 +1,12 @@
 // Bakes the colors of a scene and other attributes of its cells (docs/color.md). Reads the surfaces
-// again and bins them by cubes of the color grid. All threads bake cubes. The results are written
-// in Morton order after the levels of the global file, one section for each attribute.
+// (triangles with their materials) again and bins them by cubes of the color grid. All threads bake
+// cubes. The results are written in Morton order after the levels of the global file, one section
+// for each attribute.
 //
 // Resume rule: a baked cube is stored in the work folder (color_store.h) under a key of all its
 // inputs (color_keys.h), and a later run with an equal key reuses it. A stopped run loses only
 // unfinished cubes; a changed texture affects only the cubes that show it. An image is decoded only
-// if a cube that must be baked shows it.
+// if a cube that must be baked may show it.
 #pragma once
 
 #include <cstdint>

@@ -155,7 +155,8 @@ void ColorStore::keep_only(std::span<const Checksum128> keys, const CancelToken&
     for (const Place& place : found->second) retained_bytes += kHeaderBytes + place.bytes;
   }
   if (end_ <= 2 * retained_bytes + kTolerableBytes) return;
-  // If this run is killed, a later run removes the copy because of its ending.
+  // If this run is killed, the copy remains until the next copy or the removal of the work folder.
+  // Its ending marks it as a file of voxdag (work_folder.cc).
   const std::string copy_path = path_ + ".vdspill";
   uint64_t end = 0;
   try {

@@ -88,8 +88,8 @@ void CubeBaker::divide(const Cube& cube, ChunkList& bin, const Sink& sink) {
     const int64_t units = cube.edge_voxels(grid_.levels) * kUnitsPerVoxel;
     for_each_surface(store_, bin, [&](const FixedSurface& surface) {
       record.clear();
-      // Passes true for has_image. A surface that was stored without texture coordinates was read
-      // back without them, so nothing is lost.
+      // Passes true for has_image, so that texture coordinates are never dropped. A surface that
+      // was stored without them is stored again with zeros, which no image uses.
       append_surface(surface, true, record);
       for (uint32_t mask = touched_children(surface.position, cube, units); mask; mask &= mask - 1)
         writer.append(static_cast<size_t>(lowest_bit(mask)), record, 1);
@@ -177,8 +177,8 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
   if (most >= kManyRecordBytes) sink.take(sink.records);
 }
 
-// Returns false if the cube has more than `max_cells` cells, or if the sums of its other attributes
-// do not fit in memory.
+// Returns false if the cube has more than `max_cells` cells, or if the sums of its normals and
+// materials do not fit in memory.
 template <class AddSurfaces>
 bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces) {
   bool is_complete = true;

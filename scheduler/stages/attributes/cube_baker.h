@@ -1,4 +1,5 @@
-// Bakes the regions of cubes of the color grid, for one thread.
+// Bakes the attributes in cubes of the color grid, one region (color_grid.h) after another. Each
+// thread has its own CubeBaker.
 #pragma once
 
 #include <cstddef>

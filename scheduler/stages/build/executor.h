@@ -44,9 +44,10 @@ struct ExecutorCounts {
 };
 
 // Builds `subvolumes` and releases their bins. Records the results in `jobs` in groups
-// (CommitQueue). Moves the workers' commit queues to `unfinished`. The last group of each queue is
-// recorded only when the caller calls unfinished.commit(). Throws the first Error of any worker
-// after all workers have stopped and finished subvolumes are recorded.
+// (CommitQueue). Moves the workers' commit queues to `unfinished`. Unless `triangles` is a
+// DurableStore, the last group of each queue is recorded only when the caller calls
+// unfinished.commit(). Throws the first Error of any worker after all workers have stopped and
+// finished subvolumes are recorded.
 ExecutorCounts build_subvolumes(const ExecutorOptions& options,
                                 std::vector<QueuedSubvolume> subvolumes, TriangleStore& triangles,
                                 JobStore& jobs, CommitQueues& unfinished, MemoryBudget& budget,

@@ -76,7 +76,7 @@ class TopTree {
     std::vector<LargeTriangle> large_;           // triangles that touch more than kMaxTouched cells
     std::array<uint32_t, kSlots> last_entry_{};  // index of the last entry with code % kSlots
     std::vector<uint64_t> touched_;              // cells that the last triangle touches
-    CubeInside last_cell_;                       // a cell that contains a complete triangle
+    CubeInside last_cell_;  // cell of the last triangle that is inside one cell
     size_t entry_of_last_cell_ = 0;
   };
   void add(Tally& tally);

@@ -34,8 +34,8 @@ constexpr size_t kBatchTriangles = 256;
 // the order of the scene.
 class TouchedPiece {
  public:
-  // Allocates space for kPartitionPiece records, plus the records of one more triangle, which may
-  // touch all leaves.
+  // Allocates space for 2 * kPartitionPiece records, or kPartitionPiece + `leaves` if that is more.
+  // So the buffer always has space for the records of one triangle, which may touch all leaves.
   TouchedPiece(const CubeTree& tree, size_t leaves, size_t record_bytes, MemoryBudget& budget)
       : tree_(tree),
         leaves_(leaves),

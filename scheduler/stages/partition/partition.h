@@ -18,7 +18,7 @@ class CubeTree {
  public:
   // `root` contains all `leaves`.
   CubeTree(uint32_t grid_levels, const Cube& root, std::span<const Cube> leaves);
-  // A leaf that contains a complete triangle.
+  // A leaf that contained an earlier triangle. The next triangle is probably in the same leaf.
   struct Hint {
     size_t leaf = 0;
     CubeInside inside;

@@ -23,7 +23,7 @@ constexpr double kTaskOverhead = 1.15;
 // Triangle records in all batches per triangle of the scene: a triangle at a border between
 // subvolumes is in several subvolumes.
 constexpr double kTaskCopies = 1.2;
-// Enough for the largest planned subvolumes on two threads.
+// Recommended memory per task. It is enough for the largest planned subvolumes on two threads.
 constexpr uint64_t kTaskMemory = uint64_t{2} << 30;
 
 }  // namespace

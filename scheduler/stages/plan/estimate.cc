@@ -42,9 +42,11 @@ constexpr double kMaxCellsPerBrick = 32;
 constexpr double kMemoryBytesPerNode = 26;
 constexpr double kBaseMemoryBytes = 24e6;
 
-// A build below this resolution fits any disk that can store its scene, so no estimate is made.
+// Minimum levels of a build's grid for check_disk_space(): 4096 voxels per edge. A smaller build
+// fits any disk that can store its scene.
 constexpr uint32_t kMinLevelsToEstimate = 12;
-// The pilot of this estimate is much coarser than the build, so its cost is negligible.
+// The finer pilot of check_disk_space() has at least this many levels less than the build's grid,
+// so its cost is negligible.
 constexpr uint32_t kPilotLevelsBelow = 5;
 
 // A pilot build: the complete scene as one subvolume on a coarser grid. Its output is counted and
@@ -143,8 +145,9 @@ double grow_as_dag(const std::vector<PilotCounts>& pilots, int doublings) {
   return result;
 }
 
-// Triangles that do not fit in memory are already spilled. A large scene is also stored durably if
-// the disk has space; this copy is freed gradually while artifacts are written.
+// Returns the peak disk space of the triangles. Triangles that do not fit in memory are already
+// spilled. A large scene is also stored durably if the disk has space; this copy is freed gradually
+// while artifacts are written.
 EstimateRange triangles_on_disk(const PreparedScene& scene) {
   const double spilled = static_cast<double>(scene.triangles->file_bytes());
   return {spilled, std::max(spilled, scene.max_durable_bytes / 2),

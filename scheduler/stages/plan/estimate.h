@@ -44,8 +44,8 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
                         BuildScene& source, uint32_t pilot_levels, const StageContext& context);
 
 // Checks before a build that the disk has space for it. Throws Error{kNoSpace} if the build cannot
-// fit; warns if it may not fit. Does nothing if RunOptions::force is set. Returns true if this
-// required an estimate, which runs a pilot build.
+// fit; warns if it may not fit. Does nothing if RunOptions::force is set or the resolution is below
+// 4096. Returns true if the check required an estimate, which runs pilot builds.
 bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
                       const std::string& work_folder, MemoryBudget& budget,
                       const BuildContext& context);

@@ -1,7 +1,7 @@
 // The triangles of a scene on the coarser grid of a pilot. Triangles that become equal on this grid
 // are kept only once if they are close together in the scene's order. If the scene's triangles are
-// much smaller than the pilot's voxels, few triangles remain. They touch the same voxels as all
-// triangles.
+// much smaller than the pilot's voxels, few triangles remain. They touch the same voxels of the
+// pilot's grid as all triangles.
 #pragma once
 
 #include <cstdint>

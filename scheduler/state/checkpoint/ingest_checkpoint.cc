@@ -21,8 +21,9 @@ constexpr int64_t kCoarseTickNs = 2 * kSecondNs;
 // Records per triangle in the file after the partition: one in the scene's bin, and one in the bin
 // of each cube that the triangle touches.
 constexpr double kDurableCopies = 2.2;
-// Free disk space that checkpoints of triangles that fit in memory require, relative to the size of
-// the triangles' records in the file: once for the records, and once for the rest of the build.
+// Triangles that fit in memory get checkpoints only if the free disk space is at least this many
+// times the size of their records in the file: once for the records, and once for the rest of the
+// build.
 constexpr double kFreePerCopy = 2;
 
 std::string request_of(const BuildSpec& spec) {
@@ -193,7 +194,7 @@ void IngestCheckpoint::save_in_background(IngestState& state, std::optional<TopT
     commit(state);
     if (old.bytes && old.offset != state.top_tree.offset) file->release(old);
   });
-  // Tests require a checkpoint after every batch.
+  // An interval of 0, for tests, makes a checkpoint durable after every piece.
   if (spec_.run.checkpoint_interval_s == 0) wait();
 }
 

@@ -72,8 +72,9 @@ class IngestCheckpoint {
   // Saves on another thread, so that ingest does not wait for the disk. The next call throws the
   // thread's error.
   void save_in_background(IngestState& state, std::optional<TopTreeCells> top = {});
-  // Called when all subvolumes are built and recorded. Removes the durable triangles. Keeps the
-  // record, so that a later run recognizes the scene without reading it.
+  // Called when the durable triangles are not needed any more: all subvolumes are recorded as
+  // built, or the batch files of a cluster build contain their triangles. Removes the durable
+  // triangles. Keeps the record, so that a later run recognizes the scene without reading it.
   void finish();
 
   // True if the job store has a checkpoint of any scene.

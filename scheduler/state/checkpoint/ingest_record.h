@@ -42,7 +42,7 @@ struct IngestState {
   ContentDigest digest;
   Extent top_tree;  // cells of the top tree in the durable store's file
   double top_tree_weight = 0;
-  DurableStoreState triangles;  // empty again after all subvolumes are recorded
+  DurableStoreState triangles;  // empty again after IngestCheckpoint::finish()
 };
 
 struct IngestRecord {
