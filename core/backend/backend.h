@@ -30,7 +30,8 @@ namespace voxdag {
 
 // Edge in voxels of the smallest subvolume. The scheduler does not split subvolumes further.
 inline constexpr int64_t kSmallestEdge = 64;
-// Bytes of budget that suffice for a subvolume with this edge, for any number of triangles.
+// Bytes of budget that suffice for a subvolume with an edge of kSmallestEdge, for any number of
+// triangles.
 inline constexpr uint64_t kSmallestBudget = uint64_t{8} << 20;
 
 // The triangles that may touch a subvolume, in no particular order; can be read repeatedly.
@@ -76,9 +77,9 @@ enum class Simd { kNone, kAvx2, kAvx512 };
 // True if this machine and this build can run the kernels for an instruction set.
 bool cpu_supports(Simd simd);
 
-// Creates the CPU backend, which rasterizes bricks tile by tile and hash-conses nodes. It uses the
-// largest instruction set up to `max_simd` that the machine supports, chosen at run time. The
-// result is the same with every instruction set.
+// Creates the CPU backend, which rasterizes bricks tile by tile and finds equal nodes in hash
+// tables (core/dag/consing). It uses the largest instruction set up to `max_simd` that the machine
+// supports, chosen at run time. The result is the same with every instruction set.
 std::unique_ptr<Backend> make_cpu_backend(Simd max_simd = Simd::kAvx512);
 
 // The algorithms of the parallel backends. All methods produce the same result. kPointers and

@@ -121,7 +121,8 @@ constexpr const AttributeTraits& traits_of(Attribute attribute) {
   return kAttributeTable[static_cast<size_t>(attribute) - 1];
 }
 
-// The order of rows must be the order of the enumerators, because traits_of() uses them as indexes.
+// Each row must be at the position of its enumerator, because traits_of() uses the enumerators as
+// indexes.
 static_assert([] {
   for (size_t i = 0; i < std::size(kEncodingTable); ++i)
     if (kEncodingTable[i].encoding != static_cast<Encoding>(i)) return false;

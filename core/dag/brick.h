@@ -30,8 +30,8 @@ VOXDAG_HD constexpr int brick_coordinate(int bit, int axis) {
 // which means that byte i of `mask` is not 0.
 VOXDAG_HD constexpr uint32_t octants(uint64_t mask) {
   constexpr uint64_t kLowBits = 0x7f7f7f7f7f7f7f7full;
-  // Has the top bit of each byte of `mask` that is not 0. The product collects these eight bits in
-  // one byte.
+  // In `tops`, the top bit of each byte is set if this byte of `mask` is not 0. The product
+  // collects these eight bits in one byte.
   const uint64_t tops = (((mask & kLowBits) + kLowBits) | mask) & ~kLowBits;
   return static_cast<uint32_t>((tops >> 7) * 0x0102040810204080ull >> 56);
 }

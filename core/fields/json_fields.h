@@ -88,8 +88,8 @@ FieldJson difference(const FieldJson& options, const FieldJson& defaults);
 
 inline constexpr size_t kMaxNames = 64;  // maximum number of names in a set, for options
 
-// kAll: the JSON of a record, which has all members. kGiven: the JSON of options, which has only
-// the members that were given.
+// kAll: the JSON of a record. All members must be present, except optional members and members with
+// omit_empty(). kGiven: the JSON of options. Only members with required() must be present.
 enum class Members { kAll, kGiven };
 
 template <class T>

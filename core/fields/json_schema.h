@@ -112,7 +112,8 @@ FieldJson record_schema() {
   return schema;
 }
 
-// Returns the schema of options (json_fields.h). It requires only the members that are required().
+// Returns the schema of options (json_fields.h). It requires only the members whose Field is
+// required().
 template <class T>
 FieldJson options_schema() {
   FieldJson schema;

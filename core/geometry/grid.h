@@ -4,8 +4,8 @@
 // multiply-add, so that every machine snaps to the same positions. For a scene with the bounds lo
 // and hi, the default cube is
 //     edge   = max(hi - lo) * (1 + 2^-15)        origin = 0.5 * (lo + hi) - 0.5 * edge
-// It does not depend on R, the number of voxels along its edge. A world coordinate w is x voxels
-// from the origin and is snapped to the lattice coordinate u:
+// The cube does not depend on R, the number of voxels along its edge. A world coordinate w is x
+// voxels from the origin and is snapped to the lattice coordinate u:
 //     x      = ((w - origin) / edge) * R         u      = 2 * floor(128 * x) + 1
 #pragma once
 

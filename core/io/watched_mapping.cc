@@ -47,7 +47,8 @@ void on_bus_error(int number, siginfo_t* info, void* context) {
   if (g_before.sa_handler != SIG_DFL && g_before.sa_handler != SIG_IGN)
     return g_before.sa_handler(number);
   // There is no previous handler. When this handler returns, the access is repeated, and the
-  // default action ends the process. A signal without a repeated access must be raised again.
+  // default action ends the process. A signal that was not caused by an access of this thread would
+  // not occur again, so it is raised again.
   signal(SIGBUS, SIG_DFL);
   const bool was_sent = info->si_code <= 0 || info->si_code == BUS_MCEERR_AO;
   if (was_sent) raise(number);

@@ -38,7 +38,8 @@ std::vector<int> usable_devices(std::string& problem) {
   return usable;
 }
 
-// Returns the CUDA runtime's number of usable device `device`.
+// Returns the CUDA runtime's number of a device. `device`: index in usable_devices(). Throws
+// Error{kDevice} if the device does not exist.
 int runtime_device(int device) {
   std::string problem;
   const std::vector<int> usable = usable_devices(problem);

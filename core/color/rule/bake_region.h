@@ -42,7 +42,9 @@ class RegionBaker {
   // Upper bound of the memory that this object allocates, without the sums for `wanted` and the
   // vectors of the caller.
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
-  // Maximum number of cells of a region that a triangle touches: 4 for each cell of its projection.
+  // Maximum number of cells of a region that a triangle touches. Along the triangle's dominant
+  // axis, the region has 64^2 columns of cells. The triangle's plane touches at most 4 cells of
+  // each column.
   static constexpr uint32_t kTriangleCells = 4u << (2 * kRegionLevels);
 
   // The references must outlive this object. Each triangle's material is an index into `materials`.

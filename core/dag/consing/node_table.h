@@ -6,7 +6,7 @@
 // The slot of a node is at the top bits of its hash, or, if that slot is taken, the next free slot
 // (linear probing). So the slots are almost in the order of the hash. The table therefore grows in
 // one sequential pass over the slots, and sort_slots(), which makes the level array, only has to
-// sort a nearly sorted array. Records never move. They are in the order in which they were added,
+// sort a nearly sorted array. Records keep their positions, in the order in which they were added,
 // so neighbors in space are neighbors in memory. Not thread-safe. Throws OutOfBudget when the
 // budget, or 2^32 words, cannot hold more.
 #pragma once

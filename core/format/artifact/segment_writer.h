@@ -1,6 +1,6 @@
 // Writes one segment file: a header, then one artifact after another.
 //
-// Only one thread may use a writer, except for sync_written().
+// Only one thread may use a writer, except that another thread may call sync_written().
 #pragma once
 
 #include <cstdint>

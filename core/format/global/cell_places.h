@@ -1,6 +1,7 @@
 // Functions to descend from cell to cell in a global file's DAG, down to voxels. The *place* of a
-// cell identifies it in its level. For a node or brick it is the word offset. For the cells below a
-// brick it is the mask of the cell's children, which is 0 for voxels.
+// cell is the number with which these functions find the cell's children. For a node or brick it is
+// the word offset in the level. For a cell below a brick it is the mask of the cell's children,
+// which is 0 for voxels.
 #pragma once
 
 #include <cstdint>

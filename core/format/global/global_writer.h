@@ -6,14 +6,15 @@
 // Within a level everything is addressed in 32-bit words from the level's start. A brick is two
 // words, the low half of the mask first. A node is its child mask, then the word offsets of its
 // children in the next level. An offset is one word, or two (low half first) if the next level is
-// wide. Nothing in the file depends on the time, the place or the machine.
+// wide (has more than narrow_words() words). Nothing in the file depends on the time, the place or
+// the machine.
 //
 // Checksums are computed from the words and bytes that the caller passes in, not from the file.
 // (resume() reads the last incomplete checksum block back, but first compares it with its saved
 // checksum.) seal() reads the file back and compares it with these checksums. It throws
 // Error{kCorrupt} if the disk returns wrong bytes.
 //
-// Only one thread may use a writer, except for write_words() and sync().
+// Only one thread may use a writer, except that other threads may call write_words() and sync().
 #pragma once
 
 #include <cstdint>
@@ -63,8 +64,8 @@ struct GlobalFileProgress {
 
 // True if the file begins with the magic of a global file.
 bool is_global_file(const ReadableFile& file);
-// True if `file` may be an incomplete global file: if its first page, which is written last, is a
-// global file's or has only zeros so far.
+// True if `file` may be a complete or incomplete global file: it begins with the magic of a global
+// file, or its first page, which is written last, still has only zeros.
 bool is_partial_global_file(const ReadableFile& file);
 
 class GlobalFileWriter {

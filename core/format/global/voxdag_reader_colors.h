@@ -360,8 +360,8 @@ class BasicColorCursor {
     if (level < brick_level()) return Dag::child(dag_->node(level, place), static_cast<int>(index));
     return level == brick_level() ? dag_->brick(place) >> 8 * index & 255 : 0;
   }
-  // Returns the number of set cells of level `target` in the cube at `place`, counting only its
-  // first `children` children.
+  // Returns the number of set cells of level `target` in the first `children` octants (0 to 8) of
+  // the cube at `place`.
   uint64_t count(uint32_t level, uint64_t place, uint32_t target, unsigned children = 8) const {
     if (level == target) return 1;
     const uint32_t there = mask(level, place) & ((1u << children) - 1);

@@ -6,7 +6,7 @@
 //                    degrees. The nodes for every offset and size of cube are in a hash table. Its
 //                    keys contain all inputs, so a hit is exact.
 //   other planes     The nodes of 8^3 voxels are stored by direction (plane_direction.h), for
-//                    triangles that have covered enough tiles.
+//                    triangles that have covered at least kWorthwhile tiles.
 //
 // All memory is charged to the budget and kept until the build ends.
 // BackendMemory::plane_table_bytes() limits each table. Not thread-safe.
@@ -34,7 +34,7 @@ class PlaneMemo {
 
   // Sets `node` to the node of a cube that the triangle `entry` covers and no other triangle
   // touches. `node` has no node (NodeRef::exists) if the plane misses the cube. Returns false if
-  // the memo does not contain the plane (yet), or not for cubes of this size.
+  // the memo does not contain the plane (yet), or if Plane::fits() is false for cubes of this size.
   bool build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube, int size_log2,
              NodeRef& node);
   // True if build() would succeed for cubes of up to 64^3 voxels that the triangle covers.

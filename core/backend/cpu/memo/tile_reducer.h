@@ -90,8 +90,9 @@ class TileReducer {
   uint32_t ids_[kTileBlocks + kChildren] = {};
   uint64_t hashes_[kTileBlocks];
   Parents parents_;  // nodes of the next coarser level
-  // The non-empty voxel blocks of the tile: their numbers in the tile and their keys. New blocks
-  // are the blocks that were not in the memo: their positions in this list, and their voxel counts.
+  // The non-empty voxel blocks of the tile: their indexes in TileBricks::blocks, and their keys.
+  // New blocks are the blocks that were not in the memo: their positions in blocks_, and their
+  // voxel counts.
   uint16_t blocks_[kTileBlocks + 1];
   uint64_t keys_[kTileBlocks + 1];
   uint16_t new_blocks_[kTileBlocks];

@@ -29,8 +29,7 @@
 //
 // Calls take effect in their order. kWindow items, or kMaxTiles tiles, are enough to keep all
 // threads of a space busy. kOnHost is true if the space uses host memory. A space belongs to one
-// build and one thread. Loops, scans, sorts and staging() throw
-// if the build is canceled.
+// build and one thread. Loops, scans, sorts and staging() throw if the build is canceled.
 #pragma once
 
 #include <cstddef>

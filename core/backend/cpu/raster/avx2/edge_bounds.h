@@ -8,8 +8,7 @@
 //     up > 0:  x > floor(y)
 //     up < 0:  -x > floor(y)
 //     up = 0:  no voxel if t > 0, otherwise all. The code divides by 2^-60 instead of |up| = 0, so
-//     y
-//              is far above or far below all voxels.
+//              y is far above or far below all voxels.
 // The code computes y = slope k + start in doubles; only the division, products and sums are
 // rounded. y is at least 1 / (2 |up|) >= 2^-28 away from a whole number. Its floor is exact where
 // that matters:

@@ -53,7 +53,8 @@ struct Footprint {
       const uint32_t empty = static_cast<uint32_t>(
           _mm256_movemask_epi8(_mm256_cmpeq_epi8(bytes, _mm256_setzero_si256())));
       const uint32_t present = ~(empty & empty >> 16) & 0xffff;
-      // The triangle is convex, so all columns between the first and the last are also present.
+      // The triangle is convex. So all columns of bricks between the first and the last one that
+      // has voxel columns inside also have voxel columns inside.
       if (present != 0) columns.add(q, __builtin_ctz(present), 31 - __builtin_clz(present));
       store(inside[q], interleaved(_mm256_permute4x64_epi64(bytes, 0b11'01'10'00)));
     }

@@ -175,8 +175,8 @@ class Heights {
   // bits for the fraction of a voxel. This is the y of its lowest voxel column, minus kLowered
   // units of a lane. The error is less than 2^-30 voxel after 16 columns of bricks.
   int64_t origin_, step_p_, step_q_;
-  // An upper bound of the distance from the height of a column of bricks to the highest `top` of
-  // its voxel columns.
+  // An upper bound of the distance from the height of a column of bricks to the highest `top` (see
+  // bounds()) of its voxel columns.
   int64_t reach_;
   __m256i below_lanes_, top_lanes_;
 };
