@@ -1,4 +1,5 @@
-// JSON as text. Only for source files that include nlohmann/json.hpp anyway.
+// Converts JSON to text. Include this header only in source files that use nlohmann/json.hpp
+// themselves.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -10,9 +10,9 @@
 namespace voxdag::server {
 namespace {
 
-// Requests with a wrong token that one client may send. This limits the load from clients that
-// guess tokens. Secrecy does not depend on this limit: a 256-bit token cannot be guessed at any
-// rate.
+// Rate at which one client may send requests with a wrong token. This limits the load from clients
+// that guess tokens. Secrecy does not depend on this limit: a 256-bit token cannot be guessed at
+// any rate.
 constexpr double kWrongTokensPerSecond = 5;
 
 std::string without_port(const std::string& host) {

@@ -8,7 +8,9 @@ import {TilePool} from "../tiles/tile_pool.js";
 
 import {decodePage, kBlockWords, kMoreAt} from "./page_format.js";
 
-const kRecentMs = 1500;     // recently used pages remain until kRoundsToKnow readings
+// Pages that were used within this time are not evicted until the view has had kRoundsToKnow
+// readings, because the view may still use them.
+const kRecentMs = 1500;
 const kFreeShare = 1 / 64;  // share of the pool that is freed when pages are evicted
 const kTableShare = 1 / 5;  // share of the budget for the hash table
 const kEntryBytes = 16, kTableWidth = 1024;  // the shaders contain the same table width
@@ -75,7 +77,7 @@ export class ColorStore {
     return true;
   }
 
-  // Marks a page as used by a picture of epoch `epoch`.
+  // Marks a page as used by a picture that was drawn for `epoch` (tiles/tile_store.js).
   mark(key, epoch, nowMs) {
     const page = this.pages.get(key);
     if (!page) return;

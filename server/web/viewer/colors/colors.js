@@ -9,7 +9,9 @@ const kBudgetShare = 1 / 4;   // share of colors in the budget of tiles and colo
 const kMinBytes = 96 * 1024;  // minimum for a pool and a hash table together
 const kBytesPerVoxel = 1024;  // worst case: one page per voxel, and as many on coarser levels
 const kBaseBelow = 2;  // levels from a wanted page to the coarser page that is requested first
-const kWanted = 2;     // min value of the last word of a missing page: 1 + its pixels
+// Minimum value of the last word of a feedback texel whose page is missing: 1 + the number of
+// pixels that lack the page (gl/color_shader.js).
+const kWanted = 2;
 
 // Returns the part of the budget for the colors of a file.
 export function colorBudget(info, budgetBytes) {

@@ -20,9 +20,9 @@ function shareOf(sorted, share) {
 }
 
 // Returns
-// {wanted: Map from the texels of cut-off nodes whose tiles are missing to priorities,
-//  slots: Set of the slots of used tiles, coarsePixels: width of the widest cell with a missing
-//  tile, medianT, nearestT, exposure (null if no surface is seen), stepsMean, steps99}.
+// {wanted: Map from the texels of cut-off nodes (tiles/tile_format.js) whose tiles are missing to
+//  priorities, slots: Set of the slots of used tiles, coarsePixels: width of the widest cell with a
+//  missing tile, medianT, nearestT, exposure (null if no surface is seen), stepsMean, steps99}.
 // The last five values are measured on a sample of the pixels.
 export function readFeedback(words) {
   const wanted = new Map(), slots = new Set(), texels = words.length / 4;

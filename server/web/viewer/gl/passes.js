@@ -16,8 +16,10 @@ import {
   kTrace
 } from "./picture_shaders.js";
 
-const kHalfRange = 1;      // brightest light in a target with half floats
-const kByteRange = 8;      // brightest light in a target with bytes
+// Light is divided by this number before it is written to a target. Bytes hold values of at most 1,
+// so they represent light of up to kByteRange.
+const kHalfRange = 1;      // for a target with half floats
+const kByteRange = 8;      // for a target with bytes
 const kFeedbackBlock = 4;  // edge in canvas pixels of a feedback texel
 const kHitFormats = ["RGBA32UI"], kColoredHitFormats = ["RGBA32UI", "R32UI"],
       kLightFormats = ["R8", "R32UI", "R32UI"];
@@ -47,7 +49,7 @@ export class Passes {
     this.colorFeedback = null;
     this.pick = null;
     this.sun = null;
-    this.later = null;  // promise of pick and sun
+    this.later = null;  // promise for the compilation of pick and sun
     this.disposed = false;
     this.targets = null;
     this.vertexArray = gl.createVertexArray();
@@ -291,8 +293,8 @@ export class Passes {
   }
 
   // Returns {place, wanted}. `place` is one of the 48 positions of the sun: the one where the lit
-  // share of the surfaces in the last picture is nearest to `share`. `wanted` maps the texels of
-  // the cut-off nodes whose missing tiles could change the choice to the priority 1. Call
+  // share of the surfaces in the last picture is nearest to `share`. `wanted` is a Map, as in
+  // readFeedback(), of the missing tiles that could change the choice; all priorities are 1. Call
   // compileLater() first.
   chooseSun(values, share) {
     const {gl, targets} = this, wanted = new Map();

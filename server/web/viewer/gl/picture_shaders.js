@@ -105,7 +105,7 @@ uniform int u_frame;         // number of the sample
 
 struct Surface {
   vec3 center, face, direction;
-  float t, size, cube;       // cube: 1 if voxels appear as cubes, 0 if they form a surface
+  float t, size, cube;  // cube: 1 if voxels appear as cubes, 0 as a smooth surface, between: a mix
 };
 Surface surface_at(ivec2 pixel, uvec4 g) {
   Surface s;
@@ -308,7 +308,8 @@ void main() {
 
 // Writes one texel for each of 48 places of the sun (columns) and each of 40 x 24 probed pixels
 // (rows). Its first word is 0 if the pixel has no surface, 1 if the surface is in shadow, and 2 if
-// it is lit. Its second word is the cut-off node (0: none) whose missing tile may change this.
+// it is lit. Its second word is the texel of the cut-off node (tiles/tile_format.js) whose missing
+// tile may change the first word; otherwise 0.
 export const kSunPlaces = 48, kSunRows = 960;
 export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
@@ -388,7 +389,7 @@ uniform bool u_colored;      // true if u_colors has colors
 uniform sampler2D u_before;
 uniform vec2 u_haze;  // x: distance at which haze begins; y: 1 / the scene's diagonal
 uniform float u_share;  // weight of this sample: 1 / number of samples so far; 1: no u_before
-uniform float u_range;       // the brightest light that the target can hold
+uniform float u_range;       // divisor of the light that is written to the target (passes.js)
 uniform vec2 u_floor;
 uniform vec3 u_floor_center;
 layout(location = 0) out vec4 o_color;
@@ -426,7 +427,7 @@ export const kPresent = `${kVersion}
 uniform sampler2D u_color;
 uniform ivec2 u_size;        // size of the picture in the lower left corner of u_color
 uniform vec2 u_extent;       // size of the canvas in pixels
-uniform float u_exposure;    // includes the range of the target
+uniform float u_exposure;    // exposure times u_range, because u_color was divided by u_range
 out vec4 o_color;
 
 const vec3 kTop = vec3(0.46, 0.54, 0.65), kBottom = vec3(0.86, 0.87, 0.88);
@@ -452,10 +453,14 @@ void main() {
   o_color = vec4(srgb(mix(background, lit, color.a)) + (float(order) / 16.0 - 0.47) / 255.0, 1.0);
 }`;
 
-// Writes one texel per block of u_block x u_block pixels. Its words are: the cut-off node (0:
-// none) of the widest cell whose tile is missing; this cell's width in pixels, and the brightness
-// of a sampled pixel; the slot of a used tile, and the number of steps of the pixel's ray; and the
-// ray's t. The sampled pixel changes with each frame.
+// Writes one texel per block of u_block x u_block pixels. One pixel of the block is sampled, in
+// each frame a different one. The texel's four words are:
+//   1. the texel of the cut-off node (tiles/tile_format.js) of the block's widest cell whose tile
+//      is missing, or else of a missing tile that only a shadow needs; 0 if no tile is missing
+//   2. the width of this cell in pixels (kShadowPixels for a shadow), and the brightness of the
+//      sampled pixel
+//   3. the slot of a tile that the sampled pixel uses, and half the number of steps of its ray
+//   4. the t of this ray's hit
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;

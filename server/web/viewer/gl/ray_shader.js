@@ -53,7 +53,7 @@ struct Hit {
   float t;
   int scale;       // the cell has 2^scale voxels per edge
   int axis;        // axis of the face through which the ray enters; -1: the ray begins in the cell
-  uint missing;  // texel of the cut-off node whose tile is missing; 0: none
+  uint missing;  // texel of the cut-off node (tile_format.js) whose tile is missing; 0: none
 };
 
 ivec3 ray_base;

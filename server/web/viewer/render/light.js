@@ -1,6 +1,6 @@
 // The light of a picture: the position of the sun, the exposure, the distance within which surfaces
-// hide the sky, and the position of the floor. Distances are in voxels. Exposure and distance
-// follow the visible surfaces.
+// hide the sky (skyReach), the distance at which haze begins (hazeStart), and the position of the
+// floor. Distances are in voxels. Exposure and the two distances follow the visible surfaces.
 
 import {length, scale, subtract} from "../vector.js";
 
@@ -37,7 +37,8 @@ export class Light {
     return length(subtract(this.high, this.low));
   }
 
-  // After this call, the next reading sets exposure and reach directly instead of approaching them.
+  // After this call, the next readings set exposure, skyReach and hazeStart directly instead of
+  // approaching the new values in steps.
   forgetReadings() {
     this.readings = 0;
   }
@@ -59,8 +60,8 @@ export class Light {
         [Math.cos(turn) * Math.cos(height), Math.sin(height), Math.sin(turn) * Math.cos(height)];
   }
 
-  // Moves exposure and reach toward the values of a reading: slowly while the camera moves, quickly
-  // when it is still.
+  // Moves exposure, skyReach and hazeStart toward the values of a reading: slowly while the camera
+  // moves, quickly when it is still.
   adjust(read, eye, moving) {
     const share = moving ? 0.15 : 0.5;
     const toward = (from, to, known) => known ? from * (to / from) ** share : to;
@@ -69,7 +70,7 @@ export class Light {
         this.readings > 0);
     this.hazeStart = toward(this.hazeStart, Math.max(1, read.nearestT), this.readings > 0);
     // The second reading also sets the exposure directly, because the first reading measured it
-    // before the reach was known.
+    // before skyReach was known.
     this.exposure = toward(this.exposure, read.exposure, this.readings > 1);
     this.readings++;
   }
