@@ -13,8 +13,9 @@
  * immutable: any number of threads may query it concurrently. docs/library.md describes conventions
  * and units.
  *
- * A struct that may grow begins with `struct_size`: set it to its sizeof. Programs compiled with
- * this header run with every later libvoxdag.so of the same soname. */
+ * A struct that may get more members in a later version begins with `struct_size`, which the caller
+ * sets to the sizeof of the struct. Programs compiled with this header run with every later
+ * libvoxdag.so of the same soname. */
 #ifndef VOXDAG_H
 #define VOXDAG_H
 

@@ -4,9 +4,9 @@
 // z), where each coordinate is 0 or 1. This code does not use the OctoMap library, because the
 // library would store all nodes in memory.
 //
-// The octree has 16 levels, and the origin of its coordinates is in its middle. The low corner of
-// voxdag's grid is at this origin. Only a grid of 2^16 cells fills the complete octree; its low
-// corner is the octree's low corner.
+// The octree has 16 levels, and the origin of its coordinates is in its middle. A grid of fewer
+// than 2^16 cells per edge has its low corner at this origin. A grid of 2^16 cells per edge fills
+// the octree, so its low corner is the octree's low corner.
 #include <array>
 #include <cstdio>
 #include <optional>
@@ -23,8 +23,8 @@ namespace {
 constexpr uint32_t kOctoMapLevels = 16;
 enum BtChild : uint32_t { kUnknown = 0, kFree = 1, kOccupied = 2, kInner = 3 };
 
-// Walks the octree depth first. Inside the region, cubes without voxels are written as free,
-// because the file does not record the interior of objects.
+// Walks the octree depth first. Inside the region, cubes without voxels are written as free, even
+// inside closed objects: a surface does not show which of its sides is solid (docs/export.md).
 template <class Inner>
 class BtWalk {
  public:
@@ -35,8 +35,8 @@ class BtWalk {
   void run() {
     const uint32_t levels = job_.selection.grid_levels;
     ++nodes;  // the root
-    // Writes the nodes above the grid: from the root to the octant at the origin, then always to
-    // the child at the low corner.
+    // Writes the nodes above the grid. The path leads from the root to the octant whose low corner
+    // is the origin, and from there on to the child at the low corner.
     for (uint32_t level = kOctoMapLevels; level > levels; --level) {
       inner_(kInner << (level == kOctoMapLevels ? 14 : 0));
       ++nodes;

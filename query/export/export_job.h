@@ -115,9 +115,11 @@ void require_space(const ExportJob& job, uint64_t bytes);
 // arbitrary number over `limit`.
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);
 // Determines on which coarser grids the job's selection has at most `limit` set cells. Call fits()
-// for the coarsest grid first. If the memory can hold a count per node, equal subtrees are counted
-// once. If also the complete grid is selected, each level is read once for all coarser grids
-// together; otherwise, once per grid.
+// for the coarsest grid first. Chooses the first possible way to count:
+// 1. If the complete grid is selected, LevelCells reads each level once for all calls together.
+//    It needs memory for the nodes of two levels.
+// 2. NodeCounts reads each node once per call. It needs memory for a count per node.
+// 3. Otherwise, each call visits all bricks of the selection.
 class CellLimit {
  public:
   CellLimit(const ExportJob& job, uint64_t limit);

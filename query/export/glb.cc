@@ -20,7 +20,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kMaxGlbBytes = (uint64_t{1} << 32) - 1;  // its length is a u32
+constexpr uint64_t kMaxGlbBytes = (uint64_t{1} << 32) - 1;  // the header has 32 bits for it
 constexpr uint64_t kMaxGlbJsonBytes = 4096;                 // including chunk headers
 constexpr uint64_t kQuadBytes = 4 * 3 * sizeof(float) + 6 * sizeof(uint32_t);
 constexpr uint64_t kQuadColorBytes = 4 * 4 * sizeof(uint16_t);

@@ -19,7 +19,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kMaxHashDagWords = uint64_t{1} << 32;  // of 32-bit indices
+constexpr uint64_t kMaxHashDagWords = uint64_t{1} << 32;  // word indices have 32 bits
 constexpr uint64_t kMaxHashDagColors = (uint64_t{1} << 32) - 1;
 constexpr uint64_t kMaxCount = uint64_t{1} << 24;  // smaller counts fit above the child mask
 constexpr uint32_t kGray = 0xffb0b0b0;             // A, B, G, R

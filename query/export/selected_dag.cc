@@ -65,10 +65,10 @@ struct NodeSlot {
 };
 
 struct MemoSlot {
-  uint64_t hash = 0;    // bijective hash of `source`
-  uint64_t source = 0;  // offset in the file
-  uint64_t offset = kNoNode;
-  uint64_t voxels = 0;
+  uint64_t hash = 0;          // bijective hash of `source`
+  uint64_t source = 0;        // word offset of the file's node in its level
+  uint64_t offset = kNoNode;  // word offset of the new node in its level
+  uint64_t voxels = 0;        // voxels below the new node
   bool free() const { return offset == kNoNode; }
 };
 

@@ -14,7 +14,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kMaxSvdagWords = (uint64_t{1} << 32) - 1;  // its count has 32 bits
+constexpr uint64_t kMaxSvdagWords = (uint64_t{1} << 32) - 1;  // the word count has 32 bits
 // Maximum number of words for viewers whose shaders have 32-bit signed indices.
 constexpr uint64_t kMaxViewedWords = (uint64_t{1} << 31) - 1;
 constexpr uint32_t kLeafWords = 255;  // one word for each nonzero mask of 8 voxels

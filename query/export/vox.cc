@@ -137,8 +137,8 @@ class VoxWriter {
     find_instances(0, view_.root(), {0, 0, 0});
   }
 
-  // Returns the size of the file in bytes, or an arbitrary number over the limit if the file would
-  // be larger than the limit.
+  // Returns the size of the file in bytes. If the size is over kMaxVoxBytes, the result may be any
+  // number over kMaxVoxBytes.
   uint64_t bytes() const {
     return std::max(min_bytes_, 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_);
   }

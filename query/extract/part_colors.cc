@@ -25,8 +25,8 @@ using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 
 constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
-// Memory of one thread while it encodes a region: its cells, the next coarser cells, and all
-// colors.
+// Memory of one thread while it encodes a region: the sums of the region's cells and of the next
+// coarser cells (1/8 as many), two colors per cell, and one checksum block.
 constexpr uint64_t kWorkerBytes =
     kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) +
     CheckedReader::kBlockBytes;
@@ -78,7 +78,7 @@ class ResidentPages {
  private:
   // Number of bytes that the system may load for one access to a page that is not in memory.
   static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
-  static constexpr uint64_t kMinVisits = 512;  // 32 MiB
+  static constexpr uint64_t kMinVisits = 512;  // these may load 32 MiB
   const voxdag_reader::File& file_;
   const uint64_t limit_bytes_;
   const unsigned threads_;

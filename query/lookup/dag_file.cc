@@ -130,8 +130,8 @@ struct DagFile::State {
 constexpr size_t kManyQueries = size_t{1} << 14;
 
 // Requests huge pages for the mapped file, because they make many queries faster. Does nothing in
-// two cases in which they would be slow: for a few queries, because each node would require a read
-// of 2 MiB, and for a file that is larger than memory.
+// two cases in which huge pages would be slow: for a few queries, because each node would require a
+// read of 2 MiB, and for a file that is larger than half of the machine's memory.
 void DagFile::State::prepare_for_queries(size_t count) {
   if (count < kManyQueries || file->file_bytes() > default_memory()) return;
   // The system may ignore this request: pages already in memory keep their size, and not every
@@ -142,8 +142,9 @@ void DagFile::State::prepare_for_queries(size_t count) {
 }
 
 // Returns the table of the top cells. `points` is the number of lookups that will use the table.
-// Returns null until there were kManyQueries lookups, and if the top levels are damaged. In the
-// second case, the descents begin at the root, and each reports the damage that it finds.
+// Returns null, so that the descents begin at the root, in three cases: before there were
+// kManyQueries lookups, if the DAG has too few levels for the table, and if the levels above the
+// table are damaged. In the last case, each descent reports the damage that it finds.
 const TopCells* DagFile::State::top_cells(size_t points) {
   if ((points_looked_up += points) < kManyQueries || !TopCells::serve(view, view.grid_levels()))
     return nullptr;

@@ -18,10 +18,10 @@ namespace voxdag::query {
 // Counts the set cells of one grid. Immutable after construction; safe to use from several threads.
 class NodeCounts {
  public:
-  // Stores the counts, which take 8 bytes per node above the bricks, and 2 bits per word of these
-  // nodes. If this does not fit in the budget, stores no counts: count() then visits all nodes in
-  // its region. `dag` is the view of `file`; both must outlive this object. Throws Error{kCorrupt},
-  // Error{kCanceled}.
+  // Stores the counts. They take at most 8 bytes per node above the bricks, and 2 bits per word of
+  // these nodes. If the counts do not fit in the budget, stores none: count() then visits all nodes
+  // in its region. `dag` is the view of `file`; both must outlive this object. Throws
+  // Error{kCorrupt}, Error{kCanceled}.
   NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint32_t grid_levels,
              MemoryBudget& budget, const CancelToken& cancel = {});
 

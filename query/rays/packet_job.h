@@ -53,7 +53,7 @@ struct PacketJob {
   struct Level {
     const uint32_t* words;
     uint64_t count;
-    uint64_t any_node;  // a node of any size at a smaller offset is inside the level
+    uint64_t any_node;  // at smaller offsets, even the largest node fits in the level
     bool wide_children;
   };
 

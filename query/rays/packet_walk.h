@@ -9,9 +9,10 @@
 // one step each. While the other rays take their steps, memory loads the next cell of a ray.
 //
 // A ray crosses a cell if its interval in the cell, a range of its parameter t, is not empty. In
-// two cases the result depends on the path from the root: if the ray has an interval of length 0 in
-// an occupied cell, and if it passes two planes at the parameter of its hit. In these cases the
-// walk gives the ray up: the ray is removed from the packet, and RayPacket casts it with RayCaster.
+// two cases RayCaster's result depends on the path from the root to the cell: if the ray has an
+// interval of length 0 in an occupied cell, and if the ray enters the hit cell through two faces at
+// the same t. In these cases the walk gives the ray up: the ray is removed from the packet, and
+// RayPacket casts it with RayCaster.
 #pragma once
 
 #include <limits>

@@ -1,8 +1,8 @@
 // Tiles: a tile is a node of a finished DAG with a few levels below it, for viewers that fetch only
 // visible data (docs/format.md, "Tiles"). A tile is addressed by its root node, so equal subtrees
 // are one tile, wherever they occur. If a tile ends above the bricks, it contains two things for
-// each node at which it ends: the offset of that node, which is the root of another tile, and a
-// coarse brick to draw until the other tile arrives.
+// each node at which it ends: the offset of that node, which is the root of a further tile, and a
+// coarse brick to draw until the further tile arrives.
 //
 // Stateless; thread-safe. Offsets may come from unknown clients and damaged files. So each offset
 // is checked, and the work for a tile is bounded by its number of levels.

@@ -12,8 +12,9 @@ using voxdag_reader::Rgb;
 using Lab = std::array<uint32_t, 3>;
 
 // An Oklab coordinate x is stored as the integer (x + kLabShift) * kLabScale. The shift is
-// necessary because the coordinates a and b can be negative. With this scale, two neighbor gray
-// bytes differ by about 16, and sums of squares over 2^32 voxels fit in 64 bits.
+// necessary because Oklab's coordinates a and b can be negative. With this scale, the integers of
+// two neighboring gray levels of 8 bits differ by about 16, and sums of squares over 2^32 voxels
+// fit in 64 bits.
 constexpr double kLabScale = 4096, kLabShift = 1;
 
 // Returns the cube root, by Newton's method with a start value above the root. The fixed number of

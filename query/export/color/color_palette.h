@@ -48,8 +48,10 @@ class ColorPalette {
     std::array<uint32_t, 3> lab{};
     uint32_t bin = 0;
   };
+  // All sums and counts are over the colors that were added, so a color that was added n times
+  // counts n times.
   struct PaletteBox {
-    size_t begin = 0, end = 0;    // range of its points
+    size_t begin = 0, end = 0;    // range of its points in points_
     size_t axis = 0;              // axis of the largest spread
     uint64_t spread = 0;          // sum of squared distances from the mean along this axis
     uint64_t sum = 0, count = 0;  // sum of the coordinates along this axis, number of colors
@@ -63,8 +65,8 @@ class ColorPalette {
   void assign_bins();
 
   MemoryCharge charge_;
-  // The distinct colors as 24-bit numbers in increasing order. The list is used only while there
-  // are at most kMaxColors of them.
+  // The distinct colors as 24-bit numbers in increasing order. The list is used only while it has
+  // at most kMaxColors colors.
   std::vector<uint32_t> distinct_;
   bool is_exact_ = true;
   std::vector<Bin> bins_;

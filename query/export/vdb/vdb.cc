@@ -181,7 +181,8 @@ template <class GridType>
 typename GridType::Ptr empty_vdb_grid(const ExportJob& job, const char* name) {
   auto grid = GridType::create();
   grid->setName(name);
-  // A voxel's index is its center.
+  // OpenVDB's integer index coordinates denote the centers of voxels, so index 0 is mapped to the
+  // center of the first voxel.
   auto transform = openvdb::math::Transform::createLinearTransform(job.cell_edge());
   transform->postTranslate({job.world(0, 0.5), job.world(1, 0.5), job.world(2, 0.5)});
   grid->setTransform(transform);
@@ -219,7 +220,8 @@ openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job, uint64_t voxels) {
   });
 }
 
-// Writes a file of at least `min_bytes`.
+// Writes the output with write(stream), and publishes it. `min_bytes` is a lower bound on the
+// file's size, for the check of free disk space and for the progress.
 template <class Write>
 ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, uint64_t min_bytes,
                              const Write& write) {
