@@ -102,8 +102,8 @@ void check_outputs(const RenderCommand& command, FileSystem& files) {
 // size exceeds --memory.
 void check_memory(const RenderCommand& command) {
   const uint64_t limit = memory_limit(command.memory);
-  // The picture is written and freed before the depth map is computed. So the two are never in
-  // memory together, and the picture, which takes more memory, decides if there is one.
+  // The picture is written and freed before the depth map is computed, so they are never in memory
+  // together. If both are requested, the picture's memory is checked, because it is larger.
   const uint64_t of_pixel =
       command.output.path.empty() ? query::kDepthBytesPerPixel : query::kRenderBytesPerPixel;
   const uint64_t bytes = of_pixel * static_cast<uint64_t>(command.options.width) *

@@ -26,9 +26,9 @@ std::vector<std::string> own_arguments() {
   return words;
 }
 
-// Returns the command of the merge job, and the job's options for sbatch: from the user's --memory
-// and --threads, and the user's --cluster-merge-options. Without --memory or --threads, the merge
-// job gets this resource of a task.
+// Returns the command of the merge job, and the job's options for sbatch. The options are made from
+// the user's --memory and --threads, followed by the user's --cluster-merge-options. Without
+// --memory, the merge job gets as much memory as a task; without --threads, as many CPUs.
 ClusterOptions::MergeJobOptions merge_job(const BuildClusterOptions& cluster,
                                           const RunOptions& run) {
   ClusterOptions::MergeJobOptions job;

@@ -34,7 +34,7 @@ struct Region {
   friend bool operator==(const Region&, const Region&) = default;
 };
 
-// Returns all cells of a grid of 2^grid_levels per edge.
+// Returns all cells of a grid of 2^grid_levels cells per edge.
 inline Region whole_grid(uint32_t grid_levels) {
   const int64_t edge = int64_t{1} << grid_levels;
   return {{0, 0, 0}, {edge, edge, edge}};

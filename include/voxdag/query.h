@@ -68,7 +68,7 @@ struct Nearest {
   bool found = false;
 };
 
-// Points for nearest() must be within this distance of the grid's origin on every axis, so that
+// Maximum absolute value of a coordinate of a point for nearest(), in cells. Within this limit,
 // squares of distances fit in 64 bits.
 inline constexpr int64_t kMaxCoordinate = int64_t{1} << 30;
 
@@ -77,9 +77,9 @@ class DagFile {
   // Default limit of the memory for the node counts that count() stores, in bytes.
   static constexpr uint64_t kDefaultMemory = uint64_t{1} << 30;
 
-  // Opens and maps the file, which must not be shortened while it is open. count() uses at most
-  // `memory_bytes`. Throws Error{kNotFound}, Error{kIo}, Error{kUnsupportedVersion}, or
-  // Error{kCorrupt} for a damaged header.
+  // Opens and maps the file, which must not be shortened while it is open. The node counts that
+  // count() stores take at most `memory_bytes`. Throws Error{kNotFound}, Error{kIo},
+  // Error{kUnsupportedVersion}, or Error{kCorrupt} for a damaged header.
   explicit DagFile(const std::string& path, uint64_t memory_bytes = kDefaultMemory);
   ~DagFile();
   DagFile(DagFile&&) noexcept;
@@ -147,8 +147,10 @@ class DagFile {
   // to the region.
   void bricks(const Selection& selection, const std::function<void(const Brick&)>& visit) const;
 
-  // Returns the number of set cells in the region. The first count in a grid reads every node of
-  // the grid's levels once, and stores a count for each node.
+  // Returns the number of set cells in the region. The first call for a grid reads every node of
+  // the grid's levels once, and stores a count for each node. If the counts do not fit in the
+  // memory limit of the constructor, no counts are stored, and each call visits all nodes in its
+  // region.
   uint64_t count(const Selection& selection) const;
 
   // Finds the nearest set cell for each point. Distances are measured between cell centers, and the

@@ -37,8 +37,8 @@ query::Vec in_voxels(const Point& point, const voxdag_reader::File& file) {
 }
 
 // Throws Error{kOutOfMemory} if the renderer's memory and the array of pixels together exceed the
-// limit `memory`. The caller checks this before any allocation, because the system can end a
-// process that allocates too much memory.
+// limit `memory`. voxdag.render() calls this function before it allocates the array, because the
+// system can end a process that allocates too much memory.
 void check_memory(int width, int height, const std::string& memory) {
   const uint64_t limit = memory_of(memory);
   const uint64_t bytes = (query::kRenderBytesPerPixel + 3) * static_cast<uint64_t>(width) *

@@ -67,7 +67,7 @@ def dag(path):
 
 @pytest.fixture(scope="session")
 def cells(path):
-    """Whether each voxel of the file is set, (64, 64, 64) bool, found by lookup()."""
+    """Returns whether each voxel of the file is set, (64, 64, 64) bool, found by lookup()."""
     with voxdag.open(path) as opened:
         grid = np.stack(np.meshgrid(*[np.arange(64)] * 3, indexing="ij"), axis=-1)
         return opened.lookup(grid.reshape(-1, 3)).reshape(64, 64, 64)
