@@ -50,7 +50,7 @@ inline std::vector<AttributeCursor> exported_attributes(const ExportJob& job) {
   return cursors;
 }
 
-// Returns the number of bytes that put() passes for one cell, summed over these attributes.
+// Returns the number of bytes that the values of all these attributes take for one cell.
 inline uint64_t decoded_bytes(std::span<const AttributeCursor> attributes) {
   uint64_t bytes = 0;
   for (const AttributeCursor& attribute : attributes) bytes += attribute.encoding().decoded_bytes();

@@ -308,8 +308,7 @@ void main() {
 
 // Writes one texel for each of 48 places of the sun (columns) and each of 40 x 24 probed pixels
 // (rows). Its first word is 0 if the pixel has no surface, 1 if the surface is in shadow, and 2 if
-// it is lit. Its second word is the texel of the cut-off node (tiles/tile_format.js) whose missing
-// tile may change the first word; otherwise 0.
+// it is lit. Its second word is Hit.missing (ray_shader.js) of the ray to the sun if it is blocked.
 export const kSunPlaces = 48, kSunRows = 960;
 export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
@@ -453,14 +452,10 @@ void main() {
   o_color = vec4(srgb(mix(background, lit, color.a)) + (float(order) / 16.0 - 0.47) / 255.0, 1.0);
 }`;
 
-// Writes one texel per block of u_block x u_block pixels. One pixel of the block is sampled, in
-// each frame a different one. The texel's four words are:
-//   1. the texel of the cut-off node (tiles/tile_format.js) of the block's widest cell whose tile
-//      is missing, or else of a missing tile that only a shadow needs; 0 if no tile is missing
-//   2. the width of this cell in pixels (kShadowPixels for a shadow), and the brightness of the
-//      sampled pixel
-//   3. the slot of a tile that the sampled pixel uses, and half the number of steps of its ray
-//   4. the t of this ray's hit
+// Writes one texel per block of u_block x u_block pixels. Word 1: Hit.missing of the widest cell
+// whose tile is missing, or else of a shadow's ray. Word 2: the width of this cell in pixels, and
+// the brightness of a sampled pixel, in each frame a different one. Word 3: the slot of a tile that
+// the sampled pixel uses, and half the number of steps of its ray. Word 4: the t of this ray's hit.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;
