@@ -1,6 +1,6 @@
 // A large array of zero-filled pages allocated directly from the system; arrays of 2 MiB or more
-// use huge pages. Tables and level arrays use this buffer because freed pages return to the system
-// immediately, which the general allocator does not guarantee. Not thread-safe.
+// request huge pages. Tables and level arrays use this buffer because freed pages return to the
+// system immediately, which the general allocator does not guarantee. Not thread-safe.
 #pragma once
 
 #include <cstddef>

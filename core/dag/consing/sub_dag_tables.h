@@ -59,11 +59,11 @@ class SubDagTables {
   OctreeCounts& counts() { return counts_; }
   TableSizes sizes() const;
 
-  // Adds a brick. For an empty brick, returns a NodeRef that does not exist; otherwise counts one
-  // octree node and the brick's voxels.
+  // Adds a brick, and counts one octree node and the brick's voxels. If the brick is empty, does
+  // nothing and returns a NodeRef whose `exists` is false.
   NodeRef add_brick(uint64_t mask);
-  // Adds the node of a cube whose octants are `children`. If no child exists, returns a NodeRef
-  // that does not exist; otherwise counts one octree node.
+  // Adds the node of a cube whose octants are `children`, and counts one octree node. If no child
+  // exists, does nothing and returns a NodeRef whose `exists` is false.
   NodeRef add_node(int size_log2, const NodeRef (&children)[8]);
 
  private:

@@ -136,9 +136,9 @@ class Differ {
   }
 
  private:
-  // The first level with this many pairs is divided among the threads. This is enough for any
-  // number of threads. It does not depend on the number of threads, so the first error found does
-  // not depend on it either.
+  // The first level with at least this many pairs, or else the level of the bricks, is divided
+  // among the threads. So many pairs are enough for any number of threads. The level does not
+  // depend on the number of threads, so the first error found does not depend on it either.
   static constexpr size_t kPairsToDivide = 16384;
 
   // Returns the pairs of children, by child index. Both offsets of a pair are kAbsent if neither

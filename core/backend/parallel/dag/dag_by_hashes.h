@@ -49,9 +49,10 @@ struct EmitCandidates {
   }
 };
 
-// Copies the survivors among the candidates, and sets the entry of each candidate in its parent's
-// child list to the position of its survivor. The candidate at sorted index i has the original
-// index items[i] and the compact index marked[i + 1] - 1, which is its survivor's position.
+// Copies the survivors among the candidates. For every candidate, also sets its entry in the child
+// list of its parent to the position of its survivor. The candidate at sorted index i has the
+// original index items[i] and the compact index marked[i + 1] - 1, which is its survivor's
+// position.
 struct RemoveDuplicates {
   const uint32_t* marked;  // prefix sums of the marks of MarkFirstOfEquals
   const uint32_t* items;
