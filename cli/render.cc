@@ -87,9 +87,11 @@ void report(const RenderCommand& command, const query::Placement& placement,
 
 void check_outputs(const RenderCommand& command, FileSystem& files) {
   if (command.output.path.empty() && command.depth.empty())
-    throw Error(ErrorCode::kInvalidInput, "expected --output, --depth or both");
+    throw Error(ErrorCode::kInvalidInput,
+                "no output was given: expected --output, --depth or both");
   if (command.output.path == command.depth)
-    throw Error(ErrorCode::kInvalidInput, "--output and --depth name the same file");
+    throw Error(ErrorCode::kInvalidInput,
+                "--output and --depth are both '" + command.depth + "': expected two files");
   if (!command.output.path.empty())
     command.output.check(files, command.input, query::is_rendered_png);
   if (command.depth.empty()) return;

@@ -55,7 +55,9 @@ query::Region cell_region(const std::string& text, uint32_t grid_levels) {
 uint64_t memory_limit(const std::string& text) {
   const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "--memory");
   if (bytes < kMinMemory)
-    throw Error(ErrorCode::kInvalidInput, "--memory " + text + ": at least 64MiB is needed");
+    throw Error(ErrorCode::kInvalidInput,
+                "--memory " + (text.empty() ? "(default) " + size_text(bytes) : text) +
+                    ": expected at least 64MiB");
   return bytes;
 }
 
@@ -82,7 +84,8 @@ query::Selection SelectionOptions::selection(const voxdag_reader::File& file) co
   if (selection.region.empty())
     throw Error(ErrorCode::kInvalidInput, "--region '" + region + "' is outside the grid of " +
                                               std::to_string(int64_t{1} << selection.grid_levels) +
-                                              " voxels per edge");
+                                              " voxels per edge: expected a region that "
+                                              "overlaps the grid");
   return selection;
 }
 

@@ -54,7 +54,9 @@ std::string ClientResponse::header(std::string_view name) const {
 struct HttpClient::Impl {
   explicit Impl(const ClientOptions& options) : url(options.url), http(options.url) {
     if (!http.is_valid())
-      throw Error(ErrorCode::kInvalidInput, "server '" + url + "': cannot use this address");
+      throw Error(ErrorCode::kInvalidInput, "server '" + url +
+                                                "' is not a valid address: expected "
+                                                "http://HOST:PORT or https://HOST[:PORT]");
     const auto timeout = std::chrono::microseconds(static_cast<int64_t>(options.timeout_s * 1e6));
     http.set_connection_timeout(timeout);
     http.set_read_timeout(timeout);

@@ -101,14 +101,14 @@ class Download {
   }
 
   void verify() {
-    if (sha256_of_file(*files_.open_read(partial_), service_.cancel()) == sha256_) return;
+    const std::string found = sha256_of_file(*files_.open_read(partial_), service_.cancel());
+    if (found == sha256_) return;
     files_.remove(partial_);
-    throw_corrupt("expected SHA-256 " + sha256_ + "; the partial file was removed");
+    throw_corrupt("SHA-256 " + found + ", expected " + sha256_ + "; the partial file was removed");
   }
 
-  [[noreturn]] void throw_corrupt(const std::string& expected) const {
-    throw Error(ErrorCode::kCorrupt,
-                output_ + ": the download differs from the result: " + expected);
+  [[noreturn]] void throw_corrupt(const std::string& what) const {
+    throw Error(ErrorCode::kCorrupt, output_ + ": the download differs from the result: " + what);
   }
 
   ServiceClient& service_;

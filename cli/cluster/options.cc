@@ -20,8 +20,8 @@ std::vector<std::string> own_arguments() {
   for (std::string word; std::getline(line, word, '\0');) words.push_back(word);
   if (words.size() < 2)
     throw Error(ErrorCode::kIo,
-                "/proc/self/cmdline cannot be read: expected this command, for the "
-                "job that merges (--cluster-merge)");
+                "/proc/self/cmdline cannot be read or has no arguments: expected the arguments of "
+                "this command, which the job that merges needs (--cluster-merge)");
   words.erase(words.begin());
   return words;
 }

@@ -16,7 +16,9 @@ void run(const StopTasksCommand& command, CommandContext& context) {
   const auto state = read_cluster_state(context.files, command.work_folder);
   if (!state)
     throw Error(ErrorCode::kNotFound,
-                command.work_folder + ": expected the work folder of a build on a cluster");
+                command.work_folder +
+                    " has no record of cluster tasks: expected the work folder "
+                    "of a build on a cluster");
   stop_cluster_tasks(context.files, command.work_folder);
   std::printf("stopped the tasks %s; finished subvolumes are kept\n", state->task_name().c_str());
 }

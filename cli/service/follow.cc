@@ -66,7 +66,8 @@ void check_succeeded(const Json& job) {
   const std::string state = job.at("state"), id = job.at("id");
   if (state == "succeeded") return;
   if (state == "canceled") throw Error(ErrorCode::kCanceled, "job " + id + " was canceled");
-  if (!job.at("error").is_object()) throw Error(ErrorCode::kIo, "job " + id + " failed");
+  if (!job.at("error").is_object())
+    throw Error(ErrorCode::kIo, "job " + id + " is " + state + "; the service gives no reason");
   const Json& error = job.at("error");
   throw Error(client::error_code_of(error.at("code"), 500),
               "job " + id + " failed: " + printable(error.at("message").get<std::string>()));

@@ -30,7 +30,9 @@ void run(const HealthCommand& command, CommandContext&) {
   const client::ClientResponse answer = client::HttpClient(options).get("/readyz");
   client::throw_if_problem(answer);
   if (answer.status != 200 || answer.body.find("\"ready\"") == std::string::npos)
-    throw Error(ErrorCode::kIo, "server " + command.url + ": expected a voxdag service at /readyz");
+    throw Error(ErrorCode::kIo, "server " + command.url + ": /readyz answers with status " +
+                                    std::to_string(answer.status) +
+                                    " and another text: expected a voxdag service");
   std::printf("%s: ready\n", command.url.c_str());
 }
 

@@ -41,7 +41,10 @@ client::ClientOptions ServiceOptions::client_options(FileSystem& files) const {
     const bool visible = std::all_of(options.token.begin(), options.token.end(),
                                      [](char c) { return c > ' ' && c <= '~'; });
     if (options.token.empty() || !visible)
-      throw Error(ErrorCode::kInvalidInput, token_file_ + ": expected one token, on one line");
+      throw Error(ErrorCode::kInvalidInput,
+                  token_file_ +
+                      (visible ? " is empty" : " has a space, line break or control character") +
+                      ": expected one token, on one line");
   }
   return options;
 }

@@ -12,7 +12,9 @@ void ImageReader::check_size(uint64_t width, uint64_t height) {
     throw BrokenImage{"has " + std::to_string(width) + " x " + std::to_string(height) +
                       " pixels, the limits are " + std::to_string(kMaxEdge) +
                       " along an edge and 2^28 in total"};
-  if (width == 0 || height == 0) throw BrokenImage{"has no pixels"};
+  if (width == 0 || height == 0)
+    throw BrokenImage{"has " + std::to_string(width) + " x " + std::to_string(height) +
+                      " pixels, expected at least one"};
   width_ = static_cast<uint32_t>(width);
   height_ = static_cast<uint32_t>(height);
 }

@@ -44,9 +44,12 @@ class JpegReader : public ImageReader {
       // Refuses images that not every version and build of the library decodes. Ss (in the header
       // of the first scan) is the predictor of a lossless image. In all other images, the first
       // scan has the mean of each block, so Ss is 0.
-      if (jpeg_.arith_code || jpeg_.data_precision != 8 || jpeg_.Ss != 0)
-        throw BrokenImage{
-            "is a JPEG image that is lossless, has arithmetic coding, or does not have 8 bits"};
+      if (jpeg_.arith_code)
+        throw BrokenImage{"is a JPEG image with arithmetic coding, expected Huffman coding"};
+      if (jpeg_.data_precision != 8)
+        throw BrokenImage{"is a JPEG image of " + std::to_string(jpeg_.data_precision) +
+                          " bits per channel, expected 8"};
+      if (jpeg_.Ss != 0) throw BrokenImage{"is a lossless JPEG image, expected a lossy one"};
       if (use == ImageUse::kSize) return;
       charge_decoder(budget);
       if (!start()) fail();

@@ -112,7 +112,9 @@ std::vector<std::byte> encode_index(const ArtifactIndex& index) {
     for (const FrameInfo& frame : level.frames) frame_bytes += frame.bytes;
   }
   if (index.roots.size() > UINT32_MAX || frames > UINT32_MAX)
-    throw Error(ErrorCode::kLimit, "an artifact holds at most 2^32-1 roots and frames");
+    throw Error(ErrorCode::kLimit, "an artifact has " + std::to_string(index.roots.size()) +
+                                       " roots and " + std::to_string(frames) +
+                                       " frames: expected at most 2^32-1 of each");
   sink.put(kIndexMagic);
   sink.put(kSegmentVersion);
   sink.put(index.shape.grid_levels);

@@ -19,9 +19,10 @@ std::vector<std::byte> read_index(const ReadableFile& file, const ArtifactRef& r
                       ref.offset <= size && ref.bytes <= size - ref.offset &&
                       ref.index_offset - ref.offset <= ref.bytes;
   if (!inside)
-    throw Error(ErrorCode::kCorrupt, where + ": the file ends at byte " + std::to_string(size) +
-                                         ", before the artifact of " + std::to_string(ref.bytes) +
-                                         " bytes does");
+    throw Error(ErrorCode::kCorrupt,
+                where + ": " + std::to_string(ref.bytes) + " bytes, with the index at byte " +
+                    std::to_string(ref.index_offset) + ", are not a part of the file of " +
+                    std::to_string(size) + " bytes");
   std::vector<std::byte> bytes(ref.offset + ref.bytes - ref.index_offset);
   file.read_at(ref.index_offset, bytes);
   return bytes;
@@ -33,7 +34,9 @@ ArtifactReader::ArtifactReader(std::shared_ptr<ReadableFile> segment, const Arti
     : file_(std::move(segment)) {
   const std::string where = file_->path() + ", artifact at byte " + std::to_string(ref.offset);
   if (file_->size() < kSegmentHeaderBytes)
-    throw Error(ErrorCode::kCorrupt, file_->path() + ": too short for a segment header");
+    throw Error(ErrorCode::kCorrupt, file_->path() + " has " + std::to_string(file_->size()) +
+                                         " bytes: expected a segment header of " +
+                                         std::to_string(kSegmentHeaderBytes) + " bytes");
   std::byte header[kSegmentHeaderBytes];
   file_->read_at(0, header);
   check_segment_header(header, ref.segment, file_->path());

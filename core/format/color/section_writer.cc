@@ -25,7 +25,9 @@ void SectionWriter::check(const Tier& tier, const EncodedRegion& region) const {
                                          std::to_string(tier.finest - tier.levels()) + ": " + what);
   };
   const uint32_t region_bits = 3 * (tier.finest - tier.levels());
-  if (region.morton >> region_bits != 0 || (tier.regions > 0 && region.morton <= tier.last_morton))
+  if (region.morton >> region_bits != 0)
+    fail("expected a Morton code of " + std::to_string(region_bits) + " bits");
+  if (tier.regions > 0 && region.morton <= tier.last_morton)
     fail("it does not follow region " + std::to_string(tier.last_morton));
   uint64_t cells = 0;
   for (uint32_t i = 0; i <= kRegionLevels; ++i) {
@@ -77,8 +79,8 @@ void SectionWriter::add(uint32_t tier_index, const EncodedRegion& region) {
 
 void SectionWriter::finish(std::span<const std::byte> list) {
   if (tiers_[0].regions == 0)
-    throw Error(ErrorCode::kCorrupt,
-                file_.path() + ": " + name_of(attribute_) + " without a region");
+    throw Error(ErrorCode::kCorrupt, file_.path() + ": the section of " + name_of(attribute_) +
+                                         " has no regions: expected at least one");
   std::vector<std::byte> table;
   ByteSink sink(table);
   GlobalAttribute attribute{static_cast<uint32_t>(attribute_), cell_levels_, block_bytes_, 0,

@@ -165,7 +165,11 @@ void GlobalFileWriter::resume(const GlobalFileProgress& progress) {
   const uint64_t whole_blocks = (end - kPageBytes) / kChecksumBlockBytes;
   if (written->size() < end || progress.levels.size() > s.brick_level() + 1 ||
       progress.checksums.size() < whole_blocks)
-    throw Error(ErrorCode::kCorrupt, s.partial_path + " does not contain the merged levels");
+    throw Error(ErrorCode::kCorrupt,
+                s.partial_path + " has " + std::to_string(written->size()) + " bytes and " +
+                    std::to_string(progress.checksums.size()) + " checksums: expected the " +
+                    std::to_string(progress.levels.size()) + " merged levels, which end at byte " +
+                    std::to_string(end));
   BlockChecksums checksums(std::span(progress.checksums).first(whole_blocks));
   const uint64_t last_block = kPageBytes + whole_blocks * kChecksumBlockBytes;
   read_through(*written, last_block, end, CancelToken(),
@@ -189,7 +193,10 @@ void GlobalFileWriter::begin_level(uint32_t level) {
   State& s = *state_;
   if (s.level_open || level + s.levels.size() != s.brick_level())
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(level) +
-                                         " does not follow the levels before it");
+                                         " does not follow the " + std::to_string(s.levels.size()) +
+                                         " levels before it, from level " +
+                                         std::to_string(s.brick_level()) + " upward" +
+                                         (s.level_open ? ": another level is not finished" : ""));
   s.create_file();
   s.checksummed_words = 0;
   s.level_open = true;
@@ -214,7 +221,7 @@ void GlobalFileWriter::end_level(const GlobalLevel& level) {
   if (words > kMaxLevelWords)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
                                        " has " + std::to_string(words) +
-                                       " words, the format's limit is 2^40 a level");
+                                       " words, the format's limit is 2^40 per level");
   if (!s.level_open || nodes == 0 || words < 2 * nodes || words != s.checksummed_words)
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(s.current_level()) +
                                          " cannot end with " + std::to_string(nodes) +
@@ -232,7 +239,12 @@ void GlobalFileWriter::begin_section() {
   if (s.level_open || s.section_open || s.levels.empty() || !s.complete() ||
       s.sections.size() == kMaxAttributes)
     throw Error(ErrorCode::kCorrupt,
-                s.path + ": a section of attributes does not follow complete levels");
+                s.path +
+                    ": expected an attribute section only after all levels, with no other "
+                    "section open, and at most " +
+                    std::to_string(kMaxAttributes) + " sections: found " +
+                    std::to_string(s.levels.size()) + " of " + std::to_string(s.brick_level() + 1) +
+                    " levels and " + std::to_string(s.sections.size()) + " sections");
   s.section_bytes = 0;
   s.section_open = true;
 }
@@ -248,11 +260,13 @@ uint64_t GlobalFileWriter::section_bytes() const { return state_->section_bytes;
 
 void GlobalFileWriter::end_section(const GlobalAttribute& attribute) {
   State& s = *state_;
-  if (!s.section_open || s.section_bytes == 0 ||
-      (!s.sections.empty() && s.sections.back().attribute.kind >= attribute.kind))
-    throw Error(ErrorCode::kCorrupt,
-                s.path + ": the section of attribute " + std::to_string(attribute.kind) + " has " +
-                    std::to_string(s.section_bytes) + " bytes, or its kind is out of order");
+  const std::string name = s.path + ": the section of attribute " + std::to_string(attribute.kind);
+  if (!s.section_open || s.section_bytes == 0)
+    throw Error(ErrorCode::kCorrupt, name + " has no bytes: expected data before its end");
+  if (!s.sections.empty() && s.sections.back().attribute.kind >= attribute.kind)
+    throw Error(ErrorCode::kCorrupt, name + " follows attribute " +
+                                         std::to_string(s.sections.back().attribute.kind) +
+                                         ": expected increasing numbers of attributes");
   s.sections.push_back({attribute, s.end, s.section_bytes});
   s.pad(s.end + s.section_bytes);
   s.section_open = false;

@@ -142,10 +142,12 @@ void Verifier::check_header() const {
   }
   uint64_t features = 0;
   if (has_features) std::memcpy(&features, file_.data() + kFeaturesAt, sizeof(features));
-  if (has_features && (features == 0 || any_wide != ((features & kWideLevels) != 0)))
-    broken(file_.path() + ": header", "version 2 with feature bits " + std::to_string(features) +
-                                          ", expected bit 1 to be " + (any_wide ? "set" : "0") +
-                                          ", and version 1 if no bit is set");
+  if (has_features && features == 0)
+    broken(file_.path() + ": header", "version 2 without feature bits, expected version 1");
+  if (has_features && any_wide != ((features & kWideLevels) != 0))
+    broken(file_.path() + ": header", "feature bits " + std::to_string(features) +
+                                          ", expected the bit of wide levels to be " +
+                                          (any_wide ? "1" : "0"));
   check_attributes((features & kAttributes) != 0);
   check_zeros(has_features ? kReservedAt : kFeaturesAt, kHeaderChecksumAt, "a reserved byte");
 }
@@ -156,11 +158,12 @@ void Verifier::check_attributes(bool has_attributes) const {
   uint64_t count;
   std::memcpy(&count, file_.data() + kAttributeCountAt, sizeof(count));
   const std::vector<Attribute> kinds = attributes_of(file_).list();
-  if (count != kinds.size() || has_attributes == kinds.empty())
+  if (count != kinds.size())
     broken(file_.path() + ": header", std::to_string(count) + " attribute sections, expected " +
                                           std::to_string(kinds.size()) +
-                                          ", the number of known sections in the file, and feature "
-                                          "bit 2 only if there are sections");
+                                          ", the number of known sections in the file");
+  if (has_attributes == kinds.empty())
+    broken(file_.path() + ": header", "expected the feature bit of attributes only with sections");
   for (size_t i = 0; i < kinds.size(); ++i)
     check_section(kAttributesAt + i * kAttributeEntryBytes, kinds[i]);
   check_zeros(kAttributesAt + kinds.size() * kAttributeEntryBytes, kFeaturesAt, "a reserved byte");

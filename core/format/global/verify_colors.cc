@@ -83,7 +83,8 @@ class ColorVerifier {
       fail(tier, i, "its counts or its position are invalid");
     for (int at = 29; at < 32; ++at)
       if (tier.directory[32 * i + static_cast<uint64_t>(at)] != 0)
-        fail(tier, i, "a reserved byte is not 0");
+        fail(tier, i,
+             "the reserved byte " + std::to_string(at) + " of its directory entry is not 0");
     uint64_t place;
     if (region.morton >> 3 * tier.region_level != 0 ||
         !cells_.find(tier.region_level, region.morton, place))
@@ -99,8 +100,12 @@ class ColorVerifier {
       if (coarser == 0 && !traits_.is_color()) finest.push_back({static_cast<uint32_t>(code), 0});
     };
     cells_.walk(tier.region_level, place, 0, tier.finest_level, visit);
-    if (!std::equal(counts.begin(), counts.end(), region.counts))
-      fail(tier, i, "its number of values differs from the DAG's number of cells");
+    for (uint32_t j = 0; j < counts.size(); ++j)
+      if (counts[j] != region.counts[j])
+        fail(tier, i,
+             std::to_string(region.counts[j]) + " values on level " +
+                 std::to_string(tier.finest_level - j) + ": expected " + std::to_string(counts[j]) +
+                 ", the number of the DAG's cells");
     for (uint32_t table = 0; table < 2; ++table)
       for (uint64_t entry = 0; entry < region.prefix_count(table); ++entry)
         if (region.prefix(table, entry) != prefix[table][entry])
@@ -116,10 +121,12 @@ class ColorVerifier {
     return region;
   }
 
-  [[noreturn]] void fail(const ColorTier& tier, uint64_t i, const std::string& what) const {
+  [[noreturn]] void fail(const ColorTier& tier, const std::string& what) const {
     throw Error(ErrorCode::kCorrupt, file_.path() + ": " + traits_.plural + " of level " +
-                                         std::to_string(tier.finest_level) + ", region " +
-                                         std::to_string(i) + ": " + what);
+                                         std::to_string(tier.finest_level) + what);
+  }
+  [[noreturn]] void fail(const ColorTier& tier, uint64_t i, const std::string& what) const {
+    fail(tier, ", region " + std::to_string(i) + ": " + what);
   }
 
  private:
@@ -135,7 +142,8 @@ class ColorVerifier {
     const uint64_t blocks = (region.cells + 31) / 32;
     const uint64_t prefix_bytes = 4 * (region.prefix_count(0) + region.prefix_count(1));
     for (uint64_t at = region.block_bytes * blocks + prefix_bytes; at < 16 * region.units(); ++at)
-      if (region.blocks[at] != 0) fail(tier, i, "its padding is not 0");
+      if (region.blocks[at] != 0)
+        fail(tier, i, "byte " + std::to_string(at) + " of its data is padding and not 0");
   }
 
   // Checks the values of a region; not for colors. `cells` are the region's cells of the finest
@@ -180,7 +188,9 @@ class ColorVerifier {
       if (region.morton >> 3 != code || count == 8) break;
       children[count++] = region.value(region.cells - 1);
     }
-    if (count == 0) fail(tier, 0, "a cell has no regions in the finer tier");
+    if (count == 0)
+      fail(tier, ": the cell with Morton code " + std::to_string(code) +
+                     " has no regions in the next finer tier");
     return traits_.value_of_parent(std::span(children, count));
   }
 
@@ -215,7 +225,9 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
   for (uint32_t t = 0; t < section.tier_count(); ++t) {
     const ColorTier& tier = section.tier(t);
     if (!verifier.is_number_of_regions(tier))
-      verifier.fail(tier, tier.region_count, "the number of regions differs from the DAG's");
+      verifier.fail(tier, ": " + std::to_string(tier.region_count) +
+                              " regions: expected as many as the DAG has cells on level " +
+                              std::to_string(tier.region_level));
     progress.begin_stage("verify " + std::string(traits_of(attribute).plural), tier.region_count,
                          "regions");
     std::atomic<uint64_t> cells = 0;
@@ -227,15 +239,24 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
       if (i > 0 && !ColorSection::region(tier, i - 1, before))
         verifier.fail(tier, i - 1, "its counts or its position are invalid");
       if (i > 0) expected = before.first_unit + before.units();
-      if (region.first_unit != expected || (i > 0 && region.morton <= before.morton))
-        verifier.fail(tier, i, "it does not follow the previous region");
+      if (region.first_unit != expected)
+        verifier.fail(tier, i,
+                      "its data begin at unit " + std::to_string(region.first_unit) +
+                          " of 16 bytes: expected " + std::to_string(expected) +
+                          ", the end of the previous region");
+      if (i > 0 && region.morton <= before.morton)
+        verifier.fail(tier, i,
+                      "its Morton code is " + std::to_string(region.morton) +
+                          ": expected more than the previous region's " +
+                          std::to_string(before.morton));
       if (i + 1 == tier.region_count && region.first_unit + region.units() != tier.units)
         verifier.fail(tier, i, "it is the last region, but the tier has data after it");
       cells += region.cells;
       progress.advance(1);
     });
     if (cells != tier.cell_count)
-      verifier.fail(tier, tier.region_count, "the number of cells differs from the tier's");
+      verifier.fail(tier, ": " + std::to_string(cells) + " cells in all regions: expected " +
+                              std::to_string(tier.cell_count) + ", the number in the tier table");
     progress.end_stage();
   }
 }

@@ -244,7 +244,8 @@ TEST_F(ValueSectionTest, RegionsMustFitTheAttribute) {
   };
   const auto normals = encode_values_of(scene, Attribute::kNormal, 1);
   EXPECT_NO_THROW(add(normals));
-  EXPECT_THAT(error_of([&] { add({}); }).message(), HasSubstr("normal without a region"));
+  EXPECT_THAT(error_of([&] { add({}); }).message(),
+              HasSubstr("the section of normal has no regions"));
   EXPECT_THAT(error_of([&] { add(encode_values_of(scene, Attribute::kAlpha, 1)); }).message(),
               HasSubstr("bytes of blocks"));
   EXPECT_THAT(error_of([&] {
