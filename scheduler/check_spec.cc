@@ -17,8 +17,8 @@
 namespace voxdag {
 namespace {
 
-// Upper limit of the default color resolution, in cells per edge. A finer color grid is not the
-// default, because colors repeat less often than geometry.
+// Upper limit of the default color resolution, in cells per edge. Colors repeat less often than
+// geometry, so the colors of a finer grid could take far more space than the geometry.
 constexpr uint64_t kColorResolution = 4096;
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }

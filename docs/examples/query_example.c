@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
   printf("%llu of %llu voxels lie in the lower half\n", (unsigned long long)count,
          (unsigned long long)facts.voxels);
 
-  /* The first voxel below the top of the grid's center. */
+  /* Finds the first voxel below the center of the grid's top face. */
   const double middle = (double)edge / 2;
   const voxdag_ray down = {{middle, (double)edge, middle}, {0, -1, 0}};
   voxdag_hit hit;

@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
     if (visitor.highest >= 0)
       std::printf("the highest reaches y = %g\n",
                   dag.origin()[1] + static_cast<double>(visitor.highest + 1) * voxel_edge);
-    // What the whole scene looks like: the only cell of level 0.
+    // Level 0 has a single cell, whose attributes summarize the complete scene.
     if (const auto color = dag.color(0, 0, 0, 0))
       std::printf("its mean color is #%02x%02x%02x\n", color->r, color->g, color->b);
     if (const auto normal = dag.normal(0, 0, 0, 0))

@@ -141,7 +141,8 @@ class PartitionMerge {
     turns_.end();
   }
 
-  // Returns the place for the positions of a slice's rows in a bucket.
+  // Returns where to write the positions of the rows of slice `s` in a bucket: to the run's map if
+  // it is in memory, otherwise to the partition, from which store_positions() copies them.
   uint32_t* positions_of(size_t bucket, size_t s) {
     const RunSlice& slice = partition_.slices()[s];
     const uint64_t row = partition_.bucket_begin(bucket, s).row;
@@ -163,10 +164,10 @@ class PartitionMerge {
   const MergeContext& context_;
   const LevelTask& task_;
   HashPartition& partition_;
-  Turns turns_;        // turns of the buckets
-  uint64_t position_;  // position of the next bucket; changed only in turn
+  Turns turns_;        // lets the workers output buckets in their order (core/base/parallel_for.h)
+  uint64_t position_;  // position of the next bucket; changed only by the worker whose turn it is
   std::vector<BucketSorter> sorters_;
-  LevelExtent extent_;  // changed only in turn
+  LevelExtent extent_;  // changed only by the worker whose turn it is
 };
 
 uint64_t bucket_rows(const MergeContext& context, const LevelTask& task) {

@@ -8,7 +8,7 @@
 //   ingest until  triangles; the rest is spilled    up to 1/3                    TriangleStore
 //   built
 //                 cursors and pieces of the scene   1/2 of free                  each part
-//                   their cells and leaves          up to 3 MiB each             nobody
+//                   lists of touched cells, cubes   up to 3 MiB each             nobody
 //   partition     half-filled chunks of triangles   1/8                          nobody
 //   estimate      pilot builds, consecutive         3/4 of free                  Backend
 //   build         WorkerMemory, for every worker    free / workers

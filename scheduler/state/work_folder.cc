@@ -87,7 +87,7 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
                                     read_small_file(files_, lock_path, 1 << 12) +
                                     ": expected no other build in this folder");
   const std::string holder = "process " + std::to_string(getpid()) + " on " + host_name();
-  // create() empties the file, because the previous name may have been longer.
+  // create() empties the file, because the previous holder's text may have been longer.
   files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
 }
 

@@ -14,8 +14,8 @@
 namespace voxdag {
 
 // is_held() of a task or job is true if Slurm could not start it and holds it until an operator
-// releases it. One cause: after a crash, Slurm's controller (slurmctld) may reuse the ids of tasks
-// that nodes still know, and these nodes refuse the new tasks.
+// releases it. This happens, for example, if Slurm's controller (slurmctld) reuses the ids of tasks
+// after a crash: nodes that still know the earlier tasks refuse the new ones.
 
 // A task of an array. Its name is JOB_INDEX, for the user and for Slurm.
 struct SlurmTask {

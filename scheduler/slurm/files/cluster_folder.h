@@ -1,5 +1,6 @@
 // The files of a cluster build and their names. The files are in the folder `cluster` of the work
-// folder, on the shared disk. Only files with names in this list are ever removed.
+// folder, on the shared disk. Files with other names are not removed, except temporary files
+// (NAME.partial, .nfs*).
 //
 //   cluster.json                       state of the submitting process (cluster_state.h)
 //   batch-7.vdbatch                    input of batch 7 (batch_file.h)

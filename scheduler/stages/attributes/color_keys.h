@@ -43,7 +43,7 @@ std::vector<Checksum128> look_digests(std::span<const Material> materials,
 // Returns a digest of a surface's record (surface_record.h) and its material's look.
 Checksum128 surface_digest(std::span<const std::byte> record, const Checksum128& look);
 
-// Returns the key of one attribute of a cube whose surfaces have the digest `content`.
+// Returns the key of one attribute of a cube whose surfaces have the summary `content`.
 Checksum128 attribute_key(const StoredAttribute& attribute, const ColorGrid& grid, const Cube& cube,
                           const BinContent& content);
 

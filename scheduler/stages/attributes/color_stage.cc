@@ -108,7 +108,7 @@ struct ColorStage::State {
   template <class T>
   using ByAttributeAndCube = std::vector<std::vector<T>>;
   ByAttributeAndCube<Checksum128> keys;
-  // Places in the ColorStore of the parts of each cube's records.
+  // For each attribute and cube, the places of the records' parts in the ColorStore.
   ByAttributeAndCube<std::vector<ColorStore::Place>> parts;
 
   State(const ColorSource& s, const StageContext& c)

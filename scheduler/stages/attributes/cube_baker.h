@@ -63,7 +63,7 @@ class CubeBaker {
   const std::span<const StoredAttribute> attributes_;
   RecordStore& store_;
   const uint64_t surface_bytes_;
-  const uint32_t max_cells_;  // cells of a region per piece
+  const uint32_t max_cells_;  // maximum number of cells of a region that are baked in one piece
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   const MemoryCharge charge_;

@@ -25,9 +25,9 @@ class TooManyReaders : public Error {
   explicit TooManyReaders(const Error& error) : Error(error) {}
 };
 
-// Reads the scene from triangle `position` to its end, piece by piece. make_piece(optional) makes
-// the Piece that a reader uses for all its pieces. Each piece is read with Piece::read() and then
-// passed to commit(piece, end), which sets `position` to `end`.
+// Reads the scene from triangle `position` to its end, piece by piece. make_piece(piece) fills
+// an optional<Piece>, which a reader uses for all pieces that it reads. Each piece is read with
+// Piece::read() and then passed to commit(piece, end), which sets `position` to `end`.
 template <class Piece, class MakePiece, class Commit>
 void read_pieces(TriangleSource& scene, const uint64_t& position, const StageContext& context,
                  MakePiece make_piece, Commit commit) {
