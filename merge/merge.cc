@@ -79,7 +79,8 @@ class Merger {
                       std::string(too_many_rows ? "all subvolumes, any two of which have over 2^32 "
                                                   "rows,"
                                                 : "any two neighboring subvolumes") +
-                      " takes more than " + std::to_string(context_.budget.available()) + " bytes");
+                      " takes more than " + std::to_string(context_.budget.available()) +
+                      " bytes: expected more memory (--memory)");
     }
     PassSegment& segment =
         pending_.add_segment(std::make_unique<PassSegment>(context_.scratch, context_.budget));

@@ -179,7 +179,9 @@ MergeState decode_state(std::span<const std::byte> bytes) {
     fields(get, state);
     sound = source.ok() && source.left() == sizeof(uint64_t);
   }
-  if (!sound) throw Error(ErrorCode::kCorrupt, "the merge's state is damaged");
+  if (!sound)
+    throw Error(ErrorCode::kCorrupt, "its saved state is damaged: expected a state of version " +
+                                         std::to_string(kVersion) + " with its checksum");
   return state;
 }
 

@@ -203,7 +203,8 @@ void check_group_is_large(const LevelTask& task, uint64_t hash) {
   }
   throw Error(ErrorCode::kOutOfMemory, "out of memory: level " + std::to_string(task.level) +
                                            " of " + std::to_string(task.runs.size()) +
-                                           " runs does not fit the merge's memory");
+                                           " runs does not fit the merge's memory: expected more "
+                                           "memory (--memory)");
 }
 
 }  // namespace

@@ -40,17 +40,19 @@ std::span<const query::Coordinates> coordinates_of(const Rows<const double>& row
   return {reinterpret_cast<const query::Coordinates*>(rows.data()), rows.shape(0)};
 }
 
-void expect_length(size_t length, size_t expected) {
+// `name` is the parameter's name in the native module.
+void expect_length(const char* name, size_t length, size_t expected) {
   if (length != expected)
-    throw Error(ErrorCode::kInvalidInput, "an array has " + std::to_string(length) +
-                                              " rows: expected " + std::to_string(expected));
+    throw Error(ErrorCode::kInvalidInput, "the array " + std::string(name) + " has the length " +
+                                              std::to_string(length) + ": expected " +
+                                              std::to_string(expected));
 }
 
 unsigned threads_of(unsigned threads) { return threads ? threads : default_threads(); }
 
 void lookup(const query::DagFile& dag, const Rows<const int64_t>& points, uint32_t grid_levels,
             const Column<uint8_t>& set, unsigned threads) {
-  expect_length(set.shape(0), points.shape(0));
+  expect_length("set", set.shape(0), points.shape(0));
   const nb::gil_scoped_release released;
   dag.lookup(positions_of(points), grid_levels, {set.data(), set.shape(0)}, threads_of(threads));
 }
@@ -64,9 +66,10 @@ void rays(const query::DagFile& dag, const Rows<const double>& origins,
           const Column<double>& distances, const Rows<int64_t>& voxels, const Rows<int8_t>& normals,
           unsigned threads) {
   const size_t count = origins.shape(0);
-  for (const size_t length :
-       {directions.shape(0), distances.shape(0), voxels.shape(0), normals.shape(0)})
-    expect_length(length, count);
+  expect_length("directions", directions.shape(0), count);
+  expect_length("distances", distances.shape(0), count);
+  expect_length("voxels", voxels.shape(0), count);
+  expect_length("normals", normals.shape(0), count);
   const auto all_origins = coordinates_of(origins), all_directions = coordinates_of(directions);
   const std::span<Position> all_voxels = positions_of(voxels);
   const nb::gil_scoped_release released;
@@ -92,7 +95,7 @@ void rays(const query::DagFile& dag, const Rows<const double>& origins,
 void dense(const query::DagFile& dag, const Position& low, const Position& high,
            uint32_t grid_levels, const Cells<uint8_t>& cells) {
   for (size_t axis = 0; axis < 3; ++axis)
-    expect_length(cells.shape(axis),
+    expect_length("cells", cells.shape(axis),
                   static_cast<size_t>(std::max<int64_t>(0, high[axis] - low[axis])));
   const nb::gil_scoped_release released;
   dag.box({grid_levels, {low, high}}, {cells.data(), cells.size()});
@@ -101,13 +104,14 @@ void dense(const query::DagFile& dag, const Position& low, const Position& high,
 void points(const query::DagFile& dag, const Position& low, const Position& high,
             uint32_t grid_levels, const Rows<int64_t>& found) {
   const nb::gil_scoped_release released;
-  expect_length(found.shape(0), dag.positions({grid_levels, {low, high}}, positions_of(found)));
+  expect_length("found", found.shape(0),
+                dag.positions({grid_levels, {low, high}}, positions_of(found)));
 }
 
 // Finds the cell of each point of world space.
 void world_to_cells(const query::DagFile& dag, const Rows<const double>& points,
                     uint32_t grid_levels, const Rows<int64_t>& cells) {
-  expect_length(cells.shape(0), points.shape(0));
+  expect_length("cells", cells.shape(0), points.shape(0));
   const nb::gil_scoped_release released;
   for (size_t i = 0; i < points.shape(0); ++i)
     for (size_t axis = 0; axis < 3; ++axis)
@@ -138,8 +142,8 @@ uint64_t count(const query::DagFile& dag, const Position& low, const Position& h
 
 void nearest(const query::DagFile& dag, const Rows<const int64_t>& points, double max_distance,
              const Rows<int64_t>& voxels, const Column<double>& distances, unsigned threads) {
-  expect_length(voxels.shape(0), points.shape(0));
-  expect_length(distances.shape(0), points.shape(0));
+  expect_length("voxels", voxels.shape(0), points.shape(0));
+  expect_length("distances", distances.shape(0), points.shape(0));
   const std::span<Position> found_voxels = positions_of(voxels);
   const nb::gil_scoped_release released;
   std::vector<query::Nearest> found(points.shape(0));
@@ -159,7 +163,7 @@ void values(const query::DagFile& dag, const std::string& name, const Rows<const
             uint32_t grid_levels, const nb::ndarray<Number, nb::c_contig, nb::device::cpu>& found) {
   const Attribute attribute = attribute_named(name, "attributes");
   const uint32_t components = traits_of(traits_of(attribute).encoding).components;
-  expect_length(found.size(), components * points.shape(0));
+  expect_length("found", found.size(), components * points.shape(0));
   const nb::gil_scoped_release released;
   with_reader_errors([&] {
     voxdag_reader::ColorCursor cursor(dag.file(), section_of(dag.file(), attribute));

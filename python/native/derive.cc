@@ -20,11 +20,18 @@ namespace {
 
 using Corner = std::array<int64_t, 3>;
 
+std::string corner_text(const Corner& corner) {
+  return std::to_string(corner[0]) + " " + std::to_string(corner[1]) + " " +
+         std::to_string(corner[2]);
+}
+
 query::Selection selection_of(uint32_t grid_levels, const Corner& low, const Corner& high) {
   const query::Selection selection{grid_levels, query::cut_to_grid({low, high}, grid_levels)};
   if (selection.region.empty())
     throw Error(ErrorCode::kInvalidInput,
-                "the region is outside the grid: expected a region that has voxels of the grid");
+                "the region from " + corner_text(low) + " to " + corner_text(high) +
+                    " is outside the grid of 2^" + std::to_string(grid_levels) +
+                    " cells per edge: expected a region that overlaps the grid");
   return selection;
 }
 

@@ -14,7 +14,9 @@ namespace voxdag::python {
 inline uint64_t memory_of(const std::string& text) {
   const uint64_t bytes = text.empty() ? default_memory() : parse_size(text, "memory");
   if (bytes < kMinMemory)
-    throw Error(ErrorCode::kInvalidInput, "memory: " + text + ", expected at least 64MiB");
+    throw Error(ErrorCode::kInvalidInput,
+                "memory: " + (text.empty() ? "the default is " + size_text(bytes) : text) +
+                    ", expected at least 64MiB");
   return bytes;
 }
 

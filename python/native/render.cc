@@ -24,12 +24,13 @@ namespace {
 using Point = std::array<double, 3>;
 using Pixels = nb::ndarray<uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
 
-query::Vec in_voxels(const Point& point, const voxdag_reader::File& file) {
+// `what` names the point in messages.
+query::Vec in_voxels(const Point& point, const char* what, const voxdag_reader::File& file) {
   query::Vec voxels;
   for (size_t axis = 0; axis < 3; ++axis) {
     if (!std::isfinite(point[axis]))
       throw Error(ErrorCode::kInvalidInput,
-                  "the camera or its target is not finite: expected finite coordinates");
+                  "the " + std::string(what) + " is not finite: expected finite coordinates");
     voxels[static_cast<int>(axis)] =
         (point[axis] - file.origin()[axis]) * static_cast<double>(file.resolution()) / file.edge();
   }
@@ -69,7 +70,8 @@ void render(const PathText& path, const std::string& view, const std::optional<P
     query::Placement placement{{{0, 0, 1}}, {{0, 0, 0}}};
     const double aspect = static_cast<double>(options.width) / options.height;
     if (camera)
-      placement = {in_voxels(*camera, *file), in_voxels(target, *file), fov_degrees.value_or(50)};
+      placement = {in_voxels(*camera, "camera", *file), in_voxels(target, "target", *file),
+                   fov_degrees.value_or(50)};
     else if (!dag.empty())
       placement = query::named_view(view, dag, aspect, fov_degrees, cancel);
     const query::Picture picture = query::render_picture(dag, placement, options, relay, cancel);

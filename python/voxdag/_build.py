@@ -137,8 +137,8 @@ def _mesh_arrays(vertices: Any, triangles: Any) -> _Arrays:
     if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(vertices)):
         bad = np.flatnonzero(((triangles < 0) | (triangles >= len(vertices))).any(axis=1))[0]
         raise Error(
-            f"triangle {bad} has the vertices {triangles[bad].tolist()}: expected 0 to "
-            f"{len(vertices) - 1}",
+            f"triangle {bad} has the vertices {triangles[bad].tolist()}: expected numbers from 0 "
+            f"to below {len(vertices)}, the number of vertices",
             "invalid_input",
         )
     is_float = vertices.dtype == np.float32

@@ -121,7 +121,9 @@ class Dag:
         the rounding of doubles are corrected."""
         values = np.asarray(points, np.float64)
         if values.ndim == 0 or values.shape[-1] != 3:
-            raise Error(f"the points are an array {values.shape}: expected (N, 3)", "invalid_input")
+            raise Error(
+                f"the points are an array {values.shape}: expected (..., 3)", "invalid_input"
+            )
         finite = np.isfinite(values).all(axis=-1)
         if not np.all(finite):
             index = np.argwhere(~finite)[0].tolist()
@@ -346,7 +348,7 @@ class Dag:
             )
         if world:
             if np.any(np.isnan(corners)):
-                raise Error(f"the region {region!r}: expected numbers", "invalid_input")
+                raise Error(f"the region {region!r}: expected numbers, not NaN", "invalid_input")
             low, high = self._dag.world_to_region(corners.tolist(), self._levels(level))
             corners = np.array([*low, *high])
         elif corners.dtype.kind not in "iu":
@@ -383,5 +385,8 @@ def _rows(values: Any, dtype: Any, what: str) -> np.ndarray:
             "invalid_input",
         )
     if dtype == np.int64 and array.dtype == np.uint64 and (array >> np.uint64(63)).any():
-        raise Error(f"the {what} are over 2^63: expected smaller coordinates", "invalid_input")
+        raise Error(
+            f"the {what} have the coordinate {array.max()}: expected less than 2^63",
+            "invalid_input",
+        )
     return np.ascontiguousarray(array, dtype=dtype)

@@ -47,7 +47,8 @@ def render(
     """
     width, height = _size(size)
     if (camera is None) != (target is None):
-        raise Error("expected a camera and a target, or neither", "invalid_input")
+        given = "target" if camera is None else "camera"
+        raise Error(f"only a {given}: expected a camera and a target, or neither", "invalid_input")
     if not isinstance(view, str):
         raise Error(f"view {view!r}: expected the name of a view", "invalid_input")
     if camera is not None and view != "auto":
@@ -61,7 +62,7 @@ def render(
         raise TypeError(f"progress={progress!r}: expected a function or None")
     samples = _whole(samples, 1, 8, f"samples {samples!r}: expected 1 to 8")
     threads = _whole(
-        threads, 0, 1 << 16, f"threads {threads!r}: expected a number of threads, 0 for all"
+        threads, 0, 1 << 16, f"threads {threads!r}: expected 0 (all) to {1 << 16}"
     )
     place = None if camera is None else _point(camera, "camera")
     aim = (0.0, 0.0, 0.0) if target is None else _point(target, "target")
@@ -105,6 +106,6 @@ def _point(point: Any, what: str) -> tuple[float, float, float]:
     except (TypeError, ValueError):
         raise Error(f"the {what} {point!r}: expected x, y, z", "invalid_input") from None
     if numbers.shape != (3,) or not np.all(np.isfinite(numbers)):
-        raise Error(f"the {what} {point!r}: expected x, y, z, finite", "invalid_input")
+        raise Error(f"the {what} {point!r}: expected x, y, z, all finite", "invalid_input")
     x, y, z = numbers.tolist()
     return x, y, z

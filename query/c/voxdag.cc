@@ -109,7 +109,9 @@ voxdag::query::RayLimits ray_limits_of(const voxdag_ray_limits* limits) {
   const char* const bytes = reinterpret_cast<const char*>(limits);
   if (limits->struct_size > sizeof *limits &&
       std::any_of(bytes + sizeof *limits, bytes + limits->struct_size, [](char c) { return c; }))
-    refuse("voxdag_ray_limits has members that libvoxdag.so " VOXDAG_VERSION " does not know");
+    refuse("voxdag_ray_limits has members that libvoxdag.so " VOXDAG_VERSION
+           " does not know: expected "
+           "0 in their bytes");
   return {limits->max_distance, limits->stop_size};
 }
 

@@ -31,8 +31,8 @@ class AttributeCursor {
     const voxdag_reader::ColorRegion* const region = with_reader_errors(
         [&] { return cursor_.find(cell[0], cell[1], cell[2], job_.selection.grid_levels, i); });
     if (!region)
-      throw Error(ErrorCode::kCorrupt, job_.file.path() + ": a cell has no " + traits_.name +
-                                           ": the file is damaged (voxdag verify says where)");
+      throw Error(ErrorCode::kCorrupt, job_.file.path() + ": " + cell_text(job_, cell) +
+                                           " has no " + traits_.name + ": the file is damaged");
     put_value(traits_.attribute, *region, i, put);
   }
 

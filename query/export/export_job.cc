@@ -104,7 +104,7 @@ bool CellLimit::fits(uint32_t grid_levels) {
 
 void refuse_empty(const ExportJob& job) {
   throw Error(ErrorCode::kInvalidInput,
-              job.file.path() + ": the selection has no voxels: expected a selection with voxels");
+              job.file.path() + ": no voxels are selected: expected a --region with voxels");
 }
 
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected) {
@@ -119,10 +119,14 @@ voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCurso
   const auto color = with_reader_errors(
       [&] { return colors.color(cell[0], cell[1], cell[2], job.selection.grid_levels); });
   if (!color)
-    throw Error(ErrorCode::kCorrupt, job.file.path() +
-                                         ": a cell has no color: the file is damaged "
-                                         "(voxdag verify says where)");
+    throw Error(ErrorCode::kCorrupt, job.file.path() + ": " + cell_text(job, cell) +
+                                         " has no color: the file is damaged");
   return *color;
+}
+
+std::string cell_text(const ExportJob& job, const std::array<int64_t, 3>& cell) {
+  return "cell " + std::to_string(cell[0]) + " " + std::to_string(cell[1]) + " " +
+         std::to_string(cell[2]) + " of level " + std::to_string(job.selection.grid_levels);
 }
 
 uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string& reason) {

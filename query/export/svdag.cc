@@ -107,7 +107,7 @@ ExportReport write_svdag(const ExportJob& job) {
   if (words > kMaxSvdagWords)
     refuse_size(job,
                 count_text(words) + " words (" + size_text(4 * words) +
-                    ") are needed, but the file counts at most " + count_text(kMaxSvdagWords),
+                    ") are needed, but an SVDAG file has at most " + count_text(kMaxSvdagWords),
                 [&](uint32_t level) {
                   const SelectedDag::Size size = dag.size_at(level);
                   return size.words + 7 * size.bricks + kLeafWords <= kMaxSvdagWords;

@@ -223,7 +223,8 @@ std::vector<SelectedPart> Extraction::build_part(Worker& worker, const SelectedP
   } catch (const OutOfBudget&) {
     if (cube.level == shape_.brick_level())
       throw Error(ErrorCode::kOutOfMemory, "a brick does not fit a worker's share of " +
-                                               std::to_string(worker.share.limit()) + " bytes");
+                                               std::to_string(worker.share.limit()) +
+                                               " bytes: expected more memory (--memory)");
     return worker.builder.split(part);
   }
 }

@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
+#include "core/base/text.h"
 #include "core/format/global/open_global.h"
 #include "query/dag/dag_view.h"
 #include "query/dag/selection.h"
@@ -30,11 +31,26 @@ namespace {
 // rays in a packet, so only the last packet of a call can be incomplete.
 constexpr size_t kBatch = 4096;
 
-[[noreturn]] void refuse(const char* expected) {
-  throw Error(ErrorCode::kInvalidInput, std::string("query: expected ") + expected);
+[[noreturn]] void refuse(const std::string& what) {
+  throw Error(ErrorCode::kInvalidInput, "query: " + what);
 }
-inline void require(bool right, const char* expected) {
-  if (!right) refuse(expected);
+// Throws unless the array `name` has as many entries as there are `items`.
+void require_length(const char* name, size_t length, size_t expected, const char* items) {
+  if (length != expected)
+    refuse("the array of " + std::string(name) + " has " + std::to_string(length) +
+           " entries: expected " + std::to_string(expected) + ", the number of " + items);
+}
+void require_not_negative(const char* name, double value) {
+  if (!(value >= 0))
+    refuse(std::string(name) + " is " + number_text(value) + ": expected a number of at least 0");
+}
+std::string point_text(const Coordinates& point) {
+  return number_text(point[0]) + " " + number_text(point[1]) + " " + number_text(point[2]);
+}
+bool is_ray(const Coordinates& origin, const Coordinates& direction) {
+  const auto is_finite = [](double number) { return std::isfinite(number); };
+  return std::ranges::all_of(origin, is_finite) && std::ranges::all_of(direction, is_finite) &&
+         std::ranges::any_of(direction, [](double number) { return number != 0; });
 }
 
 // Divides the numbers 0 to items - 1 into batches, and calls body(first, count) for each batch on
@@ -64,8 +80,12 @@ void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates
       nothing = nothing + DoublePair::load(o) * zero + d[axis] * zero;
       largest = max(largest, absolute(d[axis]));
     }
-    require(equal(nothing, zero) == 3 && less(zero, largest) == 3,
-            "rays of finite numbers with directions that are not 0");
+    if (!(equal(nothing, zero) == 3 && less(zero, largest) == 3)) {
+      const size_t bad = is_ray(origins[first], directions[first]) ? second : first;
+      refuse("a ray has the origin " + point_text(origins[bad]) + " and the direction " +
+             point_text(directions[bad]) +
+             ": expected finite numbers and a direction other than 0");
+    }
     // Divides by the largest component first, so that no square of a component overflows or becomes
     // 0.
     for (DoublePair& component : d) component = component / largest;
@@ -182,7 +202,7 @@ uint64_t DagFile::file_bytes() const { return file().file_bytes(); }
 void DagFile::lookup(std::span<const Position> points, uint32_t grid_levels, std::span<uint8_t> set,
                      unsigned threads) const {
   check_grid_levels(state_->view, grid_levels);
-  require(points.size() == set.size(), "as many results as points");
+  require_length("results", set.size(), points.size(), "points");
   state_->prepare_for_queries(points.size());
   const TopCells* const top = state_->top_cells(points.size());
   naming_file(file().path(), [&] {
@@ -223,8 +243,9 @@ template <class Value, class ValueOf>
 void read_attribute(const AttributeSource& source, std::span<const Position> points,
                     uint32_t grid_levels, Value none, std::span<Value> values, unsigned threads,
                     const ValueOf& value_of) {
-  require(points.size() == values.size(), "as many results as points");
-  require(source.section.tier_count() > 0, source.expected);
+  require_length("results", values.size(), points.size(), "points");
+  if (source.section.tier_count() == 0)
+    refuse(source.file.path() + " does not have this attribute: expected " + source.expected);
   with_reader_errors([&] {
     for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
       voxdag_reader::ColorCursor cursor(source.file, source.section);
@@ -287,9 +308,10 @@ void DagFile::materials(std::span<const Position> points, uint32_t grid_levels,
 
 void DagFile::rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
                    const RayLimits& limits, std::span<RayHit> hits, unsigned threads) const {
-  require(origins.size() == directions.size() && origins.size() == hits.size(),
-          "as many directions and results as origins");
-  require(limits.max_distance >= 0 && limits.stop_size >= 0, "limits of rays that are at least 0");
+  require_length("directions", directions.size(), origins.size(), "origins");
+  require_length("results", hits.size(), origins.size(), "origins");
+  require_not_negative("max_distance", limits.max_distance);
+  require_not_negative("stop_size", limits.stop_size);
   state_->prepare_for_queries(origins.size());
   naming_file(file().path(), [&] {
     for_each_batch(threads, origins.size(), [&](size_t batch, size_t count) {
@@ -321,9 +343,10 @@ void DagFile::box(const Selection& selection, std::span<uint8_t> cells) const {
     const uint64_t edge = high[axis] <= low[axis] ? 0
                                                   : static_cast<uint64_t>(high[axis]) -
                                                         static_cast<uint64_t>(low[axis]);
-    require(!__builtin_mul_overflow(size, edge, &size), "a region that fits in memory");
+    if (__builtin_mul_overflow(size, edge, &size))
+      refuse("the region has 2^64 or more cells: expected fewer");
   }
-  require(cells.size() == size, "as many results as cells in the region");
+  require_length("results", cells.size(), size, "cells in the region");
   std::fill(cells.begin(), cells.end(), uint8_t{0});
   bricks(selection, [&](const Brick& brick) {
     for_each_cell_of(brick, [&](const Position& p) {
@@ -357,14 +380,15 @@ uint64_t DagFile::count(const Selection& selection) const {
 void DagFile::nearest(std::span<const Position> points, uint32_t grid_levels, double max_distance,
                       std::span<Nearest> cells, unsigned threads) const {
   check_grid_levels(state_->view, grid_levels);
-  require(points.size() == cells.size(), "as many results as points");
-  require(max_distance >= 0, "a distance that is at least 0");
+  require_length("results", cells.size(), points.size(), "points");
+  require_not_negative("max_distance", max_distance);
   const uint64_t max_squared = largest_square(max_distance);
   naming_file(file().path(), [&] {
     for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
       for (size_t i = first; i < first + count; ++i) {
         for (const int64_t c : points[i])
-          require(c >= -kMaxCoordinate && c <= kMaxCoordinate, "coordinates within 2^30");
+          if (c < -kMaxCoordinate || c > kMaxCoordinate)
+            refuse("a point has the coordinate " + std::to_string(c) + ": expected -2^30 to 2^30");
         cells[i] = find_nearest(state_->view, grid_levels, points[i], max_squared);
       }
     });
@@ -385,7 +409,6 @@ Region DagFile::world_to_region(const Coordinates& low, const Coordinates& high,
 }
 
 std::vector<uint32_t> DagFile::tile(uint32_t tile_levels, uint32_t level, uint64_t offset) const {
-  require(tile_levels >= 1 && tile_levels <= kMaxTileLevels, "1 to 5 levels in a tile");
   return naming_file(file().path(), [&] {
     return encode_tile(state_->view, tile_levels, {level, offset});
   });

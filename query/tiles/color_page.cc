@@ -21,17 +21,19 @@ constexpr size_t kBlockWords = 4;
 constexpr uint32_t kSkipShift = 16, kSingleColors = 1u << 24;
 
 void check_address(const voxdag_reader::File& file, const ColorPageAddress& page) {
-  if (!file.has_colors()) throw Error(ErrorCode::kNotFound, "the file has no colors");
+  if (!file.has_colors())
+    throw Error(ErrorCode::kNotFound, "the file has no colors: expected a file built with colors");
   const uint32_t levels = file.color_levels();
   if (page.level > levels)
     throw Error(ErrorCode::kNotFound, "colors of level " + std::to_string(page.level) +
                                           ": expected 0 to " + std::to_string(levels));
   const uint64_t edge = uint64_t{1} << (page.level - std::min(page.level, kPageLevels));
-  for (const uint64_t c : page.position)
-    if (c >= edge)
-      throw Error(ErrorCode::kNotFound,
-                  "position " + std::to_string(c) + " of a color page of level " +
-                      std::to_string(page.level) + ": expected 0 to " + std::to_string(edge - 1));
+  const auto& [x, y, z] = page.position;
+  if (x >= edge || y >= edge || z >= edge)
+    throw Error(ErrorCode::kNotFound,
+                "color page " + std::to_string(x) + "." + std::to_string(y) + "." +
+                    std::to_string(z) + " of level " + std::to_string(page.level) +
+                    ": expected each number to be 0 to " + std::to_string(edge - 1));
 }
 
 // Returns the position of a cell of the page from its Morton code within the page.

@@ -21,7 +21,12 @@ void check_address(const DagView& dag, const TileAddress& root, const CheckedBlo
     const auto& [words, wide] = dag.level(root.level);
     return root.offset < words.size() && words[root.offset] - 1 < 255;
   };
-  if (!has_level || !is_node())
+  if (!has_level)
+    throw Error(ErrorCode::kNotFound,
+                "level " + std::to_string(root.level) + ": expected less than " +
+                    std::to_string(dag.empty() ? 0 : dag.grid_levels() - kBrickLevels) +
+                    ", the number of levels with nodes");
+  if (!is_node())
     throw Error(ErrorCode::kNotFound, "level " + std::to_string(root.level) + ", word " +
                                           std::to_string(root.offset) + ": no node begins here");
 }

@@ -81,7 +81,8 @@ void find_surfaces(TriangleSource& scene, const Grid& snap, const ColorGrid& gri
       bytes += 2 * sizeof(FixedSurface);  // a vector may have twice the capacity that it needs
       if (bytes > charge.bytes() && !charge.try_resize(2 * bytes))
         throw Error(ErrorCode::kOutOfMemory,
-                    "not enough memory for the triangles of the sampled color regions");
+                    "out of memory: the triangles of the sampled color regions need over " +
+                        std::to_string(charge.bytes()) + " bytes: expected more memory (--memory)");
       region.surfaces.push_back(surface);
     }
   };
@@ -183,7 +184,11 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
   SceneMaterials materials = scene.materials();
   materials.name_unlisted();
   if (attributes.have_names() && file.material_names() != materials.names)
-    throw Error(ErrorCode::kCorrupt, file.path() + ": its materials differ from the scene's");
+    throw Error(ErrorCode::kCorrupt, file.path() + ": its list of materials (" +
+                                         std::to_string(file.material_names().size()) +
+                                         ") differs from the scene's list (" +
+                                         std::to_string(materials.names.size()) +
+                                         ") in number, names or order");
   if (!attributes.use_images()) materials.drop_images();
   progress.begin_stage("images", materials.images.size(), "images");
   const auto textures =
@@ -204,7 +209,8 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
     baker.add(region.surfaces, [&](uint64_t bytes) {
       if (bytes > values_charge.bytes() && !values_charge.try_resize(bytes))
         throw Error(ErrorCode::kOutOfMemory,
-                    "not enough memory for the normals and materials of a sampled region");
+                    "out of memory: the normals and materials of a sampled region need " +
+                        std::to_string(bytes) + " bytes: expected more memory (--memory)");
       return true;
     });
     baker.finish(cells, values);

@@ -80,8 +80,8 @@ void for_each_snapped(TriangleSource& scene, const Grid& grid, Progress& progres
       if (result == SnapResult::kTooFar)
         throw Error(
             ErrorCode::kLimit,
-            "a triangle of the scene reaches 2^40 units beyond the file's grid; builds refuse "
-            "such a scene");
+            "a triangle of the scene reaches into the file's grid and has a vertex 2^32 or more "
+            "voxels away from the grid's low corner: expected a scene that voxdag can build");
       if (result == SnapResult::kInside) visit(triangle);
     }
   });

@@ -162,7 +162,7 @@ ChargedVdb charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
   if (size.bytes > limit)
     refuse_size(
         job,
-        "the grid would take over " + size_text(limit) + " of memory, which is --memory" +
+        "the grid would take over " + size_text(limit) + " of memory, the limit --memory" +
             (job.has_colors ? " (without colors, --gray, it takes less)" : ""),
         [&](uint32_t level) {
           return vdb_size(job, coarser(job.selection, level), node, limit, CancelCheck(job))

@@ -157,7 +157,7 @@ TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
   const uint64_t others = 2 * 5 + 1 + 255;
   expect_not_refused(many_words(chain(10), k32Bits - 1 - others), "svdag");
   expect_refused(many_words(chain(10), k32Bits - others), "svdag",
-                 "4 294 967 296 words (16.00 GiB) are needed, but the file counts at most "
+                 "4 294 967 296 words (16.00 GiB) are needed, but an SVDAG file has at most "
                  "4 294 967 295",
                  "8 (256");
 }
