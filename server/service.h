@@ -25,8 +25,8 @@ class Service {
   int port() const { return http_.port(); }
   // Returns the base URL, such as "http://127.0.0.1:8080".
   std::string url() const;
-  // Serves until stop(). Then stops builds at a checkpoint, finishes requests in progress, and
-  // returns.
+  // Serves until stop(). Then stops builds at a checkpoint, waits for requests in progress up to
+  // ServerConfig::drain_timeout_s, and returns.
   void run();
   // May be called from any thread.
   void stop();

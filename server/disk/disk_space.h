@@ -1,4 +1,4 @@
-// Manages the free space on the data folder's disk. A part of it is always kept free. An upload
+// Manages the free space on the data folder's disk. Uploads leave a part of it free. An upload
 // reserves a few megabytes ahead of its writes: two uploads never use the same free bytes, and a
 // slow upload does not reserve the space of its complete scene. Thread-safe.
 //
@@ -17,7 +17,7 @@ namespace voxdag::server {
 
 class DiskSpace {
  public:
-  // Always keeps `min_free_bytes` free, but at least a few megabytes for the databases. Removes an
+  // Uploads leave `min_free_bytes` free, and at least a few megabytes for the databases. Removes an
   // existing ballast, because the databases need space to open.
   DiskSpace(FileSystem& files, const std::string& data_folder, uint64_t min_free_bytes);
 

@@ -12,7 +12,8 @@ export class ColorLoader extends Loader {
         {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, source.info.colors.batch_max)});
   }
 
-  // Requests the pages that one reading of the feedback misses. `wanted` maps key -> request.
+  // Requests the missing pages of one reading of the color feedback (gl/color_shader.js). `wanted`
+  // maps key -> request.
   demand(wanted, nowMs) {
     const requests = [];
     let unmet = 0;

@@ -1,5 +1,5 @@
-// The colors of a file: the uniforms for drawing them, and requests for the pages that the feedback
-// misses.
+// The colors of a file: the uniforms for drawing them, and requests for the missing pages, which
+// the color feedback (gl/color_shader.js) reports.
 
 import {ColorLoader} from "./color_loader.js";
 import {ColorStore, pageKey} from "./color_store.js";

@@ -1,5 +1,6 @@
-// Decodes a reading of the feedback: the missing tiles, the used tiles, and statistics of the
-// picture.
+// Decodes the feedback. Each drawn sample of a picture also draws a small picture, the feedback,
+// with the missing tiles, the used tiles, and statistics. A *reading* is one feedback, copied from
+// the GPU.
 
 const kMaxSamples = 4096;  // texels from which the statistics are computed
 const kHalf = new DataView(new ArrayBuffer(4));
@@ -22,7 +23,8 @@ function shareOf(sorted, share) {
 // Returns
 // {wanted: Map from the texels of cut-off nodes (tiles/tile_format.js) whose tiles are missing to
 //  priorities, slots: Set of the slots of used tiles, coarsePixels: width of the widest cell with a
-//  missing tile, medianT, nearestT, exposure (null if no surface is seen), stepsMean, steps99}.
+//  missing tile, medianT, nearestT, exposure (null if no surface is seen), stepsMean, steps99 (99th
+//  percentile)}.
 // The last five values are measured on a sample of the pixels.
 export function readFeedback(words) {
   const wanted = new Map(), slots = new Set(), texels = words.length / 4;

@@ -1,7 +1,7 @@
 // Draws the samples of a picture and counts them. A sample is drawn in parts, because a GPU that
 // gets too much work in one piece stops the complete system, and some drivers end a context that is
 // busy for seconds. At most one sample is being drawn. At most one drawn sample waits until its
-// feedback can be read.
+// feedback (gl/feedback.js) can be read.
 
 import {mark} from "./statistics.js";
 

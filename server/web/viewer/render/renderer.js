@@ -29,7 +29,8 @@ const kBudgetBytes = 256 << 20, kPhoneBudgetBytes = 64 << 20;
 const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;
 const kMovingMs = 180;  // duration of "moving" after the last change of the view
 const kSamples = 16;    // number of samples per pixel of a still picture
-// A picture counts as the first one if its cells with missing tiles are narrower than this.
+// A picture counts as the first one if its cells with missing tiles are narrower than this number
+// of pixels.
 const kFirstPicturePixels = 16;
 
 export class Renderer {

@@ -1,6 +1,6 @@
 // The tiles and color pages of one file in one graphics context. Loads the root, then the tiles of
-// the first view, and then the tiles that each reading of the feedback misses. A new context gets a
-// new stream.
+// the first view, and then the tiles that each reading of the feedback (gl/feedback.js) reports as
+// missing. A new context gets a new stream.
 
 import {colorBudget, Colors} from "../colors/colors.js";
 import {FirstView} from "../tiles/first_view.js";

@@ -1,4 +1,5 @@
-// Tracks how complete the picture of the current view is, from the feedback readings of its frames.
+// Tracks how complete the picture of the current view is, from the feedback readings of its frames
+// (gl/feedback.js).
 
 const kQuietReadings = 2;             // readings without a missing tile that complete the view
 export const kMaxLateCellPixels = 3;  // missing cells up to this width do not restart a picture

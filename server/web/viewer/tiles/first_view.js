@@ -81,8 +81,9 @@ export class FirstView {
       this.walk(store, tile, words, corner);  // tile is undefined if it was evicted
   }
 
-  // True if a cube is in the picture and the cells in it are too wide. `cell` is their edge in
-  // voxels.
+  // True if a cube may be in the picture and the cells in it are too wide. `cell` is the cells'
+  // edge in voxels. A ball with 0.867 (just over √3/2) times the cube's edge as radius contains the
+  // cube.
   needs(x, y, z, edge, cell) {
     return this.pixelsOf(x, y, z, edge, cell) > kPixels &&
         this.isSeen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);

@@ -1,5 +1,6 @@
 // Schedules the requests for tiles or color pages, and retries failed requests. Each reading of the
-// feedback replaces the queue, so items that are no longer in the picture are not fetched.
+// feedback (gl/feedback.js) replaces the queue, so items that are no longer in the picture are not
+// fetched.
 
 import {TileError} from "../tile_source.js";
 

@@ -5,9 +5,10 @@
 // subtrees share one tile, and an eviction costs one write. A slot exists while its tile is loaded
 // or a loaded tile refers to it.
 //
-// A tile is evicted only if the current view ("epoch") does not use it and, while the camera moves,
-// only if it was not used recently. Tiles loaded for a view remain until the next view. So the
-// number of tiles fetched for one view is bounded, however small the pool is.
+// An *epoch* is the time in which the view remains the same. A tile is evicted only if the pictures
+// of the current epoch do not use it and, while the camera moves, only if it was not used recently.
+// Tiles loaded for a view remain until the next view. So the number of tiles fetched for one view
+// is bounded, however small the pool is.
 
 import {kRoundsToKnow} from "./loader.js";
 import {decodeTile, kBlockTexels, kTexelWords, tileShape} from "./tile_format.js";
