@@ -1,9 +1,9 @@
 // Writes the surface as binary glTF 2.0. The surface consists of the faces between set and empty
 // voxels. Coplanar faces are merged to rectangles. If the file has colors, each rectangle has one
-// color. Positions are integers, in cells from the low corner of the region, which floats represent
-// exactly. The transform of the glTF node converts them to world space. The vertex colors (COLOR_0)
-// are linear light, as glTF requires. They have 16 bits, because dark sRGB bytes need this
-// precision.
+// color. Positions are in cells from the low corner of the region. They are integers, so floats
+// represent them exactly. The transform of the glTF node converts them to world space. The vertex
+// colors (COLOR_0) are linear light, as glTF requires. They have 16 bits, because 8 bits of linear
+// light cannot distinguish dark sRGB bytes.
 #include <algorithm>
 #include <array>
 #include <bit>

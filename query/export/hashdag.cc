@@ -72,7 +72,8 @@ class HashDagWriter {
       write_level(level, below, counts, stage);
       below = std::move(counts);
     }
-    // A grid of one brick has no node with a count.
+    // A grid of one brick has no node. The only count in the color file is then the number of all
+    // voxels.
     if (first_top_.empty()) enclosed_[0] = dag_.voxels();
   }
 

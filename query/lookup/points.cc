@@ -11,7 +11,8 @@ namespace {
 // faster (measured).
 constexpr size_t kGroup = 32;
 
-// Runs the descents of lookups. Up to kGroup descents run interleaved.
+// Runs descents. A descent is one lookup's way from the root, or from a node of TopCells, to its
+// cell. Up to kGroup descents run interleaved.
 class Descents {
  public:
   Descents(const DagView& dag, const TopCells* top, uint32_t grid_levels)

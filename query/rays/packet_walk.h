@@ -147,7 +147,8 @@ class PacketWalk {
     if (mask - 1 >= 255) job_.dag->corrupt(depth, offset);
     return {mask, words + 1, level.wide_children};
   }
-  // Checks that a node near the end of its level is complete.
+  // Throws Error{kCorrupt} unless the node at `offset` is completely inside its level. node() calls
+  // this function only for offsets near the end of the level.
   __attribute__((noinline)) void check_node(uint32_t depth, uint64_t offset) const {
     const PacketJob::Level& level = job_.levels[depth];
     if (offset >= level.count || uint64_t{kPopcount8[level.words[offset] & 255]}

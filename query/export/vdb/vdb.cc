@@ -259,7 +259,7 @@ ExportReport write_vdb(const ExportJob& job) {
     openvdb::GridPtrVec grids = {grid};
     if (job.has_colors) {
       grids.push_back(make_color_grid(job, voxels));
-      // Half floats can represent all sRGB bytes.
+      // Half floats are precise enough to distinguish the linear values of all sRGB bytes.
       grids.back()->setSaveFloatAsHalf(true);
     }
     const uint64_t min_bytes = grid->tree().leafCount() * kVdbLeafBytes;
