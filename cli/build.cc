@@ -29,8 +29,8 @@ void print(const BuildReport& r) {
               r.merge.passes == 1 ? "" : "es");
   if (const auto& c = r.cluster)
     std::printf(
-        "  %s batches on %zu nodes, %s attempts failed, %s CPU in tasks; nodes that their merges "
-        "took %s, left %s\n",
+        "  %s batches on %zu cluster nodes, %s attempts failed, %s CPU in tasks; the tasks' merges "
+        "reduced %s DAG nodes to %s\n",
         count_text(c->batches).c_str(), c->batches_of_node.size(), count_text(c->attempts).c_str(),
         duration_text(c->cpu_s).c_str(), count_text(c->rows_before).c_str(),
         count_text(c->rows_after).c_str());
