@@ -11,7 +11,8 @@
 namespace voxdag {
 namespace {
 
-// Maximum number of rows of an artifact, which counts rows in 32 bits.
+// Maximum number of rows of the artifacts that a pass merges into one artifact. So no level of this
+// artifact has over 2^32 rows, the limit of its format.
 constexpr uint64_t kMaxArtifactRows = uint64_t{1} << 32;
 
 // Merges in passes until all artifacts fit in one pass, then into the global file or an artifact.

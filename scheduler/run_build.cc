@@ -189,7 +189,7 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted) {
     return true;
   } catch (const Error& error) {
     // DamagedTriangles reports damage of a spill file in the work folder, not of the scene. The
-    // next call writes the file again.
+    // next call of this function writes the file again.
     const bool is_scratch = dynamic_cast<const DamagedTriangles*>(&error) != nullptr;
     if ((reads_scene && !is_scratch) || !error.is_corruption() ||
         !recover(job, error, has_restarted))

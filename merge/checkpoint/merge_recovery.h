@@ -52,7 +52,7 @@ class MergeRecovery {
   PassProgress resume(const MergeState& state, GlobalFileWriter& out);
   PassProgress resume_final_pass(const FinalPassState& state, GlobalFileWriter& out);
   MergeState make_state(std::vector<ArtifactRef> intermediates) const;
-  // Returns the intermediates (outputs of earlier passes) among the pending artifacts from number
+  // Returns the intermediates (outputs of earlier passes) among the pending artifacts from index
   // `begin` on.
   std::vector<ArtifactRef> intermediates_from(size_t begin) const;
   // Returns the inputs' frames of all levels from the bricks up to `level`, except frames returned
@@ -63,7 +63,8 @@ class MergeRecovery {
   const uint32_t grid_levels_;
   PendingArtifacts& pending_;
   StateSaver saver_;
-  // For each artifact: the end of the ranges that newly_merged() has returned.
+  // For each artifact, the end (an offset in its segment) of the ranges that newly_merged() has
+  // returned.
   std::vector<uint64_t> merged_ends_;
 };
 

@@ -13,9 +13,9 @@ namespace {
 // cache.
 constexpr size_t kFramesPerItem = 16;
 
-// Writes the positions of `children`, which `map` gives, to `out`. The map may be wide although
-// `wide` is false: the width of a map is chosen before its level is merged, and the width of
-// references to the level afterwards.
+// Looks up the positions of the rows `children` in `map` and writes them to `out`, as two words
+// each if `wide` is set. The map may be wide although `wide` is false: the width of a map is chosen
+// before its level is merged, and the width of references to the level afterwards.
 void replace_all(std::span<const uint32_t> children, const uint32_t* map, bool wide_map, bool wide,
                  uint32_t* out) {
   if (!wide_map) {

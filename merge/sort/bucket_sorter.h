@@ -31,8 +31,8 @@ class BucketSorter {
 
   // Returns the unique rows of the bucket that was sorted last.
   const MergedRows& unique() const { return unique_; }
-  // Position of every row, relative to the first position of the bucket: slice after slice, in the
-  // order of each slice.
+  // Returns the position of every row of the bucket, relative to the bucket's first position. The
+  // rows are in the order of the slices, and within a slice in the slice's order.
   std::span<const uint32_t> positions() const { return {positions_.data(), row_count_}; }
   // Returns the number of positions that the unique rows take.
   uint64_t extent() const { return extent_; }

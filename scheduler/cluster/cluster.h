@@ -19,7 +19,7 @@ namespace voxdag {
 // Throws Error{kInvalidInput} if this program has no cluster support.
 void check_cluster_support();
 // Checks a build with cluster options. Throws Error{kInvalidInput} if Slurm is not installed or
-// would refuse the build's tasks.
+// would refuse the build's tasks, or if the build has a cache folder.
 void check_cluster(const BuildSpec& spec, const BuildContext& context);
 
 // True if this process is the merge job.

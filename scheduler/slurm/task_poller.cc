@@ -82,8 +82,8 @@ void TaskPoller::warn_waiting(const SlurmTask& task) {
 }
 
 // Cancels tasks that Slurm will never start. If Slurm does not accept the request, adds their
-// batches to `listed`. The next attempt starts only after the grace period, because a node that
-// fails immediately could also take the new task.
+// batches to `listed`, so that end_missing() leaves them alone. Otherwise the next attempt starts
+// after the grace period, because a node that fails immediately could also take the new task.
 void TaskPoller::cancel_held(const std::vector<SlurmTask>& tasks, std::set<uint32_t>& listed) {
   std::vector<std::string> names;
   for (const SlurmTask& task : tasks) names.push_back(task.name());

@@ -23,8 +23,8 @@ class JsonVisitor {
   const Action& action_;
 };
 
-// Throws FieldError for an option that is not the default and breaks a limit, or that excludes an
-// earlier option that is not the default.
+// Checks the options that differ from their defaults. Throws FieldError if such an option breaks a
+// limit, or excludes such an option that was visited before it.
 class LimitChecker {
  public:
   explicit LimitChecker(const FieldJson& defaults) : defaults_(defaults) {}

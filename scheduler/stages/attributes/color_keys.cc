@@ -5,8 +5,8 @@
 namespace voxdag {
 namespace {
 
-// Version of the color rule, the decoders, the blocks and the region records. Any change to them
-// increases it, so that colors baked by an earlier version are not reused.
+// Version of the color rule, the decoders, the blocks and the region records. Increase it with any
+// change to them, so that colors baked by an earlier version are not reused.
 constexpr uint32_t kColorVersion = 1;
 
 }  // namespace

@@ -59,7 +59,7 @@ uint64_t count_finest_cells(const ReadableFile& file) {
   return number_at<uint64_t>(file, layout::kAttributesAt + layout::kAttributeFinestCellsAt);
 }
 
-// Throws Error{kLimit} for a list of names that readers of the file would refuse.
+// Throws Error{kLimit} for a list of material names that readers of the file would refuse.
 void check_list(std::span<const std::string> materials) {
   const uint64_t bytes = list_bytes(materials) + 2 * color_layout::kUnitBytes;
   if (materials.size() > color_layout::kMaxMaterials || bytes > color_layout::kMaxNamesBytes)

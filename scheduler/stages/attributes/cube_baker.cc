@@ -13,8 +13,8 @@
 namespace voxdag {
 namespace {
 
-// Memory of a surface: the surface, a copy for its region, and its index and its touched children
-// in the lists of up to 14 nested cubes.
+// Memory of a surface: the surface, a copy for its region, and, in the lists of up to 14 nested
+// cubes, its index and the mask of the children that it touches.
 constexpr uint64_t kSurfaceBytes =
     2 * sizeof(FixedSurface) + 14 * (sizeof(uint32_t) + sizeof(uint8_t));
 // Bytes of records that are collected for a child cube before they go to the store.
@@ -22,7 +22,8 @@ constexpr size_t kPartBytes = 16 << 10;
 
 // Memory of a baked cell: its sum, a sorted copy of the sum, and its colors.
 constexpr uint64_t kCellBytes = sizeof(ColorSum) + sizeof(ColoredCell) + 8;
-// Other memory: positions of cells, the next coarser level, and two parts of the records.
+// Other memory of a baker: positions of cells, the next coarser level, and two parts of the
+// records.
 constexpr uint64_t kFixedBytes = uint64_t{6} << 20;
 
 uint32_t max_cells_of(uint64_t region_bytes) {
@@ -78,7 +79,7 @@ void CubeBaker::bake(const Cube& cube, ChunkList& bin, const Sink& sink) {
 }
 
 // Bakes a cube whose surfaces do not fit in memory: distributes the surfaces to the cube's eight
-// children and bakes each child.
+// children and bakes each child. A single region is baked in parts instead.
 void CubeBaker::divide(const Cube& cube, ChunkList& bin, const Sink& sink) {
   if (cube.level == grid_.region_level()) return bake_in_parts(cube, bin, sink);
   std::array<ChunkList, 8> children;

@@ -1,7 +1,7 @@
 // Builds subvolumes on worker threads. Each worker repeatedly takes the heaviest remaining
 // subvolume, builds it with its own backend, appends the artifact to its own segment file and
-// commits it. If a subvolume needs more memory than the worker's share, the worker splits it into
-// octants, which are queued in its place.
+// passes it to its CommitQueue. If a subvolume needs more memory than the worker's share, the
+// worker splits it into octants, which are queued in its place.
 #pragma once
 
 #include <cstdint>

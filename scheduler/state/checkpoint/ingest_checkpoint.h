@@ -45,8 +45,8 @@ class IngestCheckpoint {
   // that the disk must hold them anyway) or the disk has ample space.
   bool is_worthwhile(const TriangleSource& scene) const;
   // Throws Error{kNoSpace} if memory and disk together have no space for the scene's triangles.
-  // Does nothing if RunOptions::force is set or the options give the bounds. A scene of a few bytes
-  // can declare billions of triangles.
+  // This refuses a scene of a few bytes that declares billions of triangles. Does nothing if
+  // RunOptions::force is set or the options give the bounds.
   void check_disk_space(const TriangleSource& scene) const;
   // Enables checkpoints for a scene that was opened at Unix time `opened_ns`, and removes
   // checkpoints of other scenes. Leaves checkpoints disabled if a later change of a file might not
