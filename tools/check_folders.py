@@ -99,6 +99,7 @@ LAYERS = {
         "scene/gltf/json",
         "scene/ply",
         "scene/indexed",
+        "scene/polygon",
         "scene/text",
         "scene/textures",
         "scene/vertices",

@@ -1,0 +1,33 @@
+// The projection of a polygon in space to a coordinate plane, in which it is triangulated.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "scene/polygon/orientation.h"
+
+namespace voxdag::polygon {
+
+// The plane is chosen by the triangles (c0, c(k), c(k+1)) of the polygon's fan: it is the
+// coordinate plane in which the sum of their areas is largest. Planes of equal sums are tried in
+// the order yz, zx, xy. In the plane, the signed area of the polygon is positive or 0.
+struct Projection {
+  int axis = 0;              // the axis that the projection drops
+  bool is_mirrored = false;  // the other two axes are exchanged
+  // True if no triangle of the fan is clockwise in the plane, except by the rounding of the
+  // coordinates. Then the fan lies inside the polygon.
+  bool is_fan = false;
+};
+
+// Multiplies the coordinates by a power of two, so that the largest magnitude is from 1/2 to 1.
+// `xyz` holds three finite coordinates per corner. Returns false if a coordinate is not finite.
+bool normalize(std::span<double> xyz);
+
+// Returns the projection of a normalized polygon.
+Projection choose_projection(std::span<const double> xyz);
+
+// Replaces `out` by the projected corners.
+void project(std::span<const double> xyz, const Projection& projection, std::vector<Point>& out);
+
+}  // namespace voxdag::polygon

@@ -1,0 +1,62 @@
+// Divides a polygon into monotone rings by diagonals inside the polygon, with a sweep over its
+// corners (de Berg et al., "Computational Geometry", section 3.2). Takes O(n log n) comparisons for
+// n corners. Not thread-safe.
+//
+// Corners are swept in increasing x; corners of equal x in increasing y. Corners and edges of a
+// polygon may also touch or coincide. There the order is the order after an infinitely small
+// movement of all edges: into the polygon, which separates the two edges of a bridge from an
+// outline to a hole, or out of it, which opens a neck of width 0 between two parts of the polygon.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "scene/polygon/orientation.h"
+#include "scene/polygon/rings.h"
+
+namespace voxdag::polygon {
+
+class Sweep {
+ public:
+  enum class Move { kInward, kOutward };
+
+  // Divides the polygon with these corners, which are in counterclockwise order. No three
+  // consecutive corners are collinear. The corners must remain valid as long as the rings are used.
+  // Returns false if the edges cross each other so that there is no such division. It may also
+  // return true in this case; the rings are then not monotone, or have clockwise triangles.
+  bool divide(std::span<const Point> corners, Move move);
+
+  Rings& rings() { return rings_; }
+  // Returns the position of a corner in the order of the sweep.
+  uint32_t rank(uint32_t corner) const { return rank_[corner]; }
+
+ private:
+  // A lower edge of the polygon that crosses the sweep line. The area above it is inside.
+  struct LowerEdge {
+    uint32_t from;         // its left corner, the one before its right corner in the polygon
+    uint32_t helper_node;  // the last node of the area above it that can see the sweep line
+    bool is_merge;         // true if both edges of this node are to the left of it
+  };
+
+  uint32_t previous(uint32_t corner) const { return corner == 0 ? count() - 1 : corner - 1; }
+  uint32_t next(uint32_t corner) const { return corner + 1 == count() ? 0 : corner + 1; }
+  uint32_t count() const { return static_cast<uint32_t>(corners_.size()); }
+  void sort_corners();
+  Point movement(uint32_t corner) const;
+  bool is_before(uint32_t a, uint32_t b) const;
+  bool is_above(uint32_t corner, uint32_t edge) const;
+  bool add(uint32_t corner);
+  bool add_left_end(uint32_t corner, size_t below);
+  bool add_right_end(uint32_t corner, size_t below);
+  bool add_between(uint32_t corner, size_t below, bool is_lower);
+  uint32_t connect(size_t edge, uint32_t node, bool only_merges);
+
+  std::span<const Point> corners_;
+  double distance_ = 1;  // of the movement; negative if it is outward
+  std::vector<uint32_t> order_, rank_;
+  std::vector<LowerEdge> edges_;  // from bottom to top
+  Rings rings_;
+};
+
+}  // namespace voxdag::polygon
