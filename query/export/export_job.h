@@ -141,10 +141,10 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
 // Throws Error{kCorrupt} unless `written`, the number of voxels that a writer has found, equals
 // `expected`, the number of voxels in the file's header or from an earlier count.
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
-// Returns the color of a selected cell, which must be set. Throws Error{kCorrupt} if it has no
-// color.
 // Returns the name of a cell of the selection's grid, for messages.
 std::string cell_text(const ExportJob& job, const std::array<int64_t, 3>& cell);
+// Returns the color of a selected cell, which must be set. Throws Error{kCorrupt} if it has no
+// color.
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
                                  const std::array<int64_t, 3>& cell);
 

@@ -128,7 +128,8 @@ class PacketWalk {
     }
   }
 
-  // Like DagView::Children. The functions of DagView are not compiled for this instruction set.
+  // Replaces DagView::Children, because the functions of DagView are not compiled for this
+  // instruction set.
   struct Node {
     uint32_t mask;
     const uint32_t* children;

@@ -15,8 +15,8 @@ constexpr double kBounce = 0.42;        // share of light that an occluder refle
 constexpr double kSkyWidening = 0.1;    // spread of the cones of rays to the sky
 constexpr double kSunWidening = 0.004;  // spread of the cones of rays to the sun
 
-// Dimensions of the Sampler for rays to the sky and to the sun. The renderer uses dimension 0 for
-// the position within the pixel.
+// Dimensions of the Sampler (sampling.h) for rays to the sky and to the sun. The renderer uses
+// dimension 0 for the position within the pixel.
 constexpr uint64_t kSkyDimension = 1, kSunDimension = 2;
 
 Vec sky_color(const Vec& direction) {

@@ -55,7 +55,7 @@ const std::vector<std::string>& view_names();
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
                      std::optional<double> fov_degrees, const CancelToken& cancel = {});
 
-// Like named_view(), for several views of the same DAG. Computes data that the views share only
+// Like named_view(), for several views of the same DAG. Data that the views share is computed only
 // once. The DAG and the token must outlive this object.
 class NamedViews {
  public:
