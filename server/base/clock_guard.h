@@ -13,9 +13,10 @@ class ClockGuard {
   // `last_seen_s`: Unix time at which the previous service is known to have run; 0 if unknown.
   explicit ClockGuard(double last_seen_s) : last_clock_s_(last_seen_s) {}
 
-  // True if the clock advanced over an hour more than the time since the last call, or, in the
-  // first call, over a day since `last_seen_s`. Call it at least once per hour. `clock_s`:
-  // unix_seconds(); `now_s`: wall_seconds().
+  // Returns true if the clock has advanced over an hour more than the time that has passed since
+  // the last call. The first call returns true if the clock is over a day ahead of `last_seen_s`.
+  // Call this function at least once per hour, with `clock_s` = unix_seconds() and `now_s` =
+  // wall_seconds().
   bool has_jumped(double clock_s, double now_s);
   // True if the clock jumped within the last day.
   bool is_uncertain(double now_s) const { return now_s < uncertain_until_s_; }

@@ -21,7 +21,8 @@ struct StoreFormat {
 
 // Opens a database, creating or upgrading its tables. Throws Error: kInvalidInput if it is not a
 // database of this kind, or if it is new and `may_create` is false (the folders already have files
-// that a lost database may have listed); kUnsupportedVersion for a different version.
+// that a lost database may have listed); kUnsupportedVersion if its version is neither the version
+// of `format` nor the previous version that format.upgrade accepts.
 SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool may_create);
 
 }  // namespace voxdag::server

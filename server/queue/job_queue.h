@@ -78,11 +78,12 @@ class JobQueue {
   std::optional<Job> next(double now_s, double max_wait_s, const std::set<std::string>& except);
   // Returns a job that succeeded and has no preview yet.
   std::optional<Job> next_without_preview();
-  // Call it after a crash. `running` are the ids of the jobs whose processes are known to run. Of
-  // all other jobs, queues the jobs in the state running again at the front, and sets the jobs in
-  // the state canceling to canceled. A job with many interruptions may be their cause. So it is not
-  // queued at the front and waits for `pause_s(attempt)` seconds before each further attempt (1, 2,
-  // ...); finally it fails. Returns the jobs that have ended by this call.
+  // Call it after a crash. `running` has the ids of the jobs whose processes are known to run;
+  // these jobs are not changed. All other jobs in the state running are queued again, at the front.
+  // All other jobs in the state canceling become canceled. A job that was interrupted often may
+  // itself be the cause of the interruptions. So such a job is not queued at the front, waits for
+  // pause_s(attempt) seconds before each further attempt (1, 2, ...), and finally fails. Returns
+  // the jobs that have ended by this call.
   std::vector<Job> recover(const std::set<std::string>& running,
                            const std::function<double(unsigned attempt)>& pause_s);
   // Returns the ids of the ended jobs that finished before `finished_before_s`, and of the ended

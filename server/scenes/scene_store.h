@@ -26,8 +26,8 @@
 
 namespace voxdag::server {
 
-// True for 1 to 128 of A–Z a–z 0–9 . _ -, first a letter or digit, with the file name ending of a
-// scene.
+// True for a name of 1 to 128 characters A–Z a–z 0–9 . _ - that begins with a letter or digit and
+// ends with a file name ending of a scene format.
 bool is_scene_name(std::string_view name);
 // Returns a regular expression that matches scene names, for the OpenAPI document.
 std::string scene_name_pattern();

@@ -70,7 +70,7 @@ struct Part {
   uint64_t first = 0;
   std::optional<uint64_t> end;    // nullopt for a chunked body
   std::optional<uint64_t> total;  // size of the scene, if known
-  // True if a part that ends at `offset` completes the scene.
+  // True if a part that ends at `offset` completes the scene. A part without a total always does.
   bool is_last(uint64_t offset) const { return !total || offset == *total; }
 };
 

@@ -25,8 +25,8 @@ namespace voxdag::server {
 
 class Connection {
  public:
-  // Does not own the socket, which must be non-blocking, the limits or the table. `place` is the
-  // connection's place in the table.
+  // The socket must be non-blocking; this object does not close it. `limits` and `table` must
+  // outlive this object. `place` is the connection's place in the table.
   Connection(int socket, const HttpLimits& limits, TlsSession tls, ConnectionTable& table,
              ConnectionTable::Place place);
 

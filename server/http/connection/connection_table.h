@@ -56,7 +56,7 @@ class ConnectionTable {
   std::map<std::string, size_t> by_client_;
 };
 
-// True for addresses of the loopback: 127.0.0.0/8 and ::1.
+// True for addresses of the loopback: 127.0.0.0/8, also as ::ffff:127.x.x.x, and ::1.
 bool is_loopback(const std::string& address);
 // Returns the text that identifies a client: an IPv4 address, or the /64 of an IPv6 address,
 // because one customer has all 2^64 addresses of a /64.

@@ -34,7 +34,8 @@ struct Request {
   using Sink = std::function<bool(std::string_view piece)>;
   std::function<BodyEnd(const Sink& sink)> read_body;
 
-  // True if the client has closed the connection. Handlers that take long call it and then give up.
+  // Returns true if the client has closed the connection. Handlers that take long call this
+  // function often, and stop when it returns true.
   std::function<bool()> client_has_left;
 
   std::string header(std::string_view name) const { return header_value(headers, name); }

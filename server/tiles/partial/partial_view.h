@@ -103,7 +103,8 @@ class PartialView {
   std::shared_ptr<const TileSource> known(const std::string& digest) const {
     return answers_.known(digest);
   }
-  // True if the job's folder was removed before any request for tiles.
+  // True if the job's folder was removed before any request for tiles. PartialViews then forgets
+  // this view, because it has nothing to serve.
   bool is_worthless() const { return is_worthless_; }
 
  private:

@@ -342,7 +342,7 @@ export class Renderer {
     this.judgeProgress(sample, now);
   }
 
-  // Notes whether the reading of a sample lacks no tiles. Once the view is complete, places the
+  // Records whether a sample's reading has no missing tiles. Once the view is complete, places the
   // sun. An outdated sample cannot show that the view is complete: tiles arrived after it began,
   // and may refer to further tiles that are missing.
   judgeProgress({isMoving, isFull, isOutdated}, now) {
