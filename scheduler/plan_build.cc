@@ -10,8 +10,7 @@ namespace {
 
 // Returns the number of grid levels of the finer of a plan's two pilot builds (estimate.h). Large
 // builds are extrapolated from 13 levels (8192^3 voxels). This pilot takes one or two seconds. If
-// the scene is so large that its triangles do not fit in memory on this grid, they are read again
-// for a coarser pilot.
+// the triangles do not fit in memory on this grid, they are read again for a coarser pilot.
 uint32_t plan_pilot_levels(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels - std::min<uint32_t>(grid_levels, 2), 12, 13);
 }

@@ -16,7 +16,7 @@ namespace voxdag {
 // A state is a few hundred KB that only the merge interprets. It names files of the scratch folder
 // and the partial global file, all of which are synced before save(). It identifies the inputs by
 // their content, so the merge can resume it even if an artifact was built again. Background threads
-// call save() and release(), one call at a time.
+// call save() and release(), never concurrently.
 class Checkpoint {
  public:
   virtual ~Checkpoint() = default;

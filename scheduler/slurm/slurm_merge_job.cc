@@ -94,7 +94,7 @@ class SlurmMergeJob : public MergeJob {
   bool is_answering_ = true;
   bool is_running_ = false;
   uint64_t shown_built_ = 0;
-  std::set<std::string> warned_reasons_;  // why the job waits
+  std::set<std::string> warned_reasons_;  // reported reasons why the job waits
   // Names from the last cluster state that was read. They are kept because a finished job removes
   // the state.
   std::string name_, task_name_;

@@ -52,7 +52,7 @@ class TaskPoller {
   BatchTable& batches_;
   std::map<uint32_t, Seconds> missing_since_;  // batches whose tasks Slurm does not list
   std::set<uint32_t> inherited_;               // batches with tasks of an earlier run
-  std::set<std::string> warned_reasons_;       // why tasks wait
+  std::set<std::string> warned_reasons_;       // reported reasons why tasks wait
   bool is_answering_ = true;                   // Slurm answered the last query
   bool is_accepting_ = true;                   // Slurm accepted the last submission
 };

@@ -119,7 +119,8 @@ class Slurm {
   CommandRunner& commands_;
   const CancelToken& cancel_;
   const double start_s_;
-  std::optional<double> without_nodes_since_s_;  // time of the first such refusal
+  std::optional<double> without_nodes_since_s_;  // time of the first refusal
+                                                 // because of missing nodes
   uint64_t requests_ = 0;
   std::optional<std::string> configuration_;
 };

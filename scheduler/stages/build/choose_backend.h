@@ -15,7 +15,7 @@ struct BackendChoice {
   std::string name;
   // Opens one backend per call; every worker calls it once.
   std::function<std::unique_ptr<Backend>()> open;
-  unsigned max_workers = 256;  // more workers gain nothing
+  unsigned max_workers = 256;  // more workers do not make the build faster
 };
 
 // Throws Error{kInvalidInput} for a method that the backend does not have, or Error{kDevice} for

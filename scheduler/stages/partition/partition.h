@@ -49,7 +49,7 @@ class CubeTree {
   static constexpr int32_t kNone = -1;
   struct Node {
     int32_t child[8] = {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};
-    int32_t leaf = kNone;  // index of this leaf; kNone for inner nodes
+    int32_t leaf = kNone;  // index in `leaves`; kNone for inner nodes
   };
 
   template <class Visit>

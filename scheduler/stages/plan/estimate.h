@@ -34,7 +34,7 @@ struct Estimate {
   std::optional<ColorEstimate>
       colors;                // only for a build with colors; included in the totals above
   uint64_t free_disk = 0;    // free bytes on the work folder's disk; 0 if unknown
-  uint64_t free_memory = 0;  // the budget
+  uint64_t free_memory = 0;  // the memory budget in bytes
 };
 
 // Estimates the build of a prepared scene without changing it. The pilots have at most

@@ -181,7 +181,8 @@ void IngestCheckpoint::save_in_background(IngestState& state, std::optional<TopT
   wait();
   if (!record_) return;
   last_save_s_ = wall_seconds();
-  if (!store_) return commit(state);  // The scan has no triangles yet.
+  // Without a durable store only the record is saved. The scan, for example, stores no triangles.
+  if (!store_) return commit(state);
   const std::shared_ptr<TriangleFile> file = store_->file();
   if (top) {
     state.top_tree = file->append(top->cells);
