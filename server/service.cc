@@ -38,7 +38,8 @@ ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
 std::unique_ptr<FileLock> lock_folder(FileSystem& files, const std::string& folder) {
   auto lock = files.try_lock(folder + "/lock");
   if (!lock)
-    throw Error(ErrorCode::kInvalidInput, folder + ": another service uses this data folder");
+    throw Error(ErrorCode::kInvalidInput,
+                folder + ": another service uses this data folder: expected a folder of its own");
   return lock;
 }
 

@@ -56,7 +56,10 @@ class TemporaryFolder {
         if (error.code() != ErrorCode::kNotFound) throw;
       }
     }
-    if (!lock_) throw Error(ErrorCode::kIo, path_ + ": expected a folder that only this task uses");
+    if (!lock_)
+      throw Error(
+          ErrorCode::kIo,
+          path_ + " is in use by another process: expected a folder that only this task uses");
   }
   ~TemporaryFolder() {
     try {
@@ -246,7 +249,8 @@ class Task {
     const std::string folder = folder_.attempt_folder(run_.batch, attempt_);
     // If the folder is missing, it was removed with the build, which no longer needs this task.
     if (!context_.files.exists(folder_.path()))
-      throw Error(ErrorCode::kNotFound, folder_.path() + ": expected the folder of the build");
+      throw Error(ErrorCode::kNotFound,
+                  folder_.path() + " does not exist: expected the folder of the build");
     context_.files.make_directories(folder);
     SegmentWriter out(context_.files, folder, ClusterFolder::segment_of(run_.batch), budget);
     MergeReport report;

@@ -83,7 +83,8 @@ void check_integrity(SqlDatabase& database) {
 
 void check_job_schema(SqlDatabase& database, const std::string& path) {
   if (database.integer("PRAGMA application_id") != kApplicationId)
-    throw Error(ErrorCode::kInvalidInput, path + " is not a job store of voxdag");
+    throw Error(ErrorCode::kInvalidInput,
+                path + " is not a job store of voxdag: expected the job.db of a build");
   const int64_t version = database.integer("PRAGMA user_version");
   if (version != kSchemaVersion)
     throw Error(ErrorCode::kUnsupportedVersion,

@@ -235,9 +235,10 @@ std::vector<StoredSubvolume> JobStore::leaves() {
     leaves.push_back(built == built_in_memory_.end() ? subvolume : built->second);
   }
   if (count != job.subvolumes)
-    throw Error(ErrorCode::kCorrupt, "job store: rows of subvolumes are missing: expected " +
-                                         std::to_string(job.subvolumes) +
-                                         " rows; start over with --restart");
+    throw Error(ErrorCode::kCorrupt,
+                "job store: expected rows of the subvolumes 1 to " +
+                    std::to_string(job.subvolumes) +
+                    ", but some are missing or too many; start over with --restart");
   return leaves;
 }
 
@@ -272,7 +273,9 @@ std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,
   split.state = SubvolumeState::kSplit;
   update_row(split);
   auto job = find_sealed<JobRow>(database_, "job", "the job");
-  if (!job) throw Error(ErrorCode::kCorrupt, "job store: the row of the job is missing");
+  if (!job)
+    throw Error(ErrorCode::kCorrupt,
+                "job store: the row of the job is missing: start over with --restart");
   SubvolumeId next = job->subvolumes + 1;
   job->subvolumes += static_cast<int64_t>(parts.size());
   put_sealed(database_, "job", *job);

@@ -41,7 +41,8 @@ void DurableStore::read_chain() {
       std::memcpy(&chunk, link.data() + i, sizeof chunk);
       if (chunk.bin >= bins_.size())
         throw DamagedTriangles("the stored triangles name bin " + std::to_string(chunk.bin) +
-                               ": expected one of " + std::to_string(bins_.size()));
+                               ": expected less than " + std::to_string(bins_.size()) +
+                               ", the number of bins");
       bins_[chunk.bin]->list.add({.extent = chunk.extent, .records = chunk.triangles});
       list_bytes_ += kChunkListBytes;
     }

@@ -26,9 +26,12 @@ DiskSpace::DiskSpace(FileSystem& files, const std::string& data_folder, uint64_t
 void DiskSpace::reserve(uint64_t bytes, uint64_t expected) {
   std::lock_guard lock(mutex_);
   const uint64_t needed = std::max(bytes, expected);
-  if (free() < min_free_bytes_ + reserved_bytes_ + needed)
-    throw Error(ErrorCode::kNoSpace, folder_ + ": the disk has not enough free space for " +
-                                         std::to_string(needed) + " more bytes");
+  const uint64_t free_bytes = free(), kept = min_free_bytes_ + reserved_bytes_;
+  if (free_bytes < kept + needed)
+    throw Error(ErrorCode::kNoSpace,
+                folder_ + ": the disk has not enough free space for " + std::to_string(needed) +
+                    " more bytes: " + std::to_string(free_bytes) + " bytes are free, of which " +
+                    std::to_string(kept) + " are reserved");
   reserved_bytes_ += bytes;
 }
 

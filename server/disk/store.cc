@@ -9,11 +9,11 @@ SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool 
   const bool fresh = is_new(database);
   const int64_t version = database.integer("PRAGMA user_version");
   if (!fresh && database.integer("PRAGMA application_id") != format.application_id)
-    throw Error(ErrorCode::kInvalidInput,
-                path + ": expected " + format.records + " of voxdag serve");
+    throw Error(ErrorCode::kInvalidInput, path + " is a database of another program: expected " +
+                                              format.records + " of voxdag serve");
   if (fresh && !may_create)
     throw Error(ErrorCode::kInvalidInput,
-                path + ": expected " + format.records +
+                path + " is new: expected " + format.records +
                     ", because the data folder has folders of " + format.files +
                     ". Restore it from a backup, or start once with --adopt, which creates new "
                     "records of the " +

@@ -51,7 +51,8 @@ Request& Exchange::read_request(size_t max_header_bytes) {
   request_.read_body = [this](const Request::Sink& sink) { return body_->read(sink); };
   request_.client_has_left = [this] { return connection_.peer_disconnected(); };
   if (request_.headers.contains("Content-Encoding"))
-    throw Problem(415, "unsupported_media_type", "expected a body without Content-Encoding");
+    throw Problem(415, "unsupported_media_type",
+                  "the request has Content-Encoding: expected a body without it");
   return request_;
 }
 
@@ -61,7 +62,9 @@ std::string Exchange::read_head(size_t max_bytes) {
     if (!connection_.read_line(text, max_bytes)) {
       if (connection_.error_state() == Connection::ErrorState::kTooSlow)
         throw Problem(408, "timeout", "the request was sent too slowly");
-      throw Problem(431, "headers_too_large", "the header fields are too large");
+      throw Problem(431, "headers_too_large",
+                    "the header fields are too large: expected at most " +
+                        std::to_string(max_bytes) + " bytes");
     }
     if (std::string_view(text).substr(line_begin) != "\r\n") continue;
     if (line_begin > 0) return text;

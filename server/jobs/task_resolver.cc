@@ -24,7 +24,8 @@ TaskResolver::TaskResolver(const ServerConfig& config, SceneStore& scenes)
   for (const std::string& root : config.scene_roots) {
     const std::string resolved = resolved_path(root);
     if (resolved.empty())
-      throw Error(ErrorCode::kInvalidInput, "scene_roots: " + root + ": expected a folder");
+      throw Error(ErrorCode::kInvalidInput,
+                  "scene_roots: " + root + " cannot be found: expected an existing folder");
     roots_.push_back(resolved.ends_with('/') ? resolved : resolved + "/");
   }
 }
@@ -73,8 +74,9 @@ JobTask TaskResolver::make(const JobRequest& request, JobTask::Kind kind) {
   task.memory_bytes = memory_of(request);
   if (task.memory_bytes > memory_bytes_)
     throw RequestError(RequestError::Kind::kLimit,
-                       "'memory': a job of this service may have at most " +
-                           std::to_string(memory_bytes_) + " bytes");
+                       "'memory' is " + std::to_string(task.memory_bytes) +
+                           " bytes: expected at most " + std::to_string(memory_bytes_) +
+                           ", the limit for a job of this service");
   task.threads = config_.jobs.threads;
   task.cluster = config_.cluster;
   return task;

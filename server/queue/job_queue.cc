@@ -226,7 +226,9 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
     if (auto known = job_of_key(writer_, key)) return {std::move(*known), true};
     if (static_cast<uint64_t>(writer_.integer("SELECT count(*) FROM job WHERE " + kOpen)) >=
         max_open)
-      throw RequestError(RequestError::Kind::kBusy, "the queue is full");
+      throw RequestError(
+          RequestError::Kind::kBusy,
+          "the queue is full: " + std::to_string(max_open) + " jobs have not ended, the limit");
     if (job.id.empty()) job.id = random_id();
     job.number = writer_.integer("SELECT coalesce(max(number), 0) + 1 FROM job");
     if (job.created_s == 0) job.created_s = unix_seconds();

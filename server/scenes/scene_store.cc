@@ -236,7 +236,8 @@ SceneStore::NameLock::NameLock(SceneStore& store, const std::string& name)
     : store_(store), name_(name) {
   std::lock_guard lock(store_.mutex_);
   if (!store_.busy_.insert(name_).second)
-    throw RequestError(RequestError::Kind::kConflict, "another request is uploading this scene");
+    throw RequestError(RequestError::Kind::kConflict,
+                       "another request is uploading the scene '" + name_ + "'");
 }
 
 SceneStore::NameLock::~NameLock() {
@@ -289,9 +290,11 @@ void SceneStore::finish_publishing(const std::string& name, uint64_t size,
 void SceneStore::check_part(const std::string& name, uint64_t size) {
   if (!files_.exists(part_path(name)))
     throw Error(ErrorCode::kCorrupt, part_path(name) + ": the file was removed during the upload");
-  if (files_.open_read(part_path(name))->size() != size)
-    throw Error(ErrorCode::kCorrupt, part_path(name) + ": expected " + std::to_string(size) +
-                                         " bytes; the file was changed during the upload");
+  const uint64_t found = files_.open_read(part_path(name))->size();
+  if (found != size)
+    throw Error(ErrorCode::kCorrupt, part_path(name) + " has " + std::to_string(found) +
+                                         " bytes: expected " + std::to_string(size) +
+                                         "; the file was changed during the upload");
 }
 
 void SceneStore::move_into_place(const std::string& name, uint64_t size,

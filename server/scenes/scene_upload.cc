@@ -102,8 +102,9 @@ bool SceneUpload::finish(const std::string& part_digest, const std::string& whol
       store_.drop_upload(name_);
     else
       store_.record(name_, {first_, total_});
-    throw RequestError(RequestError::Kind::kInvalid,
-                       "the SHA-256 of the part's bytes differs from Content-Digest");
+    throw RequestError(RequestError::Kind::kInvalid, "the SHA-256 of the part's bytes is " + part +
+                                                         ": expected " + part_digest +
+                                                         ", the Content-Digest");
   }
   checkpoint();
   done_ = true;
@@ -112,8 +113,9 @@ bool SceneUpload::finish(const std::string& part_digest, const std::string& whol
       first_ == 0 ? part : file_sha256(store_.files_, store_.part_path(name_), offset_, check);
   if (!whole_digest.empty() && whole_digest != sha256_) {
     store_.drop_upload(name_);
-    throw RequestError(RequestError::Kind::kInvalid,
-                       "the SHA-256 of the scene's bytes differs from Repr-Digest");
+    throw RequestError(RequestError::Kind::kInvalid, "the SHA-256 of the scene's bytes is " +
+                                                         sha256_ + ": expected " + whole_digest +
+                                                         ", the Repr-Digest");
   }
   return true;
 }

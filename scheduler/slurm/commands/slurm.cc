@@ -256,7 +256,7 @@ std::string Slurm::accepted_job(const CommandResult& submitted) {
     throw Error(is_unreachable(submitted) || is_too_much(submitted) || may_be_starting(submitted)
                     ? ErrorCode::kIo
                     : ErrorCode::kInvalidInput,
-                "sbatch refused: " + trimmed(submitted.error + submitted.output) +
+                "sbatch refused the job: " + trimmed(submitted.error + submitted.output) +
                     ": expected a job id (--cluster-options)");
   without_nodes_since_s_.reset();
   return job;
@@ -377,8 +377,8 @@ std::vector<std::string> split_words(const std::string& text) {
     }
   }
   if (quote != 0)
-    throw Error(ErrorCode::kInvalidInput,
-                "'" + text + "': expected a closing " + std::string(1, quote));
+    throw Error(ErrorCode::kInvalidInput, "the options for sbatch '" + text +
+                                              "': expected a closing " + std::string(1, quote));
   if (in_word) words.push_back(word);
   return words;
 }

@@ -141,7 +141,8 @@ BatchFile::BatchFile(FileSystem& files, const std::string& path) : file_(files.o
                 path + ": it is not a batch of this version: expected \"" +
                     std::string(kBatchMagic) + "\"");
   if (prologue.header_bytes > std::min(kMaxHeaderBytes, file_->size() - sizeof prologue))
-    throw damaged("its header is longer than the file");
+    throw damaged("its header has " + std::to_string(prologue.header_bytes) + " bytes, more than " +
+                  std::to_string(std::min(kMaxHeaderBytes, file_->size() - sizeof prologue)));
   std::string header(static_cast<size_t>(prologue.header_bytes), '\0');
   const auto header_bytes = std::as_writable_bytes(std::span(header));
   file_->read_at(sizeof prologue, header_bytes);

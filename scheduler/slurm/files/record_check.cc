@@ -13,15 +13,23 @@ namespace {
 
 [[noreturn]] void refuse_record(const std::string& what) { throw Error(ErrorCode::kCorrupt, what); }
 
+std::string describe(const Cube& cube) {
+  return "level " + std::to_string(cube.level) + ", position (" + std::to_string(cube.position[0]) +
+         ", " + std::to_string(cube.position[1]) + ", " + std::to_string(cube.position[2]) + ")";
+}
+
 void check_roots(const ArtifactReader& artifact, std::span<const ExpectedSubvolume> subvolumes,
                  std::set<Cube> to_find) {
   for (const ArtifactRoot& root : artifact.roots()) {
     const auto owner = std::ranges::find_if(
         subvolumes, [&](const ExpectedSubvolume& s) { return contains(s.cube, root.cube); });
-    if (owner == subvolumes.end()) refuse_record("its artifact has the root of another cube");
+    if (owner == subvolumes.end())
+      refuse_record("its artifact has the root of the cube at " + describe(root.cube) +
+                    ": expected only cubes of the batch");
     to_find.erase(owner->cube);
   }
-  if (!to_find.empty()) refuse_record("its artifact lacks the root of a subvolume");
+  if (!to_find.empty())
+    refuse_record("its artifact lacks the root of the subvolume at " + describe(*to_find.begin()));
 }
 
 }  // namespace
@@ -41,7 +49,9 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
                   state.build + ", " + std::to_string(entry.batch) + ", " + entry.attempt);
   if (!std::ranges::equal(record.subvolumes, subvolumes, {}, &BuiltSubvolume::id,
                           &ExpectedSubvolume::id))
-    refuse_record("its subvolumes differ from the batch's");
+    refuse_record("its list of " + std::to_string(record.subvolumes.size()) +
+                  " subvolumes differs from the batch's list of " +
+                  std::to_string(subvolumes.size()));
   std::set<Cube> to_find;
   for (size_t i = 0; i < subvolumes.size(); ++i)
     if (!record.subvolumes[i].summary.empty()) to_find.insert(subvolumes[i].cube);
@@ -56,7 +66,10 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
                   std::to_string(record.segment_bytes));
   const ArtifactReader artifact(segment, record.artifact);
   if (artifact.shape() != state.shape)
-    refuse_record("its artifact has a different grid or hash size");
+    refuse_record("its artifact is for " + std::to_string(artifact.shape().grid_levels) +
+                  " grid levels and " + std::to_string(artifact.shape().hash_bits) +
+                  " hash bits: expected " + std::to_string(state.shape.grid_levels) + " and " +
+                  std::to_string(state.shape.hash_bits));
   check_roots(artifact, subvolumes, std::move(to_find));
   return record;
 }

@@ -33,7 +33,8 @@ void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
   if (std::ranges::none_of(reader.roots(), [&](const ArtifactRoot& root) {
         return contains(subvolume.cube, root.cube);
       }))
-    throw Error(ErrorCode::kCorrupt, "the artifact belongs to another cube");
+    throw Error(ErrorCode::kCorrupt,
+                "the artifact has no root in the subvolume's cube: expected at least one");
   if (!reads_frames) return;
   Frame frame;
   for (const ArtifactLevel& l : reader.levels())

@@ -111,9 +111,11 @@ const CubeBin& nearest(const BinsByCube& bins, const Cube& wanted) {
     const auto found = bins.find(cube);
     if (found != bins.end()) return found->second;
     if (cube.level == 0)
-      throw DamagedTriangles("the stored triangles have no bin for a cube of level " +
-                             std::to_string(wanted.level) +
-                             ": expected the cube's bin or the bin of a cube around it");
+      throw DamagedTriangles(
+          "the stored triangles have no bin for a cube of level " + std::to_string(wanted.level) +
+          " at position (" + std::to_string(wanted.position[0]) + ", " +
+          std::to_string(wanted.position[1]) + ", " + std::to_string(wanted.position[2]) +
+          "): expected the cube's bin or the bin of a cube around it");
   }
 }
 

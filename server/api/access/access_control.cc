@@ -57,12 +57,16 @@ void AccessControl::check_site(const Request& request) const {
   const std::string host = request.header("Host");
   if (!host.empty() && !is_ours(without_port(host)))
     throw Problem(403, "forbidden",
-                  "the Host header '" + printable(host) + "' does not name this service");
+                  "the Host header '" + printable(host) +
+                      "' does not name this service: expected its address or one of hosts in the "
+                      "configuration");
   // A browser hides the answer to a cross-site request from the page. But the page could still
   // waste the service's time, and could infer existing names from response times.
   const auto& segments = request.target.segments;
   if (!segments.empty() && segments[0] == "api" && request.header("Sec-Fetch-Site") == "cross-site")
-    throw Problem(403, "forbidden", "cross-site request: expected one of this service's pages");
+    throw Problem(
+        403, "forbidden",
+        "Sec-Fetch-Site is cross-site: expected a request of one of this service's pages");
   if (!is_write(request.method)) return;
   const std::string origin = request.header("Origin");
   const size_t scheme = origin.find("://");
@@ -79,14 +83,17 @@ Caller AccessControl::identify(const Request& request) {
   const std::string header = request.header("Authorization");
   constexpr std::string_view kScheme = "bearer ";
   if (header.empty()) return {};
-  if (header.size() > kScheme.size() &&
-      equal_ignoring_case(std::string_view(header).substr(0, kScheme.size()), kScheme)) {
+  const bool is_bearer =
+      header.size() > kScheme.size() &&
+      equal_ignoring_case(std::string_view(header).substr(0, kScheme.size()), kScheme);
+  if (is_bearer) {
     const auto caller = tokens_->find(trimmed(std::string_view(header).substr(kScheme.size())));
     if (caller) return *caller;
   }
   if (!wrong_tokens_.take(client_of(request.peer), wall_seconds()))
-    throw too_many("too many wrong tokens");
-  throw unauthorized("unknown token");
+    throw too_many("too many wrong tokens from this client: expected at most 5 per second");
+  throw unauthorized(is_bearer ? "unknown token: expected a token of this service"
+                               : "the Authorization header is not Bearer TOKEN");
 }
 
 Caller AccessControl::admit(Request& request, Role needed) {
@@ -101,7 +108,8 @@ Caller AccessControl::admit(Request& request, Role needed) {
   Caller caller = identify(request);
   caller.client = "token " + caller.name;
   request.caller = caller.name;
-  if (caller.role == Role::kNone) throw unauthorized("expected Authorization: Bearer TOKEN");
+  if (caller.role == Role::kNone)
+    throw unauthorized("no token was given: expected Authorization: Bearer TOKEN");
   if (caller.role < needed)
     throw Problem(403, "forbidden", "the role of the token is not sufficient");
   return caller;

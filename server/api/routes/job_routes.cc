@@ -7,6 +7,7 @@
 #include "core/base/text.h"
 #include "core/format/checksum.h"
 #include "core/io/random_id.h"
+#include "scene/messages.h"
 #include "server/api/answers/job_json.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
@@ -54,7 +55,9 @@ IdempotencyKey key_of(const Request& request, const JobRequest& job) {
   const std::string& key = given->second;
   bool visible = !key.empty() && key.size() <= kMaxKeyChars;
   for (const char c : key) visible = visible && c > 0x20 && c < 0x7f;
-  if (!visible) throw bad_request("Idempotency-Key: expected 1 to 255 visible ASCII characters");
+  if (!visible)
+    throw bad_request("Idempotency-Key '" + printable(key) + "' of " + std::to_string(key.size()) +
+                      " bytes: expected 1 to 255 visible ASCII characters");
   return {key, sha256_hex(job.text + '\n' + std::to_string(job.priority) + '\n' + job.name)};
 }
 
@@ -150,14 +153,15 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
                    duration_text(context.config.jobs.plan_timeout_s),
                60);
   if (failure) throw problem_of(*failure);
-  if (estimate.empty()) throw Problem(500, "internal", "the process that makes the plan crashed");
+  if (estimate.empty())
+    throw Problem(500, "internal", "the process that makes the plan ended without a result");
   return json_response(200, estimate);
 }
 
 Response post_job(Context& context, Call& call) {
   const std::string dry = call.query("dry_run");
   if (call.request.target.query.contains("dry_run") && dry != "true" && dry != "false")
-    throw bad_request("'dry_run': expected true or false");
+    throw bad_request("'dry_run' is '" + printable(dry) + "': expected true or false");
   const JobRequest request =
       parse_job_request(read_json_body(call.request, context.config.transfers.max_body_bytes));
   const IdempotencyKey key = key_of(call.request, request);
@@ -185,7 +189,9 @@ JobFilter filter_of(const Call& call) {
   for (size_t begin = 0; begin <= states.size();) {
     const size_t end = std::min(states.find(',', begin), states.size());
     const auto state = parse_state(std::string_view(states).substr(begin, end - begin));
-    if (!state) throw bad_request("'state': expected a comma-separated list of job states");
+    if (!state)
+      throw bad_request("'state' is '" + printable(states) +
+                        "': expected a comma-separated list of job states");
     filter.states.push_back(*state);
     begin = end + 1;
   }
@@ -343,7 +349,8 @@ void add_action_routes(Router& router) {
 
 Job find_job(JobQueue& queue, const std::string& id) {
   auto job = queue.find(id);
-  if (!job) throw not_found("no such job: expected the id of an existing job");
+  if (!job)
+    throw not_found("no such job: '" + printable(id) + "': expected the id of an existing job");
   return std::move(*job);
 }
 

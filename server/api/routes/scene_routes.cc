@@ -4,6 +4,7 @@
 
 #include "core/base/error.h"
 #include "scene/formats/formats.h"
+#include "scene/messages.h"
 #include "server/api/answers/job_json.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
@@ -39,7 +40,8 @@ nlohmann::ordered_json scene_json(const Scene& scene) {
 
 std::string checked_name(const Call& call) {
   if (!is_scene_name(call.names[0]))
-    throw bad_request(std::string("scene name: expected 1 to 128 of A-Z a-z 0-9 . _ -, beginning "
+    throw bad_request("scene name '" + printable(call.names[0]) +
+                      std::string("': expected 1 to 128 of A-Z a-z 0-9 . _ -, beginning "
                                   "with a letter or digit and "
                                   "ending with ") +
                       list_scene_endings());
@@ -50,7 +52,8 @@ std::string checked_name(const Call& call) {
 // an upload.
 Response scene_response(Context& context, int status, const std::string& name) {
   const auto scene = context.scenes.find(name);
-  if (!scene) throw not_found("no such scene: expected the name of an uploaded scene");
+  if (!scene)
+    throw not_found("no such scene: '" + name + "': expected the name of an uploaded scene");
   Response response = json_response(status, scene_json(*scene).dump());
   const auto upload = context.scenes.upload(name);
   const uint64_t offset = upload ? upload->offset : scene->offset;
@@ -84,7 +87,8 @@ std::optional<uint64_t> total_of_empty_part(const std::string& text) {
   uint64_t total = 0;
   const auto [end, error] = std::from_chars(header.data(), header.data() + header.size(), total);
   if (error != std::errc{} || end != header.data() + header.size() || total == 0)
-    throw bad_request("Content-Range: '" + text + "': expected bytes */TOTAL with a TOTAL above 0");
+    throw bad_request("Content-Range: '" + printable(text) +
+                      "': expected bytes */TOTAL with a TOTAL above 0");
   return total;
 }
 
@@ -93,7 +97,7 @@ Part part_of(const Request& request) {
   const std::string header = request.header("Content-Range");
   if (header.empty()) {
     part.end = part.total = request.content_length;
-    if (!request.has_body) throw bad_request("expected the scene as body");
+    if (!request.has_body) throw bad_request("the request has no body: expected the scene");
     return part;
   }
   if (const auto whole = total_of_empty_part(header)) {
@@ -103,13 +107,14 @@ Part part_of(const Request& request) {
   ByteRange range;
   uint64_t total = 0;
   if (!parse_content_range(header, range, total))
-    throw bad_request("Content-Range: '" + header +
+    throw bad_request("Content-Range: '" + printable(header) +
                       "': expected bytes FIRST-LAST/TOTAL with FIRST <= LAST < TOTAL");
   if (request.content_length && *request.content_length != range.size())
     throw bad_request("Content-Length is " + std::to_string(*request.content_length) +
                       ": expected " + std::to_string(range.size()) +
                       ", the number of bytes of the Content-Range");
-  if (!request.has_body) throw bad_request("expected the part of the scene as body");
+  if (!request.has_body)
+    throw bad_request("the request has no body: expected the part of the scene");
   return {range.begin, range.end, total};
 }
 
@@ -120,7 +125,8 @@ uint64_t announced_bytes(Context& context, const Part& part) {
   const uint64_t size = part.total.value_or(0);
   if (size > max_bytes)
     throw Problem(413, "too_large",
-                  "a scene may have at most " + std::to_string(max_bytes) + " bytes");
+                  "the scene has " + std::to_string(size) + " bytes: expected at most " +
+                      std::to_string(max_bytes));
   return size - std::min(size, part.first);
 }
 
@@ -174,7 +180,11 @@ Response put_scene(Context& context, Call& call) {
     case BodyEnd::kComplete:
       break;
     case BodyEnd::kStopped:
-      throw Problem(413, "too_large", "the body is too large");
+      throw Problem(413, "too_large",
+                    part.end ? "the body is larger than the announced part: expected " +
+                                   std::to_string(*part.end - part.first) + " bytes"
+                             : "the scene has more bytes than expected: at most " +
+                                   std::to_string(context.config.transfers.max_scene_bytes));
     case BodyEnd::kTooSlow:
       throw Problem(408, "timeout", "the body was sent too slowly; resume at Upload-Offset");
     case BodyEnd::kBroken:
@@ -195,7 +205,8 @@ Response list_scenes(Context& context, Call& call) {
   const size_t limit = call.query_integer(kSceneLimit);
   const std::string cursor = call.query("cursor");
   if (call.request.target.query.contains("cursor") && !is_scene_name(cursor))
-    throw bad_request("'cursor': expected the next_cursor of a page");
+    throw bad_request("'cursor' is '" + printable(cursor) +
+                      "': expected the next_cursor of a page");
   auto scenes = context.scenes.list(cursor, limit + 1);
   nlohmann::ordered_json json = {{"scenes", nlohmann::ordered_json::array()},
                                  {"next_cursor", nullptr}};
@@ -218,7 +229,8 @@ Response delete_scene(Context& context, Call& call) {
   check_unused(context, name);
   if (context.planned_scenes.contains(name)) throw conflict("the scene is in use by a dry run");
   const bool found = context.disk.with_ballast([&] { return context.scenes.remove(name); });
-  if (!found) throw not_found("no such scene: expected the name of an uploaded scene");
+  if (!found)
+    throw not_found("no such scene: '" + name + "': expected the name of an uploaded scene");
   return no_content();
 }
 

@@ -9,6 +9,7 @@
 #include "core/format/checksum.h"
 #include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
+#include "scene/messages.h"
 #include "server/api/answers/gzip.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
@@ -77,7 +78,8 @@ query::TileAddress parse_address(const std::string& text, int status) {
   const auto numbers = parse_numbers<uint64_t, 2>(text, '.');
   if (!numbers || (*numbers)[0] > kMaxLevel || (*numbers)[1] > kMaxOffset)
     throw problem(status == 404 ? ErrorCode::kNotFound : ErrorCode::kInvalidInput,
-                  "expected the level and the word offset of a node");
+                  "tile '" + printable(text) + "': expected LEVEL.OFFSET, with a level from 0 to " +
+                      std::to_string(kMaxLevel) + " and the word offset of a node");
   return {static_cast<uint32_t>((*numbers)[0]), (*numbers)[1]};
 }
 
@@ -86,7 +88,8 @@ query::ColorPageAddress parse_page(const std::string& text) {
   const auto numbers = parse_numbers<uint64_t, 4>(text, '.');
   if (!numbers || (*numbers)[0] > kMaxColorLevel ||
       std::any_of(numbers->begin() + 1, numbers->end(), [](uint64_t c) { return c > kMaxPage; }))
-    throw bad_request("'pages': expected the level and the place of each page, LEVEL.X.Y.Z");
+    throw bad_request("page '" + printable(text) +
+                      "' of 'pages': expected LEVEL.X.Y.Z, the level and the place of a page");
   const auto& [level, x, y, z] = *numbers;
   return {static_cast<uint32_t>(level), {x, y, z}};
 }
@@ -110,7 +113,8 @@ void check_digest(const Call& call, const TileSource& dag) {
   const std::string digest = call.query("v");
   if (digest.size() != dag.digest().size() ||
       digest.find_first_not_of("0123456789abcdef") != std::string::npos)
-    throw bad_request("'v': expected the digest of the manifest, 32 hex digits");
+    throw bad_request("'v' is '" + printable(digest) +
+                      "': expected the digest of the manifest, 32 hex digits");
   if (digest != dag.digest())
     throw Problem(410, "gone",
                   "the file or the format of its tiles has changed: get the manifest again");
@@ -222,7 +226,8 @@ Response get_colors(const Call& call, const TileSource& dag) {
   const std::string pages = call.query("pages");
   const auto addresses = parse_batch("pages", pages, kMaxColorPagesOfBatch, parse_page);
   return immutable_response(call, dag, "colors " + pages, [&] {
-    if (!dag.colored_file()) throw not_found("the DAG has no colors");
+    if (!dag.colored_file())
+      throw not_found("the DAG has no colors: expected a DAG built with colors");
     query::ColorPages pages_of_file(*dag.colored_file(), dag.dag(), dag.blocks());
     return batch_of(call, addresses,
                     [&](const auto& address) { return make_page(pages_of_file, address); });

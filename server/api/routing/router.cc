@@ -4,6 +4,7 @@
 
 #include "core/base/text.h"
 #include "core/fields/field.h"
+#include "scene/messages.h"
 #include "server/http/message/problem.h"
 
 namespace voxdag::server {
@@ -56,8 +57,9 @@ uint64_t Call::query_integer(const Parameter& parameter) const {
   if (found == request.target.query.end()) return range.default_value.value();
   const auto number = parse_numbers<uint64_t, 1>(found->second, 0);
   if (!number || (*number)[0] < range.min || (*number)[0] > range.max)
-    throw bad_request("'" + parameter.name + "': expected an integer from " +
-                      std::to_string(range.min) + " to " + std::to_string(range.max));
+    throw bad_request("'" + parameter.name + "' is '" + printable(found->second) +
+                      "': expected an integer from " + std::to_string(range.min) + " to " +
+                      std::to_string(range.max));
   return (*number)[0];
 }
 
@@ -87,8 +89,10 @@ Response Router::route(Request& request, AccessControl& access) const {
     if (entry.route.method == "GET") allowed += ", HEAD";
   }
   access.admit(request, Role::kNone);
-  if (allowed.empty()) throw not_found("no such resource");
-  Problem problem(405, "method_not_allowed", "expected one of " + allowed);
+  if (allowed.empty())
+    throw not_found("no such resource: '" + printable(request.target.path) + "'");
+  Problem problem(405, "method_not_allowed",
+                  "the method is " + request.method + ": expected one of " + allowed);
   problem.headers.emplace("Allow", allowed);
   throw problem;
 }
@@ -129,7 +133,8 @@ std::string read_json_body(Request& request, uint64_t max_bytes) {
   const std::string type = request.header("Content-Type");
   if (!equal_ignoring_case(trimmed(std::string_view(type).substr(0, type.find(';'))),
                            "application/json"))
-    throw Problem(415, "unsupported_media_type", "expected Content-Type: application/json");
+    throw Problem(415, "unsupported_media_type",
+                  "Content-Type is '" + printable(type) + "': expected application/json");
   const Problem too_large(413, "too_large",
                           "the body is larger than " + std::to_string(max_bytes) + " bytes");
   if (request.content_length.value_or(0) > max_bytes) throw too_large;
@@ -145,7 +150,7 @@ std::string read_json_body(Request& request, uint64_t max_bytes) {
 }
 
 void expect_no_body(const Request& request) {
-  if (request.has_body) throw bad_request("expected a request without a body");
+  if (request.has_body) throw bad_request("the request has a body: expected none");
 }
 
 }  // namespace voxdag::server

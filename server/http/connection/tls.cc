@@ -83,9 +83,10 @@ TlsContext::TlsContext(const std::string& certificate_file, const std::string& k
                    SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
   if (SSL_CTX_use_certificate_chain_file(context_.get(), certificate_file.c_str()) != 1)
     fail("TLS certificate " + certificate_file + ": expected a readable PEM file");
-  if (SSL_CTX_use_PrivateKey_file(context_.get(), key_file.c_str(), SSL_FILETYPE_PEM) != 1 ||
-      SSL_CTX_check_private_key(context_.get()) != 1)
-    fail("TLS key " + key_file + ": expected a readable PEM file with the key of the certificate");
+  if (SSL_CTX_use_PrivateKey_file(context_.get(), key_file.c_str(), SSL_FILETYPE_PEM) != 1)
+    fail("TLS key " + key_file + ": expected a readable PEM file");
+  if (SSL_CTX_check_private_key(context_.get()) != 1)
+    fail("TLS key " + key_file + " does not belong to the certificate " + certificate_file);
 }
 
 TlsSession TlsContext::session(int socket) const {

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "core/base/text.h"
+#include "scene/messages.h"
 #include "server/base/request_error.h"
 #include "server/http/message/headers.h"
 
@@ -29,12 +30,14 @@ std::string parse_digest_field(const std::string& header) {
     if (entry.size() != kName.size() + kBase64Chars + 1 || !entry.ends_with("=:") ||
         EVP_DecodeBlock(bytes.data(), reinterpret_cast<const unsigned char*>(base64.data()),
                         kBase64Chars) != kDigestBytes + 1)
-      throw RequestError(RequestError::Kind::kInvalid,
-                         "a digest is malformed: expected sha-256=:BASE64:");
+      throw RequestError(
+          RequestError::Kind::kInvalid,
+          "the digest '" + printable(entry) + "' is malformed: expected sha-256=:BASE64:");
     return hex_text(std::span(bytes).first(kDigestBytes));
   }
-  throw RequestError(RequestError::Kind::kInvalid,
-                     "a digest has no sha-256: expected sha-256=:BASE64:");
+  throw RequestError(
+      RequestError::Kind::kInvalid,
+      "the digest header '" + printable(header) + "' has no sha-256: expected sha-256=:BASE64:");
 }
 
 }  // namespace voxdag::server

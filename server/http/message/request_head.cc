@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "scene/messages.h"
 #include "server/http/message/problem.h"
 
 namespace voxdag::server {
@@ -15,7 +16,8 @@ constexpr size_t kMaxFields = 100;
 // Returns the text up to the next CRLF. Removes the text and the CRLF from `rest`.
 std::string_view take_line(std::string_view& rest) {
   const size_t end = rest.find("\r\n");
-  if (end == std::string_view::npos) throw bad_request("expected lines that end with CRLF");
+  if (end == std::string_view::npos)
+    throw bad_request("the request head has a line without CRLF at its end: expected CRLF");
   const std::string_view line = rest.substr(0, end);
   rest.remove_prefix(end + 2);
   return line;
@@ -33,7 +35,10 @@ bool is_control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x
 void parse_request_line(std::string_view line, RequestHead& head) {
   const size_t first = line.find(' ');
   const size_t last = line.rfind(' ');
-  const auto malformed = [] { return bad_request("expected an HTTP/1.1 request"); };
+  const auto malformed = [&] {
+    return bad_request("the request line '" + printable(line) +
+                       "': expected METHOD TARGET HTTP/1.1");
+  };
   if (first == std::string_view::npos || first == last) throw malformed();
   head.method = line.substr(0, first);
   head.target = line.substr(first + 1, last - first - 1);
@@ -44,19 +49,22 @@ void parse_request_line(std::string_view line, RequestHead& head) {
       head.target.find(' ') != std::string::npos || std::ranges::any_of(head.target, is_control))
     throw malformed();
   if (head.target.size() > kMaxTargetBytes)
-    throw bad_request("the request target is longer than 8192 bytes");
+    throw bad_request("the request target has " + std::to_string(head.target.size()) +
+                      " bytes: expected at most " + std::to_string(kMaxTargetBytes));
 }
 
 void parse_field(std::string_view line, HeaderMap& headers) {
   const size_t colon = line.find(':');
   if (colon == std::string_view::npos || !is_token(line.substr(0, colon)))
-    throw bad_request("expected header fields as NAME: VALUE, each on one line");
+    throw bad_request("the header line '" + printable(line) +
+                      "': expected NAME: VALUE, each field on one line");
   const std::string_view value = trimmed(line.substr(colon + 1));
   if (std::ranges::any_of(value, [](char c) { return is_control(c) && c != '\t'; }))
     throw bad_request("the header field " + std::string(line.substr(0, colon)) +
                       " has a control character");
   if (headers.size() == kMaxFields)
-    throw Problem(431, "headers_too_large", "expected at most 100 header fields");
+    throw Problem(431, "headers_too_large",
+                  "the request has more than " + std::to_string(kMaxFields) + " header fields");
   headers.emplace(line.substr(0, colon), value);
 }
 
@@ -87,14 +95,18 @@ void parse_framing(RequestHead& head) {
     uint64_t length = 0;
     const auto parsed = std::from_chars(text.data(), text.data() + text.size(), length);
     if (lengths > 1 || parsed.ec != std::errc{} || parsed.ptr != text.data() + text.size())
-      throw bad_request("Content-Length: expected one number");
+      throw bad_request("Content-Length '" + printable(text) + "', given " +
+                        std::to_string(lengths) + " times: expected one number, once");
     head.content_length = length;
   }
   if (!head.headers.contains("Transfer-Encoding")) return;
   head.chunked = true;
-  if (lengths > 0 || head.is_http_1_0 || head.headers.count("Transfer-Encoding") > 1 ||
-      !equal_ignoring_case(header_value(head.headers, "Transfer-Encoding"), "chunked"))
-    throw bad_request("Transfer-Encoding: expected chunked alone, in HTTP/1.1");
+  if (lengths > 0 || head.is_http_1_0)
+    throw bad_request("Transfer-Encoding: expected it only in HTTP/1.1, without Content-Length");
+  const std::string coding = header_value(head.headers, "Transfer-Encoding");
+  if (head.headers.count("Transfer-Encoding") > 1 || !equal_ignoring_case(coding, "chunked"))
+    throw bad_request("Transfer-Encoding: '" + printable(coding) +
+                      "': expected chunked, given once");
 }
 
 }  // namespace
@@ -105,9 +117,12 @@ RequestHead parse_request_head(std::string_view text) {
   for (std::string_view line = take_line(text); !line.empty(); line = take_line(text))
     parse_field(line, head.headers);
   const size_t hosts = head.headers.count("Host");
-  if (hosts > 1 || (hosts == 0 && !head.is_http_1_0)) throw bad_request("expected one Host header");
+  if (hosts > 1 || (hosts == 0 && !head.is_http_1_0))
+    throw bad_request("the request has " + std::to_string(hosts) + " Host headers: expected one");
   for (const char* name : kSingleFields)
-    if (head.headers.count(name) > 1) throw bad_request(std::string(name) + ": expected it once");
+    if (const size_t count = head.headers.count(name); count > 1)
+      throw bad_request("the header field " + std::string(name) + " is given " +
+                        std::to_string(count) + " times: expected it once");
   parse_framing(head);
   head.expects_continue = !head.is_http_1_0 && lists(head.headers, "Expect", "100-continue");
   head.keep_alive = !head.is_http_1_0 && !lists(head.headers, "Connection", "close");

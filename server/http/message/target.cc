@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/text.h"
+#include "scene/messages.h"
 #include "server/http/message/problem.h"
 
 namespace voxdag::server {
@@ -11,10 +12,12 @@ namespace {
 std::string decode(std::string text, bool plus_is_space) {
   if (plus_is_space) std::ranges::replace(text, '+', ' ');
   auto out = percent_decoded(text);
-  if (!out) throw bad_request("the request target has a malformed percent escape");
+  if (!out)
+    throw bad_request("the request target has a malformed percent escape in '" + printable(text) +
+                      "': expected % and two hex digits");
   for (const char c : *out)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-      throw bad_request("the request target has a control character");
+      throw bad_request("the request target has a control character in '" + printable(text) + "'");
   return std::move(*out);
 }
 
@@ -37,7 +40,7 @@ void parse_query(std::string_view text, std::map<std::string, std::string>& quer
     const auto [at, is_new] = query.emplace(decode(std::string(pair.substr(0, equals)), true),
                                             decode(std::string(value), true));
     if (!is_new)
-      throw bad_request("the query parameter '" + at->first.substr(0, 64) +
+      throw bad_request("the query parameter '" + printable(at->first) +
                         "' is repeated: expected it once");
   });
 }
@@ -56,7 +59,8 @@ std::string_view without_origin(std::string_view text) {
 
 Target parse_target(std::string_view text) {
   text = without_origin(text.substr(0, text.find('#')));
-  if (!text.starts_with('/')) throw bad_request("the request target is not a path: expected /...");
+  if (!text.starts_with('/'))
+    throw bad_request("the request target '" + printable(text) + "' is not a path: expected /...");
   Target target;
   const size_t mark = std::min(text.find('?'), text.size());
   target.path = text.substr(0, mark);

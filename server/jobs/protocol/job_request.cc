@@ -11,7 +11,9 @@ namespace {
 template <class Options>
 FieldJson read_body(std::string_view body, Options& options) {
   FieldJson json = FieldJson::parse(body, nullptr, false);
-  if (json.is_discarded()) throw RequestError(RequestError::Kind::kInvalid, "the body is not JSON");
+  if (json.is_discarded())
+    throw RequestError(RequestError::Kind::kInvalid,
+                       "the body is not JSON: expected a JSON object");
   set_options(json, "the body", options);
   return json;
 }
