@@ -10,7 +10,8 @@
 namespace voxdag::server {
 namespace {
 
-// Viewers of a job send requests more often than every kMinIdleS seconds.
+// Viewers of a job send requests more often than every kMinIdleS seconds. So a view that was not
+// requested for this time has no viewers.
 constexpr int kMinIdleS = 10;
 
 }  // namespace

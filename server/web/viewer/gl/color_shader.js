@@ -99,8 +99,8 @@ uint spread_bits(int x) {
 }
 
 // Returns the color of the cell with this low corner and 2^scale voxels per edge, or of the nearest
-// coarser cell whose page is loaded. Sets kPageMissing if the color is too coarse: by one level, or
-// by three if is_final is false, because finer cells will then replace this cell.
+// coarser cell whose page is loaded. Sets kPageMissing if the color is coarser by at least one
+// level, or by at least three if is_final is false, because finer cells then replace this cell.
 uint color_of_cell(ivec3 cell, int scale, bool is_final) {
   int wanted = min(u_levels - scale, u_color_levels);
   ivec3 at = cell >> (u_levels - wanted);

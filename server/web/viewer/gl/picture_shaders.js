@@ -96,7 +96,7 @@ vec3 unpack_normal(uint packed_normal) {
 }
 `;
 
-// Source that the passes of light share, for rays that begin at the surface of a pixel.
+// GLSL source shared by the passes of light, for rays that begin at the surface of a pixel.
 const kSurface = `
 uniform usampler2D u_hits;
 uniform ivec2 u_size;        // size of the picture in the lower left corner of the targets

@@ -1,5 +1,5 @@
 // Draws the samples of a picture and counts them. A sample is drawn in parts, because a GPU that
-// gets too much work in one piece stops the complete system, and some drivers end a context that is
+// gets too much work in one piece freezes the whole system, and some drivers end a context that is
 // busy for seconds. At most one sample is being drawn. At most one drawn sample waits until its
 // feedback (gl/feedback.js) can be read.
 

@@ -285,7 +285,7 @@ export class Loader {
     this.queue = [];
   }
 
-  // True if no request is in progress but wanted items may still arrive after a retry.
+  // True if wanted items are missing and may still arrive after a retry.
   get awaitsRetry() {
     const nowMs = performance.now();
     if (this.hasEnded || this.unmet === 0) return false;
