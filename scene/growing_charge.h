@@ -22,7 +22,8 @@ class GrowingCharge {
   void grow_to(uint64_t bytes) {
     if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
     throw Error(ErrorCode::kOutOfMemory, "out of memory: " + what_ + " needs over " +
-                                             std::to_string(bytes) + " bytes of the budget");
+                                             std::to_string(bytes) +
+                                             " bytes, more than the memory budget has left");
   }
   // Charges `bytes` in addition to all previous calls of add().
   void add(uint64_t bytes) { grow_to(added_ += bytes); }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/text.h"
 #include "core/geometry/cube.h"
 
 namespace voxdag {
@@ -25,8 +26,9 @@ Grid centered(const WorldBounds& bounds, double edge, uint32_t levels) {
     grid.origin[a] = middle - 0.5 * edge;
     if (!std::isfinite(grid.origin[a]) || !std::isfinite(edge))
       throw Error(ErrorCode::kLimit,
-                  "the grid around the scene is out of the range of doubles: expected coordinates "
-                  "below 1e307");
+                  "the grid of edge " + number_text(edge) +
+                      " around the scene is out of the range of doubles on the " + "xyz"[a] +
+                      " axis: expected coordinates below 1e307");
   }
   return grid;
 }
@@ -94,21 +96,26 @@ Grid Grid::given(const std::array<double, 3>& origin, double edge, uint32_t leve
   const bool finite = std::isfinite(origin[0]) && std::isfinite(origin[1]) &&
                       std::isfinite(origin[2]) && std::isfinite(edge);
   if (!finite || !(edge > 0))
-    throw Error(ErrorCode::kInvalidInput, "bounds: expected finite X,Y,Z and an EDGE above 0");
+    throw Error(ErrorCode::kInvalidInput, "bounds " + number_text(origin[0]) + "," +
+                                              number_text(origin[1]) + "," +
+                                              number_text(origin[2]) + "," + number_text(edge) +
+                                              ": expected finite X,Y,Z and an EDGE above 0");
   return {levels, origin, edge};
 }
 
 Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels) {
   check_levels(levels);
   if (!std::isfinite(voxel_size) || !(voxel_size > 0))
-    throw Error(ErrorCode::kInvalidInput, "voxel size: expected a finite number above 0");
+    throw Error(ErrorCode::kInvalidInput,
+                "voxel size " + number_text(voxel_size) + ": expected a finite number above 0");
   const double edge = voxel_size * static_cast<double>(int64_t{1} << levels);
   const double extent = largest_extent(bounds);
   if (!(extent < edge) && extent > 0)
     throw Error(ErrorCode::kInvalidInput,
                 "the scene's largest extent " + std::to_string(extent) +
                     " does not fit a grid of edge " + std::to_string(edge) + " (voxel size " +
-                    std::to_string(voxel_size) + " times the resolution)");
+                    std::to_string(voxel_size) +
+                    " times the resolution): expected a larger voxel size or resolution");
   return centered(bounds, edge, levels);
 }
 

@@ -38,25 +38,30 @@ void check_size(const GenerateOptions& options) {
                 : options.instances || options.triangles <= kMaxGlbBytes / kMinBytesPerTriangle;
   if (!fits)
     throw Error(ErrorCode::kLimit,
-                "the limit of a .glb is 4 294 967 295 bytes: request " +
-                    (is_menger ? "a level of at most " + std::to_string(kMaxMengerLevel)
-                               : std::string("fewer triangles")));
+                "the limit of a .glb is 4 294 967 295 bytes: expected " +
+                    (is_menger ? "a level of at most " + std::to_string(kMaxMengerLevel) +
+                                     ", not " + std::to_string(options.level)
+                               : "at most " + std::to_string(kMaxGlbBytes / kMinBytesPerTriangle) +
+                                     " triangles, not " + std::to_string(options.triangles)));
 }
 
 void check(const GenerateOptions& options) {
   const std::string name = scene_kind(options.kind).name;
   const bool has_parts = options.kind == SceneKind::kCity || options.kind == SceneKind::kSpheres;
   if (options.instances && !has_parts)
-    throw Error(ErrorCode::kInvalidInput, name + " has no repeated parts to write as instances");
+    throw Error(ErrorCode::kInvalidInput, name +
+                                              " has no repeated parts to write as instances: "
+                                              "expected city or spheres");
   if (options.colors && scene_kind(options.kind).materials.empty())
-    throw Error(ErrorCode::kInvalidInput, name + " has no colors; expected city");
+    throw Error(ErrorCode::kInvalidInput, name + " has no colors: expected city");
   if (options.colors && options.instances)
     throw Error(ErrorCode::kInvalidInput,
                 "colors and instances were both given, but instances of a part share one color: "
                 "expected one of them");
   if (options.kind == SceneKind::kMenger && options.triangles != 0)
-    throw Error(ErrorCode::kInvalidInput,
-                "the size of menger is its level, not a number of triangles");
+    throw Error(ErrorCode::kInvalidInput, "the size of menger is its level, not " +
+                                              std::to_string(options.triangles) +
+                                              " triangles: expected a level");
   check_size(options);
 }
 

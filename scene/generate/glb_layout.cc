@@ -103,7 +103,7 @@ void GlbLayout::add_bytes(uint64_t bytes) {
   if (bin_bytes_ > kMaxGlbBytes)
     throw Error(ErrorCode::kLimit,
                 "the limit of a .glb is 4 294 967 295 bytes, which this scene exceeds after " +
-                    std::to_string(stored_triangles_) + " triangles; request fewer");
+                    std::to_string(stored_triangles_) + " triangles: expected fewer triangles");
 }
 
 // Parts come first, so that part p is mesh p. The last mesh has all triangles that are not

@@ -45,15 +45,22 @@ ArtifactRoot get_root(ByteSource& source, const std::string& where) {
 
 void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std::string& where) {
   const uint32_t level = root.cube.level, brick_level = index.shape.brick_level();
+  const std::string name =
+      "the root at row " + std::to_string(root.index) + " of level " + std::to_string(level);
   const bool has_level = level <= brick_level && brick_level - level < index.levels.size();
   if (!has_level || root.index >= index.levels[brick_level - level].rows)
-    corrupt(where, "a root is row " + std::to_string(root.index) + " of level " +
-                       std::to_string(level) + ", which the artifact does not have");
+    corrupt(where, name + ", which the artifact does not have");
   for (const uint32_t p : root.cube.position)
-    if (p >> level != 0) corrupt(where, "a root's cube is outside the grid");
-  if (root.voxels == 0 || root.svo_nodes == 0) corrupt(where, "a root is empty");
+    if (p >> level != 0)
+      corrupt(where, name + " has the position " + std::to_string(p) + ", expected less than 2^" +
+                         std::to_string(level));
+  if (root.voxels == 0 || root.svo_nodes == 0)
+    corrupt(where, name + " has " + std::to_string(root.voxels) + " voxels and " +
+                       std::to_string(root.svo_nodes) +
+                       " octree nodes, expected at least 1 of each");
   if (truncate_hash(root.hash, index.shape.hash_bits) != root.hash)
-    corrupt(where, "a root's hash has bits beyond the hash bits");
+    corrupt(where,
+            name + " has a hash of more than " + std::to_string(index.shape.hash_bits) + " bits");
 }
 
 // Reads the entries of one level's frames. `offset` is the segment offset of the level's first
@@ -74,7 +81,9 @@ void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& 
     const uint32_t reserved = source.get<uint32_t>();
     frame.first_hash = source.get<uint64_t>();
     frame.checksum = source.get<uint64_t>();
-    if (reserved != 0) corrupt(here, "a reserved field of a frame is not 0");
+    if (reserved != 0)
+      corrupt(here, "the reserved field of frame " + std::to_string(i) + " is " +
+                        std::to_string(reserved) + ", expected 0");
     if (frame.rows == 0 || frame.rows > kFrameRows || (i + 1 < count && frame.rows != kFrameRows))
       corrupt(here, "frame " + std::to_string(i) + " has " + std::to_string(frame.rows) +
                         " rows, expected " + (i + 1 < count ? "" : "1 to ") +
@@ -86,19 +95,20 @@ void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& 
                   " children, expected " +
                   (bricks ? "0" : "1 to 8 for each of " + std::to_string(frame.rows) + " rows"));
     if (frame.first_hash < hash)
-      corrupt(here, "the first hash of frame " + std::to_string(i) + " is below that of frame " +
-                        std::to_string(i - 1));
+      corrupt(here, "the first hash of frame " + std::to_string(i) +
+                        " is less than the first hash of frame " + std::to_string(i - 1));
     hash = frame.first_hash;
     rows += frame.rows;
     children += frame.children;
     offset += frame.bytes;
     level.frames.push_back(frame);
   }
-  if (rows != level.rows || children != level.children || rows == 0 || rows > uint64_t{1} << 32)
+  if (rows != level.rows || children != level.children)
     corrupt(here, "the frames have " + std::to_string(rows) + " rows and " +
                       std::to_string(children) + " children, expected " +
-                      std::to_string(level.rows) + " and " + std::to_string(level.children) +
-                      ", and 1 to 2^32 rows");
+                      std::to_string(level.rows) + " and " + std::to_string(level.children));
+  if (rows == 0 || rows > uint64_t{1} << 32)
+    corrupt(here, std::to_string(rows) + " rows, expected 1 to 2^32");
 }
 
 }  // namespace
@@ -157,11 +167,14 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
   const uint64_t frames = source.get<uint32_t>();
   const uint64_t frame_bytes = source.get<uint64_t>();
   if (index.shape.grid_levels < kMinGridLevels || index.shape.grid_levels > kMaxGridLevels)
-    corrupt(where, "a grid of 2^" + std::to_string(index.shape.grid_levels) + " voxels per edge");
+    corrupt(where, "a grid of 2^" + std::to_string(index.shape.grid_levels) +
+                       " voxels per edge, expected 2^" + std::to_string(kMinGridLevels) + " to 2^" +
+                       std::to_string(kMaxGridLevels));
   if (index.shape.hash_bits < 4 || index.shape.hash_bits > 64)
     corrupt(where, std::to_string(index.shape.hash_bits) + " hash bits, expected 4 to 64");
   if (levels > index.shape.brick_level() + 1)
-    corrupt(where, std::to_string(levels) + " levels are too many for the grid");
+    corrupt(where, std::to_string(levels) + " levels, expected at most " +
+                       std::to_string(index.shape.brick_level() + 1));
   // After this check, everything allocated below is limited by the size of `bytes`.
   if (bytes.size() !=
       kFixedBytes + roots * kRootBytes + levels * kLevelBytes + frames * kFrameBytes)

@@ -75,9 +75,9 @@ void ArtifactReader::read_frame(uint32_t level, size_t index, Frame& out) const 
                                       levels_[place - 1].rows, shape_.hash_bits, last);
   if (wrong) damaged(level, index, wrong);
   if (out.hashes.front() != info.first_hash)
-    damaged(level, index, "its first hash differs from the index's");
+    damaged(level, index, "its first hash differs from the hash in the index");
   if (index + 1 < frames.size() && last.hash > frames[index + 1].first_hash)
-    damaged(level, index, "its hashes overlap the next frame's");
+    damaged(level, index, "its last hash is greater than the first hash of the next frame");
 }
 
 }  // namespace voxdag

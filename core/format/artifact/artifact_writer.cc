@@ -56,8 +56,9 @@ struct ArtifactWriter::State {
     level.rows += rows;
     level.children += child_count;
     if (level.rows > uint64_t{1} << 32)
-      throw Error(ErrorCode::kLimit,
-                  "level " + std::to_string(level.level) + " of an artifact has over 2^32 nodes");
+      throw Error(ErrorCode::kLimit, "level " + std::to_string(level.level) +
+                                         " of an artifact has " + std::to_string(level.rows) +
+                                         " nodes: expected at most 2^32");
   }
 
   void add_brick_frame(std::span<const uint64_t> rows);
@@ -100,7 +101,8 @@ ArtifactWriter::~ArtifactWriter() = default;
 void ArtifactWriter::begin_level(uint32_t level) {
   State& s = *state_;
   if (s.level_open || level + s.index.levels.size() != s.index.shape.brick_level())
-    s.broken("level " + std::to_string(level) + " does not follow the level before it");
+    s.broken("level " + std::to_string(level) + " does not follow the level before it" +
+             (s.level_open ? ", which is still open" : ""));
   s.child_rows = s.index.levels.empty() ? 0 : s.index.levels.back().rows;
   s.last = {};
   s.index.levels.push_back({level, 0, 0, {}});
@@ -109,7 +111,8 @@ void ArtifactWriter::begin_level(uint32_t level) {
 
 void ArtifactWriter::append_bricks(std::span<const uint64_t> masks) {
   State& s = *state_;
-  if (!s.level_open || s.index.levels.size() != 1) s.broken("bricks outside the brick level");
+  if (!s.level_open || s.index.levels.size() != 1)
+    s.broken("expected bricks only while the brick level is open");
   while (!masks.empty()) {
     const size_t n = std::min<size_t>(masks.size(), kFrameRows - s.values.size());
     if (n == kFrameRows)
@@ -123,14 +126,20 @@ void ArtifactWriter::append_bricks(std::span<const uint64_t> masks) {
 
 void ArtifactWriter::append_nodes(const NodeLevelView& rows) {
   State& s = *state_;
-  if (!s.level_open || s.index.levels.size() < 2) s.broken("nodes outside a node level");
-  if (rows.masks.size() != rows.hashes.size()) s.broken("the numbers of masks and hashes differ");
+  if (!s.level_open || s.index.levels.size() < 2)
+    s.broken("expected nodes only while a level above the bricks is open");
+  if (rows.masks.size() != rows.hashes.size())
+    s.broken(std::to_string(rows.masks.size()) + " masks, expected " +
+             std::to_string(rows.hashes.size()) + ", the number of hashes");
   size_t at = 0, at_child = 0;
   while (at < rows.masks.size()) {
     const size_t n = std::min<size_t>(rows.masks.size() - at, kFrameRows - s.values.size());
     size_t child_count = 0;
     for (const uint8_t mask : rows.masks.subspan(at, n)) child_count += kPopcount8[mask];
-    if (child_count > rows.children.size() - at_child) s.broken("children are missing");
+    if (child_count > rows.children.size() - at_child)
+      s.broken("children are missing: expected " + std::to_string(child_count) + " for " +
+               std::to_string(n) + " nodes, found " +
+               std::to_string(rows.children.size() - at_child));
     const NodeLevelView part{rows.level, rows.hashes.subspan(at, n), rows.masks.subspan(at, n),
                              rows.children.subspan(at_child, child_count)};
     if (n == kFrameRows) {
@@ -144,14 +153,16 @@ void ArtifactWriter::append_nodes(const NodeLevelView& rows) {
     at += n;
     at_child += child_count;
   }
-  if (at_child != rows.children.size()) s.broken("children are left over");
+  if (at_child != rows.children.size())
+    s.broken("children are left over: found " + std::to_string(rows.children.size()) +
+             ", expected " + std::to_string(at_child));
 }
 
 void ArtifactWriter::end_level() {
   State& s = *state_;
-  if (!s.level_open) s.broken("no level is open");
+  if (!s.level_open) s.broken("no level is open: expected an open level to end");
   s.add_pending_frame();
-  if (s.index.levels.back().rows == 0) s.broken("a level has no nodes");
+  if (s.index.levels.back().rows == 0) s.broken("the level has no nodes: expected at least one");
   s.level_open = false;
 }
 
@@ -169,7 +180,7 @@ void ArtifactWriter::nodes(const NodeLevelView& level) {
 
 ArtifactRef ArtifactWriter::finish(std::span<const ArtifactRoot> roots) {
   State& s = *state_;
-  if (s.level_open) s.broken("a level is still open");
+  if (s.level_open) s.broken("the level is still open: expected the end of all levels");
   s.index.roots.assign(roots.begin(), roots.end());
   return s.segment.append_index(s.offset, encode_index(s.index));
 }
