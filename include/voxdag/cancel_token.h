@@ -1,4 +1,4 @@
-// A request to stop a build.
+// A request to stop a running operation, for example a build.
 #pragma once
 
 #include <atomic>
@@ -7,7 +7,7 @@
 
 namespace voxdag {
 
-// Thread-safe. The running operation checks the token every few milliseconds.
+// Thread-safe. The running operation calls check() regularly, so it ends soon after cancel().
 class CancelToken {
  public:
   // Async-signal-safe.
