@@ -13,7 +13,9 @@ std::string text_of(const Json& body) {
     return body.dump();
   } catch (const Json::type_error&) {
     throw Error(ErrorCode::kInvalidInput,
-                "a name or path is not UTF-8, which JSON cannot carry: expected UTF-8");
+                "a name or path in the request " +
+                    body.dump(-1, ' ', true, Json::error_handler_t::replace).substr(0, 200) +
+                    " is not UTF-8 (\\ufffd marks the place): expected UTF-8");
   }
 }
 

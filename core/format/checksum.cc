@@ -63,7 +63,8 @@ struct Sha256::Context {
 namespace {
 
 void check(int status) {
-  if (status != 1) throw Error(ErrorCode::kOutOfMemory, "libcrypto cannot compute a SHA-256");
+  if (status != 1)
+    throw Error(ErrorCode::kOutOfMemory, "out of memory: libcrypto cannot compute a SHA-256");
 }
 
 }  // namespace

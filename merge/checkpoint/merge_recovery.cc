@@ -32,7 +32,7 @@ PassProgress MergeRecovery::restore(GlobalFileWriter& out) {
 
 PassProgress MergeRecovery::resume(const MergeState& state, GlobalFileWriter& out) {
   if (state.inputs_checksum != pending_.inputs_checksum())
-    throw Error(ErrorCode::kCorrupt, "its saved state is of a merge of other subvolumes");
+    throw Error(ErrorCode::kCorrupt, "the merge's saved state is of a merge of other subvolumes");
   context_.scratch.set_next_id(state.next_scratch_id);
   std::set<uint32_t> segments;
   for (const ArtifactRef& ref : state.intermediates)
@@ -66,16 +66,16 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
   uint64_t map_rows = 0;
   for (const uint64_t rows : state.map_rows) map_rows += rows;
   if (state.map_rows.size() != pending_.size() + 1)
-    throw Error(ErrorCode::kCorrupt, "its saved state has position maps of " +
+    throw Error(ErrorCode::kCorrupt, "the merge's saved state has position maps of " +
                                          std::to_string(state.map_rows.size()) +
                                          " runs: expected " + std::to_string(pending_.size() + 1));
   if (state.map.words != map_rows && state.map.words != 2 * map_rows)
-    throw Error(ErrorCode::kCorrupt, "its saved position maps have " +
+    throw Error(ErrorCode::kCorrupt, "the merge's saved position maps have " +
                                          std::to_string(state.map.words) + " words: expected " +
                                          std::to_string(map_rows) + " or twice as many");
   if (state.file.levels.empty())
     throw Error(ErrorCode::kCorrupt,
-                "its saved state has no finished level: expected at least one");
+                "the merge's saved state has no finished level: expected at least one");
   PassProgress progress;
   progress.level = state.level;
   progress.maps.emplace(state.map_rows, std::move(file), context_.plan.resident_bytes,

@@ -180,8 +180,9 @@ MergeState decode_state(std::span<const std::byte> bytes) {
     sound = source.ok() && source.left() == sizeof(uint64_t);
   }
   if (!sound)
-    throw Error(ErrorCode::kCorrupt, "its saved state is damaged: expected a state of version " +
-                                         std::to_string(kVersion) + " with its checksum");
+    throw Error(ErrorCode::kCorrupt,
+                "the merge's saved state is damaged: expected a state of version " +
+                    std::to_string(kVersion) + " with its checksum");
   return state;
 }
 

@@ -101,7 +101,9 @@ class BuiltLevel {
     if (words_.size() + more <= words_.capacity()) return;
     const size_t count = std::max<size_t>(256, words_.capacity() + words_.capacity() / 2);
     if (count > uint64_t{1} << 32)
-      throw Error(ErrorCode::kLimit, "the DAG of the selection has a level of over 2^32 words");
+      throw Error(ErrorCode::kLimit,
+                  "the DAG of the selection has a level of over 2^32 words: expected "
+                  "a smaller --region or a coarser --level");
     MemoryCharge charge(budget_, count * sizeof(uint32_t), kDagMemory);
     words_.reserve(count);
     charge_ = std::move(charge);

@@ -82,7 +82,7 @@ void find_surfaces(TriangleSource& scene, const Grid& snap, const ColorGrid& gri
       if (bytes > charge.bytes() && !charge.try_resize(2 * bytes))
         throw Error(ErrorCode::kOutOfMemory,
                     "out of memory: the triangles of the sampled color regions need over " +
-                        std::to_string(charge.bytes()) + " bytes: expected more memory (--memory)");
+                        std::to_string(bytes) + " bytes: expected more memory (--memory)");
       region.surfaces.push_back(surface);
     }
   };

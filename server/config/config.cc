@@ -2,6 +2,7 @@
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "core/base/text.h"
 #include "core/fields/json_fields.h"
 #include "scheduler/cluster/cluster.h"
 #include "server/http/connection/listener.h"
@@ -105,20 +106,26 @@ void check_config(const ServerConfig& config) {
   expect(config.http.port >= 0 && config.http.port <= 65535,
          "port " + std::to_string(config.http.port) + ": expected 0 to 65535");
   expect(config.http.certificate_file.empty() == config.http.key_file.empty(),
-         "TLS needs both files, the certificate and its key");
+         "certificate '" + config.http.certificate_file + "' and key '" + config.http.key_file +
+             "': expected both files for TLS, or neither");
   expect(!config.token_file.empty() || is_loopback_name(config.http.address),
          "refusing to listen on " + config.http.address +
              " without tokens: anybody who can reach this port could build and delete. Make a "
              "token file (voxdag token --role admin --name you >> tokens) and name it (--tokens "
              "FILE), or listen on 127.0.0.1");
-  expect(config.jobs.max_concurrent >= 1 && config.jobs.max_attempts >= 1,
-         "jobs.max_concurrent and jobs.max_attempts: expected at least 1");
-  expect(
-      config.http.limits.max_connections >= 8 && config.http.limits.min_bytes_per_s > 0,
-      "connections.max_connections: expected at least 8, connections.min_bytes_per_s: more than 0");
+  expect(config.jobs.max_concurrent >= 1, "jobs.max_concurrent is 0: expected at least 1");
+  expect(config.jobs.max_attempts >= 1, "jobs.max_attempts is 0: expected at least 1");
+  expect(config.http.limits.max_connections >= 8,
+         "connections.max_connections is " + std::to_string(config.http.limits.max_connections) +
+             ": expected at least 8");
+  expect(config.http.limits.min_bytes_per_s > 0,
+         "connections.min_bytes_per_s is " + number_text(config.http.limits.min_bytes_per_s) +
+             ": expected more than 0");
   expect(config.jobs.memory_bytes == 0 ||
              config.jobs.memory_bytes / config.jobs.max_concurrent >= kMinMemory,
-         "jobs.memory: expected at least 64MiB for each of jobs.max_concurrent");
+         "jobs.memory is " + size_text(config.jobs.memory_bytes) +
+             ": expected at least 64MiB for each of the " +
+             std::to_string(config.jobs.max_concurrent) + " jobs of jobs.max_concurrent");
   for (const std::string& root : config.scene_roots)
     expect(root.starts_with('/'), "scene_roots: '" + root + "': expected an absolute folder");
 }

@@ -348,7 +348,7 @@ Job Dispatcher::cancel(const std::string& id) {
     const bool is_running = worker != workers_.end() && worker->second.is_running();
     job = queue_.change(id, [&](Job& j) {
       if (j.state == JobState::kFailed || j.state == JobState::kSucceeded)
-        throw state_conflict(j, "the job has ended");
+        throw state_conflict(j, "expected a job that has not ended");
       if (j.state == JobState::kCanceling || j.state == JobState::kCanceled) return;
       j.state = is_running ? JobState::kCanceling : JobState::kCanceled;
       if (!is_running) j.finished_s = unix_seconds();

@@ -194,13 +194,15 @@ RequestError no_job(const std::string& id) {
 
 void expect_ended(const std::optional<Job>& job, const std::string& id) {
   if (!job) throw no_job(id);
-  if (!has_ended(job->state)) throw state_conflict(*job, "the job has not ended: cancel it first");
+  if (!has_ended(job->state))
+    throw state_conflict(*job, "expected a job that has ended; cancel it first");
 }
 
 }  // namespace
 
 RequestError state_conflict(const Job& job, const std::string& message) {
-  RequestError error(RequestError::Kind::kConflict, message);
+  RequestError error(RequestError::Kind::kConflict,
+                     std::string("the job is ") + state_name(job.state) + ": " + message);
   error.job_state = state_name(job.state);
   return error;
 }
@@ -226,9 +228,9 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
     if (auto known = job_of_key(writer_, key)) return {std::move(*known), true};
     if (static_cast<uint64_t>(writer_.integer("SELECT count(*) FROM job WHERE " + kOpen)) >=
         max_open)
-      throw RequestError(
-          RequestError::Kind::kBusy,
-          "the queue is full: " + std::to_string(max_open) + " jobs have not ended, the limit");
+      throw RequestError(RequestError::Kind::kBusy, "the queue is full: expected less than " +
+                                                        std::to_string(max_open) +
+                                                        " jobs that have not ended");
     if (job.id.empty()) job.id = random_id();
     job.number = writer_.integer("SELECT coalesce(max(number), 0) + 1 FROM job");
     if (job.created_s == 0) job.created_s = unix_seconds();

@@ -211,7 +211,8 @@ void GlobalFileWriter::write_words(uint64_t first, std::span<const uint32_t> wor
   State& s = *state_;
   if (first > kMaxLevelWords || words.size() > kMaxLevelWords - first)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
-                                       " is over the format's limit of 2^40 words per level");
+                                       " would have more than " + std::to_string(first) +
+                                       " words: expected at most 2^40, the format's limit");
   s.file->write_at(s.end + sizeof(uint32_t) * first, std::as_bytes(words));
 }
 

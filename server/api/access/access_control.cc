@@ -92,13 +92,14 @@ Caller AccessControl::identify(const Request& request) {
   }
   if (!wrong_tokens_.take(client_of(request.peer), wall_seconds()))
     throw too_many("too many wrong tokens from this client: expected at most 5 per second");
-  throw unauthorized(is_bearer ? "unknown token: expected a token of this service"
-                               : "the Authorization header is not Bearer TOKEN");
+  throw unauthorized(is_bearer
+                         ? "unknown token: expected a token of this service"
+                         : "the Authorization header has another scheme: expected Bearer TOKEN");
 }
 
 Caller AccessControl::admit(Request& request, Role needed) {
   if (!is_loopback(request.peer) && !requests_.take(client_of(request.peer), wall_seconds()))
-    throw too_many("the rate limit of this client is exceeded");
+    throw too_many("too many requests from this client: see max_requests_per_s");
   if (!tokens_) {
     check_site(request);
     request.caller = "local";
@@ -111,7 +112,9 @@ Caller AccessControl::admit(Request& request, Role needed) {
   if (caller.role == Role::kNone)
     throw unauthorized("no token was given: expected Authorization: Bearer TOKEN");
   if (caller.role < needed)
-    throw Problem(403, "forbidden", "the role of the token is not sufficient");
+    throw Problem(403, "forbidden",
+                  std::string("the role of the token is ") + role_name(caller.role) +
+                      ": expected at least " + role_name(needed));
   return caller;
 }
 

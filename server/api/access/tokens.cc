@@ -23,6 +23,11 @@ bool is_name(const std::string& name) {
 
 }  // namespace
 
+const char* role_name(Role role) {
+  static constexpr const char* kNames[] = {"none", "read", "submit", "admin"};
+  return kNames[static_cast<size_t>(role)];
+}
+
 std::optional<Role> parse_role(std::string_view name) {
   if (name == "read") return Role::kRead;
   if (name == "submit") return Role::kSubmit;

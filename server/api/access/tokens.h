@@ -20,6 +20,7 @@ enum class Role { kNone, kRead, kSubmit, kAdmin };
 
 // Parses "read", "submit" or "admin"; nullopt for anything else.
 std::optional<Role> parse_role(std::string_view name);
+const char* role_name(Role role);
 
 struct Caller {
   Role role = Role::kNone;

@@ -42,7 +42,7 @@ bool accepts_gzip(std::string_view accepted) {
 std::string gzip(std::string_view bytes) {
   z_stream stream{};
   if (deflateInit2(&stream, kLevel, Z_DEFLATED, kGzipWindow, kMemory, Z_DEFAULT_STRATEGY) != Z_OK)
-    throw Error(ErrorCode::kOutOfMemory, "compressing an answer: zlib has no memory");
+    throw Error(ErrorCode::kOutOfMemory, "out of memory: zlib cannot compress an answer");
   std::string out(deflateBound(&stream, bytes.size()), '\0');
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
   stream.avail_in = static_cast<uInt>(bytes.size());

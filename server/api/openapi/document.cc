@@ -43,11 +43,6 @@ constexpr std::pair<int, const char*> kProblems[] = {
     {507, "the disk is full"},
 };
 
-const char* role_name(Role role) {
-  static constexpr const char* kNames[] = {"none", "read", "submit", "admin"};
-  return kNames[static_cast<size_t>(role)];
-}
-
 Json reference(const std::string& kind, const std::string& name) {
   return {{"$ref", "#/components/" + kind + "/" + name}};
 }

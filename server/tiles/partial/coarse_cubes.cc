@@ -32,7 +32,9 @@ class ArtifactRows {
                                    [&](const ArtifactRoot& r) { return r.cube == cube; });
     if (root == roots.end())
       throw Error(ErrorCode::kCorrupt,
-                  "an artifact does not contain the subvolume of its row in the job store");
+                  "an artifact does not contain its subvolume of level " +
+                      std::to_string(cube.level) + " at " + std::to_string(cube.position[0]) + " " +
+                      std::to_string(cube.position[1]) + " " + std::to_string(cube.position[2]));
     const uint32_t bricks = reader_.shape().brick_level();
     if (cube.level == bricks) return brick(root->index);
     const Frame& frame = frame_of(cube.level, root->index);

@@ -46,7 +46,12 @@ uint64_t PartialDag::add_parts(const Cube& cube, const Parts& parts) {
   for (const Part* part : parts)
     if (!is_within(part->cube, cube) || part->cube.level > brick_level_ ||
         (parts.size() > 1 && part->cube.level == cube.level))
-      throw Error(ErrorCode::kCorrupt, "a subvolume overlaps another one, or is outside the grid");
+      throw Error(ErrorCode::kCorrupt, "the subvolume of level " +
+                                           std::to_string(part->cube.level) + " at " +
+                                           std::to_string(part->cube.position[0]) + " " +
+                                           std::to_string(part->cube.position[1]) + " " +
+                                           std::to_string(part->cube.position[2]) +
+                                           " overlaps another one, or is outside the grid");
   if (parts.size() == 1 && parts[0]->cube.level == cube.level)
     return add_coarse(cube.level, parts[0]->brick);
   std::vector<uint64_t> children;

@@ -24,7 +24,8 @@ std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, uint64_t
     const auto is_outside = [&](uint64_t at) { return at >= resolution || at % edge != 0; };
     if (!std::has_single_bit(edge) || edge < uint64_t{kBrickEdge} || edge > resolution ||
         is_outside(entry.at(0)) || is_outside(entry.at(1)) || is_outside(entry.at(2)))
-      throw Error(ErrorCode::kCorrupt, "the list of the subvolumes has an invalid cube");
+      throw Error(ErrorCode::kCorrupt,
+                  "the list of the subvolumes has an invalid cube: " + entry.dump());
     Cube cube{levels - levels_of_resolution(edge), {}};
     for (size_t axis = 0; axis < 3; ++axis)
       cube.position[axis] = static_cast<uint32_t>(entry.at(axis).get<uint64_t>() / edge);
