@@ -204,7 +204,7 @@ TEST_F(FileCommands, RenderMeasuresDistances) {
   EXPECT_EQ(contents("d.npy"), array);
   EXPECT_TRUE(exists("both.png"));
   expect_error(2, "--depth", {"render", "m.vdag"});
-  expect_error(2, "same file", {"render", "m.vdag", "-o", "x.png", "--depth", "x.png"});
+  expect_error(2, "are both 'x.png'", {"render", "m.vdag", "-o", "x.png", "--depth", "x.png"});
 }
 
 // The estimate has a range for every value, and plan builds nothing.
