@@ -98,6 +98,7 @@ LAYERS = {
         "scene/gltf/document",
         "scene/gltf/json",
         "scene/ply",
+        "scene/ply/rows",
         "scene/indexed",
         "scene/polygon",
         "scene/text",

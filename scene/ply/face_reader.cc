@@ -1,22 +1,46 @@
 #include "scene/ply/face_reader.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace voxdag::ply {
 
-void FaceReader::read(uint64_t first, uint64_t count, uint32_t* corners) {
+FaceReader::FaceReader(const PlyFile& ply, unsigned cursors, MemoryBudget& budget)
+    : ply_(ply), budget_(budget), rows_(ply.open_faces({}, budget)) {
+  const auto has_splits = [](const PlyFile::FaceBlock& block) { return block.has_splits; };
+  if (std::ranges::any_of(ply.face_blocks(), has_splits))
+    splitter_ = std::make_unique<Splitter>(ply, cursors, budget);
+}
+
+void FaceReader::request(const RequestedProperties& others) {
+  is_loaded_ = false;
+  has_surfaces_ = true;
+  rows_.reset();
+  rows_ = ply_.open_faces(others, budget_);
+}
+
+void FaceReader::read(uint64_t first, uint64_t count, uint32_t* corners, Surfaces& surfaces) {
+  surfaces.numbers.clear();
+  surfaces.texcoords.clear();
   seek(first);
   for (const uint64_t end = first + count;;) {
-    const auto entries = rows_->entries();
+    const auto indices = rows_->indices();
     for (const uint64_t face_end = std::min(end, this->face_end()); first < face_end; ++first) {
-      const auto k = static_cast<size_t>(first - first_triangle_);
-      *corners++ = entries[0];
-      *corners++ = entries[k + 1];
-      *corners++ = entries[k + 2];
+      for (size_t k = 0; k < 3; ++k) *corners++ = indices[corner_of(first, k)];
+      if (has_surfaces_) add_surface(first, surfaces);
     }
     if (first == end) return;
     load();
   }
+}
+
+void FaceReader::add_surface(uint64_t triangle, Surfaces& out) const {
+  const auto numbers = rows_->numbers(), reals = rows_->reals();
+  out.numbers.insert(out.numbers.end(), numbers.begin(), numbers.end());
+  auto& pairs = out.texcoords.emplace_back();
+  pairs.fill(std::nan(""));
+  if (reals.size() != 2 * rows_->indices().size()) return;
+  for (size_t k = 0; k < 3; ++k) std::copy_n(&reals[2 * corner_of(triangle, k)], 2, &pairs[2 * k]);
 }
 
 uint64_t FaceReader::face_of(uint64_t triangle) {
@@ -36,8 +60,7 @@ void FaceReader::seek(uint64_t triangle) {
   if (!is_ahead || face_ < block * PlyFile::kBlockRows) {
     face_ = block * PlyFile::kBlockRows;
     first_triangle_ = blocks[static_cast<size_t>(block)].first_triangle;
-    next_offset_ = rows_->read(face_, blocks[static_cast<size_t>(block)].offset);
-    is_loaded_ = true;
+    load_at(blocks[static_cast<size_t>(block)].offset);
   }
   while (triangle >= face_end()) load();
 }
@@ -46,15 +69,30 @@ void FaceReader::seek(uint64_t triangle) {
 void FaceReader::load() {
   first_triangle_ = face_end();
   ++face_;
+  load_at(next_offset_);
+}
+
+void FaceReader::load_at(uint64_t offset) {
   is_loaded_ = false;
-  next_offset_ = rows_->read(face_, next_offset_);
+  next_offset_ = rows_->read(face_, offset);
+  split_ = {};
+  const auto indices = rows_->indices();
+  if (indices.size() > 3 && ply_.face_blocks()[face_ / PlyFile::kBlockRows].has_splits)
+    split_ = splitter_->faces.split(indices);
   is_loaded_ = true;
 }
 
 // Returns the number of the first triangle of the next face.
 uint64_t FaceReader::face_end() const {
-  const size_t corners = rows_->entries().size();
+  const size_t corners = rows_->indices().size();
   return first_triangle_ + (corners < 3 ? 0 : corners - 2);
+}
+
+// Returns the position in the face of a corner of a triangle.
+size_t FaceReader::corner_of(uint64_t triangle, size_t k) const {
+  const auto number = static_cast<size_t>(triangle - first_triangle_);
+  if (!split_.empty()) return split_[3 * number + k];
+  return k == 0 ? 0 : number + k;
 }
 
 }  // namespace voxdag::ply

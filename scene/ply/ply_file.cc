@@ -1,83 +1,72 @@
 #include "scene/ply/ply_file.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "core/base/error.h"
 #include "core/base/integers.h"
 #include "scene/messages.h"
-#include "scene/ply/numbers.h"
+#include "scene/ply/vertex_reader.h"
+#include "scene/polygon/face_splitter.h"
+#include "scene/text/word_scanner.h"
 
 namespace voxdag::ply {
-namespace {
-
-size_t find_element(const Header& header, const char* name) {
-  return static_cast<size_t>(std::ranges::find(header.elements, name, &Element::name) -
-                             header.elements.begin());
-}
-
-size_t find_property(const Element& element, const char* name) {
-  return static_cast<size_t>(std::ranges::find(element.properties, name, &Property::name) -
-                             element.properties.begin());
-}
-
-}  // namespace
 
 PlyFile::PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget,
                  const CancelToken& cancel)
     : file_(std::move(file)),
       header_(read_header(*file_, budget)),
-      vertex_(find_element(header_, "vertex")),
-      face_(find_element(header_, "face")),
+      layout_(find_layout(header_, file_->path())),
       charge_(budget, "the rows of " + file_->path()) {
-  const size_t none = header_.elements.size();
-  if (find_element(header_, "tristrips") != none)
-    refuse("has an element tristrips, which voxdag does not read, expected an element face");
-  if (vertex_ == none) refuse("has no element vertex");
-  find_vertex_properties();
-  if (face_ == none)
-    warnings_.push_back(file_->path() + ": has no element face, points make no voxels");
-  else
-    find_face_list();
-  const size_t last = face_ == none ? vertex_ : std::max(vertex_, face_);
+  warn_about_header();
+  try {
+    pass_over_elements(budget, cancel);
+  } catch (const Error& error) {
+    if (first_irregular_.empty()) throw;
+    throw Error(error.code(),
+                error.message() + "; the first row that is not one line: " + first_irregular_);
+  }
+  if (small_faces_ > 0)
+    warn("has " + std::to_string(small_faces_) +
+         " faces of fewer than three corners, which make no voxels");
+  find_splits(budget, cancel);
+}
+
+void PlyFile::warn_about_header() {
+  if (header_.ignored_lines > 0)
+    warn("line " + std::to_string(header_.first_ignored_line) + " of the header begins with " +
+         header_.first_ignored_word + "; it is ignored");
+  if (layout_.face == Layout::kNone && layout_.strips == Layout::kNone)
+    warn("has no element face, points make no voxels");
+}
+
+std::unique_ptr<Rows> PlyFile::open_faces(RequestedProperties others, MemoryBudget& budget) const {
+  others.indices = layout_.face_indices;
+  return open_rows(*file_, header_.format, face_element(), others, budget);
+}
+
+StripReader PlyFile::open_strips(MemoryBudget& budget) const {
+  return {*file_,
+          header_.format,
+          header_.elements[layout_.strips],
+          layout_.strip_indices,
+          vertex_element().count,
+          budget};
+}
+
+// Reads all elements up to the last needed one. If rows are not lines, reads all elements, because
+// the file is then only valid if they are all of its text.
+void PlyFile::pass_over_elements(MemoryBudget& budget, const CancelToken& cancel) {
   uint64_t begin = header_.data_begin;
-  for (size_t i = 0; i <= last; ++i) begin = pass_over(i, begin, budget, cancel);
-}
-
-std::unique_ptr<Rows> PlyFile::open_faces(MemoryBudget& budget) const {
-  return open_rows(*file_, header_.format, header_.elements[face_], face_list_, budget);
-}
-
-void PlyFile::find_vertex_properties() {
-  const Element& vertex = header_.elements[vertex_];
-  if (vertex.count >= kNoVertex)
-    throw Error(ErrorCode::kLimit, file_->path() + ": has " + std::to_string(vertex.count) +
-                                       " vertices, the limit is 2^32 - 2");
-  for (const Property& property : vertex.properties)
-    if (property.is_list) refuse("has a list as a property of its vertices, expected numbers");
-  constexpr const char* kNames[] = {"x", "y", "z"};
-  for (size_t a = 0; a < 3; ++a) {
-    axes_[a] = find_property(vertex, kNames[a]);
-    if (axes_[a] == vertex.properties.size())
-      refuse(std::string("has vertices without a property ") + kNames[a]);
+  for (size_t i = 0; i < header_.elements.size(); ++i) {
+    const auto is_ahead = [&](size_t element) { return element != Layout::kNone && element >= i; };
+    const bool is_needed =
+        is_ahead(layout_.vertex) || is_ahead(layout_.face) || is_ahead(layout_.strips);
+    if (!is_needed && first_irregular_.empty()) return;
+    begin = i == layout_.strips ? pass_over_strips(begin, budget, cancel)
+                                : pass_over(i, begin, budget, cancel);
   }
-  for (const char* name : {"red", "green", "blue", "alpha"}) {
-    const size_t property = find_property(vertex, name);
-    if (property < vertex.properties.size())
-      colors_.push_back(property);
-    else if (name[0] != 'a')
-      return colors_.clear();
-  }
-}
-
-void PlyFile::find_face_list() {
-  const Element& face = header_.elements[face_];
-  face_list_ = find_property(face, "vertex_indices");
-  if (face_list_ == face.properties.size()) face_list_ = find_property(face, "vertex_index");
-  if (face_list_ == face.properties.size())
-    refuse("has faces without a property vertex_indices or vertex_index");
-  const Property& list = face.properties[face_list_];
-  if (!list.is_list || !is_integer(list.type))
-    refuse("has faces whose property " + list.name + " is not a list of integers");
+  if (!first_irregular_.empty()) check_end(begin, budget);
 }
 
 // Returns the end of element `index`, which begins at offset `begin`. If its rows vary in size,
@@ -85,31 +74,44 @@ void PlyFile::find_face_list() {
 uint64_t PlyFile::pass_over(size_t index, uint64_t begin, MemoryBudget& budget,
                             const CancelToken& cancel) {
   const Element& element = header_.elements[index];
-  if (index == vertex_) vertices_begin_ = begin;
+  if (index == layout_.vertex) vertices_begin_ = begin;
   const bool has_list = std::ranges::any_of(element.properties, &Property::is_list);
   const bool is_ascii = header_.format == Format::kAscii;
   if (element.properties.empty() || (!is_ascii && !has_list))
     return end_of_fixed_rows(element, begin);
-  const auto rows = open_rows(*file_, header_.format, element,
-                              index == face_ ? face_list_ : Rows::kNoList, budget);
-  uint64_t too_small = 0;
+  RequestedProperties requested;
+  if (index == layout_.face) requested.indices = layout_.face_indices;
+  const auto rows = open_rows(*file_, header_.format, element, requested, budget);
   for (uint64_t row = 0; row < element.count; ++row) {
     if (row % kBlockRows == 0) {
       cancel.check();
       note_row(index, begin);
     }
-    begin = rows->read(row, begin);
-    if (index != face_) continue;
-    const size_t corners = rows->entries().size();
-    if (corners < 3)
-      ++too_small;
-    else
-      triangles_ += corners - 2;
+    try {
+      begin = rows->read(row, begin);
+    } catch (...) {
+      if (first_irregular_.empty()) first_irregular_ = rows->first_irregular();
+      throw;
+    }
+    if (index == layout_.face) note_face(rows->indices().size());
   }
-  if (too_small > 0)
-    warnings_.push_back(file_->path() + ": has " + std::to_string(too_small) +
-                        " faces of fewer than three corners, which make no voxels");
+  if (first_irregular_.empty()) first_irregular_ = rows->first_irregular();
   return begin;
+}
+
+uint64_t PlyFile::pass_over_strips(uint64_t begin, MemoryBudget& budget,
+                                   const CancelToken& cancel) {
+  StripReader strips = open_strips(budget);
+  strips.seek({.offset = begin});
+  for (;;) {
+    const StripReader::Position position = strips.position();
+    uint32_t corners[3];
+    if (!strips.next(corners)) return strips.position().offset;
+    if (strip_triangles_++ % kBlockRows != 0) continue;
+    cancel.check();
+    charge_.add(sizeof(position));
+    strip_blocks_.push_back(position);
+  }
 }
 
 uint64_t PlyFile::end_of_fixed_rows(const Element& element, uint64_t begin) const {
@@ -125,14 +127,60 @@ uint64_t PlyFile::end_of_fixed_rows(const Element& element, uint64_t begin) cons
 
 // Records the offset of the first row of a block, if the element is the vertices or the faces.
 void PlyFile::note_row(size_t element, uint64_t offset) {
-  if (element == face_) {
+  if (element == layout_.face) {
     charge_.add(sizeof(FaceBlock));
-    face_blocks_.push_back({offset, triangles_});
-  } else if (element == vertex_) {
+    face_blocks_.push_back({offset, face_triangles_, false});
+  } else if (element == layout_.vertex) {
     charge_.add(sizeof(uint64_t));
     vertex_blocks_.push_back(offset);
   }
 }
+
+void PlyFile::note_face(size_t corners) {
+  if (corners < 3)
+    ++small_faces_;
+  else
+    face_triangles_ += corners - 2;
+  if (corners > 3) face_blocks_.back().has_splits = true;
+}
+
+// Refuses a file with text after its last row.
+void PlyFile::check_end(uint64_t offset, MemoryBudget& budget) const {
+  WordScanner text(*file_, budget);
+  text.begin_row(offset);
+  const std::string_view word = text.word();
+  if (!word.empty()) refuse("has " + printable(word) + " after its last row");
+}
+
+// Clears has_splits in the blocks whose faces are all fans, and counts doubtful faces.
+void PlyFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
+  if (std::ranges::none_of(face_blocks_, [](const FaceBlock& block) { return block.has_splits; }))
+    return;
+  const auto rows = open_faces({}, budget);
+  VertexReader vertices(*this, layout_.axes, budget);
+  polygon::FaceSplitter splitter(vertices, file_->path(), 1, budget);
+  uint64_t doubtful = 0, first_doubtful = 0;
+  for (size_t b = 0; b < face_blocks_.size(); ++b) {
+    FaceBlock& block = face_blocks_[b];
+    if (!block.has_splits) continue;
+    cancel.check();
+    block.has_splits = false;
+    uint64_t offset = block.offset;
+    const uint64_t end = std::min((b + 1) * kBlockRows, face_element().count);
+    for (uint64_t row = b * kBlockRows; row < end; ++row) {
+      offset = rows->read(row, offset);
+      if (rows->indices().size() < 4) continue;
+      if (!splitter.split(rows->indices()).empty()) block.has_splits = true;
+      if (splitter.is_doubtful() && doubtful++ == 0) first_doubtful = row;
+    }
+  }
+  if (doubtful > 0)
+    warn("face " + std::to_string(first_doubtful) + ": " + std::to_string(doubtful) +
+         " faces have edges that cross each other, so their area is doubtful; they are read as "
+         "fans");
+}
+
+void PlyFile::warn(const std::string& what) { warnings_.push_back(file_->path() + ": " + what); }
 
 void PlyFile::refuse(const std::string& what) const { voxdag::refuse(file_->path(), what); }
 

@@ -1,13 +1,13 @@
-// An open PLY file: the positions of its vertices and faces in the file, and the number of
-// triangles. A polygon of n corners is the fan of n - 2 triangles around its first corner. A
-// polygon with fewer than three corners has no triangle.
+// An open PLY file: the positions of its vertices, faces and strips in the file, and the number of
+// triangles. The triangles of the faces are numbered first, then those of the strips. A face of n
+// corners has n - 2 triangles (scene/polygon); a face with fewer than three corners has none.
 //
-// Rows of faces and all rows of ASCII files have no fixed size. So one pass over the file records
-// the offset of every 1024th row. Any other row is found by reading on from the last recorded row
-// before it.
+// Rows of faces and strips, all rows of ASCII files, and vertices with lists have no fixed size. So
+// one pass over the file records positions in regular distances. Any other position is found by
+// reading on from the last recorded one before it. A second pass over the faces finds the blocks of
+// faces with concave polygons.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -17,14 +17,17 @@
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "scene/growing_charge.h"
-#include "scene/ply/header.h"
-#include "scene/ply/rows.h"
+#include "scene/ply/layout.h"
+#include "scene/ply/rows/header.h"
+#include "scene/ply/rows/rows.h"
+#include "scene/ply/rows/strip_reader.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::ply {
 
 class PlyFile {
  public:
+  // Rows of vertices and of faces, and triangles of strips, between two recorded positions.
   static constexpr uint64_t kBlockRows = 1024;
 
   // Throws Error{kInvalidInput} with the line, element or row of the damage, Error{kLimit} for more
@@ -32,52 +35,61 @@ class PlyFile {
   // budget.
   PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
-  // A block of kBlockRows faces: the offset of its first face in the file, and the number of its
-  // first triangle.
+  // A block of kBlockRows faces.
   struct FaceBlock {
-    uint64_t offset;
-    uint64_t first_triangle;
+    uint64_t offset;          // offset of its first face in the file
+    uint64_t first_triangle;  // number of its first triangle
+    bool has_splits;          // true if some of its faces are not fans
   };
 
   const ReadableFile& file() const { return *file_; }
   Format format() const { return header_.format; }
-  uint64_t triangles() const { return triangles_; }
+  const Header& header() const { return header_; }
+  const Layout& layout() const { return layout_; }
+  uint64_t face_triangles() const { return face_triangles_; }
+  uint64_t triangles() const { return face_triangles_ + strip_triangles_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
 
-  const Element& vertex_element() const { return header_.elements[vertex_]; }
+  const Element& vertex_element() const { return header_.elements[layout_.vertex]; }
   uint64_t vertices_begin() const { return vertices_begin_; }
-  // Offsets in the file of every kBlockRows-th vertex. Empty for a binary file, whose vertices have
-  // a fixed size.
+  // Offsets in the file of every kBlockRows-th vertex. Empty if the vertices have a fixed size.
   const std::deque<uint64_t>& vertex_blocks() const { return vertex_blocks_; }
-  // Indices of the properties x, y and z.
-  const std::array<size_t, 3>& axes() const { return axes_; }
-  // Indices of the properties red, green, blue and, if present, alpha. Empty unless all three
-  // colors exist.
-  const std::vector<size_t>& colors() const { return colors_; }
 
+  // The file must have faces.
+  const Element& face_element() const { return header_.elements[layout_.face]; }
   const std::deque<FaceBlock>& face_blocks() const { return face_blocks_; }
-  std::unique_ptr<Rows> open_faces(MemoryBudget& budget) const;
+  // Returns a reader of the faces' vertex indices and of other properties.
+  std::unique_ptr<Rows> open_faces(RequestedProperties others, MemoryBudget& budget) const;
+
+  // Positions before every kBlockRows-th triangle of the strips. The file must have strips.
+  const std::deque<StripReader::Position>& strip_blocks() const { return strip_blocks_; }
+  StripReader open_strips(MemoryBudget& budget) const;
 
  private:
-  void find_vertex_properties();
-  void find_face_list();
+  void warn(const std::string& what);
+  void warn_about_header();
+  void pass_over_elements(MemoryBudget& budget, const CancelToken& cancel);
   uint64_t pass_over(size_t element, uint64_t begin, MemoryBudget& budget,
                      const CancelToken& cancel);
+  uint64_t pass_over_strips(uint64_t begin, MemoryBudget& budget, const CancelToken& cancel);
   uint64_t end_of_fixed_rows(const Element& element, uint64_t begin) const;
   void note_row(size_t element, uint64_t offset);
+  void note_face(size_t corners);
+  void check_end(uint64_t offset, MemoryBudget& budget) const;
+  void find_splits(MemoryBudget& budget, const CancelToken& cancel);
   [[noreturn]] void refuse(const std::string& what) const;
 
   const std::unique_ptr<ReadableFile> file_;
   Header header_;
-  size_t vertex_, face_;  // indices of the two elements; the number of elements if absent
-  std::array<size_t, 3> axes_{};
-  std::vector<size_t> colors_;
-  size_t face_list_ = Rows::kNoList;
+  Layout layout_;
   uint64_t vertices_begin_ = 0;
-  uint64_t triangles_ = 0;
+  uint64_t face_triangles_ = 0, strip_triangles_ = 0;
+  uint64_t small_faces_ = 0;  // faces of fewer than three corners
   std::deque<uint64_t> vertex_blocks_;
   std::deque<FaceBlock> face_blocks_;
-  GrowingCharge charge_;  // charge for the blocks
+  std::deque<StripReader::Position> strip_blocks_;
+  GrowingCharge charge_;         // charge for the blocks
+  std::string first_irregular_;  // the first row of an ASCII file that is not exactly one line
   std::vector<std::string> warnings_;
 };
 

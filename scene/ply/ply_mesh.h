@@ -1,43 +1,67 @@
-// The triangles of a PLY file with their positions and colors. Not thread-safe.
+// The triangles of a PLY file with their positions and surfaces. Not thread-safe.
 #pragma once
 
+#include <array>
+#include <memory>
 #include <optional>
 
+#include "scene/indexed/block_cache.h"
 #include "scene/indexed/indexed_mesh.h"
 #include "scene/ply/face_reader.h"
 #include "scene/ply/ply_file.h"
-#include "scene/ply/vertex_colors.h"
+#include "scene/ply/rows/strip_reader.h"
+#include "scene/ply/surfaces.h"
 #include "scene/ply/vertex_reader.h"
 
 namespace voxdag::ply {
 
 class PlyMesh : public IndexedMesh {
  public:
-  // The file must have faces. It and the budget must outlive the mesh.
-  PlyMesh(const PlyFile& ply, MemoryBudget& budget)
-      : ply_(ply), budget_(budget), faces_(ply, budget), vertices_(ply, ply.axes(), budget) {}
+  // The file must have triangles. The references must outlive the mesh. `cursors` is the number of
+  // cursors that share the memory.
+  PlyMesh(const PlyFile& ply, Surfaces& surfaces, unsigned cursors, MemoryBudget& budget);
 
   const std::string& path() const override { return ply_.file().path(); }
   PositionSource& positions() override { return vertices_; }
-  void read_corners(uint64_t first, uint64_t count, uint32_t* corners) override {
-    faces_.read(first, count, corners);
-  }
-  bool open_surfaces(unsigned cursors) override {
-    if (!ply_.colors().empty()) colors_.emplace(ply_, cursors, budget_);
-    return colors_.has_value();
-  }
+  void read_corners(uint64_t first, uint64_t count, uint32_t* corners) override;
+  bool open_surfaces(unsigned cursors) override;
   void read_surfaces(std::span<const uint32_t> numbers, const uint32_t* corners,
                      SurfaceTriangle* out) override;
-  std::string place_of(uint64_t triangle) override {
-    return "face " + std::to_string(faces_.face_of(triangle));
-  }
+  std::string place_of(uint64_t triangle) override;
 
  private:
+  using Pair = std::array<double, 2>;
+
+  // Properties of vertices, converted to values.
+  template <class Value>
+  struct Cached {
+    VertexReader reader;
+    std::vector<double> numbers;
+    BlockCache<Value> cache;
+  };
+
+  void read_strips(uint64_t first, uint64_t count, uint32_t* corners);
+  bool read_texture(size_t number, const uint32_t* vertices, SurfaceTriangle& out);
+  bool find_texcoords(size_t number, const uint32_t* vertices, std::array<double, 6>& out);
+  size_t texture_of(size_t number) const;
+  void read_colors(size_t number, const uint32_t* vertices, SurfaceTriangle& out);
+  const Color& color_of(uint32_t vertex);
+  const Pair& texcoords_of(uint32_t vertex);
+
   const PlyFile& ply_;
+  Surfaces& surfaces_;
   MemoryBudget& budget_;
-  FaceReader faces_;
   VertexReader vertices_;
-  std::optional<VertexColors> colors_;
+  std::optional<FaceReader> faces_;
+  std::optional<StripReader> strips_;
+  uint64_t next_strip_triangle_ = UINT64_MAX;  // the triangle at the position of strips_
+
+  const Surfaces::Values* values_ = nullptr;  // set by open_surfaces()
+  std::optional<Cached<Color>> colors_;
+  std::optional<Cached<Pair>> texcoords_;
+  // The last call of read_corners(): the number of triangles of faces, and their values.
+  size_t face_triangles_ = 0;
+  FaceReader::Surfaces face_values_;
 };
 
 }  // namespace voxdag::ply

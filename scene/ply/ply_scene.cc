@@ -1,31 +1,36 @@
 #include "scene/ply/ply_scene.h"
 
+#include <algorithm>
 #include <array>
-#include <string_view>
 #include <utility>
 
 #include "scene/indexed/indexed_cursor.h"
 #include "scene/ply/ply_file.h"
 #include "scene/ply/ply_mesh.h"
+#include "scene/ply/surfaces.h"
 
 namespace voxdag::ply {
 namespace {
 
 class PlyScene : public TriangleSource {
  public:
-  PlyScene(std::unique_ptr<ReadableFile> file, const SceneOptions& options, MemoryBudget& budget,
-           const CancelToken& cancel)
+  PlyScene(FileSystem& files, std::unique_ptr<ReadableFile> file, const SceneOptions& options,
+           MemoryBudget& budget, const CancelToken& cancel)
       : ply_(std::move(file), budget, cancel),
+        surfaces_(std::make_unique<Surfaces>(files, ply_, budget, cancel)),
         options_(options),
         budget_(budget),
         cancel_(cancel) {}
 
   std::unique_ptr<TriangleCursor> open(unsigned cursors) override {
     if (ply_.triangles() == 0) return std::make_unique<NoTriangles>();
-    return std::make_unique<IndexedCursor>(std::make_unique<PlyMesh>(ply_, budget_),
-                                           options_.skip_invalid, cursors, budget_, cancel_);
+    return std::make_unique<IndexedCursor>(
+        std::make_unique<PlyMesh>(ply_, *surfaces_, cursors, budget_), options_.skip_invalid,
+        cursors, budget_, cancel_);
   }
   uint64_t declared_triangles() const override { return ply_.triangles(); }
+  SceneMaterials materials() const override { return surfaces_->values().scene; }
+  uint32_t material_count() const override { return surfaces_->materials(); }
   std::vector<SourceFile> files() const override {
     return {{ply_.file().path(), ply_.file().identity()}};
   }
@@ -33,6 +38,7 @@ class PlyScene : public TriangleSource {
 
  private:
   const PlyFile ply_;
+  const std::unique_ptr<Surfaces> surfaces_;
   const SceneOptions options_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
@@ -41,17 +47,16 @@ class PlyScene : public TriangleSource {
 }  // namespace
 
 bool is_ply(const ReadableFile& file) {
-  std::array<char, 4> first{};
-  if (file.size() < first.size()) return false;
-  file.read_at(0, std::as_writable_bytes(std::span(first)));
-  const std::string_view text(first.data(), first.size());
-  return text == "ply\n" || text == "ply\r";
+  std::array<char, 256> first{};
+  const auto size = static_cast<size_t>(std::min<uint64_t>(file.size(), first.size()));
+  file.read_at(0, std::as_writable_bytes(std::span(first).first(size)));
+  return first_line_bytes({first.data(), size}) > 0;
 }
 
-std::unique_ptr<TriangleSource> open_ply(FileSystem&, std::unique_ptr<ReadableFile> file,
+std::unique_ptr<TriangleSource> open_ply(FileSystem& files, std::unique_ptr<ReadableFile> file,
                                          const SceneOptions& options, MemoryBudget& budget,
                                          const CancelToken& cancel) {
-  return std::make_unique<PlyScene>(std::move(file), options, budget, cancel);
+  return std::make_unique<PlyScene>(files, std::move(file), options, budget, cancel);
 }
 
 }  // namespace voxdag::ply

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include "scene/messages.h"
-#include "scene/ply/numbers.h"
+#include "scene/ply/rows/numbers.h"
 
 namespace voxdag::ply {
 namespace {
@@ -22,26 +21,28 @@ void decode_property(const std::byte* bytes, size_t row_bytes, size_t count, siz
 VertexReader::VertexReader(const PlyFile& ply, std::span<const size_t> properties,
                            MemoryBudget& budget)
     : ply_(ply), properties_(properties.begin(), properties.end()), offsets_(properties.size()) {
-  const auto& all = ply.vertex_element().properties;
-  for (size_t i = 0; i < all.size(); ++i) {
+  const Element& element = ply.vertex_element();
+  const bool has_list = std::ranges::any_of(element.properties, &Property::is_list);
+  if (ply.format() == Format::kAscii || has_list) {
+    rows_ = open_rows(ply.file(), ply.format(), element, {.numbers = properties_}, budget);
+    return;
+  }
+  for (size_t i = 0; i < element.properties.size(); ++i) {
     for (size_t p = 0; p < properties_.size(); ++p)
       if (properties_[p] == i) offsets_[p] = row_bytes_;
-    row_bytes_ += bytes_of(all[i].type);
+    row_bytes_ += bytes_of(element.properties[i].type);
   }
-  if (ply.format() == Format::kAscii)
-    text_.emplace(ply.file(), budget);
-  else
-    window_.emplace(ply.file(), budget);
+  window_.emplace(ply.file(), budget);
 }
 
 void VertexReader::read(uint64_t first, size_t count, double* out) {
-  if (text_)
-    read_text(first, count, out);
+  if (rows_)
+    read_rows(first, count, out);
   else
-    read_binary(first, count, out);
+    read_fixed(first, count, out);
 }
 
-void VertexReader::read_binary(uint64_t first, size_t count, double* out) {
+void VertexReader::read_fixed(uint64_t first, size_t count, double* out) {
   const size_t stride = properties_.size();
   const size_t at_once = FileWindow::kBytes / row_bytes_;
   const bool is_big_endian = ply_.format() == Format::kBigEndian;
@@ -63,31 +64,13 @@ void VertexReader::read_binary(uint64_t first, size_t count, double* out) {
   }
 }
 
-void VertexReader::read_text(uint64_t first, size_t count, double* out) {
+void VertexReader::read_rows(uint64_t first, size_t count, double* out) {
   uint64_t vertex = first / PlyFile::kBlockRows * PlyFile::kBlockRows;
-  text_->begin_row(ply_.vertex_blocks()[static_cast<size_t>(vertex / PlyFile::kBlockRows)]);
-  std::vector<double> skipped(properties_.size());
+  uint64_t offset = ply_.vertex_blocks()[static_cast<size_t>(vertex / PlyFile::kBlockRows)];
   for (; vertex < first + count; ++vertex) {
-    read_line(vertex, vertex < first ? skipped.data() : out);
-    if (vertex >= first) out += properties_.size();
+    offset = rows_->read(vertex, offset);
+    if (vertex >= first) out = std::ranges::copy(rows_->numbers(), out).out;
   }
-}
-
-void VertexReader::read_line(uint64_t vertex, double* out) {
-  text_->begin_row(text_->offset());
-  const auto& properties = ply_.vertex_element().properties;
-  for (size_t i = 0; i < properties.size(); ++i) {
-    const std::string_view word = text_->word();
-    for (size_t p = 0; p < properties_.size(); ++p) {
-      if (properties_[p] != i) continue;
-      const auto value = parse_number(word, properties[i].type);
-      if (!value)
-        refuse(ply_.file().path(), "vertex " + std::to_string(vertex) + " has " + printable(word) +
-                                       ", expected a number");
-      out[p] = *value;
-    }
-  }
-  text_->end_row();
 }
 
 }  // namespace voxdag::ply

@@ -3,13 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "scene/ply/ply_file.h"
+#include "scene/ply/rows/rows.h"
 #include "scene/text/file_window.h"
-#include "scene/text/word_scanner.h"
 #include "scene/vertices/position_source.h"
 
 namespace voxdag::ply {
@@ -25,15 +26,15 @@ class VertexReader : public PositionSource {
   void read(uint64_t first, size_t count, double* out) override;
 
  private:
-  void read_binary(uint64_t first, size_t count, double* out);
-  void read_text(uint64_t first, size_t count, double* out);
-  void read_line(uint64_t vertex, double* out);
+  void read_fixed(uint64_t first, size_t count, double* out);
+  void read_rows(uint64_t first, size_t count, double* out);
 
   const PlyFile& ply_;
-  std::optional<FileWindow> window_;
-  std::optional<WordScanner> text_;
   const std::vector<size_t> properties_;
-  std::vector<size_t> offsets_;  // offset of each property in a row
+  std::unique_ptr<Rows> rows_;  // for vertices that vary in size
+  // For vertices of a fixed size: the offset of each property in a row.
+  std::optional<FileWindow> window_;
+  std::vector<size_t> offsets_;
   size_t row_bytes_ = 0;
 };
 

@@ -4,65 +4,13 @@
 
 #include <bit>
 #include <cmath>
-#include <cstring>
 
+#include "tests/unit/scene/ply_writer.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {
 namespace {
 
-enum class PlyFormat { kAscii, kLittle, kBig };
-
-// Writes a file: appends numbers in the types that the header lines name.
-class PlyWriter {
- public:
-  explicit PlyWriter(PlyFormat format, std::string line_end = "\n")
-      : format_(format), line_end_(std::move(line_end)) {
-    static const char* kNames[] = {"ascii", "binary_little_endian", "binary_big_endian"};
-    header("ply");
-    header(std::string("format ") + kNames[static_cast<int>(format)] + " 1.0");
-  }
-
-  PlyWriter& header(const std::string& line) {
-    text_ += line + line_end_;
-    return *this;
-  }
-  template <class T>
-  PlyWriter& put(T value) {
-    if (format_ == PlyFormat::kAscii) {
-      std::ostringstream number;
-      number.precision(17);
-      number << +value;
-      text_ += (at_line_begin_ ? "" : " ") + number.str();
-      at_line_begin_ = false;
-      return *this;
-    }
-    std::string bytes(sizeof(T), '\0');
-    std::memcpy(bytes.data(), &value, sizeof(T));
-    if (format_ == PlyFormat::kBig) std::reverse(bytes.begin(), bytes.end());
-    text_ += bytes;
-    return *this;
-  }
-  template <class T>
-  PlyWriter& put_all(std::initializer_list<T> values) {
-    for (T value : values) put(value);
-    return *this;
-  }
-  PlyWriter& end_row() {
-    if (format_ == PlyFormat::kAscii) text_ += line_end_;
-    at_line_begin_ = true;
-    return *this;
-  }
-  const std::string& text() const { return text_; }
-
- private:
-  const PlyFormat format_;
-  const std::string line_end_;
-  std::string text_;
-  bool at_line_begin_ = true;
-};
-
-constexpr PlyFormat kFormats[] = {PlyFormat::kAscii, PlyFormat::kLittle, PlyFormat::kBig};
 const Corners kLower = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
 
 // The triangle (0 0 0) (1 0 0) (0 1 0), as most programs write it.
@@ -124,17 +72,17 @@ PlyWriter mesh_header(PlyFormat format, size_t vertices, size_t faces, const cha
   return ply;
 }
 
-// Thousands of faces have 0 to 9 corners. The triangles are the faces' fans in order, from any
-// first triangle.
+// Thousands of faces have 0 to 9 corners, which are on a parabola, so that the faces are convex.
+// The triangles are the faces' fans in order, from any first triangle.
 TEST(Ply, PolygonsAreFansFromAnyTriangleOn) {
   constexpr uint32_t kVertices = 5000, kFaces = 5000;
   for (const PlyFormat format : kFormats) {
     PlyWriter ply = mesh_header(format, kVertices, kFaces, "ushort uint");
     for (uint32_t i = 0; i < kVertices; ++i)
-      ply.put(static_cast<float>(i)).put(static_cast<float>(i * i % 97)).put(1.0f).end_row();
+      ply.put(static_cast<float>(i)).put(static_cast<float>(i * i)).put(1.0f).end_row();
     std::vector<Corners> expected;
     const auto corner = [](uint32_t v) {
-      return std::array<double, 3>{double(v), double(v * v % 97), 1};
+      return std::array<double, 3>{double(v), double(static_cast<float>(v * v)), 1};
     };
     for (uint32_t f = 0; f < kFaces; ++f) {
       const uint32_t n = f * 7 % 10;
@@ -245,7 +193,7 @@ TEST(Ply, ColorsOfVertices) {
                                                    {0, 65535, 300, 1, 2, 3, 40000, 255, 256}))[2],
               (Color{light(40000 / 65535.0), light(255 / 65535.0), light(256 / 65535.0), 65535}));
     EXPECT_EQ(colors_of(colored_triangle<float>(format, "float", true,
-                                                {0, 1, 0.5, 0.25, -1, 7, 0, 2, 1, 1, 1, 1})),
+                                                {0, 1, 0.5, 0.25, -1, 1.5, 0, 2, 1, 1, 1, 1})),
               (std::array{Color{0, 65535, light(0.5), 16384}, Color{0, 65535, 0, 65535},
                           Color{65535, 65535, 65535, 65535}}));
     EXPECT_EQ(colors_of(colored_triangle<int32_t>(format, "int", false,
@@ -371,8 +319,19 @@ TEST(Ply, HostileHeadersAreRefused) {
        "is not a list of integers"},
       {begin + "element vertex 0\nproperty list float int x\nend_header\n",
        "float type for the count of a list"},
-      {begin + "element vertex 0\nproperty list uchar int x\nend_header\n", "as a property"},
-      {begin + "element tristrips 1\n" + list + "end_header\n", "tristrips"},
+      {begin + "element vertex 0\nproperty list uchar int x\nend_header\n", "without a property x"},
+      {begin + "element vertex 0\n" + xyz + "element tristrips 1\n" + list + "end_header\n",
+       "tristrips 0 ends past"},
+      {begin + "element vertex 0\n" + xyz + "element tristrips 1\nproperty int a\nend_header\n",
+       "tristrips without a list vertex_indices"},
+      {begin + "element vertex 0\n" + xyz + "element tristrips 1\n" + list + "end_header\n\3\1",
+       "tristrips 0 ends past"},
+      {begin + "element vertex 0\n" + xyz +
+           "element tristrips 1\nproperty list int int vertex_indices\nend_header\n" +
+           std::string("\xff\xff\xff\x7f", 4),
+       "tristrips 0 has a list of 2147483647 entries"},
+      {begin + "format ascii 1.0\nend_header\n", "second format line"},
+      {begin + "element vertex 0\npropertie float x\nend_header\n", "begins with propertie"},
       {begin + "element vertex 0\n" + xyz + "element vertex 0\nend_header\n",
        "repeats the name of an element"},
       {begin + "property float x\nend_header\n",

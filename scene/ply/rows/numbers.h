@@ -9,8 +9,9 @@
 #include <limits>
 #include <optional>
 #include <string_view>
+#include <utility>
 
-#include "scene/ply/header.h"
+#include "scene/ply/rows/header.h"
 
 namespace voxdag::ply {
 
@@ -33,6 +34,10 @@ decltype(auto) with_type(Type type, const Body& body) {
       return body(int32_t{});
     case Type::kUint32:
       return body(uint32_t{});
+    case Type::kInt64:
+      return body(int64_t{});
+    case Type::kUint64:
+      return body(uint64_t{});
     case Type::kFloat:
       return body(float{});
     default:
@@ -52,10 +57,14 @@ T load(const std::byte* bytes, bool is_big_endian) {
 
 template <std::integral T>
 uint32_t as_index(T value) {
-  return value < 0 ? kNoVertex : static_cast<uint32_t>(value);
+  return std::in_range<uint32_t>(value) ? static_cast<uint32_t>(value) : kNoVertex;
 }
 
-// Returns the number of type `type` that the complete text denotes, as parse_integer() or
+// Returns the integer that the complete text denotes, or nullopt. Accepts a real number that is an
+// integer, such as "3.0".
+std::optional<int64_t> parse_whole_number(std::string_view text);
+
+// Returns the number of type `type` that the complete text denotes, as parse_whole_number() or
 // parse_real() read it, or nullopt.
 std::optional<double> parse_number(std::string_view text, Type type);
 

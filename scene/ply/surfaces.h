@@ -1,0 +1,71 @@
+// The colors and textures of a PLY file, apart from the values of single vertices and faces.
+//
+// A triangle is textured if a texture file is named and can be opened, and if its face, or else its
+// vertices, have texture coordinates. Other triangles have the colors of their vertices or, if the
+// vertices have none, of their face.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <mutex>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scene/ply/color_scale.h"
+#include "scene/ply/ply_file.h"
+#include "scene/triangle_source.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::ply {
+
+class Surfaces {
+ public:
+  struct Values {
+    ColorScale vertex_colors, face_colors;
+    // Material 0 is white. Material i + 1 has image i, which is texture file i.
+    SceneMaterials scene;
+  };
+
+  // All references must outlive this object.
+  Surfaces(FileSystem& files, const PlyFile& ply, MemoryBudget& budget, const CancelToken& cancel)
+      : files_(files), ply_(ply), budget_(budget), cancel_(cancel) {}
+
+  // Returns the values. The first call reads the colors of the file, if their type does not
+  // determine their range, and opens the texture files. Thread-safe.
+  const Values& values();
+
+  // Number of materials.
+  uint32_t materials() const {
+    return 1 + static_cast<uint32_t>(ply_.header().texture_files.size());
+  }
+  // True if a texture file can be opened.
+  static bool is_usable(const Values& values, size_t texture) {
+    return texture < values.scene.images.size() && values.scene.images[texture].problem.empty();
+  }
+  // Returns the position of a texture in the list of texture files, from its number in a face.
+  // Returns SIZE_MAX for a number that is no position.
+  static size_t texture_of(double number) {
+    const bool is_position = number >= 0 && number < 65536 && std::floor(number) == number;
+    return is_position ? static_cast<size_t>(number) : SIZE_MAX;
+  }
+  // Returns the properties of faces that surfaces need. The numbers are the channels of the color
+  // and then, if the layout has it, the number of the texture.
+  static RequestedProperties face_properties(const Layout& layout);
+
+ private:
+  void warn(const std::string& what);
+  void open_textures();
+  void scan_vertices();
+  void scan_faces();
+
+  FileSystem& files_;
+  const PlyFile& ply_;
+  MemoryBudget& budget_;
+  const CancelToken& cancel_;
+  std::mutex mutex_;
+  bool is_ready_ = false;
+  Values values_;
+};
+
+}  // namespace voxdag::ply
