@@ -32,6 +32,8 @@ BuildSpec spec_of(const BuildOptions& options) {
   run.keep_work = options.keep_work;
   run.restart = options.restart;
   run.force = options.force;
+  run.strict = options.strict;
+  run.allow_empty = options.allow_empty;
   run.cache_folder = options.cache_folder;
   run.cache_bytes = options.cache_bytes;
   run.memory_bytes = options.memory_bytes;
@@ -75,6 +77,8 @@ BuildResult build(const BuildOptions& options, const BuildHooks& hooks) {
   result.wall_s = report.wall_s;
   result.cpu_s = report.cpu_s;
   result.peak_memory_bytes = report.peak_rss_bytes;
+  for (const Warning& warning : report.warnings)
+    result.warnings.push_back({warning.code, warning.place, warning.message, warning.count});
   result.json = report_json(report);
   return result;
 }

@@ -28,7 +28,7 @@ void add_materials(SceneMaterials& all, SceneMaterials more) {
   }
   std::ranges::move(more.images, std::back_inserter(all.images));
   std::ranges::move(more.names, std::back_inserter(all.names));
-  std::ranges::move(more.warnings, std::back_inserter(all.warnings));
+  all.warnings.add(more.warnings.list());
 }
 
 // Returns a visitor that adds `first_material` to the material index of each triangle, and passes
@@ -128,8 +128,10 @@ class ChainedScene : public TriangleSource {
   std::vector<SourceFile> files() const override {
     return all_of<SourceFile>([](const TriangleSource& source) { return source.files(); });
   }
-  std::vector<std::string> warnings() const override {
-    return all_of<std::string>([](const TriangleSource& source) { return source.warnings(); });
+  std::vector<Warning> warnings() const override {
+    WarningList all;
+    for (const Part& part : parts_) all.add(part.source->warnings());
+    return all.list();
   }
 
  private:

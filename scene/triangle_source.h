@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/memory_budget.h"
+#include "core/base/warning.h"
 #include "core/color/surface.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
@@ -65,7 +66,7 @@ struct ImageSource {
 struct SceneMaterials {
   std::vector<Material> materials = {Material{}};  // at least one
   std::vector<ImageSource> images;                 // images that materials use
-  std::vector<std::string> warnings;               // only about materials and images
+  WarningList warnings;                            // only about materials and images
   std::vector<std::string> names;  // names of the materials listed in the scene's files, in order
 
   // Removes the images, so that materials have only their factors.
@@ -104,9 +105,8 @@ class TriangleSource {
   // All files that the triangles come from, with their identity when they were first opened.
   // Reading throws an Error if a file has another identity when it is opened again.
   virtual std::vector<SourceFile> files() const { return {}; }
-  // Warnings for the user, one sentence each (ignored optional extensions, points and lines that
-  // make no voxels).
-  virtual std::vector<std::string> warnings() const { return {}; }
+  // Warnings about the files (ignored optional extensions, points and lines that make no voxels).
+  virtual std::vector<Warning> warnings() const { return {}; }
 };
 
 struct SceneOptions {

@@ -8,6 +8,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "core/base/text.h"
 #include "scheduler/check_spec.h"
 #include "scheduler/cluster/cluster.h"
 #include "scheduler/stages/attributes/attribute_sections.h"
@@ -56,15 +57,35 @@ void prepare_work_folder(BuildJob& job) {
   job.work.remove_spilled();
 }
 
+// A scene without triangles in the grid is an error, or a warning with --allow-empty.
+void check_empty(BuildJob& job, uint64_t declared) {
+  const BuildReport& report = job.report;
+  std::string message = "has no triangles in the grid";
+  if (declared == 0)
+    message = "has no triangles";
+  else if (report.dropped_invalid == declared)
+    message = "has only invalid triangles (" + count_text(declared) + ")";
+  else if (report.dropped_outside == declared)
+    message = "has " + count_text(declared) + " triangles, all outside the grid";
+  std::string scenes;
+  for (const std::string& scene : job.spec.geometry.scenes)
+    scenes += (scenes.empty() ? "" : ", ") + scene;
+  if (!job.spec.run.allow_empty) {
+    for (const Warning& warning : job.store->warnings()) message += "; " + warning.text();
+    throw Error(ErrorCode::kInvalidInput,
+                scenes + ": " + message + "; --allow-empty writes a file without voxels");
+  }
+  job.context.progress.warn_of_input(
+      {"empty-scene", scenes, message + "; the file will have no nodes"});
+}
+
 void report_scene(BuildJob& job, const IngestState& state) {
   BuildReport& report = job.report;
   report.grid = state.grid;
   report.triangles = state.counts.triangles;
   report.dropped_outside = state.counts.dropped_outside;
   report.dropped_invalid = state.counts.dropped_invalid;
-  if (report.triangles == 0)
-    job.context.progress.warn(
-        "the scene has no triangles in the grid: the file will have no nodes");
+  if (report.triangles == 0) check_empty(job, state.declared_triangles);
 }
 
 // Plan: records the subvolumes in the job store. Resume rule: a stored job keeps its subvolumes; a
@@ -112,10 +133,17 @@ void report_artifacts(BuildJob& job) {
     job.report.artifact_nodes += subvolume.summary.dag_nodes;
 }
 
+// A strict build refuses warnings that an earlier run of the job only reported.
+void refuse_stored_warnings(BuildJob& job) {
+  if (!job.spec.run.strict) return;
+  for (const Warning& warning : job.store->warnings()) refuse_warning(warning);
+}
+
 // Scan, ingest, plan, partition and build: from the scene to artifacts of all subvolumes.
 void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
   PreparedScene scene =
       prepare_scene(job.spec, job.scene, job.budget, job.clock, job.context, job.checkpoint);
+  refuse_stored_warnings(job);
   report_scene(job, scene.state);
   plan(job, scene);
   job.scene.close();  // frees its memory for the subvolumes
@@ -214,6 +242,7 @@ void write_output(BuildJob& job, SubvolumeBuilder& builder) {
 void write_report(BuildJob& job, double start_s) {
   BuildReport& report = job.report;
   report.stages = job.clock.stages();
+  report.warnings = job.store->warnings();
   report.wall_s = wall_seconds() - start_s;
   report.cpu_s = process_cpu_seconds();
   report.peak_rss_bytes = peak_resident_bytes();

@@ -3,6 +3,8 @@
 #include "cli/service/job_text.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
+#include "core/base/warning.h"
+#include "core/fields/json_fields.h"
 
 namespace voxdag::cli {
 namespace {
@@ -16,7 +18,7 @@ class JobView {
     state_ = state;
     const Json& warnings = job.at("warnings");
     for (; warnings_ < warnings.size(); ++warnings_)
-      line_.warn(printable(warnings[warnings_].get<std::string>()));
+      line_.warn(printable(record_from_json<Warning>(warnings[warnings_]).text()));
     if (job.at("progress").is_object()) show_progress(job, job.at("progress"));
   }
 

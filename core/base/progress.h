@@ -10,6 +10,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/warning.h"
+
 namespace voxdag {
 
 // A subvolume of a build, as shown to users.
@@ -51,6 +53,9 @@ class Progress {
   virtual void end_stage() = 0;
   // Reports a warning that a user should read: one sentence.
   virtual void warn(std::string_view message) = 0;
+  // Reports a warning about the input. Throws Error{kInvalidInput} if the command treats these
+  // warnings as errors.
+  virtual void warn_of_input(const Warning& warning) { warn(warning.text()); }
 
   // Reports the grid's low corner and edge length, in the units of the scene. Called before
   // set_subvolumes().

@@ -63,6 +63,8 @@ struct BuildOptions {
   bool keep_work = false;    // keep the work folder after success
   bool restart = false;      // discard the job in the work folder and start over
   bool force = false;        // build although the estimate predicts a lack of memory or disk space
+  bool strict = false;       // throw Error{kInvalidInput} for a warning about the scene
+  bool allow_empty = false;  // build a scene without triangles in the grid instead of refusing it
   std::string cache_folder;  // folder for subvolumes shared between builds; "": no cache
   uint64_t cache_bytes = uint64_t{16} << 30;  // limit of the cache folder
 
@@ -92,6 +94,14 @@ struct BuildHooks {
   const CancelToken* cancel = nullptr;  // build() throws Error{kCanceled} soon after cancel()
 };
 
+// A fault of the scene that did not stop the build.
+struct SceneWarning {
+  std::string code;     // the kind, such as "ignored-extension" (docs/scenes.md)
+  std::string place;    // the first place: the scene file, and the element of the file
+  std::string message;  // one sentence about this place
+  uint64_t count = 1;   // number of places
+};
+
 struct BuildResult {
   std::string output;
   std::string sha256;  // SHA-256 of the output, in hexadecimal digits
@@ -108,7 +118,8 @@ struct BuildResult {
   uint64_t subvolumes_reused = 0;  // subvolumes from an interrupted run or the cache
   double wall_s = 0, cpu_s = 0;
   uint64_t peak_memory_bytes = 0;  // peak resident memory of the complete process
-  std::string json;                // the complete report, as `voxdag build --json` prints it
+  std::vector<SceneWarning> warnings;
+  std::string json;  // the complete report, as `voxdag build --json` prints it
 };
 
 // Runs the build, or resumes the build in its work folder. Also writes the report to output +

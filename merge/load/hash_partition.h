@@ -114,7 +114,7 @@ class HashPartition {
  private:
   class Loader;
 
-  // Returns the first hash of a bucket, which must be less than bucket_count().
+  // Returns the first hash of the bucket with index `bucket`, which is less than bucket_count().
   uint64_t first_hash(size_t bucket) const {
     return bucket == 0 ? interval_.first
                        : ((interval_.first >> bucket_bits_) + bucket) << bucket_bits_;

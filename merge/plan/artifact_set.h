@@ -50,8 +50,9 @@ class ArtifactSet {
   MemoryCharge charge_;
 };
 
-// Reads the indexes of all artifacts, one after another. `wide`: computes the minimum memory for
-// wide levels. Throws Error{kCorrupt} for the same reasons as the constructor of ArtifactSet.
+// Reads the indexes of all artifacts, one after another. If `wide` is set, computes the minimum
+// memory for wide levels, in which a child takes two words (merge/load/row.h). Throws
+// Error{kCorrupt} for the same reasons as the constructor of ArtifactSet.
 ArtifactSurvey survey_artifacts(std::span<const ArtifactRef> refs, const OpenSegment& open,
                                 const DagShape& shape, bool wide);
 

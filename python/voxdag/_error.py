@@ -33,7 +33,10 @@ def path_text(path: Path) -> str:
     except UnicodeEncodeError:
         usable = False
     if not usable:
-        raise Error(f"the path {text!r}: expected a path that a file can have", "invalid_input")
+        raise Error(
+            f"the path {text!r}: expected text without NUL that the file system can encode",
+            "invalid_input",
+        )
     return text
 
 

@@ -61,9 +61,7 @@ def render(
     if progress is not None and not callable(progress):
         raise TypeError(f"progress={progress!r}: expected a function or None")
     samples = _whole(samples, 1, 8, f"samples {samples!r}: expected 1 to 8")
-    threads = _whole(
-        threads, 0, 1 << 16, f"threads {threads!r}: expected 0 (all) to {1 << 16}"
-    )
+    threads = _whole(threads, 0, 1 << 16, f"threads {threads!r}: expected 0 (all) to {1 << 16}")
     place = None if camera is None else _point(camera, "camera")
     aim = (0.0, 0.0, 0.0) if target is None else _point(target, "target")
     file = path_text(path)

@@ -104,13 +104,7 @@ class GltfScene : public TriangleSource {
     for (const SourceFile& file : external_files_.all()) all.push_back(file);
     return all;
   }
-  std::vector<std::string> warnings() const override {
-    std::vector<std::string> all = document_.warnings;
-    if (document_.further_warnings > 0)
-      all.push_back(document_.path + ": " + std::to_string(document_.further_warnings) +
-                    " further warnings");
-    return all;
-  }
+  std::vector<Warning> warnings() const override { return document_.warnings.list(); }
 
  private:
   BufferReader buffers(unsigned readers) {

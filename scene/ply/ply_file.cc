@@ -27,17 +27,16 @@ PlyFile::PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget,
                 error.message() + "; the first row that is not one line: " + first_irregular_);
   }
   if (small_faces_ > 0)
-    warn("has " + std::to_string(small_faces_) +
-         " faces of fewer than three corners, which make no voxels");
+    warn("degenerate-faces", "", "faces of fewer than three corners make no voxels", small_faces_);
   find_splits(budget, cancel);
 }
 
 void PlyFile::warn_about_header() {
   if (header_.ignored_lines > 0)
-    warn("line " + std::to_string(header_.first_ignored_line) + " of the header begins with " +
-         header_.first_ignored_word + "; it is ignored");
+    warn("ignored-line", "line " + std::to_string(header_.first_ignored_line) + " of the header",
+         "begins with " + header_.first_ignored_word + "; it is ignored", header_.ignored_lines);
   if (layout_.face == Layout::kNone && layout_.strips == Layout::kNone)
-    warn("has no element face, points make no voxels");
+    warn("no-faces", "", "has no element face, points make no voxels");
 }
 
 std::unique_ptr<Rows> PlyFile::open_faces(RequestedProperties others, MemoryBudget& budget) const {
@@ -175,12 +174,15 @@ void PlyFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
     }
   }
   if (doubtful > 0)
-    warn("face " + std::to_string(first_doubtful) + ": " + std::to_string(doubtful) +
-         " faces have edges that cross each other, so their area is doubtful; they are read as "
-         "fans");
+    warn("crossing-edges", "face " + std::to_string(first_doubtful),
+         "its edges cross each other, so its area is doubtful; it is read as a fan", doubtful);
 }
 
-void PlyFile::warn(const std::string& what) { warnings_.push_back(file_->path() + ": " + what); }
+void PlyFile::warn(const char* code, const std::string& place, const std::string& message,
+                   uint64_t count) {
+  warnings_.add(
+      {code, place.empty() ? file_->path() : file_->path() + ": " + place, message, count});
+}
 
 void PlyFile::refuse(const std::string& what) const { voxdag::refuse(file_->path(), what); }
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/base/memory_budget.h"
+#include "core/base/warning.h"
 #include "core/io/file_system.h"
 #include "scene/growing_charge.h"
 #include "scene/ply/layout.h"
@@ -48,7 +49,7 @@ class PlyFile {
   const Layout& layout() const { return layout_; }
   uint64_t face_triangles() const { return face_triangles_; }
   uint64_t triangles() const { return face_triangles_ + strip_triangles_; }
-  const std::vector<std::string>& warnings() const { return warnings_; }
+  const std::vector<Warning>& warnings() const { return warnings_.list(); }
 
   const Element& vertex_element() const { return header_.elements[layout_.vertex]; }
   uint64_t vertices_begin() const { return vertices_begin_; }
@@ -66,7 +67,9 @@ class PlyFile {
   StripReader open_strips(MemoryBudget& budget) const;
 
  private:
-  void warn(const std::string& what);
+  // `place`: the part of the file; "" is the file.
+  void warn(const char* code, const std::string& place, const std::string& message,
+            uint64_t count = 1);
   void warn_about_header();
   void pass_over_elements(MemoryBudget& budget, const CancelToken& cancel);
   uint64_t pass_over(size_t element, uint64_t begin, MemoryBudget& budget,
@@ -90,7 +93,7 @@ class PlyFile {
   std::deque<StripReader::Position> strip_blocks_;
   GrowingCharge charge_;         // charge for the blocks
   std::string first_irregular_;  // the first row of an ASCII file that is not exactly one line
-  std::vector<std::string> warnings_;
+  WarningList warnings_;
 };
 
 }  // namespace voxdag::ply

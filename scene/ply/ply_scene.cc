@@ -34,7 +34,7 @@ class PlyScene : public TriangleSource {
   std::vector<SourceFile> files() const override {
     return {{ply_.file().path(), ply_.file().identity()}};
   }
-  std::vector<std::string> warnings() const override { return ply_.warnings(); }
+  std::vector<Warning> warnings() const override { return ply_.warnings(); }
 
  private:
   const PlyFile ply_;

@@ -62,11 +62,12 @@ void Surfaces::open_textures() {
   }
   if (!scene.images.empty() && layout.vertex_texture.empty() &&
       layout.face_texture == Layout::kNone)
-    warn("names texture files, but has no texture coordinates; the textures are ignored");
+    warn("unused-texture", "",
+         "names texture files, but has no texture coordinates; the textures are ignored");
   if (layout.ignored_colors.empty()) return;
   std::string names;
   for (const std::string& name : layout.ignored_colors) names += (names.empty() ? "" : ", ") + name;
-  warn("the colors " + names + " are ignored");
+  warn("ignored-colors", "", "the colors " + names + " are ignored");
 }
 
 void Surfaces::scan_vertices() {
@@ -111,13 +112,14 @@ void Surfaces::scan_faces() {
   }
   scale.set_full_intensities();
   if (has_texture && faults > 0)
-    warn("face " + std::to_string(first_fault) + ": " + std::to_string(faults) +
-         " faces have no texture coordinates, or a texture number without file; they have no "
-         "texture");
+    warn("missing-texture-coordinates", "face " + std::to_string(first_fault),
+         "has no texture coordinates, or a texture number without file; it has no texture", faults);
 }
 
-void Surfaces::warn(const std::string& what) {
-  values_.scene.warnings.push_back(ply_.file().path() + ": " + what);
+void Surfaces::warn(const char* code, const std::string& place, const std::string& message,
+                    uint64_t count) {
+  const std::string& path = ply_.file().path();
+  values_.scene.warnings.add({code, place.empty() ? path : path + ": " + place, message, count});
 }
 
 }  // namespace voxdag::ply

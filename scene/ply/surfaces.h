@@ -54,7 +54,9 @@ class Surfaces {
   static RequestedProperties face_properties(const Layout& layout);
 
  private:
-  void warn(const std::string& what);
+  // `place`: the part of the file; "" is the file.
+  void warn(const char* code, const std::string& place, const std::string& message,
+            uint64_t count = 1);
   void open_textures();
   void scan_vertices();
   void scan_faces();

@@ -224,15 +224,15 @@ class TextureSet::Builder {
 
   // Removes unreadable images from the materials, with a warning for each.
   std::unique_ptr<TextureSet> finish(Progress& progress) {
-    for (const std::string& warning : materials_.warnings) progress.warn(warning);
+    for (const Warning& warning : materials_.warnings.list()) progress.warn_of_input(warning);
     set_->materials_ = materials_.materials;
     TextureLayout& layout = set_->layout_;
     for (size_t i = 0; i < levels_.size(); ++i) {
       layout.first_level.push_back(static_cast<uint32_t>(layout.levels.size()));
       std::ranges::copy(levels_[i], std::back_inserter(layout.levels));
       if (problems_[i].empty()) continue;
-      progress.warn(materials_.images[i].name + users_[i] + " " + problems_[i] +
-                    "; its base color factor is used alone");
+      progress.warn_of_input({"unusable-image", materials_.images[i].name + users_[i],
+                              problems_[i] + "; its base color factor is used alone"});
       for (Material& material : set_->materials_)
         if (material.image == i) material.image = Material::kNoImage;
     }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/warning.h"
 #include "core/geometry/grid.h"
 #include "merge/merge.h"
 #include "scheduler/spec/stage_clock.h"
@@ -39,6 +40,7 @@ struct BuildReport {
   uint64_t peak_rss_bytes = 0;
   std::optional<ColorReport> colors;     // only for a build with colors
   std::optional<ClusterTotals> cluster;  // only for a cluster build
+  std::vector<Warning> warnings;         // warnings about the scene
   std::string merge_request;  // only if a merge job wrote the output (MergeJob::request())
 };
 

@@ -97,8 +97,10 @@ struct RunOptions {
   // end.
   double lock_wait_s = 30;
   bool keep_work = false;
-  bool restart = false;  // discard the job in the work folder and start over
-  bool force = false;    // build even if the estimate does not fit
+  bool restart = false;      // discard the job in the work folder and start over
+  bool force = false;        // build even if the estimate does not fit
+  bool strict = false;       // treat warnings about the scene as errors
+  bool allow_empty = false;  // build a scene without triangles in the grid instead of refusing it
   std::optional<ClusterOptions> cluster;
 };
 

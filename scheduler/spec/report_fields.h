@@ -99,6 +99,7 @@ void fields(Visitor& visit, BuildReport& report) {
                 report.wall_s > 0 ? static_cast<double>(report.merge.voxels) / report.wall_s : 0.0);
   visit("colors", report.colors);
   visit("cluster", report.cluster);
+  visit("warnings", report.warnings);
   visit(Field("merge_request").omit_empty(), report.merge_request);
 }
 

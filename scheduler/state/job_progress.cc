@@ -13,6 +13,10 @@ constexpr double kWriteIntervalS = 1;
 
 }  // namespace
 
+void refuse_warning(const Warning& warning) {
+  throw Error(ErrorCode::kInvalidInput, warning.text() + "; --strict makes this an error");
+}
+
 template <class Change>
 void JobProgress::update(bool writes_now, const Change& change) {
   std::unique_lock lock(mutex_);
@@ -75,6 +79,13 @@ void JobProgress::set_total(uint64_t total) {
 void JobProgress::end_stage() {
   shown_.end_stage();
   update(true, [](ProgressSnapshot&) {});
+}
+
+void JobProgress::warn_of_input(const Warning& warning) {
+  if (is_strict_) refuse_warning(warning);
+  shown_.warn_of_input(warning);
+  std::lock_guard lock(store_mutex_);
+  if (store_) store_->add_warning(warning);
 }
 
 void JobProgress::record_failure(const Error& error) {

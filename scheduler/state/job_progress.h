@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/progress.h"
+#include "core/base/warning.h"
 #include "scheduler/state/job_store.h"
 #include "scheduler/state/work_folder.h"
 
@@ -16,8 +17,9 @@ namespace voxdag {
 
 class JobProgress : public Progress {
  public:
-  JobProgress(Progress& shown, JobStore& store, const WorkFolder& work)
-      : shown_(shown), work_(work), store_(&store) {}
+  // `is_strict`: warnings about the input are errors.
+  JobProgress(Progress& shown, JobStore& store, const WorkFolder& work, bool is_strict)
+      : shown_(shown), work_(work), is_strict_(is_strict), store_(&store) {}
 
   void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override;
   void resume_at(uint64_t done) override;
@@ -25,6 +27,8 @@ class JobProgress : public Progress {
   void set_total(uint64_t total) override;
   void end_stage() override;
   void warn(std::string_view message) override { shown_.warn(message); }
+  // Forwards the warning and records it for the report.
+  void warn_of_input(const Warning& warning) override;
   void set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) override {
     shown_.set_subvolumes(resolution, all);
   }
@@ -49,12 +53,16 @@ class JobProgress : public Progress {
 
   Progress& shown_;
   const WorkFolder& work_;
+  const bool is_strict_;
   std::mutex mutex_;  // guards the next two members
   ProgressSnapshot snapshot_;
   double last_written_s_ = 0;
   std::mutex store_mutex_;  // guards store_; a thread that locks both mutexes locks this one first
   JobStore* store_;
 };
+
+// Throws Error{kInvalidInput}: the warning, which is an error in a strict build.
+[[noreturn]] void refuse_warning(const Warning& warning);
 
 // Returns a subvolume in the form that Progress reports.
 SubvolumeStatus status_of(const StoredSubvolume& subvolume, uint32_t grid_levels);

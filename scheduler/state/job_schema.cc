@@ -9,7 +9,7 @@ namespace {
 // "vdag": marks a database as a job store.
 constexpr int64_t kApplicationId = 0x76646167;
 
-constexpr int64_t kSchemaVersion = 7;
+constexpr int64_t kSchemaVersion = 8;
 
 constexpr const char* kTables = R"sql(
 CREATE TABLE job (
@@ -67,6 +67,11 @@ CREATE TABLE ingest (
   id INTEGER PRIMARY KEY CHECK (id = 1),
   record BLOB NOT NULL,
   row_checksum INTEGER NOT NULL
+);
+-- The warnings about the scene so far. Nothing that determines the result.
+CREATE TABLE warning (
+  id INTEGER PRIMARY KEY,
+  code TEXT NOT NULL, place TEXT NOT NULL, message TEXT NOT NULL, count INTEGER NOT NULL
 );
 )sql";
 

@@ -229,7 +229,8 @@ std::vector<StoredSubvolume> JobStore::leaves() {
     auto row = read_row<Sealed<SubvolumeRow>>(rows);
     const std::string name = "subvolume " + std::to_string(row.record.subvolume.id);
     const StoredSubvolume subvolume = unsealed(std::move(row), name).subvolume;
-    if (subvolume.id != ++count) break;
+    if (subvolume.id != count + 1) break;
+    ++count;
     if (subvolume.state == SubvolumeState::kSplit) continue;
     const auto built = built_in_memory_.find(subvolume.id);
     leaves.push_back(built == built_in_memory_.end() ? subvolume : built->second);
@@ -328,10 +329,30 @@ void JobStore::save_ingest(std::span<const std::byte> record) {
 
 void JobStore::forget_ingest() {
   std::lock_guard lock(mutex_);
-  if (database_.integer("SELECT count(*) FROM ingest") == 0) return;
+  if (database_.integer("SELECT EXISTS (SELECT 1 FROM ingest UNION SELECT 1 FROM warning)") == 0)
+    return;
   SqlTransaction transaction(database_);
-  database_.execute("DELETE FROM ingest");
+  database_.execute("DELETE FROM ingest; DELETE FROM warning;");
   transaction.commit();
+}
+
+void JobStore::add_warning(const Warning& warning) {
+  std::lock_guard lock(mutex_);
+  SqlTransaction transaction(database_, Durable::kLater);
+  auto replaced = database_.prepare("DELETE FROM warning WHERE code = ? AND message = ?");
+  replaced.bind(0, warning.code);
+  replaced.bind(1, warning.message);
+  replaced.run();
+  put_row(database_, "warning", warning);
+  transaction.commit();
+}
+
+std::vector<Warning> JobStore::warnings() {
+  std::lock_guard lock(mutex_);
+  auto rows = select_rows<Warning>(database_, "warning", "ORDER BY id");
+  std::vector<Warning> warnings;
+  while (rows.step()) warnings.push_back(read_row<Warning>(rows));
+  return warnings;
 }
 
 std::optional<StoredMerge> JobStore::merge() {

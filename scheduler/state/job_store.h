@@ -25,6 +25,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/warning.h"
 #include "core/dag/sub_dag.h"
 #include "core/db/sqlite.h"
 #include "core/format/artifact/artifact.h"
@@ -116,8 +117,13 @@ class JobStore {
   // or the next job. Throws Error{kCorrupt} if it does not match its checksum.
   std::optional<std::vector<std::byte>> ingest();
   void save_ingest(std::span<const std::byte> record);
-  // Removes the progress of ingest. Does not write to a store without this progress.
+  // Removes the progress of ingest, and the warnings. Does not write to a store without both.
   void forget_ingest();
+
+  // Stores a warning about the scene. Replaces a warning with the same code and message, because a
+  // resumed build repeats warnings.
+  void add_warning(const Warning& warning);
+  std::vector<Warning> warnings();
 
   std::optional<StoredMerge> merge();
   void save_merge(uint32_t level, std::span<const std::byte> state);

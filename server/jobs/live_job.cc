@@ -57,9 +57,9 @@ void LiveJob::apply(const Message& message) {
   if (const auto* subvolumes = std::get_if<SubvolumeTotals>(&message)) subvolumes_ = *subvolumes;
   if (const auto* usage = std::get_if<Usage>(&message)) usage_ = *usage;
   if (const auto* tasks = std::get_if<ClusterTasks>(&message)) cluster_tasks_ = *tasks;
-  if (const auto* warning = std::get_if<Warning>(&message);
-      warning && warnings_.size() < kMaxWarnings)
-    warnings_.push_back(warning->text);
+  if (const auto* reported = std::get_if<WarningReported>(&message);
+      reported && warnings_.size() < kMaxWarnings)
+    warnings_.push_back(reported->warning);
   if (const auto* failure = std::get_if<Failure>(&message)) failure_ = *failure;
   if (const auto* result = std::get_if<Result>(&message)) result_ = result->json;
 }

@@ -29,7 +29,7 @@ class LiveJob {
   uint64_t version() const { return locked(version_); }
   // Returns the cluster tasks of this run; nullopt for a build without a cluster.
   std::optional<ClusterTasks> cluster_tasks() const { return locked(cluster_tasks_); }
-  std::vector<std::string> warnings() const { return locked(warnings_); }
+  std::vector<Warning> warnings() const { return locked(warnings_); }
   std::optional<Failure> failure() const { return locked(failure_); }
   // Returns the result as JSON; "" before the job's process has reported one.
   std::string result() const { return locked(result_); }
@@ -60,7 +60,7 @@ class LiveJob {
   SubvolumeTotals subvolumes_;
   Usage usage_;
   std::optional<ClusterTasks> cluster_tasks_;
-  std::vector<std::string> warnings_;
+  std::vector<Warning> warnings_;
   std::optional<Failure> failure_;
   std::string result_;
   uint64_t version_ = 1;

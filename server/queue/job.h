@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/warning.h"
+
 namespace voxdag::server {
 
 //             ┌── retry ──────────────────────────────┐
@@ -58,7 +60,7 @@ struct Job {
   unsigned interruptions = 0;  // number of consecutive runs that ended because the service ended
   double created_s = 0, started_s = 0, finished_s = 0, not_before_s = 0;
   std::optional<JobError> error;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::string result;    // JSON; "" until the job succeeded
   std::string progress;  // JSON of the last attempt, "" before the first
   Preview preview = Preview::kNone;

@@ -7,6 +7,7 @@
 #include "core/db/table_rows.h"
 #include "core/io/random_id.h"
 #include "server/base/json_text.h"
+#include "server/base/warning_json.h"
 #include "server/disk/store.h"
 
 namespace voxdag::server {
@@ -68,10 +69,17 @@ CREATE TABLE idempotency (
 CREATE INDEX idempotency_by_job ON idempotency (job);
 )sql";
 
+// In version 3 a warning was a text.
+constexpr const char* kUpgrade = R"sql(
+UPDATE job SET warnings = (
+  SELECT json_group_array(
+      json_object('code', 'build', 'place', '', 'message', value, 'count', 1))
+  FROM json_each(job.warnings))
+WHERE json_valid(warnings);
+)sql";
+
 // Application id "vdsv": the queue of a service.
-const StoreFormat kQueueFormat = {
-    "a queue", "jobs",  0x76647376,
-    3,         kSchema, "ALTER TABLE job ADD COLUMN interruptions INTEGER NOT NULL DEFAULT 0"};
+const StoreFormat kQueueFormat = {"a queue", "jobs", 0x76647376, 4, kSchema, kUpgrade};
 
 // A row of the table `job`. The columns scenes, error and warnings contain JSON, because SQL has no
 // type for them.
@@ -143,7 +151,7 @@ Job read_job(const SqlStatement& statement) {
   check(is_json(job.progress), job.progress, "");
   check(is_json(job.result), job.result, "");
   if (job.error && job.error->code.empty()) job.error.reset();
-  if (damaged) job.warnings.push_back("the record of this job is damaged");
+  if (damaged) job.warnings.push_back({"build", "", "the record of this job is damaged"});
   return std::move(job);
 }
 

@@ -53,6 +53,7 @@ FileTileSource::FileTileSource(const std::string& path, const FileIdentity& iden
                                std::shared_ptr<ManifestCache> manifests)
     : identity_(identity),
       bytes_(std::move(bytes)),
+      path_(path),
       mapping_(bytes_->data(), bytes_->size()),
       file_(read_header(path)),
       blocks_(*file_),
@@ -88,7 +89,9 @@ const std::string& FileTileSource::manifest(const CancelToken& cancel) const {
 
 void FileTileSource::expect_readable() const {
   if (mapping_.is_damaged())
-    throw Error(ErrorCode::kIo, "the DAG was truncated, or its disk failed, while it was viewed");
+    throw Error(
+        ErrorCode::kIo,
+        path_ + " was truncated, or its disk failed, while it was viewed: restore or rebuild it");
 }
 
 bool FileTileSource::was_overwritten() const {

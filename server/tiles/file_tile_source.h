@@ -49,6 +49,7 @@ class FileTileSource : public TileSource {
 
   const FileIdentity identity_;
   const std::shared_ptr<const voxdag_reader::Bytes> bytes_;
+  const std::string path_;
   const WatchedMapping mapping_;  // created before the first byte is read
   const std::unique_ptr<voxdag_reader::File> file_;
   const CheckedBlocks blocks_;

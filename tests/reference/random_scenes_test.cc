@@ -96,11 +96,14 @@ TEST_F(RandomScenes, SeveralFilesAreOneScene) {
   EXPECT_EQ(contents(run(spec).output), contents(whole.output));
 }
 
-// If no triangle is in the grid, the result is a valid file without nodes.
+// If no triangle is in the grid, a build with allow_empty writes a valid file without nodes.
 TEST_F(RandomScenes, EmptyScenes) {
   const Triangles none, outside = {{{{-999, -999, -999}, {-999, -1, -1}, {-1, -999, -999}}}};
   for (const Triangles& scene : {none, outside}) {
-    const auto report = expect_right(scene, 64, spec_for(scene, 64));
+    auto spec = spec_for(scene, 64);
+    EXPECT_THROW(run(spec), voxdag::Error);
+    spec.run.allow_empty = true;
+    const auto report = expect_right(scene, 64, spec);
     EXPECT_EQ(report.merge.dag_nodes, 0u);
     EXPECT_EQ(report.dropped_outside, scene.size());
   }

@@ -416,7 +416,7 @@ TEST_F(View, ShowsASingleBrickAndAnEmptyScene) {
   EXPECT_EQ(m["root_brick"],
             (Json{static_cast<uint32_t>(mask), static_cast<uint32_t>(mask >> 32)}));
   EXPECT_EQ(status("0/0", m["digest"]), 404);
-  build("64", "--bounds 100,100,100,1");
+  build("64", "--bounds 100,100,100,1 --allow-empty");
   m = manifest();
   EXPECT_TRUE(m["root"].is_null()) << m;
   EXPECT_EQ(m["voxels"], "0");

@@ -80,7 +80,7 @@ class ColorVerifier {
   ColorRegion check_region(const ColorTier& tier, uint64_t i) const {
     ColorRegion region;
     if (!ColorSection::region(tier, i, region))
-      fail(tier, i, "its counts or its position are invalid");
+      fail(tier, i, "a count of cells or the place of its data is out of range");
     for (int at = 29; at < 32; ++at)
       if (tier.directory[32 * i + static_cast<uint64_t>(at)] != 0)
         fail(tier, i,
@@ -184,7 +184,7 @@ class ColorVerifier {
     for (uint64_t i = ColorSection::lower_bound(below, code << 3); i < below.region_count; ++i) {
       ColorRegion region;
       if (!ColorSection::region(below, i, region))
-        fail(below, i, "its counts or its position are invalid");
+        fail(below, i, "a count of cells or the place of its data is out of range");
       if (region.morton >> 3 != code || count == 8) break;
       children[count++] = region.value(region.cells - 1);
     }
@@ -237,7 +237,7 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
       uint64_t expected = 0;
       ColorRegion before;
       if (i > 0 && !ColorSection::region(tier, i - 1, before))
-        verifier.fail(tier, i - 1, "its counts or its position are invalid");
+        verifier.fail(tier, i - 1, "a count of cells or the place of its data is out of range");
       if (i > 0) expected = before.first_unit + before.units();
       if (region.first_unit != expected)
         verifier.fail(tier, i,

@@ -262,8 +262,8 @@ void check_joint_sets(Document& d, const Primitive& primitive, uint64_t vertices
 void warn_of_leftovers(Document& d, const Primitive& primitive, const std::string& where) {
   const int corners = primitive.indices >= 0 ? primitive.indices : primitive.position;
   if (primitive.mode != kTriangleList || at(d.accessors, corners).count % 3 == 0) return;
-  d.warn(where + ": " + d.name_accessor(corners) +
-         " is not a multiple of three, the surplus corners are ignored");
+  d.warn("surplus-corners", where + ": " + d.name_accessor(corners),
+         "its count is not a multiple of three; the surplus corners are ignored");
 }
 
 void check_triangles(Document& d, Primitive& primitive, const std::vector<double>& weights,
@@ -297,8 +297,8 @@ void check_mesh(Document& d, int index) {
       ++without_triangles;
   }
   if (without_triangles > 0)
-    d.warn(d.name_mesh(index) + " has " + std::to_string(without_triangles) +
-           " primitives of points or lines, which make no voxels");
+    d.warn("points-or-lines", d.name_mesh(index), "primitives of points or lines make no voxels",
+           static_cast<uint64_t>(without_triangles));
 }
 
 void check_skin(Document& d, int index) {

@@ -7,8 +7,6 @@
 namespace voxdag::gltf {
 namespace {
 
-constexpr size_t kMaxWarnings = 20;
-
 struct ComponentInfo {
   const char* name;
   int bytes;
@@ -31,11 +29,9 @@ std::string name_of(const char* kind, const std::deque<T>& all, int index) {
 
 }  // namespace
 
-void Document::warn(const std::string& what) {
-  if (warnings.size() < kMaxWarnings)
-    warnings.push_back(path + ": " + what);
-  else
-    ++further_warnings;
+void Document::warn(const char* code, const std::string& place, const std::string& message,
+                    uint64_t count) {
+  warnings.add({code, place.empty() ? path : path + ": " + place, message, count});
 }
 
 std::string Document::name_node(int node) const { return name_of("node ", nodes, node); }

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/warning.h"
 #include "scene/gltf/document/compression.h"
 #include "scene/gltf/document/tinygltf_model.h"
 #include "scene/gltf/json/file_range.h"
@@ -175,12 +176,12 @@ struct Document {
   std::deque<std::vector<int>> scenes;                 // root nodes of each scene
   std::shared_ptr<const DocumentMaterials> materials;  // set by resolve_materials()
   int scene = -1;                                      // the default scene; -1: none
-  std::vector<int> roots;             // roots of the scene to draw; set by check_document()
-  std::vector<std::string> warnings;  // only the first 20
-  uint64_t further_warnings = 0;      // number of the others
+  std::vector<int> roots;  // roots of the scene to draw; set by check_document()
+  WarningList warnings;
 
-  // Adds "<path>: <what>" to the warnings or, if there are many, to their number.
-  void warn(const std::string& what);
+  // Adds a warning about `place`, an element of the document; "" is the document.
+  void warn(const char* code, const std::string& place, const std::string& message,
+            uint64_t count = 1);
 
   // Return a kind, an index and a name for messages: node 3 "wheel".
   std::string name_node(int node) const;

@@ -131,7 +131,8 @@ void ModelReader::parse(Document& document) {
     model_->materials.clear();
     model_->textures.clear();
     model_->samplers.clear();
-    document.warn("its materials cannot be used: " + printable(errors, kMaxReasonBytes));
+    document.warn("unusable-materials", "",
+                  "its materials cannot be used: " + printable(errors, kMaxReasonBytes));
   }
   model_->images = std::move(images);
   document.model = std::move(model_);

@@ -131,7 +131,7 @@ Document read_document(const ReadableFile& file, MemoryBudget& budget, const Can
       d.quantized = d.quantized || name == "KHR_mesh_quantization";
   for (const std::string& name : d.model->extensionsUsed)
     if (may_change_geometry(name))
-      d.warn("the optional extension " + printable(name) + " is ignored");
+      d.warn("ignored-extension", "", "the optional extension " + printable(name) + " is ignored");
   trim_heap();  // returns the parser's freed blocks to the system
   return d;
 }

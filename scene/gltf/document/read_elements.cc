@@ -153,7 +153,8 @@ Transform read_transform(const JsonElement& node, const std::string& where, Docu
   }
   if (!is_finite(local)) throw Violation{where + ": its transform is not finite"};
   if (rotation.size() == 4 && !is_unit(rotation))
-    document.warn(where + ": its rotation is not a unit quaternion, and is used unchanged");
+    document.warn("unnormalized-rotation", where,
+                  "its rotation is not a unit quaternion, and is used unchanged");
   return local;
 }
 

@@ -14,8 +14,6 @@
 namespace voxdag::gltf {
 namespace {
 
-constexpr size_t kMaxMaterialWarnings = 20;
-
 class MaterialResolver {
  public:
   explicit MaterialResolver(Document& document) : document_(document) {
@@ -33,9 +31,6 @@ class MaterialResolver {
       }
     }
     if (result_.materials.empty()) plain_material();
-    if (further_warnings_ > 0)
-      result_.warnings.push_back(document_.path + ": " + std::to_string(further_warnings_) +
-                                 " further warnings about materials");
     document_.materials = std::make_shared<DocumentMaterials>(std::move(result_));
   }
 
@@ -44,8 +39,8 @@ class MaterialResolver {
     MaterialSource source = read_material(*document_.model, index);
     source.material.number = static_cast<uint32_t>(index);
     if (!source.problem.empty())
-      warn("material " + numbered(index, source.material.name) + ": " + source.problem +
-           "; its base color factor is used alone");
+      warn("unusable-texture", "material " + numbered(index, source.material.name),
+           source.problem + "; its base color factor is used alone");
     if (source.image >= 0) {
       const auto found = std::ranges::find(result_.images, source.image);
       source.material.image = static_cast<uint32_t>(found - result_.images.begin());
@@ -74,8 +69,9 @@ class MaterialResolver {
       }
     } else {
       if (primitive.material >= 0)
-        warn(where_ + ": material " + std::to_string(primitive.material) +
-             " does not exist; the primitive is white");
+        warn("missing-material", where_,
+             "material " + std::to_string(primitive.material) +
+                 " does not exist; the primitive is white");
       surface.material = plain_material();
     }
     place_draco_surface(document_, primitive, set);
@@ -90,10 +86,11 @@ class MaterialResolver {
   int texture_coordinates(const Primitive& primitive, int set) {
     const std::vector<int>& sets = primitive.texture_coordinates;
     if (static_cast<size_t>(set) < sets.size()) return sets[static_cast<size_t>(set)];
-    warn(where_ + ": has no TEXCOORD_" + std::to_string(set) + ", which material " +
-         numbered(primitive.material,
-                  result_.materials[static_cast<size_t>(primitive.material)].name) +
-         " needs; its base color factor is used alone");
+    warn("missing-texture-coordinates", where_,
+         "has no TEXCOORD_" + std::to_string(set) + ", which material " +
+             numbered(primitive.material,
+                      result_.materials[static_cast<size_t>(primitive.material)].name) +
+             " needs; its base color factor is used alone");
     return -1;
   }
 
@@ -124,7 +121,10 @@ class MaterialResolver {
       check_count(document_, index, vertices, use.where);
     } catch (const Error& error) {
       index = -1;
-      warn_as_is(error.message() + "; it is left out");
+      const std::string prefix = document_.path + ": ";
+      const std::string& message = error.message();
+      warn("unusable-attribute", "",
+           message.substr(message.starts_with(prefix) ? prefix.size() : 0) + "; it is left out");
     }
   }
 
@@ -143,12 +143,8 @@ class MaterialResolver {
     return place->second;
   }
 
-  void warn(const std::string& what) { warn_as_is(document_.path + ": " + what); }
-  void warn_as_is(std::string what) {
-    if (result_.warnings.size() < kMaxMaterialWarnings)
-      result_.warnings.push_back(std::move(what));
-    else
-      ++further_warnings_;
+  void warn(const char* code, const std::string& place, const std::string& message) {
+    result_.warnings.add({code, document_.path + (place.empty() ? "" : ": " + place), message});
   }
 
   Document& document_;
@@ -157,7 +153,6 @@ class MaterialResolver {
   std::optional<uint32_t> plain_;
   std::map<uint32_t, uint32_t> without_image_;
   std::string where_;
-  uint64_t further_warnings_ = 0;
 };
 
 }  // namespace

@@ -19,7 +19,7 @@ struct DocumentMaterials {
   std::vector<Material> materials;
   std::vector<TextureTransform> transforms;  // transform of each material's texture coordinates
   std::vector<int> images;                   // indices of used images in the model
-  std::vector<std::string> warnings;         // the first few, and a line with the number of others
+  WarningList warnings;
 };
 
 // Sets document.materials and the surfaces of its primitives. Call it once, after check_document().

@@ -69,7 +69,7 @@ class Preparation {
     const TriangleSource& scene = scene_.open();
     state_.declared_triangles = scene.declared_triangles();
     if (state_.position == 0) checkpoint_.check_disk_space(scene);
-    for (const std::string& warning : scene.warnings()) context_.progress.warn(warning);
+    for (const Warning& warning : scene.warnings()) context_.progress.warn_of_input(warning);
   }
 
   // Enables checkpoints. If the scene's files are slightly too young for their times to be trusted,

@@ -64,8 +64,10 @@ void merge_artifacts(BuildJob& job, GlobalFileWriter& out) {
                                 job.context.progress, job.context.cancel, &checkpoint);
   report.spill_bytes += report.merge.scratch_bytes;
   if (report.merge.voxels == 0 && report.triangles > 0)
-    job.context.progress.warn("none of the " + std::to_string(report.triangles) +
-                              " triangles near the grid touches it: the file will have no nodes");
+    job.context.progress.warn_of_input(
+        {"no-voxels", job.spec.geometry.scenes.front(),
+         "none of the " + std::to_string(report.triangles) +
+             " triangles near the grid touches it: the file will have no nodes"});
   job.clock.finish("merge");
 }
 

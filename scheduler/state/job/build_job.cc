@@ -36,7 +36,7 @@ BuildJob::BuildJob(const BuildSpec& spec_of_build, BuildScene& scene_of_build,
       output_lock(lock_output(outside, spec.run.output, spec.run.lock_wait_s)),
       work(outside, work_folder_of(spec.run), spec.run.lock_wait_s),
       store(open_job_store(outside.files, work, spec.run.restart)),
-      progress(outside.progress, *store, work),
+      progress(outside.progress, *store, work, spec.run.strict),
       context{outside.files, progress, outside.cancel},
       checkpoint(spec, store.get(), work, context),
       start_over(spec.run.restart) {

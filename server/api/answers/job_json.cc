@@ -4,6 +4,7 @@
 
 #include "core/base/text.h"
 #include "server/base/json_text.h"
+#include "server/base/warning_json.h"
 
 namespace voxdag::server {
 namespace {

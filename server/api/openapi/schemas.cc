@@ -159,7 +159,7 @@ void add_jobs(Json& all) {
                        {"progress", named_or_null("Progress")},
                        {"result", named_or_null("Result")},
                        {"error", named_or_null("JobError")},
-                       {"warnings", array(text())},
+                       {"warnings", array(record_schema<Warning>())},
                        {"preview", boolean()},
                        {"links", map_of(text())}});
   all["JobList"] = object({{"jobs", array(named("Job"))},

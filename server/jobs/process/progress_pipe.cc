@@ -69,9 +69,13 @@ void ProgressPipe::end_stage() {
 }
 
 void ProgressPipe::warn(std::string_view message) {
+  warn_of_input({.code = "build", .place = "", .message = std::string(message)});
+}
+
+void ProgressPipe::warn_of_input(const Warning& warning) {
   std::lock_guard lock(mutex_);
-  send(Warning{std::string(message)});
-  log("warning: " + std::string(message));
+  send(WarningReported{warning});
+  log("warning: " + warning.text());
 }
 
 void ProgressPipe::set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) {

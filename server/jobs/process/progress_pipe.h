@@ -26,6 +26,7 @@ class ProgressPipe : public Progress {
   void set_total(uint64_t total) override;
   void end_stage() override;
   void warn(std::string_view message) override;
+  void warn_of_input(const Warning& warning) override;
   void set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) override;
   void set_grid(const std::array<double, 3>& origin, double edge) override;
   void subvolume_begun(int64_t id) override;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/base/json_text.h"
+#include "server/base/warning_json.h"
 
 namespace voxdag {
 
@@ -19,7 +20,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StageResumed, done)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StageAdvanced, done, total)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SubvolumeTotals, built, total, voxels, nodes, bytes)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Usage, memory_bytes, disk_bytes)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Warning, text)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WarningReported, warning)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Failure, code, text)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Result, json)
 void to_json(nlohmann::json& line, const StageEnded&) { line = nlohmann::json::object(); }

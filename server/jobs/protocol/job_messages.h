@@ -46,9 +46,9 @@ struct Usage {
 };
 // "cluster_tasks": the tasks of a build on a cluster, with the members of ClusterTasks.
 using voxdag::ClusterTasks;
-// "warning"
-struct Warning {
-  std::string text;
+// "warning": about the scene. A warning about the machine has the code "build" and no place.
+struct WarningReported {
+  Warning warning;
 };
 // "failure": the last message of a failed job. `code` as in docs/errors.md, or "internal".
 struct Failure {
@@ -60,7 +60,7 @@ struct Result {
 };
 
 using Message = std::variant<StageBegun, StageResumed, StageAdvanced, StageEnded, SubvolumeTotals,
-                             Usage, ClusterTasks, Warning, Failure, Result>;
+                             Usage, ClusterTasks, WarningReported, Failure, Result>;
 
 // Returns one line of JSON, without the newline.
 std::string encode(const Message& message);

@@ -74,7 +74,9 @@ nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, ui
     }
     return frame;
   } catch (const nlohmann::json::exception&) {
-    throw Error(ErrorCode::kCorrupt, "the list of the subvolumes is damaged");
+    throw Error(
+        ErrorCode::kCorrupt,
+        folder.subvolumes() + " is damaged: expected the JSON that the job's process writes");
   }
 }
 

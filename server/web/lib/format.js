@@ -87,6 +87,11 @@ export function titleText(job) {
   return job.name || sceneText(job);
 }
 
+// Returns a warning of a job as a sentence.
+export function warningText({place, message, count}) {
+  return (place ? `${place}: ` : "") + message + (count > 1 ? ` (${count} times)` : "");
+}
+
 export function stateText(state) {
   return state === "canceling" ? "canceling…" : state;
 }

@@ -10,7 +10,8 @@ import {
   sceneText,
   stateText,
   timeText,
-  titleText
+  titleText,
+  warningText
 } from "../lib/format.js";
 import {ClusterView} from "../views/cluster_view.js";
 import {CubesView} from "../views/cubes_view.js";
@@ -108,7 +109,8 @@ class JobPage {
     clear(
         this.places.warnings,
         job.warnings.length > 0 &&
-            h("ul", {class: "notice"}, job.warnings.map((text) => h("li", {}, text))));
+            h("ul", {class: "notice"},
+              job.warnings.map((warning) => h("li", {}, warningText(warning)))));
     this.progress.show(job);
     if (job.progress) this.updateProgress(job.progress);
     this.cubes.update(job);

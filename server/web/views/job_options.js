@@ -25,8 +25,12 @@ class Fields {
         [["", "Bounds of the scene"], ["bounds", "Corner and edge"], ["voxel_size", "Voxel size"]]);
     this.bounds = ["X", "Y", "Z", "Edge"].map(
         (name) => this.number({step: "any", "aria-label": `Bounds: ${name}`, placeholder: name}));
-    this.skipInvalid = this.checkBox("skip-invalid");
-    this.color = this.checkBox("color");
+    this.flags = {
+      skip_invalid: this.checkBox("skip-invalid"),
+      color: this.checkBox("color"),
+      strict: this.checkBox("strict"),
+      allow_empty: this.checkBox("allow-empty"),
+    };
     this.attributes =
         Object.keys(kAttributes).map((name) => this.checkBox(`attribute-${name}`, name));
     this.options = {
@@ -72,7 +76,7 @@ export class JobOptions {
   }
 
   geometryPart() {
-    const {cube, bounds, skipInvalid, color, attributes, options} = this.fields;
+    const {cube, bounds, flags, attributes, options} = this.fields;
     const boundsAttributes = {class: "field", role: "group", "aria-label": "Bounds"};
     this.boundsRow =
         h("div", boundsAttributes, h("span", {class: "label"}, "Low corner and edge"),
@@ -83,18 +87,20 @@ export class JobOptions {
         "At most the resolution; finer voxels have the color of their cell.");
     return h(
         "fieldset", {}, h("legend", {}, "Geometry: determines the result"), field("Cube", cube),
-        this.boundsRow, this.sizeRow, checkRow(skipInvalid, "Skip invalid triangles"),
-        checkRow(color, "Colors of the scene"),
+        this.boundsRow, this.sizeRow, checkRow(flags.skip_invalid, "Skip invalid triangles"),
+        checkRow(flags.color, "Colors of the scene"),
         attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,
         field("Hash bits", options.hash_bits));
   }
 
   runPart() {
-    const {priority, options: {memory, threads, subvolume, backend, method}} = this.fields;
+    const {priority, flags, options: {memory, threads, subvolume, backend, method}} = this.fields;
     return h(
         "fieldset", {}, h("legend", {}, "Run: does not affect the result"),
         field("Memory", memory, "For example 512MiB or 8GiB."), field("Threads", threads),
         field("Subvolumes", subvolume), field("Backend", backend), field("Method", method),
+        checkRow(flags.strict, "Treat warnings about the scene as errors"),
+        checkRow(flags.allow_empty, "Allow a result without voxels"),
         field("Priority", priority, "Higher runs earlier; -100 to 100."));
   }
 
@@ -107,7 +113,7 @@ export class JobOptions {
 
   // True if cells have colors or other attributes.
   hasCells() {
-    return [this.fields.color, ...this.fields.attributes].some((input) => input.checked);
+    return [this.fields.flags.color, ...this.fields.attributes].some((input) => input.checked);
   }
 
   // Returns {resolution, priority?, options?}. Throws Problem for an invalid field.
@@ -121,14 +127,14 @@ export class JobOptions {
   }
 
   optionValues() {
-    const {cube, bounds, skipInvalid, color, attributes, options: inputs} = this.fields;
+    const {cube, bounds, flags, attributes, options: inputs} = this.fields;
     const hidden = {voxel_size: cube.value !== "voxel_size", color_resolution: !this.hasCells()};
     const chosen = attributes.filter((input) => input.checked).map((input) => input.value);
     const values = {
       ...(cube.value === "bounds" &&
           {bounds: bounds.map((input) => numberOf(input, "The bounds"))}),
-      ...(skipInvalid.checked && {skip_invalid: true}),
-      ...(color.checked && {color: true}),
+      ...Object.fromEntries(
+          Object.entries(flags).filter(([, input]) => input.checked).map(([name]) => [name, true])),
       ...(chosen.length && {attributes: chosen}),
     };
     for (const [name, input] of Object.entries(inputs)) {
@@ -145,8 +151,8 @@ export class JobOptions {
     if (priority) fields.priority.value = String(priority);
     fields.cube.value = options.bounds ? "bounds" : options.voxel_size ? "voxel_size" : "";
     options.bounds?.forEach((value, i) => fields.bounds[i].value = String(value));
-    fields.skipInvalid.checked = Boolean(options.skip_invalid);
-    fields.color.checked = Boolean(options.color) || attributes.includes("color");
+    for (const [name, input] of Object.entries(fields.flags))
+      input.checked = Boolean(options[name]) || attributes.includes(name);
     for (const input of fields.attributes) input.checked = attributes.includes(input.value);
     for (const [name, input] of Object.entries(fields.options))
       if (options[name] !== undefined) input.value = String(options[name]);

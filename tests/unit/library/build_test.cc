@@ -139,7 +139,12 @@ TEST_F(LibraryBuild, Hooks) {
   hooks.on_warning = [&](std::string_view message) { warnings.emplace_back(message); };
   BuildOptions empty = options("empty.vdag");
   empty.mesh = Mesh{std::span<const float>{}, {}};
-  EXPECT_EQ(build(empty, hooks).voxels, 0u);
+  EXPECT_THROW(build(empty), Error);
+  empty.allow_empty = true;
+  const BuildResult result = build(empty, hooks);
+  EXPECT_EQ(result.voxels, 0u);
+  ASSERT_EQ(result.warnings.size(), 1u);
+  EXPECT_EQ(result.warnings[0].code, "empty-scene");
   EXPECT_FALSE(stages.empty());
   EXPECT_FALSE(warnings.empty()) << "a scene without triangles is worth a warning";
 

@@ -139,7 +139,7 @@ TEST(GltfDraco, SurfacesAreCompressed) {
     primitive["attributes"]["TEXCOORD_0"] = uv;
     primitive["attributes"]["COLOR_0"] = rgba;
     OpenScene open(scene.glb());
-    EXPECT_TRUE(open.source->materials().warnings.empty());
+    EXPECT_TRUE(open.source->materials().warnings.list().empty());
     return surfaces_of(*open.source);
   };
   SceneBuilder plain = plain_scene(*decoded);

@@ -175,7 +175,8 @@ TEST(GltfGeometry, PointsAndLinesAreNamedInAWarning) {
   EXPECT_EQ(open.source->declared_triangles(), 1u);
   EXPECT_EQ(open.triangles(), (std::vector<Corners>{kLower}));
   ASSERT_EQ(open.source->warnings().size(), 1u);
-  EXPECT_NE(open.source->warnings()[0].find("4 primitives of points or lines"), std::string::npos);
+  EXPECT_EQ(open.source->warnings()[0].code, "points-or-lines");
+  EXPECT_EQ(open.source->warnings()[0].count, 4u);
 }
 
 // Corners that fill no triangle are ignored with a warning.
@@ -185,7 +186,7 @@ TEST(GltfGeometry, LeftoverCornersAreNamedInAWarning) {
   OpenScene open(scene_of(scene, {{"attributes", {{"POSITION", positions}}}}).glb());
   EXPECT_EQ(open.triangles(), (std::vector<Corners>{kLower}));
   ASSERT_EQ(open.source->warnings().size(), 1u);
-  EXPECT_NE(open.source->warnings()[0].find("accessor 0 is not a multiple of three"),
+  EXPECT_NE(open.source->warnings()[0].text().find("accessor 0: its count is not a multiple"),
             std::string::npos);
 }
 

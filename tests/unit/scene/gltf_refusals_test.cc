@@ -304,7 +304,7 @@ TEST(GltfRefusals, ExtensionsThatAreNot) {
   OpenScene open(scene.glb());
   EXPECT_EQ(open.triangles().size(), 1u);
   ASSERT_EQ(open.source->warnings().size(), 1u);
-  EXPECT_NE(open.source->warnings()[0].find("ACME_bent"), std::string::npos);
+  EXPECT_NE(open.source->warnings()[0].message.find("ACME_bent"), std::string::npos);
 }
 
 // Invalid triangles end the build, or are dropped and counted with --skip-invalid. Vertices that no

@@ -59,8 +59,9 @@ TEST(PlySurfaces, ColorsOfEveryFamily) {
                 "diffuse_blue", "specular_red", "specular_green", "specular_blue"});
   EXPECT_EQ(color_of(triangle(both, "1 2 3 200 60 20 4 5 6")), kRed);
   OpenScene open(triangle(both, "1 2 3 200 60 20 4 5 6"));
-  ASSERT_EQ(open.source->materials().warnings.size(), 1u);
-  EXPECT_NE(open.source->materials().warnings[0].find("specular_red"), std::string::npos);
+  ASSERT_EQ(open.source->materials().warnings.list().size(), 1u);
+  EXPECT_NE(open.source->materials().warnings.list()[0].text().find("specular_red"),
+            std::string::npos);
 }
 
 TEST(PlySurfaces, AlphaOfEveryFamily) {
@@ -104,7 +105,7 @@ TEST(PlySurfaces, ColorsOfVerticesComeBeforeColorsOfFaces) {
   const std::string file = triangle(rgb, "200 60 20", rgb, "1 2 3");
   EXPECT_EQ(color_of(file), kRed);
   OpenScene open(file);
-  ASSERT_EQ(open.source->materials().warnings.size(), 1u);
+  ASSERT_EQ(open.source->materials().warnings.list().size(), 1u);
 }
 
 // Triangles of one polygon share its color. Strips have the colors of their vertices.
@@ -170,7 +171,7 @@ TEST(PlySurfaces, TexturesOfVertices) {
     EXPECT_EQ(materials.images[0].file.path, "folder/tex one.png");
     EXPECT_EQ(materials.materials.at(1).image, 0u);
     EXPECT_EQ(materials.names, std::vector<std::string>{"tex one.png"});
-    EXPECT_TRUE(materials.warnings.empty());
+    EXPECT_TRUE(materials.warnings.list().empty());
   }
 }
 
@@ -198,8 +199,8 @@ TEST(PlySurfaces, TexturesOfFaces) {
   const SceneMaterials materials = scene.source->materials();
   ASSERT_EQ(materials.images.size(), 2u);
   EXPECT_EQ(materials.images[1].file.path, "folder/b.png");
-  ASSERT_EQ(materials.warnings.size(), 1u);
-  EXPECT_NE(materials.warnings[0].find("face 1: 2 faces have no texture coordinates"),
+  ASSERT_EQ(materials.warnings.list().size(), 1u);
+  EXPECT_NE(materials.warnings.list()[0].text().find("face 1: has no texture coordinates"),
             std::string::npos);
 }
 
@@ -217,7 +218,7 @@ TEST(PlySurfaces, MissingTextures) {
   EXPECT_EQ(present.triangle().corners[0].color, kWhite);
   TexturedScene unused(triangle("", "", "", "", kTexture));
   EXPECT_EQ(unused.triangle().material, 0u);
-  ASSERT_EQ(unused.source->materials().warnings.size(), 1u);
+  ASSERT_EQ(unused.source->materials().warnings.list().size(), 1u);
   for (const char* name : {"/etc/passwd", "C:\\no.png", "http://a/no.png", ""}) {
     TexturedScene absolute(triangle(values, "200 60 20 0 0", "", "",
                                     std::string("comment TextureFile ") + name + "\n"));

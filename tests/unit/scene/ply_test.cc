@@ -97,7 +97,7 @@ TEST(Ply, PolygonsAreFansFromAnyTriangleOn) {
     EXPECT_EQ(open.source->declared_triangles(), expected.size());
     EXPECT_EQ(open.triangles(), expected);
     ASSERT_EQ(open.source->warnings().size(), 1u);
-    EXPECT_NE(open.source->warnings()[0].find("1500 faces of fewer than three corners"),
+    EXPECT_NE(open.source->warnings()[0].text().find("three corners make no voxels (1500 times)"),
               std::string::npos);
     const auto cursor = open.source->open(3);
     for (uint64_t first :
@@ -389,7 +389,7 @@ TEST(Ply, PointsMakeNoTriangles) {
       "property float z\nend_header\n1 2 3\n");
   EXPECT_EQ(open.triangles().size(), 0u);
   ASSERT_EQ(open.source->warnings().size(), 1u);
-  EXPECT_NE(open.source->warnings()[0].find("no element face"), std::string::npos);
+  EXPECT_NE(open.source->warnings()[0].message.find("no element face"), std::string::npos);
 }
 
 // What does not fit the budget is refused, not read.

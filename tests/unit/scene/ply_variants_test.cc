@@ -135,8 +135,7 @@ TEST(PlyVariants, CrossedPolygonsAreCounted) {
                  "end_header\n0 0 0\n1 1 0\n1 0 0\n0 1 0\n3 0 1 2\n4 0 1 2 3\n");
   EXPECT_EQ(open.triangles().size(), 3u);
   ASSERT_EQ(open.source->warnings().size(), 1u);
-  EXPECT_NE(open.source->warnings()[0].find("face 1: 1 faces have edges that cross"),
-            std::string::npos);
+  EXPECT_NE(open.source->warnings()[0].text().find("face 1: its edges cross"), std::string::npos);
 }
 
 TEST(PlyVariants, ListsOfVertices) {
@@ -191,7 +190,7 @@ TEST(PlyVariants, TolerantHeaders) {
   OpenScene unknown(replaced(plain, "element vertex", "Made by hand\nand more\nelement vertex"));
   EXPECT_EQ(unknown.triangles(), kLower);
   ASSERT_EQ(unknown.source->warnings().size(), 1u);
-  EXPECT_NE(unknown.source->warnings()[0].find("line 3 of the header begins with Made"),
+  EXPECT_NE(unknown.source->warnings()[0].text().find("line 3 of the header: begins with Made"),
             std::string::npos);
   EXPECT_NE(error_of_file(replaced(plain, "uchar int", "float int")).message().find("float type"),
             std::string::npos);

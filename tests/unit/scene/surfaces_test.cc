@@ -74,7 +74,7 @@ using Channels = std::array<uint16_t, 4>;
 SurfaceTriangle with_colors(SceneBuilder scene, int accessor) {
   only_primitive(scene)["attributes"]["COLOR_0"] = accessor;
   OpenScene open(scene.glb());
-  EXPECT_TRUE(open.source->materials().warnings.empty());
+  EXPECT_TRUE(open.source->materials().warnings.list().empty());
   return surfaces_of(*open.source).at(0);
 }
 
@@ -111,8 +111,8 @@ TEST(Surfaces, BrokenColorsAreLeftOut) {
   for (const int accessor : {too_few, pairs, 999}) {
     only_primitive(scene)["attributes"]["COLOR_0"] = accessor;
     OpenScene open(scene.glb());
-    ASSERT_EQ(open.source->materials().warnings.size(), 1u);
-    EXPECT_THAT(open.source->materials().warnings[0], HasSubstr("COLOR_0"));
+    ASSERT_EQ(open.source->materials().warnings.list().size(), 1u);
+    EXPECT_THAT(open.source->materials().warnings.list()[0].text(), HasSubstr("COLOR_0"));
     EXPECT_EQ(surfaces_of(*open.source).at(0).corners[0].color,
               Channels({65535, 65535, 65535, 65535}));
     EXPECT_EQ(open.triangles().size(), 1u);
@@ -142,8 +142,8 @@ TEST(Surfaces, TextureCoordinatesOfOtherTypesAndSets) {
   use["extensions"] = {{"KHR_texture_transform", {{"texCoord", 3}}}};
   OpenScene open(scene.glb());
   const SceneMaterials scene_materials = open.source->materials();
-  ASSERT_EQ(scene_materials.warnings.size(), 1u);
-  EXPECT_THAT(scene_materials.warnings[0], HasSubstr("TEXCOORD_3"));
+  ASSERT_EQ(scene_materials.warnings.list().size(), 1u);
+  EXPECT_THAT(scene_materials.warnings.list()[0].text(), HasSubstr("TEXCOORD_3"));
   const uint32_t material = surfaces_of(*open.source).at(0).material;
   ASSERT_LT(material, scene_materials.materials.size());
   EXPECT_EQ(scene_materials.materials[material].image, Material::kNoImage);

@@ -116,7 +116,8 @@ NodeRef PlaneMemo::node(const Plane& plane, PlaneDirection& direction, int64_t f
 
 NodeRef PlaneMemo::tile_node(PlaneDirection& direction, int64_t f, int size_log2) {
   constexpr int kLog2 = PlaneDirection::kSizeLog2;
-  // The plane's offset from the m-th node of the tile is f + 8 * offsets[m].
+  // `f` is the plane's offset (plane.h) from the tile's low corner. From the low corner of the
+  // tile's m-th node, the offset is f + 8 * offsets[m].
   const int64_t* offsets = direction.offsets();
   const int64_t low = direction.min_offset() - f, high = direction.max_offset() - f;
   uint64_t crossed[8];

@@ -190,8 +190,10 @@ TEST(Messages, AreReadAsTheyWereWritten) {
   EXPECT_EQ(tasks.failed_attempts, 1u);
   EXPECT_EQ(tasks.running.at("n2"), 1u);
   EXPECT_EQ(tasks.built_of_node.at("n3"), 2u);
-  EXPECT_EQ(sent(Warning{"a \"text\"\nof two lines"}).text, "a \"text\"\nof two lines");
-  EXPECT_EQ(sent(Warning{"no UTF-8: \xff"}).text.substr(0, 10), "no UTF-8: ");
+  const Warning warning{"a-code", "a \"place\"", "two\nlines", 12};
+  EXPECT_EQ(sent(WarningReported{warning}).warning, warning);
+  EXPECT_EQ(sent(WarningReported{{"", "", "no UTF-8: \xff"}}).warning.message.substr(0, 10),
+            "no UTF-8: ");
   const Failure failure = sent(Failure{"no_space", "full"});
   EXPECT_EQ(failure.code, "no_space");
   EXPECT_EQ(failure.text, "full");
@@ -200,15 +202,17 @@ TEST(Messages, AreReadAsTheyWereWritten) {
 
 TEST(Messages, AreLinesOfNamedMembers) {
   EXPECT_EQ(encode(StageAdvanced{12, 64}), R"({"done":12,"message":"stage_advanced","total":64})");
-  EXPECT_EQ(encode(Warning{"two\nlines"}), R"({"message":"warning","text":"two\nlines"})");
+  EXPECT_EQ(
+      encode(WarningReported{{"a", "b", "two\nlines"}}),
+      R"({"message":"warning","warning":{"code":"a","count":1,"message":"two\nlines","place":"b"}})");
 }
 
 // The service checks the lines of a job's process, because it trusts them no more than a file.
 TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
   for (const char* line :
        {"", "hello", "[]", "null", "{", "{\"a\":1}", "[0,1,2,3,4,5,6,7,8,9,10]", R"({"message":1})",
-        R"({"message":"unknown"})", R"({"message":"warning"})", R"({"message":"warning","text":1})",
-        R"({"message":"stage_advanced","done":1})",
+        R"({"message":"unknown"})", R"({"message":"warning"})",
+        R"({"message":"warning","warning":1})", R"({"message":"stage_advanced","done":1})",
         R"({"message":"stage_advanced","done":-1,"total":2})",
         R"({"message":"stage_advanced","done":1.5,"total":2})",
         R"({"message":"stage_begun","stage":"s","unit":"u","total":"3"})",
@@ -226,7 +230,7 @@ TEST(Messages, MayHaveADeepMember) {
   constexpr size_t kDepth = 1'000'000;
   const std::string deep = std::string(kDepth, '[') + std::string(kDepth, ']');
   EXPECT_TRUE(decode(R"({"message":"stage_ended","x":)" + deep + "}"));
-  EXPECT_FALSE(decode(R"({"message":"warning","text":)" + deep + "}"));
+  EXPECT_FALSE(decode(R"({"message":"warning","warning":)" + deep + "}"));
   EXPECT_FALSE(decode(deep));
 }
 

@@ -51,7 +51,7 @@ TEST_F(Queue, StoresEveryMemberOfAJob) {
     j.state = JobState::kQueued;
     j.attempts = 3;
     j.error = JobError{"no_space", "full", 12.5, true};
-    j.warnings = {"one", "two"};
+    j.warnings = {{"ignored-extension", "a.glb", "one", 3}, {"build", "", "two"}};
     j.progress = "{\"stage\":\"build\"}";
     j.not_before_s = 99;
     j.preview = Preview::kReady;
@@ -66,7 +66,8 @@ TEST_F(Queue, StoresEveryMemberOfAJob) {
   EXPECT_EQ(job->error->code, "no_space");
   EXPECT_EQ(job->error->at_s, 12.5);
   EXPECT_TRUE(job->error->transient);
-  EXPECT_EQ(job->warnings, (std::vector<std::string>{"one", "two"}));
+  EXPECT_EQ(job->warnings,
+            (std::vector<Warning>{{"ignored-extension", "a.glb", "one", 3}, {"build", "", "two"}}));
   EXPECT_EQ(job->progress, "{\"stage\":\"build\"}");
   EXPECT_EQ(job->not_before_s, 99);
   EXPECT_EQ(job->preview, Preview::kReady);
@@ -312,18 +313,15 @@ TEST_F(Queue, NoticesThatItsFileIsGone) {
   EXPECT_THROW(queue_->check_file(), Error) << "another file";
 }
 
-// The queue of the last version is brought to this one.
-TEST_F(Queue, ReadsTheLastVersion) {
+// A queue of version 3, whose warnings are texts, is upgraded.
+TEST_F(Queue, ReadsThePreviousVersion) {
   const std::string id = post().id;
   queue_.reset();
   SqlDatabase(folder_.file("queue.db"), SqlDatabase::Mode::kReadWrite)
-      .execute("ALTER TABLE job DROP COLUMN interruptions; PRAGMA user_version = 2");
+      .execute(R"(UPDATE job SET warnings = '["the disk is slow"]'; PRAGMA user_version = 3)");
   reopen();
-  EXPECT_EQ(queue_->find(id)->interruptions, 0u);
-  set_state(id, JobState::kRunning);
-  reopen();
-  queue_->recover({}, pause_);
-  EXPECT_EQ(queue_->find(id)->interruptions, 1u);
+  const std::vector<Warning> expected{{"build", "", "the disk is slow"}};
+  EXPECT_EQ(queue_->find(id)->warnings, expected);
 }
 
 TEST_F(Queue, MakesNoNewQueueWhereThereWasOne) {

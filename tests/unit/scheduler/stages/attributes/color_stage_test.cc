@@ -188,6 +188,7 @@ TEST_F(ColorStage, NeedNoMaterials) {
 TEST_F(ColorStage, WithoutVoxelsAreNone) {
   BuildSpec s = spec(64);
   s.geometry.bounds = {{100, 100, 100, 1}};
+  s.run.allow_empty = true;
   const BuildReport report = build(s);
   EXPECT_EQ(report.merge.voxels, 0u);
   EXPECT_FALSE(open_global_file(output())->has_colors());
