@@ -1,6 +1,7 @@
 // Triangulates the faces of an indexed mesh, whose corners are vertex indices. Not thread-safe.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -41,11 +42,10 @@ class FaceSplitter {
 
  private:
   bool load(std::span<const uint32_t> corners) {
-    xyz_.clear();
-    for (const uint32_t corner : corners) {
-      if (corner >= vertex_count_) return false;
-      const double* const position = cache_.at(corner);
-      xyz_.insert(xyz_.end(), position, position + 3);
+    xyz_.resize(3 * corners.size());
+    for (size_t i = 0; i < corners.size(); ++i) {
+      if (corners[i] >= vertex_count_) return false;
+      std::copy_n(cache_.at(corners[i]), 3, &xyz_[3 * i]);
     }
     return true;
   }

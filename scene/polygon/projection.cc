@@ -40,6 +40,27 @@ struct FanInPlane {
 
 }  // namespace
 
+bool is_clear_fan(std::span<const double> xyz) {
+  Vector sum{}, low{}, high{};  // sum of magnitudes, minimum and maximum of the areas
+  Vector q = difference(&xyz[3], &xyz[0]);
+  for (size_t k = 2; 3 * k < xyz.size(); ++k) {
+    const Vector p = q;
+    q = difference(&xyz[3 * k], &xyz[0]);
+    const Vector twice_area = cross(p, q);
+    for (size_t a = 0; a < 3; ++a) {
+      sum[a] += std::fabs(twice_area[a]);
+      low[a] = std::min(low[a], twice_area[a]);
+      high[a] = std::max(high[a], twice_area[a]);
+    }
+  }
+  size_t best = 0;
+  for (size_t a = 1; a < 3; ++a)
+    if (sum[a] > sum[best]) best = a;
+  // Outside of this range, products may have been rounded to 0 or infinity.
+  const bool is_in_range = sum[best] > 0x1p-800 && sum[best] < 0x1p1000;
+  return is_in_range && (low[best] >= 0 || high[best] <= 0);
+}
+
 bool normalize(std::span<double> xyz) {
   double largest = 0, sum = 0;
   for (const double c : xyz) {

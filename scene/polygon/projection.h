@@ -20,6 +20,10 @@ struct Projection {
   bool is_fan = false;
 };
 
+// A fast test for most polygons: if it returns true, choose_projection() would return a fan, or a
+// coordinate is not finite. `xyz` holds three coordinates per corner and need not be normalized.
+bool is_clear_fan(std::span<const double> xyz);
+
 // Multiplies the coordinates by a power of two, so that the largest magnitude is from 1/2 to 1.
 // `xyz` holds three finite coordinates per corner. Returns false if a coordinate is not finite.
 bool normalize(std::span<double> xyz);

@@ -7,7 +7,7 @@ namespace voxdag::polygon {
 
 bool Triangulator::triangulate(std::span<double> xyz) {
   is_doubtful_ = false;
-  if (xyz.size() == 9 || !normalize(xyz)) return false;
+  if (xyz.size() == 9 || is_clear_fan(xyz) || !normalize(xyz)) return false;
   const Projection projection = choose_projection(xyz);
   if (projection.is_fan) return false;
   charge_.grow_to(xyz.size() / 3 * kBytesPerCorner);
