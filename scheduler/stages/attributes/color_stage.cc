@@ -143,8 +143,8 @@ void ColorStage::State::open() {
     attributes.push_back({attribute, value_bytes(attribute, materials.names.size())});
   if (wanted.have_names()) check_list(materials.names);
   if (!wanted.use_images()) materials.drop_images();
-  for (const Warning& warning : std::exchange(materials.warnings, {}).list())
-    build.progress.warn_of_input(warning);
+  const WarningList warnings = std::exchange(materials.warnings, {});
+  for (const Warning& warning : warnings.list()) build.progress.warn_of_input(warning);
   images = image_digests(build.files, materials.images, context.threads, build.cancel);
 }
 
