@@ -114,6 +114,10 @@ void declare(Command& command, VerifyCommand& state) {
   command.option("--seed", state.seed, "seed of the sample that --against compares").show_default();
   command.flag("--skip-invalid", state.scene_options.skip_invalid,
                "drop invalid triangles of the scene, as the build did");
+  command.option("--point-radius", state.scene_options.point_radius,
+                 "half edge of the cube that replaces each point, as in the build");
+  command.option("--columns", state.scene_options.columns,
+                 "columns of text files with points, as in the build");
   command.threads_option(state.threads);
   command.json_flag(state.json);
 }

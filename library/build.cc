@@ -20,6 +20,8 @@ BuildSpec spec_of(const BuildOptions& options) {
   geometry.bounds = options.bounds;
   geometry.voxel_size = options.voxel_size;
   geometry.skip_invalid = options.skip_invalid;
+  geometry.point_radius = options.point_radius;
+  geometry.columns = options.columns;
   geometry.hash_bits = options.hash_bits;
   geometry.attributes[Attribute::kColor] = options.color;
   geometry.attributes[Attribute::kAlpha] = options.alpha;

@@ -116,6 +116,12 @@ struct SceneOptions {
   // Path of the temporary file for decompressed geometry, in an existing folder. The name is
   // removed as soon as the file is open. "": a path in a new folder in temporary_parent().
   std::string scratch_path = {};
+  // Half edge of the cube that replaces each point, in the scene's units; 0: a point sets one
+  // voxel.
+  double point_radius = 0;
+  // Names of the columns of text files with points, such as "x,y,z,_,r,g,b"; "": the first row
+  // decides. scene/points/columns.h defines the names.
+  std::string columns = {};
 };
 
 }  // namespace voxdag

@@ -99,6 +99,7 @@ LAYERS = {
         "scene/gltf/json",
         "scene/ply",
         "scene/ply/rows",
+        "scene/points",
         "scene/indexed",
         "scene/polygon",
         "scene/text",

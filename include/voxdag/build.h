@@ -36,8 +36,8 @@ enum class BackendName { kAuto, kCpu, kCuda, kParallelHost };
 enum class MethodName { kDefault, kConsing, kPointers, kHashes };
 
 struct BuildOptions {
-  // The scene: files (glTF 2.0, PLY), a mesh in memory, or both. The files and the mesh form one
-  // scene.
+  // The scene: files (glTF 2.0, PLY, LAS, text with points), a mesh in memory, or both. The files
+  // and the mesh form one scene.
   std::vector<std::string> scenes;
   std::optional<Mesh> mesh;
 
@@ -48,6 +48,12 @@ struct BuildOptions {
   // most one of them can be given. If neither is given, the cube encloses the scene.
   std::optional<std::array<double, 4>> bounds;
   std::optional<double> voxel_size;
+  // Half edge of the cube that replaces each point of a file of points. If it is not given, a point
+  // sets exactly one voxel.
+  std::optional<double> point_radius;
+  // Names of the columns of text files with points, such as "x,y,z,_,r,g,b" (docs/scenes.md). If it
+  // is empty, the file's header line or first row decides.
+  std::string columns;
   bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
   uint32_t hash_bits = 64;    // bits of the node hash, 4 to 64
   // The attributes to store for each cell of the color grid. `color_resolution` is the number of

@@ -77,8 +77,8 @@ class LayoutFinder {
 
   Layout find() {
     out_.vertex = find_element(header_, "vertex");
-    out_.face = find_element(header_, "face");
-    out_.strips = find_element(header_, "tristrips");
+    out_.face = find_rows("face");
+    out_.strips = find_rows("tristrips");
     if (out_.vertex == kNone) refuse("has no element vertex");
     find_axes();
     if (out_.face != kNone) out_.face_indices = find_indices(out_.face, "faces");
@@ -89,6 +89,12 @@ class LayoutFinder {
 
  private:
   const Element& element(size_t index) const { return header_.elements[index]; }
+
+  // Returns kNone for an element without rows.
+  size_t find_rows(const char* name) const {
+    const size_t index = find_element(header_, name);
+    return index == kNone || element(index).count == 0 ? kNone : index;
+  }
 
   void find_axes() {
     const Element& vertex = element(out_.vertex);

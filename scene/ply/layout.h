@@ -15,7 +15,7 @@ namespace voxdag::ply {
 struct Layout {
   static constexpr size_t kNone = RequestedProperties::kNone;
 
-  // Indices of the elements vertex, face and tristrips; kNone if absent.
+  // Indices of the elements vertex, face and tristrips; kNone if absent, or if it has no rows.
   size_t vertex = kNone, face = kNone, strips = kNone;
   std::array<size_t, 3> axes{};  // x, y and z of the vertices
   size_t face_indices = kNone;   // the list of vertex indices

@@ -35,8 +35,6 @@ void PlyFile::warn_about_header() {
   if (header_.ignored_lines > 0)
     warn("ignored-line", "line " + std::to_string(header_.first_ignored_line) + " of the header",
          "begins with " + header_.first_ignored_word + "; it is ignored", header_.ignored_lines);
-  if (layout_.face == Layout::kNone && layout_.strips == Layout::kNone)
-    warn("no-faces", "", "has no element face, points make no voxels");
 }
 
 std::unique_ptr<Rows> PlyFile::open_faces(RequestedProperties others, MemoryBudget& budget) const {

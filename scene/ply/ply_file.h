@@ -47,6 +47,10 @@ class PlyFile {
   Format format() const { return header_.format; }
   const Header& header() const { return header_; }
   const Layout& layout() const { return layout_; }
+  // False if the file has neither faces nor strips. Then its vertices are points.
+  bool has_primitives() const {
+    return layout_.face != Layout::kNone || layout_.strips != Layout::kNone;
+  }
   uint64_t face_triangles() const { return face_triangles_; }
   uint64_t triangles() const { return face_triangles_ + strip_triangles_; }
   const std::vector<Warning>& warnings() const { return warnings_.list(); }

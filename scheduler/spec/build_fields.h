@@ -29,7 +29,7 @@ inline constexpr int64_t kMaxOptionThreads = 1024;
 inline constexpr int64_t kMaxOptionEdge = int64_t{1} << 20;
 
 inline constexpr Field kSceneField =
-    Field("scene", "glTF and PLY files (.glb, .gltf, .ply), together one scene")
+    Field("scene", "scene files (.glb, .gltf, .ply, .las, .xyz, .txt, .csv), together one scene")
         .required()
         .positional()
         .key(false);
@@ -49,6 +49,15 @@ void fields(Visitor& visit, GeometryOptions& g) {
   visit(option("hash_bits", "bits of a node's hash that count").range(4, 64).key(true),
         g.hash_bits);
   visit(option("skip_invalid", "drop and count invalid triangles").key(true), g.skip_invalid);
+  visit(option("point_radius", "half edge of the cube that replaces each point, in scene units")
+            .above_zero()
+            .unset_means("a point sets one voxel"),
+        g.point_radius);
+  visit(option("columns", "columns of text files with points, such as x,y,z,_,r,g,b")
+            .line(1024)
+            .unset_means("the file's header line, or x,y,z and colors")
+            .or_unset(),
+        g.columns);
   visit(option("bounds", "the grid's cube, by its low corner and edge")
             .with(&Field::parts, "X,Y,Z,EDGE")
             .above_zero(),

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "core/fields/json_fields.h"
+#include "scene/points/columns.h"
 #include "scheduler/spec/build_fields.h"
 
 namespace voxdag {
@@ -66,6 +67,8 @@ void check_options(const BuildSpec& spec) {
   const GeometryOptions& g = spec.geometry;
   if (g.resolution == 0)
     json_fields::refuse(kResolutionField.name, expectation<uint64_t>(kResolutionField), 0);
+  if (!g.columns.empty() && !points::Columns::parse(g.columns))
+    json_fields::refuse("columns", points::Columns::kExpected, g.columns);
   if (g.color_resolution && !g.attributes.any())
     json_fields::refuse("color_resolution", "color or attributes as well");
   if (g.color_resolution > g.resolution)

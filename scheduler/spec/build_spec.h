@@ -32,11 +32,13 @@ constexpr std::array<const char*, 2> enum_names(ClusterEngine) { return {"", "sl
 
 // Options that determine the bytes of the global file.
 struct GeometryOptions {
-  std::vector<std::string> scenes;              // glTF and PLY files that together form one scene
+  std::vector<std::string> scenes;              // files that together form one scene
   uint64_t resolution = 0;                      // R, a power of two from 4 to 2^20
   std::optional<std::array<double, 4>> bounds;  // X, Y, Z of the low corner, EDGE
   std::optional<double> voxel_size;
   bool skip_invalid = false;
+  std::optional<double> point_radius;  // half edge of the cube that replaces each point
+  std::string columns;                 // names of the columns of text files with points
   uint32_t hash_bits = 64;
   AttributeSet attributes;  // attributes of the color grid's cells
   // Cells per edge of the color grid, a power of two from 4 to the resolution; 0: the build chooses

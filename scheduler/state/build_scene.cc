@@ -26,10 +26,16 @@ BuildScene::BuildScene(const GeometryOptions& options, const std::string& scratc
 TriangleSource& BuildScene::open() {
   if (!scene_) {
     opened_ns_ = unix_ns();
-    scene_ = open_scene(context_.files, options_.scenes, {options_.skip_invalid, scratch_path_},
-                        budget_, context_.cancel);
+    scene_ = open_scene(context_.files, options_.scenes, scene_options(), budget_, context_.cancel);
   }
   return *scene_;
+}
+
+SceneOptions BuildScene::scene_options() const {
+  return {.skip_invalid = options_.skip_invalid,
+          .scratch_path = scratch_path_,
+          .point_radius = options_.point_radius.value_or(0),
+          .columns = options_.columns};
 }
 
 }  // namespace voxdag

@@ -26,6 +26,8 @@ class BuildScene {
   void close() { scene_.reset(); }
 
  private:
+  SceneOptions scene_options() const;
+
   const GeometryOptions& options_;
   const std::string scratch_path_;
   MemoryBudget& budget_;

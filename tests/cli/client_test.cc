@@ -207,7 +207,8 @@ TEST_F(Client, ReportsErrors) {
   expect_error(3, "none.glb", {"submit", "none.glb", "-r", "64"});
   expect_error(2, "power of two", {"submit", "m.glb", "-r", "100"});
   put("text.obj", "no scene");
-  expect_error(2, "ending with .glb, .gltf or .ply", {"submit", "text.obj", "-r", "64"});
+  expect_error(2, "ending with .glb, .gltf, .ply, .las, .xyz, .txt or .csv",
+               {"submit", "text.obj", "-r", "64"});
   expect_error(2, "text.obj", {"submit", "text.obj", "-r", "64"});
   expect_error(2, "http://", {"jobs", "--server", "ftp://127.0.0.1"});
   expect_error(6, "127.0.0.1:1", {"jobs", "--server", "http://127.0.0.1:1"});

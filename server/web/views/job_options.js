@@ -35,6 +35,8 @@ class Fields {
         Object.keys(kAttributes).map((name) => this.checkBox(`attribute-${name}`, name));
     this.options = {
       voxel_size: this.number({step: "any", min: "0"}),
+      point_radius: this.number({step: "any", min: "0", placeholder: "one voxel"}),
+      columns: h("input", {placeholder: "x,y,z,r,g,b", autocomplete: "off", on}),
       color_resolution: this.choice([kAutomatic, ...gridChoices(kMinLevel, kMaxLevel)]),
       hash_bits: this.number({min: "4", max: "64", step: "1", placeholder: "64"}),
       memory: h("input", {placeholder: "2GiB", autocomplete: "off", on}),
@@ -87,7 +89,11 @@ export class JobOptions {
         "At most the resolution; finer voxels have the color of their cell.");
     return h(
         "fieldset", {}, h("legend", {}, "Geometry: determines the result"), field("Cube", cube),
-        this.boundsRow, this.sizeRow, checkRow(flags.skip_invalid, "Skip invalid triangles"),
+        this.boundsRow, this.sizeRow,
+        field(
+            "Point radius", options.point_radius, "Draws each point as a cube of this half edge."),
+        field("Columns", options.columns, "Names of the columns of text files with points."),
+        checkRow(flags.skip_invalid, "Skip invalid triangles"),
         checkRow(flags.color, "Colors of the scene"),
         attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,
         field("Hash bits", options.hash_bits));
@@ -173,7 +179,7 @@ function checkRow(input, label) {
 
 // Returns the value of an option, in the form that a request needs.
 function valueOf(name, input) {
-  if (["memory", "backend", "method"].includes(name)) return input.value.trim();
+  if (["memory", "backend", "method", "columns"].includes(name)) return input.value.trim();
   return numberOf(input, `The ${name.replace("_", " ")}`);
 }
 

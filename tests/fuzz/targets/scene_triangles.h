@@ -14,14 +14,15 @@ namespace voxdag::fuzz {
 constexpr uint64_t kMaxTriangles = 2000;
 constexpr uint64_t kSceneBudgetBytes = uint64_t{16} << 20;
 
-// Reads all triangles of the file in one batch, and one by one, if it is a scene.
-inline void check_scene(std::string file) {
+// Reads all triangles of the file in one batch, and one by one, if it is a scene. `path` is the
+// name of the file.
+inline void check_scene(std::string file, const std::string& path = "scene") {
   test::MemoryFiles files;
-  files.contents["scene"] = std::move(file);
+  files.contents[path] = std::move(file);
   MemoryBudget budget(kSceneBudgetBytes);
   CancelToken cancel;
   try {
-    const auto scene = open_scene(files, {"scene"}, {.skip_invalid = true}, budget, cancel);
+    const auto scene = open_scene(files, {path}, {.skip_invalid = true}, budget, cancel);
     if (scene->declared_triangles() > kMaxTriangles) return;
     uint64_t visited = 0;
     scene->for_each_batch([&](auto batch) { visited += batch.size(); });

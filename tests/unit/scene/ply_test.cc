@@ -382,16 +382,6 @@ TEST(Ply, HostileTextIsRefused) {
             (std::vector<Corners>{{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}}));
 }
 
-// A cloud of points makes no voxels, which a warning says.
-TEST(Ply, PointsMakeNoTriangles) {
-  OpenScene open(
-      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
-      "property float z\nend_header\n1 2 3\n");
-  EXPECT_EQ(open.triangles().size(), 0u);
-  ASSERT_EQ(open.source->warnings().size(), 1u);
-  EXPECT_NE(open.source->warnings()[0].message.find("no element face"), std::string::npos);
-}
-
 // What does not fit the budget is refused, not read.
 TEST(Ply, WindowsAreChargedToTheBudget) {
   const std::string file = plain_triangle(PlyFormat::kLittle);

@@ -1,0 +1,7 @@
+// LAS files: the header and the records. Every input begins like a LAS file.
+#include "tests/fuzz/targets/scene_triangles.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  voxdag::fuzz::check_scene("LASF" + std::string(reinterpret_cast<const char*>(data), size));
+  return 0;
+}
