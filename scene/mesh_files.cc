@@ -57,9 +57,9 @@ class MeshFile : public ReadableFile {
   uint64_t size() const override { return size_; }
   void read_at(uint64_t offset, std::span<std::byte> out) const override {
     if (offset > size_ || out.size() > size_ - offset)
-      throw Error(ErrorCode::kCorrupt, path_ + ": cannot read " + std::to_string(out.size()) +
-                                           " bytes at offset " + std::to_string(offset) + " of " +
-                                           std::to_string(size_));
+      throw Error(ErrorCode::kCorrupt, path_ + " has " + std::to_string(size_) +
+                                           " bytes: expected " + std::to_string(out.size()) +
+                                           " bytes at offset " + std::to_string(offset));
     while (!out.empty()) {
       const size_t done = read_some(offset, out);
       offset += done;

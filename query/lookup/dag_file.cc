@@ -388,7 +388,8 @@ void DagFile::nearest(std::span<const Position> points, uint32_t grid_levels, do
       for (size_t i = first; i < first + count; ++i) {
         for (const int64_t c : points[i])
           if (c < -kMaxCoordinate || c > kMaxCoordinate)
-            refuse("a point has the coordinate " + std::to_string(c) + ": expected -2^30 to 2^30");
+            refuse("points[" + std::to_string(i) + "] has the coordinate " + std::to_string(c) +
+                   ": expected -2^30 to 2^30");
         cells[i] = find_nearest(state_->view, grid_levels, points[i], max_squared);
       }
     });

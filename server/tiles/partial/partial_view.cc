@@ -162,9 +162,12 @@ void PartialView::update_json(uint64_t resolution) {
 
 void PartialView::find_frame(const JobFolder& folder, uint64_t resolution) {
   if (!frame_.is_null()) return;
-  // Tries to read the frame only once after each reading of the folder.
+  // Calls read_frame() once per reading of the work folder. Here an earlier call with this version
+  // failed, because the list of the subvolumes does not exist yet or is damaged.
   if (std::exchange(frame_version_, version_) == version_)
-    throw Error(ErrorCode::kNotFound, "the subvolumes are not planned yet");
+    throw Error(ErrorCode::kNotFound,
+                folder.subvolumes() +
+                    " is missing or unreadable: expected the list of the planned subvolumes");
   frame_ = read_frame(files_, folder, resolution);
 }
 
