@@ -63,9 +63,10 @@ void ScratchFile::read(uint64_t first_word, std::span<uint32_t> words) const {
     const std::span<uint32_t> whole(block, std::min(kBlockWords, state_.words - begin));
     in_->read_at(begin * sizeof(uint32_t), std::as_writable_bytes(whole));
     if (indexed_checksum(begin, whole) != state_.checksums[begin / kBlockWords])
-      throw Error(ErrorCode::kCorrupt, path_->path() + ": the words from byte " +
-                                           std::to_string(begin * sizeof(uint32_t)) +
-                                           " on fail their checksum");
+      throw Error(ErrorCode::kCorrupt,
+                  path_->path() + ": bytes " + std::to_string(begin * sizeof(uint32_t)) + " to " +
+                      std::to_string((begin + whole.size()) * sizeof(uint32_t) - 1) +
+                      " fail their checksum");
     const auto tail = whole.subspan(first_word - begin);
     const size_t count = std::min(words.size(), tail.size());
     std::copy_n(tail.begin(), count, words.begin());

@@ -84,8 +84,8 @@ struct MemoryPlan {
 
 // Memory of the workers of the color stage.
 struct ColorMemory {
-  // Minimum for baking a region of the color grid in pieces, and enough memory for baking any
-  // region in one piece.
+  // kRegionBytes is the minimum: a large region of the color grid is then baked in pieces.
+  // kSolidRegionBytes is enough to bake any region in one piece.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
   static constexpr uint64_t kSolidRegionBytes = uint64_t{46} << 20;
   // Memory for the attributes other than color in a region. Includes kValueSumBytes for the sums of

@@ -57,8 +57,9 @@ class NodeTable {
   uint64_t total_children() const { return used_ - count_ * Record::kWords; }
   Record record(uint32_t id) { return {&records_[id]}; }
 
-  // Reserves memory for `more` nodes beyond size(). Call it before the functions below. Eight
-  // children can be read from any record, even if the node has fewer.
+  // Makes room for `more` nodes beyond size(). Call it before find_or_add() and the prefetch
+  // functions, which do not grow the table. The room is for eight children per node, so eight
+  // children can be read from any record, even if its node has fewer.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow_slots(count_ + more);
     const uint64_t words = kFirstId + used_ + more * (Record::kWords + 8);

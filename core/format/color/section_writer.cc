@@ -20,15 +20,16 @@ SectionWriter::SectionWriter(GlobalFileWriter& file, Attribute attribute, uint32
 
 void SectionWriter::check(const Tier& tier, const EncodedRegion& region) const {
   const auto fail = [&](const std::string& what) {
-    throw Error(ErrorCode::kCorrupt, file_.path() + ": " + name_of(attribute_) + " of region " +
-                                         std::to_string(region.morton) + " of level " +
-                                         std::to_string(tier.finest - tier.levels()) + ": " + what);
+    throw Error(ErrorCode::kCorrupt,
+                file_.path() + ": " + name_of(attribute_) + " of the region of level " +
+                    std::to_string(tier.finest - tier.levels()) + " with Morton code " +
+                    std::to_string(region.morton) + ": " + what);
   };
   const uint32_t region_bits = 3 * (tier.finest - tier.levels());
   if (region.morton >> region_bits != 0)
     fail("expected a Morton code of " + std::to_string(region_bits) + " bits");
   if (tier.regions > 0 && region.morton <= tier.last_morton)
-    fail("it does not follow region " + std::to_string(tier.last_morton));
+    fail("expected a Morton code above the previous region's, " + std::to_string(tier.last_morton));
   uint64_t cells = 0;
   for (uint32_t i = 0; i <= kRegionLevels; ++i) {
     const uint32_t count = region.counts[i];

@@ -211,8 +211,10 @@ void GlobalFileWriter::write_words(uint64_t first, std::span<const uint32_t> wor
   State& s = *state_;
   if (first > kMaxLevelWords || words.size() > kMaxLevelWords - first)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
-                                       " would have more than " + std::to_string(first) +
-                                       " words: expected at most 2^40, the format's limit");
+                                       " would have at least " +
+                                       std::to_string(first + words.size()) +
+                                       " words: expected at most 2^40 (1099511627776), the "
+                                       "format's limit; use a lower resolution");
   s.file->write_at(s.end + sizeof(uint32_t) * first, std::as_bytes(words));
 }
 
@@ -222,7 +224,8 @@ void GlobalFileWriter::end_level(const GlobalLevel& level) {
   if (words > kMaxLevelWords)
     throw Error(ErrorCode::kLimit, s.path + ": level " + std::to_string(s.current_level()) +
                                        " has " + std::to_string(words) +
-                                       " words, the format's limit is 2^40 per level");
+                                       " words: expected at most 2^40 (1099511627776), the "
+                                       "format's limit; use a lower resolution");
   if (!s.level_open || nodes == 0 || words < 2 * nodes || words != s.checksummed_words)
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(s.current_level()) +
                                          " cannot end with " + std::to_string(nodes) +

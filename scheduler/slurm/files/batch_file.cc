@@ -138,8 +138,9 @@ BatchFile::BatchFile(FileSystem& files, const std::string& path) : file_(files.o
   file_->read_at(0, std::as_writable_bytes(std::span(&prologue, 1)));
   if (std::string_view(prologue.magic, sizeof prologue.magic) != kBatchMagic)
     throw Error(ErrorCode::kUnsupportedVersion,
-                path + ": it is not a batch of this version: expected \"" +
-                    std::string(kBatchMagic) + "\"");
+                path + ": it does not begin with \"" + std::string(kBatchMagic) +
+                    "\": expected a batch file of this version of voxdag; use the same version "
+                    "on all machines");
   if (prologue.header_bytes > std::min(kMaxHeaderBytes, file_->size() - sizeof prologue))
     throw damaged("its header has " + std::to_string(prologue.header_bytes) + " bytes, more than " +
                   std::to_string(std::min(kMaxHeaderBytes, file_->size() - sizeof prologue)));

@@ -123,7 +123,7 @@ void ColorStore::read(const Place& place, std::vector<std::byte>& out) const {
   if (checksum64(out) != place.checksum)
     throw Error(ErrorCode::kCorrupt, path_ + " at offset " + std::to_string(place.offset) +
                                          " fails its checksum: expected the colors that were "
-                                         "there before; run the same command again");
+                                         "written there; run the same command again");
 }
 
 ColorStore::Place ColorStore::add(const Checksum128& key, uint64_t number, bool is_last,

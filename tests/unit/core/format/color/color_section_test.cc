@@ -235,11 +235,11 @@ TEST_F(ColorSectionTest, RegionsMustBeInOrderAndWhole) {
   EXPECT_THAT(error_of([&] {
                 add({regions[1], regions[0]});
               }).message(),
-              HasSubstr("does not follow region"));
+              HasSubstr("above the previous region's, "));
   EXPECT_THAT(error_of([&] {
                 add({regions[1], regions[1]});
               }).message(),
-              HasSubstr("does not follow region"));
+              HasSubstr("above the previous region's, "));
   EXPECT_THAT(error_of([&] { add({}); }).message(), HasSubstr("has no regions"));
   EncodedRegion wrong = regions[0];
   wrong.blocks.pop_back();

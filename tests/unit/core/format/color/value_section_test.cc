@@ -251,7 +251,7 @@ TEST_F(ValueSectionTest, RegionsMustFitTheAttribute) {
   EXPECT_THAT(error_of([&] {
                 add({normals[1], normals[0]});
               }).message(),
-              HasSubstr("does not follow region"));
+              HasSubstr("above the previous region's, "));
 }
 
 }  // namespace
