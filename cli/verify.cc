@@ -18,7 +18,7 @@
 namespace voxdag::cli {
 namespace {
 
-constexpr uint64_t kSceneMemory = uint64_t{64} << 20;  // for windows of the scene's buffers
+constexpr uint64_t kSceneMemory = uint64_t{64} << 20;  // for the loaded parts of the scene's files
 
 struct VerifyCommand {
   std::string path;

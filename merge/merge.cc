@@ -99,8 +99,9 @@ class Merger {
     }
     segment.finish();
     ++context_.report.passes;
-    // Waits, because is_due() is false during a save. The save after this pass releases the bytes
-    // that the pass has merged.
+    // Waits for a running save to end, because is_due() returns false during a save. The save after
+    // this pass must not be skipped for this reason: it releases the bytes that the pass has
+    // merged.
     recovery_.wait();
     const bool is_due = recovery_.is_due();
     const std::vector<SurveyedArtifact> before = pending_.replace_all(merged, segment);

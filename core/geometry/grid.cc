@@ -120,7 +120,8 @@ Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_
 }
 
 void snap_vertices(const Grid& grid, std::span<double> coordinates) {
-  // Both factors are powers of two, so the order of the multiplications does not matter.
+  // The factors of `scale`, 128 and the resolution, are powers of two. So multiplying by `scale` is
+  // the same as multiplying first by the resolution and then by 128, as grid.h defines it.
   const double scale = 128.0 * static_cast<double>(grid.resolution());
   const auto& o = grid.origin;
   const Pair origins[3] = {{o[0], o[1]}, {o[2], o[0]}, {o[1], o[2]}};

@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint32_t kMaxEncodedWords = 1 + kMaxRowWords;  // a row in the scratch file: mask, words
 
-// The rows of the group in one run.
+// The rows of a group (all rows with one hash) that are in one run.
 struct GroupRun {
   size_t run = 0;
   uint64_t first_row = 0;  // first row of the group in the run
@@ -23,7 +23,7 @@ class GroupFile {
   GroupFile(const MergeContext& context, const LevelTask& task, uint64_t hash, uint64_t bytes)
       : context_(context), task_(task), hash_(hash), bytes_(bytes), file_(context.scratch) {}
 
-  // Rewires the rows of all runs into the file.
+  // Writes the group's rows of all runs to the file, with rewired children.
   void fill() {
     PageBuffer<uint32_t> buffer(context_.budget, kBufferWords, "rows of a group of equal hashes");
     buffer_ = std::move(buffer);

@@ -119,7 +119,7 @@ def test_nearest(dag, cells):
     for point, voxel, distance in zip(points, voxels, distances):
         squares = ((all_set - point) ** 2).sum(axis=1)
         assert distance == pytest.approx(np.sqrt(squares.min()))
-        assert tuple(voxel) == tuple(all_set[squares.argmin()])  # in Morton order: the first
+        assert tuple(voxel) == tuple(all_set[squares.argmin()])  # the first in Morton order
 
 
 def test_nearest_at_the_distance_that_it_returns(dag):

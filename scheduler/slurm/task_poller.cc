@@ -98,8 +98,8 @@ void TaskPoller::cancel_held(const std::vector<SlurmTask>& tasks, std::set<uint3
   }
 }
 
-// Ends the attempts whose batches are not in `listed`, the batches that have a task in Slurm.
-// Returns the batches to submit.
+// `listed` are the batches that have a task in Slurm. Ends the attempts of the other open
+// batches whose tasks have ended. Returns the batches to submit, including those without a task.
 std::vector<uint32_t> TaskPoller::end_missing(const std::set<uint32_t>& listed) {
   std::vector<uint32_t> to_submit, to_split;
   for (OpenBatch& batch : batches_.open()) {

@@ -11,8 +11,8 @@ namespace voxdag {
 namespace {
 
 // SQLite has no page checksums. So every row that determines the result has a checksum, and the
-// job's row has the number of subvolumes. Other rows can be missing; their contents are computed
-// again.
+// job's row has the number of subvolumes, so that a missing subvolume is noticed. Rows of other
+// kinds can be missing; their contents are computed again.
 template <class Record>
 struct Sealed {
   Record record;

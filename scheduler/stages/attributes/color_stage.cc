@@ -71,7 +71,7 @@ void check_list(std::span<const std::string> materials) {
                                        " bytes; leave out --attributes material");
 }
 
-// What a thread uses to bake cubes, and the result for the cube that it processes.
+// A thread's objects for baking cubes, and its result for the current cube.
 struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;

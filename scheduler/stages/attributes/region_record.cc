@@ -7,7 +7,7 @@
 namespace voxdag {
 namespace {
 
-// Calls field(value) for each number at a fixed position.
+// Calls field(value) for each number that has a fixed position in the record.
 template <class Region, class Field>
 void for_each_number(Region& region, const Field& field) {
   field(region.morton);

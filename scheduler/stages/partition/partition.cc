@@ -30,8 +30,8 @@ void partition(TriangleStream& triangles, const CubeTree& tree, BinWriter& write
 constexpr size_t kPartitionPiece = 16384;
 constexpr size_t kBatchTriangles = 256;
 
-// A piece of the scene: consecutive triangles, each encoded once for every leaf that it touches, in
-// the order of the scene.
+// A piece of the scene: consecutive triangles, in the order of the scene. Each triangle is encoded
+// once for every leaf of the CubeTree (partition.h) that it touches.
 class TouchedPiece {
  public:
   // Allocates space for 2 * kPartitionPiece records, or kPartitionPiece + `leaves` if that is more.

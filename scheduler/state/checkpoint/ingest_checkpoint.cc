@@ -84,7 +84,8 @@ std::optional<IngestState> IngestCheckpoint::resume() {
     work_.remove_durable();
     return std::nullopt;
   }
-  // Without a job there is no plan with the cubes into which the triangles were partitioned.
+  // At stage kReady the triangles are only in the bins of the planned cubes. The plan is stored
+  // with the job, so without a job such a checkpoint is useless.
   if (record_->request == request_of(spec_) && files_are_unchanged() &&
       (record_->state.stage != IngestStage::kReady || jobs_->job()))
     return record_->state;
