@@ -45,7 +45,8 @@ std::string percent(double part) {
   return text;
 }
 
-constexpr double kMinPartForEstimate = 0.01;  // below this part, no remaining time is estimated
+// Fraction of a stage's work that must be done before the remaining time is estimated.
+constexpr double kMinPartForEstimate = 0.01;
 
 class ProgressBar : public Progress {
  public:

@@ -203,7 +203,8 @@ bool CubeBaker::charge_sums(uint64_t bytes) {
   return sum_charge_.try_resize(more);
 }
 
-// Adds the baked cells to their region.
+// Adds the cells of the baked cube to the encoders of its region. `first_code` is the code of the
+// cube's first cell within the region.
 void CubeBaker::collect(uint32_t first_code, std::span<AttributeEncoder> encoders) const {
   for (AttributeEncoder& encoder : encoders) encoder.add(cells_, values_, first_code);
 }

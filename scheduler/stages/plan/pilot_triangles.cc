@@ -37,7 +37,7 @@ class CoarserStream : public TriangleStream {
   const uint32_t shift_;
 };
 
-// Remembers some of the most recent triangles.
+// Remembers some of the most recent triangles, to find triangles that repeat.
 class RecentTriangles {
  public:
   static constexpr size_t kBytes = (size_t{1} << 14) * sizeof(FixedTriangle);
