@@ -36,8 +36,8 @@ enum class BackendName { kAuto, kCpu, kCuda, kParallelHost };
 enum class MethodName { kDefault, kConsing, kPointers, kHashes };
 
 struct BuildOptions {
-  // The scene: files (glTF 2.0, PLY, LAS, text with points), a mesh in memory, or both. The files
-  // and the mesh form one scene.
+  // The scene: files (glTF 2.0, PLY, OBJ, STL, LAS, text with points), a mesh in memory, or both.
+  // The files and the mesh form one scene.
   std::vector<std::string> scenes;
   std::optional<Mesh> mesh;
 

@@ -5,16 +5,20 @@
 
 #include "scene/chained_scene.h"
 #include "scene/gltf/gltf_scene.h"
+#include "scene/obj/obj_scene.h"
 #include "scene/ply/ply_scene.h"
 #include "scene/points/las_header.h"
 #include "scene/points/las_points.h"
 #include "scene/points/text_points.h"
+#include "scene/stl/stl_scene.h"
 
 namespace voxdag {
 namespace {
 
 constexpr std::string_view kGltfEndings[] = {".glb", ".gltf"};
 constexpr std::string_view kPlyEndings[] = {".ply"};
+constexpr std::string_view kObjEndings[] = {".obj"};
+constexpr std::string_view kStlEndings[] = {".stl"};
 constexpr std::string_view kLasEndings[] = {".las"};
 constexpr std::string_view kTextPointEndings[] = {".xyz", ".txt", ".csv"};
 
@@ -22,6 +26,8 @@ constexpr SceneFormat kFormats[] = {
     {"glTF", kGltfEndings, nullptr, gltf::open_gltf},
     {"PLY", kPlyEndings, ply::is_ply, ply::open_ply},
     {"LAS", kLasEndings, points::is_las, points::open_las},
+    {"OBJ", kObjEndings, obj::is_obj, obj::open_obj},
+    {"STL", kStlEndings, stl::is_stl, stl::open_stl},
     // Last: its test of the first bytes is the weakest.
     {"text points", kTextPointEndings, points::is_text_points, points::open_text_points},
 };

@@ -15,8 +15,8 @@ constexpr std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-// Removes the first word and the blanks before it from the text. Returns this word; empty if there
-// is none.
+// Removes the first word and the blanks before it from the text. Returns this word; empty if the
+// text has only blanks.
 constexpr std::string_view next_word(std::string_view& text) {
   size_t begin = 0;
   while (begin < text.size() && is_blank(text[begin])) ++begin;

@@ -29,7 +29,8 @@ inline constexpr int64_t kMaxOptionThreads = 1024;
 inline constexpr int64_t kMaxOptionEdge = int64_t{1} << 20;
 
 inline constexpr Field kSceneField =
-    Field("scene", "scene files (.glb, .gltf, .ply, .las, .xyz, .txt, .csv), together one scene")
+    Field("scene",
+          "scene files (.glb, .gltf, .ply, .obj, .stl, .las, .xyz, .txt, .csv), together one scene")
         .required()
         .positional()
         .key(false);

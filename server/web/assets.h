@@ -1,5 +1,6 @@
 // The files of the dashboard, which are compiled into the program (embed.cmake). In these files,
-// "{{scene_suffixes}}" stands for the file name endings of the scene formats, "glb|gltf|ply".
+// "{{scene_suffixes}}" stands for the file name endings of the scene formats,
+// "glb|gltf|ply|obj|stl".
 #pragma once
 
 #include <cstddef>

@@ -206,10 +206,10 @@ TEST_F(Client, ReportsErrors) {
   expect_error(2, "16 hex digits", {"cancel", "../scenes"});
   expect_error(3, "none.glb", {"submit", "none.glb", "-r", "64"});
   expect_error(2, "power of two", {"submit", "m.glb", "-r", "100"});
-  put("text.obj", "no scene");
-  expect_error(2, "ending with .glb, .gltf, .ply, .las, .xyz, .txt or .csv",
-               {"submit", "text.obj", "-r", "64"});
-  expect_error(2, "text.obj", {"submit", "text.obj", "-r", "64"});
+  put("text.doc", "no scene");
+  expect_error(2, "ending with .glb, .gltf, .ply, .obj, .stl, .las, .xyz, .txt or .csv",
+               {"submit", "text.doc", "-r", "64"});
+  expect_error(2, "text.doc", {"submit", "text.doc", "-r", "64"});
   expect_error(2, "http://", {"jobs", "--server", "ftp://127.0.0.1"});
   expect_error(6, "127.0.0.1:1", {"jobs", "--server", "http://127.0.0.1:1"});
   unsetenv("VOXDAG_SERVER");

@@ -49,6 +49,32 @@ void add_scenes(const Corpus& corpus) {
   for (const auto& [name, file] : compressed_scenes()) corpus.add("gltf_document", name, file);
 }
 
+void add_text_scenes(const Corpus& corpus) {
+  corpus.add("obj_file", "faces",
+             "vt 0.5 1\nvn 0 0 1\ng a\nf 1 2 3\nf 1/1 2/2 3/1\nf 1//1 2//1 3//1\n"
+             "f -3/-1/1 -2/-2/1 -1/-1/1 1\n");
+  corpus.add("obj_file", "lines", "# a\\\r\nl 1 2\rp 1\nf 1 2 \\\n 3 # b\nusemtl a\nv 1 2");
+  corpus.add("obj_file", "materials",
+             "newmtl a\nKd 0.5 1 0\nd 0.5\nmap_Kd -s 2 2 -clamp on a.png\nmap_d a.png\n"
+             "newmtl b\nTr 1\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 1 2 3\n");
+  corpus.add("obj_file", "free_form", "vp 0 1\ncstype bspline\ndeg 3\ncurv 0 1 1 2 3\nend\n");
+  const std::string facet =
+      "outer loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\n";
+  corpus.add("stl_file", "ascii", '\0' + facet + "endsolid a\nsolid b\n" + facet);
+  corpus.add("stl_file", "ascii_square",
+             std::string(1, '\0') +
+                 "OUTER LOOP\nvertex 0 0\n0 vertex 1 0 0\nvertex 1 1 0\n"
+                 "vertex 0 1 0\nENDLOOP\ncolor 1 0 0\nENDFACET\n");
+  std::string facets;
+  for (int i = 0; i < 2; ++i) {
+    const float numbers[] = {0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0};
+    facets += text_of(std::as_bytes(std::span(numbers))) + "\x1f\x80";
+  }
+  const std::string header = "COLOR=" + std::string(74, '\xff');
+  corpus.add("stl_file", "binary", '\1' + header + little_endian(2) + facets);
+  corpus.add("stl_file", "trailing_bytes", '\2' + header + little_endian(1) + facets);
+}
+
 // Adds the index without the rest of its file, and the frames after the prefix that the target
 // expects.
 void add_artifacts(const Corpus& corpus) {
@@ -236,6 +262,7 @@ int main(int argc, char** argv) {
   }
   const voxdag::test::Corpus corpus(argv[1]);
   voxdag::test::add_scenes(corpus);
+  voxdag::test::add_text_scenes(corpus);
   voxdag::test::add_artifacts(corpus);
   voxdag::test::add_global_files(corpus);
   voxdag::test::add_colored_files(corpus);

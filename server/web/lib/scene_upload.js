@@ -6,7 +6,7 @@ import {authorization, Problem, request, sleep} from "./api.js";
 const kPartBytes = 8 << 20;
 const kMaxFailures = 6;  // consecutive failures; the pauses between them grow
 
-const kSuffixes = "{{scene_suffixes}}";  // the service fills this in: "glb|gltf|ply"
+const kSuffixes = "{{scene_suffixes}}";  // the service fills this in: "glb|gltf|ply|obj|stl"
 export const kSceneEndings = kSuffixes.split("|").map((suffix) => `.${suffix}`);
 export const kSceneName = new RegExp(`^[A-Za-z0-9][A-Za-z0-9._-]{0,122}\\.(${kSuffixes})$`);
 export const kSceneEnding = new RegExp(`\\.(${kSuffixes})$`);

@@ -15,9 +15,9 @@ constexpr uint64_t kMaxTriangles = 2000;
 constexpr uint64_t kSceneBudgetBytes = uint64_t{16} << 20;
 
 // Reads all triangles of the file in one batch, and one by one, if it is a scene. `path` is the
-// name of the file.
-inline void check_scene(std::string file, const std::string& path = "scene") {
-  test::MemoryFiles files;
+// name of the file. `files` may have other files that it refers to.
+inline void check_scene(std::string file, const std::string& path = "scene",
+                        test::MemoryFiles files = {}) {
   files.contents[path] = std::move(file);
   MemoryBudget budget(kSceneBudgetBytes);
   CancelToken cancel;
@@ -32,6 +32,14 @@ inline void check_scene(std::string file, const std::string& path = "scene") {
     for (uint64_t i = 0; i < scene->declared_triangles(); ++i)
       cursor->read(i, 1, [&](auto batch) { again += batch.size(); });
     require(again == visited, "each triangle can be read alone");
+    const auto materials = scene->materials();
+    require(materials.materials.size() == scene->material_count(), "all materials are counted");
+    cursor->read_surfaces(0, scene->declared_triangles(), [&](auto batch) {
+      again -= batch.size();
+      for (const SurfaceTriangle& triangle : batch)
+        require(triangle.material < materials.materials.size(), "each material exists");
+    });
+    require(again == 0, "each triangle has a surface");
   } catch (const Error& error) {
     require(!error.message().empty(), "an error has a message");
   }

@@ -158,6 +158,12 @@ inline std::vector<SurfaceTriangle> surfaces_of(TriangleSource& source) {
   return all;
 }
 
+inline std::vector<std::string> texts_of(const std::vector<Warning>& warnings) {
+  std::vector<std::string> texts;
+  for (const Warning& warning : warnings) texts.push_back(warning.text());
+  return texts;
+}
+
 // A scene file in memory, opened.
 struct OpenScene {
   explicit OpenScene(std::string file, SceneOptions options = {},

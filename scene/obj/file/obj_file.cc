@@ -1,0 +1,162 @@
+#include "scene/obj/file/obj_file.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+#include "scene/messages.h"
+#include "scene/obj/file/corners.h"
+#include "scene/obj/file/numbers.h"
+#include "scene/obj/file/statement.h"
+#include "scene/text/line_reader.h"
+
+namespace voxdag::obj {
+namespace {
+
+// Maximum number of recorded places. They take at most 7 MiB in total.
+constexpr size_t kMaxLinePlaces = size_t{1} << 17;
+constexpr size_t kMaxFacePlaces = size_t{1} << 16;
+// Number of statements between two checks for cancellation.
+constexpr uint64_t kStatementsPerCheck = 1024;
+constexpr size_t kMaxLibraries = 1024;
+
+// A kind of statement that is ignored with a warning.
+struct IgnoredStatements {
+  uint64_t count = 0;
+  uint64_t first_line = 0;
+  std::string keyword;  // of the first one
+
+  void add(const Statement& statement, uint64_t line) {
+    if (count++ > 0) return;
+    first_line = line;
+    keyword = statement.keyword;
+  }
+};
+
+}  // namespace
+
+// The pass over the file.
+class ObjFile::Scan {
+ public:
+  Scan(ObjFile& obj, MemoryBudget& budget, const CancelToken& cancel)
+      : obj_(obj), cancel_(cancel), lines_(*obj.file_, budget, LineReader::Join::kBackslash) {}
+
+  void run() {
+    for (uint64_t statement = 0; lines_.next(); ++statement) {
+      if (statement % kStatementsPerCheck == 0) cancel_.check();
+      read(statement_of(lines_.text()));
+    }
+  }
+
+  IgnoredStatements points_or_lines, unknown, small_faces;
+
+ private:
+  void read(const Statement& statement) {
+    switch (statement.kind) {
+      case Kind::kIgnored:
+        return;
+      case Kind::kVertex:
+        return add_vertex(statement.arguments);
+      case Kind::kTexture:
+        return add_place(obj_.texcoords_, obj_.texcoord_index_, "texture coordinates");
+      case Kind::kFace:
+        return add_face(statement);
+      case Kind::kUseMaterial:
+        material_ = obj_.materials_.add(trimmed(statement.arguments), lines_.number());
+        return;
+      case Kind::kLibrary:
+        return add_library(statement.arguments);
+      case Kind::kPointOrLine:
+        return points_or_lines.add(statement, lines_.number());
+      case Kind::kUnknown:
+        return unknown.add(statement, lines_.number());
+      case Kind::kFreeForm:
+        refuse_line(std::string(statement.keyword) +
+                    " is part of a free-form curve or surface, which voxdag does not read; "
+                    "convert the surfaces to polygons first");
+      case Kind::kCall:
+        refuse_line("call includes another file, which voxdag does not read; insert its lines");
+    }
+  }
+
+  void add_place(uint64_t& count, BlockIndex<LinePlace>& index, const char* what) {
+    if (index.wants(count)) index.add({lines_.offset(), lines_.number()});
+    if (++count >= kNoIndex)
+      throw Error(ErrorCode::kLimit, obj_.file_->path() + ": line " +
+                                         std::to_string(lines_.number()) +
+                                         " exceeds the limit of 2^32 - 2 " + what);
+  }
+
+  void add_vertex(std::string_view arguments) {
+    add_place(obj_.vertices_, obj_.vertex_index_, "vertices");
+    if (obj_.full_color_ > 1 || count_words(arguments) < 6) return;
+    double numbers[6];
+    if (read_numbers(arguments, numbers, 6) < 6) return;
+    obj_.has_colors_ = true;
+    if (std::max({numbers[3], numbers[4], numbers[5]}) > 1) obj_.full_color_ = 255;
+  }
+
+  void add_face(const Statement& statement) {
+    if (obj_.face_index_.wants(obj_.faces_))
+      obj_.face_index_.add({{lines_.offset(), lines_.number()},
+                            obj_.triangles_,
+                            obj_.vertices_,
+                            obj_.texcoords_,
+                            material_});
+    ++obj_.faces_;
+    const size_t corners = count_words(statement.arguments);
+    if (corners < 3) return small_faces.add(statement, lines_.number());
+    obj_.triangles_ += corners - 2;
+    UsedMaterials::Use& use = obj_.materials_.all()[material_];
+    ++use.faces;
+    if (!has_texture(statement.arguments)) ++use.faces_without_texture;
+  }
+
+  void add_library(std::string_view names) {
+    const auto same = [&](const Library& library) { return library.names == names; };
+    if (std::ranges::any_of(obj_.libraries_, same)) return;
+    if (obj_.libraries_.size() == kMaxLibraries)
+      throw Error(ErrorCode::kLimit, obj_.file_->path() + ": line " +
+                                         std::to_string(lines_.number()) +
+                                         " exceeds the limit of " + std::to_string(kMaxLibraries) +
+                                         " mtllib statements");
+    obj_.libraries_.push_back({std::string(names.substr(0, kMaxNames)), lines_.number()});
+  }
+
+  [[noreturn]] void refuse_line(const std::string& what) const {
+    refuse(obj_.file_->path(), "line " + std::to_string(lines_.number()) + ": " + what);
+  }
+
+  static constexpr size_t kMaxNames = 8192;  // bytes; longer than any path
+
+  ObjFile& obj_;
+  const CancelToken& cancel_;
+  LineReader lines_;
+  uint32_t material_ = 0;
+};
+
+ObjFile::ObjFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget,
+                 const CancelToken& cancel)
+    : file_(std::move(file)),
+      vertex_index_(budget, kMaxLinePlaces, "the vertices of " + file_->path()),
+      texcoord_index_(budget, kMaxLinePlaces, "the texture coordinates of " + file_->path()),
+      face_index_(budget, kMaxFacePlaces, "the faces of " + file_->path()),
+      materials_(budget, file_->path()) {
+  Scan scan(*this, budget, cancel);
+  scan.run();
+  add_warnings(scan);
+}
+
+void ObjFile::add_warnings(const Scan& scan) {
+  const auto add = [&](const char* code, const IgnoredStatements& ignored, const char* message) {
+    if (ignored.count > 0)
+      warnings_.add({code, file_->path() + ": line " + std::to_string(ignored.first_line), message,
+                     ignored.count});
+  };
+  add("degenerate-faces", scan.small_faces, "a face of fewer than three corners makes no voxels");
+  add("points-or-lines", scan.points_or_lines, "points and lines make no voxels");
+  const std::string unknown =
+      "the unknown statement \"" + printable(scan.unknown.keyword) + "\" is ignored";
+  add("unknown-statements", scan.unknown, unknown.c_str());
+}
+
+}  // namespace voxdag::obj

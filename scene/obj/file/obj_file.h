@@ -1,0 +1,75 @@
+// An open OBJ file after one pass over it: the number of its vertices, texture coordinates, faces
+// and triangles, the places of every n-th of them (block_index.h), and the names of its materials
+// and libraries. A polygon of n corners has n - 2 triangles. A polygon with fewer than three
+// corners has no triangle.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/base/warning.h"
+#include "core/io/file_system.h"
+#include "scene/indexed/block_index.h"
+#include "scene/obj/file/used_materials.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::obj {
+
+class ObjFile {
+ public:
+  // Throws Error{kInvalidInput} with the line for a free-form curve or surface, or a call of
+  // another file; Error{kLimit} for a line that is too long, or 2^32 - 1 vertices or texture
+  // coordinates; Error{kOutOfMemory}.
+  ObjFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
+
+  // The beginning of a line.
+  struct LinePlace {
+    uint64_t offset, line;
+  };
+  // A face: its line, its first triangle, and the statements before it.
+  struct FacePlace {
+    LinePlace place;
+    uint64_t first_triangle;
+    uint64_t vertices, texcoords;  // number of v and vt statements before the face
+    uint32_t material;             // number in materials()
+  };
+  struct Library {
+    std::string names;  // the arguments of the statement
+    uint64_t line;
+  };
+
+  const ReadableFile& file() const { return *file_; }
+  uint64_t vertices() const { return vertices_; }
+  uint64_t texcoords() const { return texcoords_; }
+  uint64_t triangles() const { return triangles_; }
+  const BlockIndex<LinePlace>& vertex_index() const { return vertex_index_; }
+  const BlockIndex<LinePlace>& texcoord_index() const { return texcoord_index_; }
+  const BlockIndex<FacePlace>& face_index() const { return face_index_; }
+  // True if a vertex has a color.
+  bool has_colors() const { return has_colors_; }
+  // The number that stands for full intensity of a color: 1, or 255 if a number is larger than 1.
+  double full_color() const { return full_color_; }
+  const UsedMaterials& materials() const { return materials_; }
+  const std::vector<Library>& libraries() const { return libraries_; }
+  const std::vector<Warning>& warnings() const { return warnings_.list(); }
+
+ private:
+  class Scan;
+
+  void add_warnings(const Scan& scan);
+
+  const std::unique_ptr<ReadableFile> file_;
+  uint64_t vertices_ = 0, texcoords_ = 0, faces_ = 0, triangles_ = 0;
+  BlockIndex<LinePlace> vertex_index_, texcoord_index_;
+  BlockIndex<FacePlace> face_index_;
+  bool has_colors_ = false;
+  double full_color_ = 1;
+  UsedMaterials materials_;
+  std::vector<Library> libraries_;
+  WarningList warnings_;
+};
+
+}  // namespace voxdag::obj

@@ -1,0 +1,103 @@
+#include "scene/stl/polygon_reader.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+#include "scene/messages.h"
+#include "scene/text/characters.h"
+#include "scene/text/numbers.h"
+
+namespace voxdag::stl {
+namespace {
+
+bool is_keyword(std::string_view word) {
+  constexpr std::string_view kKeywords[] = {"vertex",  "facet", "endfacet", "outer", "loop",
+                                            "endloop", "solid", "endsolid", "normal"};
+  return std::ranges::any_of(
+      kKeywords, [&](std::string_view keyword) { return equals_in_any_case(keyword, word); });
+}
+
+}  // namespace
+
+void PolygonReader::seek(uint64_t offset, uint64_t line) {
+  lines_.seek(offset, line);
+  rest_ = {};
+}
+
+bool PolygonReader::next() {
+  vertices_.clear();
+  for (;;) {
+    const std::string_view word = next_word(rest_);
+    if (word.empty()) {
+      if (next_line()) continue;
+      is_cut_off_ = in_facet_;
+      line_ = lines_.number();
+      return !vertices_.empty();
+    }
+    if (equals_in_any_case(word, "vertex")) {
+      if (vertices_.empty()) {
+        offset_ = lines_.offset_of(word);
+        line_ = lines_.number();
+      }
+      read_vertex();
+    } else {
+      skip(word);
+      if (!vertices_.empty()) return true;
+    }
+  }
+}
+
+bool PolygonReader::next_line() {
+  const bool found = lines_.next();
+  rest_ = found ? lines_.text() : std::string_view();
+  return found;
+}
+
+// Skips the name or the numbers after a word other than "vertex".
+void PolygonReader::skip(std::string_view word) {
+  const auto is = [&](std::string_view keyword) { return equals_in_any_case(word, keyword); };
+  if (is("facet")) {
+    in_facet_ = true;
+  } else if (is("endfacet")) {
+    in_facet_ = false;
+  } else if (is("normal")) {
+    skip_normal();
+  } else if (is("solid") || is("endsolid")) {
+    rest_ = {};  // a name
+  } else if (!is_keyword(word)) {
+    if (unknown_words_++ == 0) first_unknown_line_ = lines_.number();
+    rest_ = {};
+  }
+}
+
+// Skips up to three words, which are usually numbers.
+void PolygonReader::skip_normal() {
+  for (int i = 0; i < 3; ++i) {
+    std::string_view after = rest_;
+    if (is_keyword(next_word(after))) return;
+    rest_ = after;
+  }
+}
+
+void PolygonReader::read_vertex() {
+  std::array<double, 3> numbers;
+  for (double& number : numbers) {
+    std::string_view word;
+    while ((word = next_word(rest_)).empty())
+      if (!next_line()) refuse_line("has a vertex without three numbers");
+    const auto value = parse_real<double>(word);
+    if (!value) refuse_line("has " + printable(word) + ", expected a coordinate of a vertex");
+    number = *value;
+  }
+  if (vertices_.size() == kMaxCorners)
+    throw Error(ErrorCode::kLimit, file_.path() + ": line " + std::to_string(line_) +
+                                       " begins a facet of more vertices than the limit, " +
+                                       std::to_string(kMaxCorners));
+  vertices_.push_back(numbers);
+}
+
+void PolygonReader::refuse_line(const std::string& what) const {
+  refuse(file_.path(), "line " + std::to_string(lines_.number()) + " " + what);
+}
+
+}  // namespace voxdag::stl

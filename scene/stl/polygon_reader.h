@@ -1,0 +1,63 @@
+// Reads the polygons of an ASCII STL file one after another. A polygon is a sequence of "vertex x y
+// z" without another keyword in between; it usually has three vertices. All other words (normals,
+// names, loops) do not affect the triangles. Keywords may be in any case, and several may be in one
+// line. Not thread-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/io/file_system.h"
+#include "scene/text/line_reader.h"
+
+namespace voxdag::stl {
+
+class PolygonReader {
+ public:
+  // Maximum number of vertices of a polygon.
+  static constexpr size_t kMaxCorners = 32768;
+
+  // The file must outlive the reader.
+  PolygonReader(const ReadableFile& file, MemoryBudget& budget)
+      : file_(file), lines_(file, budget, LineReader::Join::kNone) {}
+
+  // Moves to the polygon whose first word "vertex" is at `offset`, in line `line`.
+  void seek(uint64_t offset, uint64_t line);
+  // Reads the next polygon. Returns false at the end of the file. Throws Error{kInvalidInput} with
+  // the line if a vertex does not have three numbers.
+  bool next();
+
+  // Return the vertices of the polygon, and the place of its first one.
+  size_t corners() const { return vertices_.size(); }
+  const std::array<double, 3>& vertex(size_t i) const { return vertices_[i]; }
+  uint64_t offset() const { return offset_; }
+  uint64_t line() const { return line_; }
+
+  // True if the file ended within a facet.
+  bool is_cut_off() const { return is_cut_off_; }
+  // Number of words that are not part of STL, and the line of the first one.
+  uint64_t unknown_words() const { return unknown_words_; }
+  uint64_t first_unknown_line() const { return first_unknown_line_; }
+
+ private:
+  bool next_line();
+  void skip(std::string_view word);
+  void skip_normal();
+  void read_vertex();
+  [[noreturn]] void refuse_line(const std::string& what) const;
+
+  const ReadableFile& file_;
+  LineReader lines_;
+  std::string_view rest_;  // the part of the current line that is not read
+  bool in_facet_ = false;
+  bool is_cut_off_ = false;
+  std::vector<std::array<double, 3>> vertices_;
+  uint64_t offset_ = 0, line_ = 0;
+  uint64_t unknown_words_ = 0, first_unknown_line_ = 0;
+};
+
+}  // namespace voxdag::stl
