@@ -9,7 +9,7 @@ namespace {
 
 constexpr uint64_t kUploadPieceBytes = 256 << 10;
 
-// ASCII only, independent of the locale.
+// Converts only ASCII letters, independent of the locale.
 std::string lower_case(std::string_view name) {
   std::string lower(name);
   for (char& c : lower)

@@ -135,9 +135,9 @@ class HashPartition::Loader {
     return (hash >> partition_.bucket_bits_) - (interval.first >> partition_.bucket_bits_) + 1;
   }
 
-  // Sets the begins of the buckets that begin after the first hash of this frame and not after the
-  // first hash of the next frame. The slice's first frame also sets all earlier begins, and its
-  // last frame all later ones.
+  // Sets the begins of the buckets whose lowest hash is above the first hash of this frame, and at
+  // most the first hash of the next frame. The slice's first frame also sets the begins of all
+  // earlier buckets, and its last frame the begins of all later buckets.
   void mark_bucket_begins(size_t slice_index, const LevelRun& run, size_t f, const Frame& frame) {
     const RunSlice& slice = partition_.slices_[slice_index];
     size_t next = f == slice.frames.begin ? 0 : begins_up_to(frame.hashes.front());

@@ -85,8 +85,8 @@ class Pass {
     return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }
 
-  // Reserves memory for the largest level from the start if the budget allows it, so that the
-  // memory is never replaced by a larger one.
+  // Reserves memory for the largest level, if the budget allows it. Otherwise the memory is
+  // allocated again for each partition that does not fit in it.
   void reserve_memory() {
     std::vector<RowCount> levels(task_.shape.grid_levels);
     for (const ArtifactReader& artifact : task_.artifacts)

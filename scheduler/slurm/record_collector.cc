@@ -76,7 +76,8 @@ void RecordCollector::read_record(const ClusterFolder::Entry& entry) {
   }
 }
 
-// On a shared file system a segment can become visible later than its record.
+// Returns true during the grace period after the first call for this record. On a shared file
+// system the segment can become visible later than its record.
 bool RecordCollector::may_appear_later(const std::string& record_path) {
   const double now_s = wall_seconds();
   const Seconds since_s = incomplete_since_.try_emplace(record_path, now_s).first->second;

@@ -74,7 +74,7 @@ void TaskPoller::update(const SlurmTask& task) {
   batch->task = task;
 }
 
-// Warns once for each reason that needs a person to act.
+// If the task waits for a reason that needs a person to act, warns once for each such reason.
 void TaskPoller::warn_waiting(const SlurmTask& task) {
   if (task.state == "PENDING" && !waits_for_its_turn(task.reason) &&
       warned_reasons_.insert(task.reason).second)

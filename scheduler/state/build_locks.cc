@@ -9,7 +9,8 @@
 namespace voxdag {
 namespace {
 
-// Seconds of waiting before the warning. `voxdag status` locks a work folder for a shorter time.
+// Seconds of waiting before a warning is shown. `voxdag status` locks a work folder for a shorter
+// time, so it causes no warning.
 constexpr double kQuietS = 0.3;
 constexpr auto kPause = std::chrono::milliseconds(20);
 

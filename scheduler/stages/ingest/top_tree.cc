@@ -27,7 +27,9 @@ ExpectedWork expected_work(const SnappedTriangle& t) {
     const double high = std::max(std::max(t.v[0][a], t.v[1][a]), t.v[2][a]);
     extents += (high - low) * kVoxel;
   }
-  double area = 0;  // sum of the areas of the three projections: area * (|nx| + |ny| + |nz|)
+  // Sum of the areas of the triangle's projections along the three axes, in square voxels. It is
+  // the triangle's area times |nx| + |ny| + |nz|, where n is the unit normal.
+  double area = 0;
   for (int a = 0; a < 3; ++a) {
     const int b = (a + 1) % 3, c = (a + 2) % 3;
     area += 0.5 * std::abs(e[0][b] * e[1][c] - e[0][c] * e[1][b]);

@@ -14,8 +14,8 @@ namespace {
 // (core/color/blocks/region.h). Does not include the padding of regions with few cells.
 constexpr double kColorBytesPerCell = 0.69;
 // Values of other attributes are not compressed. For each cell of the finest level, the file has
-// kCellsOfAllLevels values of an attribute, because the coarser levels add about a third, and
-// kPrefixBytesPerCell bytes of prefixes.
+// kCellsOfAllLevels values of an attribute: one for the cell, and about a third for the coarser
+// levels. The prefixes add kPrefixBytesPerCell bytes per cell of the finest level.
 constexpr double kCellsOfAllLevels = 1.36;
 constexpr double kPrefixBytesPerCell = 0.03;
 constexpr EstimateRange kFileSpread = {0.95, 1, 1.25};
