@@ -52,7 +52,7 @@ class JobView {
   ProgressLine line_;
   std::string state_;
   Json attempt_;
-  size_t warnings_ = 0;  // number shown so far
+  size_t warnings_ = 0;  // warnings shown so far
   size_t ended_ = 0;     // stages shown as ended so far
   double shown_s_ = 0;
 };

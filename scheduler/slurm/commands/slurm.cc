@@ -209,7 +209,7 @@ std::string Slurm::setting(const std::string& name) {
 void Slurm::submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks) {
   const uint32_t size =
       std::max<uint32_t>(number(setting("MaxArraySize")).value_or(kDefaultMaxArraySize), 1);
-  std::map<uint32_t, std::vector<uint32_t>> arrays;  // indexes, keyed by the batch of index 0
+  std::map<uint32_t, std::vector<uint32_t>> arrays;  // array indexes, by the batch of index 0
   std::vector<uint32_t> batches = request.batches;
   std::ranges::sort(batches);
   for (const uint32_t batch : batches) arrays[batch / size * size].push_back(batch % size);

@@ -56,7 +56,7 @@ struct PilotCounts {
   double voxels = 0;
   double svo_nodes = 0;
   double dag_nodes = 0;
-  double file_bytes = 0;  // size its global file would have
+  double file_bytes = 0;  // size of the pilot's global file, which is not written
   double cpu_s = 0;
 };
 
@@ -124,7 +124,7 @@ std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot
 double grow_as_surface(double coarse, double fine, int doublings) {
   const double ratio = std::exp2(doublings);
   const double square = 2 * (fine - 2 * coarse),
-               linear = fine - square;  // values at the fine pilot
+               linear = fine - square;  // a R^2 and b R at the fine pilot
   if (square <= 0) return fine * ratio * ratio;
   const double grown = square * ratio * ratio + linear * ratio;
   return doublings < 0 ? std::max(grown, 1.0) : std::max(grown, fine);

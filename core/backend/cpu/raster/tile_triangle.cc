@@ -26,7 +26,8 @@ bool TileTriangle<Coordinate>::set_up(const Triangle<Coordinate>& triangle, bool
     first_voxel[a] = static_cast<int>(low);
     last_voxel[a] = static_cast<int>(high);
   }
-  int64_t half[3][3];  // half-edges, [axis][edge]; edge i leads from vertex i
+  // Half-edges (the edge vectors, divided by 2), [axis][edge]. Edge i leads from vertex i.
+  int64_t half[3][3];
   for (int a = 0; a < 3; ++a)
     for (int i = 0; i < 3; ++i) half[a][i] = (v[a][i == 2 ? 0 : i + 1] - v[a][i]) / 2;
   if (!set_plane(v, half, tile.edge >> kUnitBits)) return false;
