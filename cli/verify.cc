@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/output.h"
+#include "cli/selection_options.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
@@ -18,13 +19,12 @@
 namespace voxdag::cli {
 namespace {
 
-constexpr uint64_t kSceneMemory = uint64_t{64} << 20;  // for the loaded parts of the scene's files
-
 struct VerifyCommand {
   std::string path;
   std::vector<std::string> scenes;
   SceneOptions scene_options;
   uint64_t seed = 1;
+  std::string memory;
   unsigned threads = default_threads();
   bool json = false;
 };
@@ -43,7 +43,7 @@ Sample check_against(const VerifyCommand& command, const voxdag_reader::File& fi
                      Progress& progress, CommandContext& context) {
   const Grid grid = grid_of(file);
   const bool has_attributes = attributes_of(file).any();
-  MemoryBudget budget(has_attributes ? std::max(default_memory(), kSceneMemory) : kSceneMemory);
+  MemoryBudget budget(memory_limit(command.memory));
   const auto scene =
       open_scene(context.files, command.scenes, command.scene_options, budget, context.cancel);
   const auto boxes = query::sample_surface(*scene, grid, command.seed, progress, context.cancel);
@@ -112,6 +112,8 @@ void declare(Command& command, VerifyCommand& state) {
   command.option("--against", state.scenes,
                  "compare a sample of voxels, and of colors, with the triangles of this scene");
   command.option("--seed", state.seed, "seed of the sample that --against compares").show_default();
+  command.option("--memory", state.memory,
+                 "memory for the scene of --against; default: half the RAM");
   command.flag("--skip-invalid", state.scene_options.skip_invalid,
                "drop invalid triangles of the scene, as the build did");
   command.option("--point-radius", state.scene_options.point_radius,

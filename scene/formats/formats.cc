@@ -4,7 +4,9 @@
 #include <utility>
 
 #include "scene/chained_scene.h"
+#include "scene/formats/unknown_file.h"
 #include "scene/gltf/gltf_scene.h"
+#include "scene/gltf/json/container.h"
 #include "scene/obj/obj_scene.h"
 #include "scene/ply/ply_scene.h"
 #include "scene/points/las_header.h"
@@ -23,7 +25,7 @@ constexpr std::string_view kLasEndings[] = {".las"};
 constexpr std::string_view kTextPointEndings[] = {".xyz", ".txt", ".csv"};
 
 constexpr SceneFormat kFormats[] = {
-    {"glTF", kGltfEndings, nullptr, gltf::open_gltf},
+    {"glTF", kGltfEndings, gltf::is_gltf, gltf::open_gltf},
     {"PLY", kPlyEndings, ply::is_ply, ply::open_ply},
     {"LAS", kLasEndings, points::is_las, points::open_las},
     {"OBJ", kObjEndings, obj::is_obj, obj::open_obj},
@@ -33,14 +35,9 @@ constexpr SceneFormat kFormats[] = {
 };
 
 const SceneFormat& format_of(const ReadableFile& file) {
-  const SceneFormat* fallback = nullptr;
-  for (const SceneFormat& format : kFormats) {
-    if (!format.sniff)
-      fallback = &format;
-    else if (format.sniff(file))
-      return format;
-  }
-  return *fallback;
+  for (const SceneFormat& format : kFormats)
+    if (format.sniff(file)) return format;
+  refuse_unknown_file(file);
 }
 
 std::vector<std::string_view> all_endings() {

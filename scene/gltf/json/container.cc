@@ -68,25 +68,24 @@ Container read_glb(const ReadableFile& file) {
   return container;
 }
 
-// True for white space, an opening brace or bracket, or a byte order mark followed by one of these.
-bool may_be_json(const ReadableFile& file) {
-  constexpr std::string_view kMark = "\xef\xbb\xbf";
-  char text[4] = {};
-  const size_t size = std::min<uint64_t>(sizeof text, file.size());
-  file.read_at(0, std::as_writable_bytes(std::span(text).first(size)));
-  std::string_view begin(text, size);
-  if (begin.starts_with(kMark)) begin.remove_prefix(kMark.size());
-  return begin.find_first_of(" \t\r\n{[") == 0;
-}
+bool is_glb(const ReadableFile& file) { return file.size() >= 4 && read_u32(file, 0) == kMagic; }
 
 }  // namespace
 
+bool is_gltf(const ReadableFile& file) {
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  std::array<char, 256> text{};
+  const size_t size = std::min<uint64_t>(text.size(), file.size());
+  file.read_at(0, std::as_writable_bytes(std::span(text).first(size)));
+  std::string_view begin(text.data(), size);
+  if (begin.starts_with(kMark)) begin.remove_prefix(kMark.size());
+  begin.remove_prefix(std::min(begin.find_first_not_of(" \t\r\n"), begin.size()));
+  return is_glb(file) || begin.starts_with('{') || begin.starts_with('[');
+}
+
 Container read_container(const ReadableFile& file) {
-  if (file.size() == 0) refuse(file.path(), "is empty, expected a .glb or .gltf scene");
-  const bool is_glb = file.size() >= 4 && read_u32(file, 0) == kMagic;
-  if (!is_glb && !may_be_json(file))
-    refuse(file.path(), "is neither a GLB, which begins with \"glTF\", nor JSON");
-  const Container container = is_glb ? read_glb(file) : Container{{0, file.size()}, false, {}};
+  const Container container =
+      is_glb(file) ? read_glb(file) : Container{{0, file.size()}, false, {}};
   if (container.json.size > kMaxJsonBytes)
     throw Error(ErrorCode::kLimit, file.path() + ": its JSON has " +
                                        std::to_string(container.json.size) +

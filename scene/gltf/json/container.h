@@ -13,6 +13,10 @@ struct Container {
   FileRange bin;
 };
 
+// True if the file is a GLB, or begins like JSON: with an object or an array, perhaps after a byte
+// order mark and white space.
+bool is_gltf(const ReadableFile& file);
+
 // Throws Error{kInvalidInput} for a broken container, Error{kLimit} for JSON over 1 GiB.
 Container read_container(const ReadableFile& file);
 

@@ -1,0 +1,123 @@
+#include "scene/formats/unknown_file.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <string_view>
+
+#include "scene/formats/formats.h"
+#include "scene/messages.h"
+
+namespace voxdag {
+namespace {
+
+constexpr size_t kFirstBytes = 512;
+
+constexpr const char* kUnpack = "unpack it first";
+constexpr const char* kConvert = "convert it first, for example with Blender";
+
+// A format that voxdag does not read. Its files have `bytes` at `offset`.
+struct KnownFormat {
+  size_t offset;
+  std::string_view bytes;
+  const char* name;  // "a file compressed by gzip"
+  const char* remedy = "";
+};
+
+// More specific formats come first.
+constexpr KnownFormat kKnown[] = {
+    {0, "\x1f\x8b", "compressed by gzip", kUnpack},
+    {0, "\x28\xb5\x2f\xfd", "compressed by Zstandard", kUnpack},
+    {0, {"\xfd\x37zXZ\0", 6}, "compressed by xz", kUnpack},
+    {0, "BZh", "compressed by bzip2", kUnpack},
+    {0, "\x04\x22\x4d\x18", "compressed by LZ4", kUnpack},
+    {0, "7z\xbc\xaf\x27\x1c", "a 7z archive", kUnpack},
+    {0, "Rar!", "a RAR archive", kUnpack},
+    {257, "ustar", "a tar archive", kUnpack},
+    {0, "PK\x03\x04", "a zip archive, as 3MF, USDZ and KMZ files are", kConvert},
+    {0, "Kaydara FBX Binary", "an FBX file", kConvert},
+    {0, "; FBX", "an FBX file", kConvert},
+    {0, "BLENDER", "a Blender file", "export it as .glb"},
+    {0, "PXR-USDC", "a USD file", kConvert},
+    {0, "#usda", "a USD file", kConvert},
+    {0, {"MM\0*", 4}, "a TIFF image"},
+    {0, "MM", "a 3DS file", kConvert},
+    {0, "Ogawa", "an Alembic file", kConvert},
+    {0, "\x89HDF\r\n\x1a\n", "an HDF5 file", kConvert},
+    {0, "# vtk DataFile", "a VTK file", kConvert},
+    {0, "<VTKFile", "a VTK file", kConvert},
+    {0, "# .PCD", "a PCD point cloud", "convert it to PLY"},
+    {0, ".PCD", "a PCD point cloud", "convert it to PLY"},
+    {0, "ASTM-E57", "an E57 point cloud", "convert it to PLY or LAS"},
+    {0, "#VRML", "a VRML file", kConvert},
+    {0, "OFF", "an OFF file", kConvert},
+    {0, "COFF", "an OFF file", kConvert},
+    {0, "NOFF", "an OFF file", kConvert},
+    {0, "ISO-10303-21", "a STEP or IFC file", kConvert},
+    {0, "AC10", "a DWG file", kConvert},
+    {0, "VOX ", "a MagicaVoxel file"},
+    {0, "DRACO", "a bare Draco file", "convert it to .glb"},
+    {0, "KHRONOS", "a KTX file, which is an image"},
+    {0, "\xabKTX", "a KTX file, which is an image"},
+    {0, "\x89PNG", "a PNG image"},
+    {0, "\xff\xd8\xff", "a JPEG image"},
+    {0, "GIF8", "a GIF image"},
+    {8, "WEBP", "a WebP image"},
+    {0, "II*\0", "a TIFF image"},
+    {0, "%PDF", "a PDF document"},
+    {0, "SQLite format 3", "an SQLite database"},
+    {0,
+     "\x7f"
+     "ELF",
+     "a program"},
+};
+
+std::string lower(std::string_view text) {
+  std::string copy(text);
+  for (char& c : copy)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return copy;
+}
+
+std::string contents_of_markup(std::string_view text) {
+  const std::string small = lower(text);
+  if (small.find("<collada") != small.npos) return std::string("a COLLADA file: ") + kConvert;
+  if (small.find("<x3d") != small.npos) return std::string("an X3D file: ") + kConvert;
+  if (small.find("<html") != small.npos || small.starts_with("<!doctype html"))
+    return "a web page, perhaps the error page of a failed download";
+  return "an XML file";
+}
+
+// Returns the format and the remedy: "is compressed by gzip: unpack it first".
+std::string describe(std::string_view begin) {
+  if (begin.empty()) return "is empty";
+  for (const KnownFormat& known : kKnown)
+    if (begin.size() > known.offset && begin.substr(known.offset).starts_with(known.bytes))
+      return "is " + std::string(known.name) + (*known.remedy ? ": " : "") + known.remedy;
+  const size_t text = begin.find_first_not_of(" \t\r\n");
+  if (text == begin.npos) return "begins with blanks only";
+  if (begin[text] == '<') return "is " + contents_of_markup(begin.substr(text));
+  return "has an unknown format; it begins with " + printable(begin.substr(text), 16);
+}
+
+std::string list_formats() {
+  std::string list;
+  for (const SceneFormat& format : scene_formats()) {
+    list += (list.empty() ? "" : "; ") + std::string(format.name) + " (";
+    for (size_t i = 0; i < format.endings.size(); ++i)
+      list += (i > 0 ? ", " : "") + std::string(format.endings[i]);
+    list += ")";
+  }
+  return list;
+}
+
+}  // namespace
+
+void refuse_unknown_file(const ReadableFile& file) {
+  std::array<char, kFirstBytes> begin{};
+  const auto size = static_cast<size_t>(std::min<uint64_t>(file.size(), begin.size()));
+  file.read_at(0, std::as_writable_bytes(std::span(begin.data(), size)));
+  refuse(file.path(), describe({begin.data(), size}) + "; expected a scene: " + list_formats());
+}
+
+}  // namespace voxdag

@@ -1,0 +1,48 @@
+// Files that are not scenes are refused by the name of their format.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/scene/scene_files.h"
+
+namespace voxdag {
+namespace {
+
+using test::error_of_file;
+using testing::AllOf;
+using testing::HasSubstr;
+
+TEST(UnknownFile, IsNamedByItsFirstBytes) {
+  const std::pair<std::string, const char*> cases[] = {
+      {"\x1f\x8b\x08\x00 compressed", "is compressed by gzip: unpack it first"},
+      {std::string("\xfd\x37zXZ\0 data", 11), "is compressed by xz"},
+      {"PK\x03\x04 anything", "is a zip archive, as 3MF, USDZ and KMZ files are"},
+      {"Kaydara FBX Binary  \x1a", "is an FBX file"},
+      {"; FBX 7.3.0 project file\n", "is an FBX file"},
+      {std::string("MM\x10\0\0\0", 6), "is a 3DS file"},
+      {std::string("MM\0*\0\0", 6), "is a TIFF image"},
+      {std::string(257, ' ') + "ustar", "is a tar archive"},
+      {"OFF\n8 6 0\n", "is an OFF file"},
+      {"# .PCD v0.7\n", "is a PCD point cloud: convert it to PLY"},
+      {"<?xml version=\"1.0\"?>\n<COLLADA version=\"1.4.1\">", "is a COLLADA file"},
+      {"\n <!DOCTYPE html><title>404</title>", "is a web page, perhaps the error page"},
+      {"<svg/>", "is an XML file"},
+      {"\x89PNG\r\n", "is a PNG image"},
+      {"", "is empty; expected a scene"},
+      {" \n\n", "begins with blanks only"},
+      {"hello\x1b[2J", "has an unknown format; it begins with hello?[2J"},
+  };
+  for (const auto& [bytes, message] : cases) {
+    const Error error = error_of_file(bytes);
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+    EXPECT_THAT(error.message(), AllOf(HasSubstr(message), HasSubstr("glTF (.glb, .gltf); PLY")));
+  }
+}
+
+// JSON after white space or a byte order mark is read as glTF.
+TEST(UnknownFile, JsonIsGltf) {
+  for (const char* text : {"{", "[", "\n\t {", "\xef\xbb\xbf{", "glTF"})
+    EXPECT_THAT(error_of_file(text).message(), testing::Not(HasSubstr("expected a scene")));
+}
+
+}  // namespace
+}  // namespace voxdag
