@@ -16,6 +16,7 @@ namespace {
 // vertices to multiples of 1/256 voxel, so a difference of less than half of this step has no
 // meaning.
 constexpr double kMaxSnapCells = 1.0 / 512;
+// Maximum rounding error of a coordinate, relative to the largest number from which it is computed.
 constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
 
 int64_t whole_cells(double cells) {

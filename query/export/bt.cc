@@ -35,8 +35,8 @@ class BtWalk {
   void run() {
     const uint32_t levels = job_.selection.grid_levels;
     ++nodes;  // the root
-    // Writes the nodes above the grid. The path leads from the root to the octant whose low corner
-    // is the origin, and from there on to the child at the low corner.
+    // Writes the nodes above the grid. The root's child is the octant whose low corner is the
+    // origin. On every lower level, the child is at the low corner of its parent.
     for (uint32_t level = kOctoMapLevels; level > levels; --level) {
       inner_(kInner << (level == kOctoMapLevels ? 14 : 0));
       ++nodes;

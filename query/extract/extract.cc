@@ -37,9 +37,9 @@ constexpr uint64_t kOutsideShareBytes =
 constexpr unsigned kMaxWorkers = 256;  // each has a file open
 // Estimated memory per node while the DAG of a cube is built. It gives the initial number of cubes.
 constexpr uint64_t kBytesPerNode = 128;
-// If the file's levels have at most this number of nodes, the complete grid is one cube, which one
-// thread builds. This is faster than several threads, because each thread would build the subtrees
-// that occur in its cubes again.
+// If the levels that are read have at most this number of nodes in total, the complete grid is one
+// cube, which one thread builds. This is faster than several threads, because each thread would
+// build the subtrees that occur in its cubes again.
 constexpr uint64_t kFewNodes = uint64_t{1} << 17;
 constexpr uint64_t kPartsPerWorker = 4;
 constexpr uint64_t kMaxFirstParts = 4096;

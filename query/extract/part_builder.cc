@@ -9,8 +9,8 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kNodesBetweenChecks = 4096;  // checks of the cancel token
-// Number of nodes in the level below for which memory is reserved, per node. It is half of the
-// average for surfaces.
+// For n nodes of a level, memory for kExpectedChildren * n nodes is reserved in the next finer
+// level. Nodes of surfaces have twice this number of children on average.
 constexpr uint64_t kExpectedChildren = 2;
 constexpr uint64_t kPrefetchAhead = 8;  // nodes
 

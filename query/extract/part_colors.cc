@@ -24,6 +24,8 @@ using voxdag_reader::ColorRegion;
 using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 
+// In this file, a region is a color region (part_colors.h). The selection's region, a box of cells,
+// is always called the selection's region.
 constexpr uint64_t kMaxRegionCells = uint64_t{1} << 3 * kRegionLevels;
 // Memory of one thread while it encodes a region: the sums of the region's cells and of the next
 // coarser cells (1/8 as many), two colors per cell, and one checksum block.

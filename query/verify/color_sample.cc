@@ -125,8 +125,8 @@ class RegionComparison {
                    const std::vector<ColoredCell>& cells, const std::vector<CellValues>& values)
       : file_(file), grid_(grid), cells_(cells), values_(values) {}
 
-  // Returns true if all bytes are equal. Throws Error{kCorrupt} if they differ, unless they are
-  // colors that are similar (kMinSamplePsnr).
+  // Returns true if all bytes are equal, and false if they differ but `attribute` is a color and
+  // the colors are similar (kMinSamplePsnr). Throws Error{kCorrupt} for all other differences.
   bool compare(const SampledRegion& region, Attribute attribute) const {
     const ColorRegion& stored = region.stored[index_of(attribute)];
     const EncodedRegion baked = encode(region.cube, attribute, stored);

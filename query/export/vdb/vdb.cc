@@ -1,7 +1,7 @@
 // Exports OpenVDB's .vdb and NanoVDB's .nvdb with these two libraries. The file has a grid of
 // active voxels and, if the input has colors, a grid of the colors in linear light. The color grid
 // has the name "Cd", which Houdini and Blender use. The libraries build the grids completely in
-// memory, so the size of the grids is calculated first.
+// memory, so their size is calculated first and compared with the memory budget.
 //
 // Half floats are converted without Imath's lookup table, because a use of the table would require
 // linking Imath.
