@@ -5,7 +5,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kMaxStepS = 3600;  // by which the clock may be ahead of the elapsed time
+constexpr double kMaxStepS = 3600;              // maximum lead of the clock over the elapsed time
 constexpr double kMaxPauseS = kSecondsPerDay;   // maximum time between two runs of the service
 constexpr double kUncertainS = kSecondsPerDay;  // time after a jump in which nothing is deleted
 

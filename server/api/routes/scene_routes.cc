@@ -157,7 +157,7 @@ std::string digest_of(const Request& request, const char* name) {
 }
 
 // Throws Problem (503) while the service is stopping. A stopping service accepts no new parts. It
-// also stops to compute the digest of a received scene; the client can finish that upload later.
+// also stops computing the digest of a received scene; the client can finish that upload later.
 void check_running(const Context& context) {
   if (context.draining) throw busy("the service is stopping; resume at Upload-Offset");
 }

@@ -16,7 +16,8 @@
 namespace voxdag {
 namespace {
 
-// Reads the rows of one artifact. Keeps one frame of each level in memory.
+// Reads the rows of one artifact, which are its nodes and bricks. Keeps one frame (a group of
+// consecutive rows, artifact.h) of each level in memory.
 class ArtifactRows {
  public:
   ArtifactRows(std::shared_ptr<ReadableFile> segment, const ArtifactRef& ref)
@@ -25,7 +26,7 @@ class ArtifactRows {
   const ArtifactRef& ref() const { return ref_; }
 
   // Returns the occupied cells of the cube as a brick. A cell has a quarter of the cube's edge.
-  // Throws Error{kCorrupt} if the artifact is damaged or has no such cube.
+  // Throws Error{kCorrupt} if the artifact is damaged or does not contain the cube.
   uint64_t coarse_brick(const Cube& cube) {
     const auto roots = reader_.roots();
     const auto root = std::find_if(roots.begin(), roots.end(),

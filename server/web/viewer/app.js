@@ -21,7 +21,7 @@ import {length, scale, subtract} from "./vector.js";
 const kDefaultFov = 35;
 const kPictureAspect = 16 / 9;  // aspect ratio of the views in the manifest
 const kSeenIntervalMs = 250;    // between two measurements of the visible distance
-const kFirstSeenMs = 2000;  // delay of the first pick, because a pick needs an additional program
+const kFirstSeenMs = 2000;      // delay of the first pick, which compiles shaders
 const kStatisticsIntervalMs = 500;
 const kNoPicture = "There is no picture yet.";
 const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s

@@ -8,13 +8,14 @@ import {TilePool} from "../tiles/tile_pool.js";
 
 import {decodePage, kBlockWords, kMoreAt} from "./page_format.js";
 
-// Pages that were used within this time are not evicted until the view has had kRoundsToKnow
-// readings, because the view may still use them.
+// Before a view has had kRoundsToKnow readings, pages that were used within this time are not
+// evicted, because the view may still use them.
 const kRecentMs = 1500;
 const kFreeShare = 1 / 64;  // share of the pool that is freed when pages are evicted
 const kTableShare = 1 / 5;  // share of the budget for the hash table
 const kEntryBytes = 16, kTableWidth = 1024;  // the shaders contain the same table width
-// Entries of the hash table. The pool has at most 2^20 blocks, so half of the entries remain free.
+// Maximum number of entries of the hash table. The pool has at most 2^20 blocks, so half of the
+// entries remain free.
 const kMaxEntries = 2 ** 21;
 const kCoarseLevel = 5;  // pages of this and all coarser levels (at most 76) are never evicted
 

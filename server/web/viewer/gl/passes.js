@@ -16,8 +16,8 @@ import {
   kTrace
 } from "./picture_shaders.js";
 
-// Light is divided by this number before it is written to a target. Bytes hold values of at most 1,
-// so they represent light of up to kByteRange.
+// Light is divided by one of these two numbers before it is written to a target. Bytes hold values
+// of at most 1, so they represent light of up to kByteRange.
 const kHalfRange = 1;      // for a target with half floats
 const kByteRange = 8;      // for a target with bytes
 const kFeedbackBlock = 4;  // edge in canvas pixels of a feedback texel
@@ -25,7 +25,7 @@ const kHitFormats = ["RGBA32UI"], kColoredHitFormats = ["RGBA32UI", "R32UI"],
       kLightFormats = ["R8", "R32UI", "R32UI"];
 const kSkyFormats = ["RGBA8"], kFeedbackFormats = ["RGBA32UI"];
 const kColorTexels =
-    1 << 17;  // approximate texels of the color feedback; every visible page needs one
+    1 << 17;  // approximate number of texels in the color feedback; a visible page needs one
 
 // Returns the uniforms for a feedback: the edge of the block of pixels per texel, and the pixel of
 // the block that is sampled.

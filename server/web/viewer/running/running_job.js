@@ -16,16 +16,18 @@ import {SubvolumeWires} from "./subvolume_wires.js";
 const kPauseMs = 1500, kMaxPauseMs = 15000;
 // Statuses that mean: the partial result has a new digest, or the job has a new state.
 const kGone = [404, 409, 410];
-// After a request for the list of subvolumes, the pause before the next request is this multiple of
-// the request's duration, and at least this time per subvolume. A change appears in the list
-// slightly later than in the progress report, so the list is fetched twice per change. Started
-// subvolumes appear only in the list.
+// After a request for the list of subvolumes, the pause before the next request is kListShare times
+// the request's duration, and at least kListPausePerCubeMs per subvolume.
 const kListShare = 10, kListPausePerCubeMs = 0.1;
+// A change appears in the list slightly later than in the progress report, so the list is fetched
+// kListLooks times per change. The start of a subvolume appears only in the list, so the list of a
+// running job is also fetched when it is older than kMaxListPauseMs.
 const kListLooks = 2, kMaxListPauseMs = 15000;
 
 // Shows the job until it has a result. Resolves to false if there was nothing to show, because the
-// subvolumes are not planned yet. Throws WebGLUnavailable, or Problem if the job was deleted. The
-// next viewer takes its camera from the page's address. `showTools` fills the page's tools.
+// subvolumes are not planned yet. Throws WebGLUnavailable, or Problem if the job was deleted.
+// The camera remains in the page's address, from which the next viewer takes it. `showTools` fills
+// the page's tools.
 export async function watchJob({job, place, budgetBytes, showPicture, showTools, signal}) {
   const path = `/api/v1/jobs/${job.id}`;
   const source = new TileSource({base: `${path}/partial`, headers: authorization()});

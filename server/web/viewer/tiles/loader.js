@@ -107,8 +107,8 @@ export class Loader {
   replaceQueue(requests, unmet, nowMs) {
     this.unmet = unmet;
     if (unmet === 0) this.endOutage();
-    // Suspicious items are requested last, and the most suspicious ones at the very end, so that
-    // they do not delay other items.
+    // Items that may have caused an error (`last`) are requested after all others, so that they do
+    // not delay other items. Among these, the items with the smallest `batch` come last.
     const trust = ({key}) =>
         this.failures.get(key)?.last ? this.failures.get(key).batch : this.maxBatch;
     this.queue = requests.sort((a, b) => trust(a) - trust(b) || a.priority - b.priority);
