@@ -187,7 +187,7 @@ class TextureSet::Builder {
       users_[i] = user_of(materials, static_cast<uint32_t>(i));
   }
 
-  // Finds the levels of all pyramids, and their pages.
+  // Computes the sizes of the levels of all pyramids, and assigns pages to the levels.
   void measure(unsigned threads) {
     parallel_for(threads, levels_.size(), [&](unsigned, size_t i) {
       cancel_.check();
