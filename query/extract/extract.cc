@@ -180,8 +180,8 @@ uint64_t Extraction::wanted_parts(unsigned workers, uint64_t share_bytes) const 
                     workers * kPartsPerWorker, kMaxFirstParts);
 }
 
-// Divides the cube of the new grid, level by level, into cubes with selected cells. Stops when
-// there are at least `wanted` of them or when they are bricks.
+// Divides the cube of the new grid, level by level, into cubes that intersect the selection's
+// region. Stops when there are at least `wanted` of them or when they are bricks.
 std::vector<SelectedPart> Extraction::first_parts(Worker& worker, uint64_t wanted) const {
   if (file_.empty()) return {};
   std::vector<SelectedPart> parts{{}};

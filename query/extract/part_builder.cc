@@ -70,7 +70,7 @@ void PartBuilder::read(uint32_t level, PartLevel& nodes, PartLevel& below, Child
 }
 
 // Reads the nodes of a level above the bricks of the selected grid, and adds their children that
-// have selected cells to `below`.
+// intersect the selection's region to `below`.
 void PartBuilder::read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below,
                              Children& children) {
   const int64_t child_edge = edge(level + 1);

@@ -10,7 +10,7 @@ constexpr Vec kSunlight{{3.6, 3.2, 2.6}};
 constexpr Vec kZenith{{0.62, 0.78, 1.00}}, kHorizon{{0.95, 0.98, 1.02}};
 constexpr Vec kGround{{0.40, 0.36, 0.31}};
 constexpr double kOpenFloor = 0.82;     // green component of an open sky's light on a floor
-constexpr double kSunRadius = 0.006;    // at distance 1
+constexpr double kSunRadius = 0.006;    // radius of the sun's disk at distance 1
 constexpr double kBounce = 0.42;        // share of light that an occluder reflects
 constexpr double kSkyWidening = 0.1;    // spread of the cones of rays to the sky
 constexpr double kSunWidening = 0.004;  // spread of the cones of rays to the sun

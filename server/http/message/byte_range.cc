@@ -41,8 +41,9 @@ Parsed parse_range(std::string_view text, uint64_t size, ByteRange& range) {
   return Parsed::kRange;
 }
 
-// Returns false for many small or overlapping ranges: they cost the server more than the client,
-// and no download needs them.
+// True for one range, or if several ranges have at most `size` bytes in total. A larger total means
+// that ranges overlap. Such ranges cost the server more than the client, and no download needs
+// them.
 bool is_reasonable(const std::vector<ByteRange>& ranges, uint64_t size) {
   uint64_t bytes = 0;
   for (const ByteRange& range : ranges) bytes += range.size();

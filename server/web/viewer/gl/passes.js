@@ -129,9 +129,9 @@ export class Passes {
   }
 
   // Provides targets for a picture of width x height pixels. The picture has the size of the
-  // canvas, `full` {width, height}, or a smaller size while the camera moves. If a larger size is
-  // needed later, the targets get the full size, so that nothing is allocated when the camera
-  // starts or stops. `colored` is true if the file has colors.
+  // canvas, `full` {width, height}, or a smaller size while the camera moves or tiles arrive. If a
+  // larger size is needed later, the targets get the full size, so that later changes of the size
+  // allocate nothing. `colored` is true if the file has colors.
   resize(width, height, full, colored) {
     const {targets} = this,
           isForCanvas = targets?.full.width === full.width && targets.full.height === full.height;

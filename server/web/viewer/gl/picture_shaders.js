@@ -454,9 +454,8 @@ void main() {
 
 // Writes one texel per block of u_block x u_block pixels. Word 1: Hit.missing of the widest cell
 // whose tile is missing, or else of a shadow's ray. Word 2: the width of this cell in pixels, and
-// the brightness of the block's pixel u_sample, a different pixel in each frame. Word 3: the slot
-// of a tile that this pixel uses, and half the number of steps of its ray. Word 4: the t of this
-// ray's hit.
+// the brightness of the pixel u_sample, which differs between frames. Word 3: the slot of a tile
+// that this pixel uses, and half the number of its ray's steps. Word 4: the t of this ray's hit.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;

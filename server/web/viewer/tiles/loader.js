@@ -213,7 +213,7 @@ export class Loader {
     else this.split(batch, error, nowMs);
   }
 
-  // One item of the batch has caused the error. Splits the batch in two to find this item.
+  // One item of the batch may have caused the error. Splits the batch in two to find this item.
   split(batch, error, nowMs) {
     if (batch.length === 1) return this.noteFailure(batch[0], error, nowMs);
     const half = Math.ceil(batch.length / 2);
