@@ -26,6 +26,8 @@ struct KnownFormat {
 
 // More specific formats come first.
 constexpr KnownFormat kKnown[] = {
+    {0, "version https://git-lfs.github.com/spec/", "a Git LFS pointer, not the file itself",
+     "run git lfs pull"},
     {0, "\x1f\x8b", "compressed by gzip", kUnpack},
     {0, "\x28\xb5\x2f\xfd", "compressed by Zstandard", kUnpack},
     {0, {"\xfd\x37zXZ\0", 6}, "compressed by xz", kUnpack},

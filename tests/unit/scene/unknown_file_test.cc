@@ -15,6 +15,7 @@ TEST(UnknownFile, IsNamedByItsFirstBytes) {
   const std::pair<std::string, const char*> cases[] = {
       {"\x1f\x8b\x08\x00 compressed", "is compressed by gzip: unpack it first"},
       {std::string("\xfd\x37zXZ\0 data", 11), "is compressed by xz"},
+      {"version https://git-lfs.github.com/spec/v1\noid sha256:0", "run git lfs pull"},
       {"PK\x03\x04 anything", "is a zip archive, as 3MF, USDZ and KMZ files are"},
       {"Kaydara FBX Binary  \x1a", "is an FBX file"},
       {"; FBX 7.3.0 project file\n", "is an FBX file"},
