@@ -46,12 +46,13 @@ bool PlyMesh::open_surfaces(unsigned cursors) {
   const uint64_t vertices = ply_.vertex_element().count;
   values_ = &surfaces_.values();
   if (!layout.vertex_colors.empty())
-    colors_.emplace(VertexReader(ply_, layout.vertex_colors, budget_), std::vector<double>(),
-                    BlockCache<Color>(budget_, vertices, cursors, "the colors of vertices"));
+    colors_.emplace(
+        Cached<Color>{VertexReader(ply_, layout.vertex_colors, budget_), std::vector<double>(),
+                      BlockCache<Color>(budget_, vertices, cursors, "the colors of vertices")});
   if (!layout.vertex_texture.empty())
-    texcoords_.emplace(
+    texcoords_.emplace(Cached<Pair>{
         VertexReader(ply_, layout.vertex_texture, budget_), std::vector<double>(),
-        BlockCache<Pair>(budget_, vertices, cursors, "texture coordinates of a scene"));
+        BlockCache<Pair>(budget_, vertices, cursors, "texture coordinates of a scene")});
   const RequestedProperties of_faces = Surfaces::face_properties(layout);
   const bool has_face_values = !of_faces.numbers.empty() || of_faces.reals != Layout::kNone;
   if (faces_ && has_face_values) faces_->request(of_faces);

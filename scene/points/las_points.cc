@@ -133,7 +133,8 @@ class LasReader : public PointReader {
     if (!file_.has_withheld())
       return for_each_record(window_, las_, first, count,
                              [&](uint64_t, const std::byte* record) { visit(record); });
-    auto [begin, point] = file_.block_of(first);
+    const auto [first_record, first_point] = file_.block_of(first);
+    uint64_t begin = first_record, point = first_point;  // a lambda cannot capture the binding
     const uint64_t end = first + count;
     for (; point < end && begin < las_.records; begin += kLasBlockRecords) {
       const uint64_t records = std::min(kLasBlockRecords, las_.records - begin);

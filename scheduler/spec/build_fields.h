@@ -30,7 +30,7 @@ inline constexpr int64_t kMaxOptionEdge = int64_t{1} << 20;
 
 inline constexpr Field kSceneField =
     Field("scene",
-          "scene files (.glb, .gltf, .ply, .obj, .stl, .las, .xyz, .txt, .csv), together one scene")
+          "scene files (.glb, .gltf, .ply, .las, .obj, .stl, .xyz, .txt, .csv), together one scene")
         .required()
         .positional()
         .key(false);

@@ -207,7 +207,7 @@ TEST_F(Client, ReportsErrors) {
   expect_error(3, "none.glb", {"submit", "none.glb", "-r", "64"});
   expect_error(2, "power of two", {"submit", "m.glb", "-r", "100"});
   put("text.doc", "no scene");
-  expect_error(2, "ending with .glb, .gltf, .ply, .obj, .stl, .las, .xyz, .txt or .csv",
+  expect_error(2, "ending with .glb, .gltf, .ply, .las, .obj, .stl, .xyz, .txt or .csv",
                {"submit", "text.doc", "-r", "64"});
   expect_error(2, "text.doc", {"submit", "text.doc", "-r", "64"});
   expect_error(2, "http://", {"jobs", "--server", "ftp://127.0.0.1"});

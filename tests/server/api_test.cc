@@ -355,7 +355,7 @@ TEST_F(Api, ListsTheEndingsOfTheSceneFormats) {
   EXPECT_NE(document.find("(" + suffixes + ")$"), std::string::npos);
   EXPECT_NE(document.find(list_scene_endings()), std::string::npos);
   EXPECT_NE(http_->get("/lib/scene_upload.js").body.find('"' + suffixes + '"'), std::string::npos);
-  const ClientResponse refused = http_->get("/api/v1/scenes/a.txt");
+  const ClientResponse refused = http_->get("/api/v1/scenes/a.doc");
   EXPECT_EQ(refused.status, 400);
   EXPECT_NE(refused.body.find(list_scene_endings()), std::string::npos) << refused.body;
   for (const SceneFormat& format : scene_formats())

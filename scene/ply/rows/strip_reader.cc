@@ -25,7 +25,6 @@ StripReader::StripReader(const ReadableFile& file, Format format, const Element&
       format_(format),
       element_(element),
       list_(list),
-      vertices_(vertices),
       restart_(restart_of(element.properties[list].type, vertices)) {
   if (format == Format::kAscii)
     text_.emplace(file, budget);

@@ -60,7 +60,6 @@ class StripReader {
   const Format format_;
   const Element& element_;
   const size_t list_;
-  const uint64_t vertices_;
   const int64_t restart_;  // the entry besides -1 that begins a strip; -1 if there is none
   std::optional<FileWindow> window_;
   std::optional<WordScanner> text_;

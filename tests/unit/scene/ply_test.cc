@@ -312,10 +312,10 @@ TEST(Ply, HostileHeadersAreRefused) {
            xyz + "end_header\n",
        "element b"},
       {begin + "element vertex 0\nproperty float x\nend_header\n", "without a property y"},
-      {begin + "element vertex 0\n" + xyz + "element face 0\nproperty int k\nend_header\n",
+      {begin + "element vertex 0\n" + xyz + "element face 1\nproperty int k\nend_header\n",
        "vertex_indices"},
       {begin + "element vertex 0\n" + xyz +
-           "element face 0\nproperty list uchar float vertex_indices\nend_header\n",
+           "element face 1\nproperty list uchar float vertex_indices\nend_header\n",
        "is not a list of integers"},
       {begin + "element vertex 0\nproperty list float int x\nend_header\n",
        "float type for the count of a list"},

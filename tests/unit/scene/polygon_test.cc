@@ -60,7 +60,7 @@ void check_all_ways(Outline outline) {
   for (int direction = 0; direction < 2; ++direction) {
     for (size_t i = 0; i < outline.size(); ++i) {
       ASSERT_TRUE(is_covered(outline)) << "from corner " << i;
-      std::ranges::rotate(outline, outline.begin() + 1);
+      std::rotate(outline.begin(), outline.begin() + 1, outline.end());
     }
     std::ranges::reverse(outline);
   }

@@ -117,7 +117,7 @@ TEST(OptionsJson, SetsWhatIsGiven) {
 
 TEST(OptionsJson, IsRefusedByNameAndExpectation) {
   const std::pair<const char*, const char*> bodies[] = {
-      {"[]", "'the body': expected an object, not an array of 0 items"},
+      {"[]", "'the body': expected an object, not []"},
       {"{}", "'edge': expected a power of two from 4 to 64, but the member is missing"},
       {R"({"edge":12})", "'edge': expected a power of two"},
       {R"({"edge":4.5})", "'edge'"},
