@@ -152,6 +152,11 @@ struct Skin {
   int inverse_bind = -1;  // -1: identity matrices
 };
 
+struct Asset {
+  std::string version = "2.0";
+  std::string min_version;  // empty if it is absent
+};
+
 struct Document {
   Document(std::string scene_path, MemoryBudget& budget)
       : path(std::move(scene_path)), charge(budget, "the structure of " + path) {}
@@ -160,8 +165,11 @@ struct Document {
   GrowingCharge charge;        // charge for the arrays
   GrowingCharge model_charge;  // charge for the model
 
-  // The asset, the extensions, materials, textures, samplers and images, as read by tinygltf. The
-  // model's other arrays are empty. No image is loaded: a data: URI ends at its comma.
+  Asset asset;
+  std::deque<std::string> extensions_used;
+  std::deque<std::string> extensions_required;
+  // Materials, textures, samplers and images, as read by tinygltf. The model's other arrays are
+  // empty. No image is loaded: a data: URI ends at its comma.
   std::shared_ptr<tinygltf::Model> model;
   std::vector<RawString> image_uris;  // one per image of the model; size 0 for an image without uri
 
