@@ -2,7 +2,8 @@
 // scene are compact structs, each charged to the memory budget. Asset, extensions, materials,
 // textures, samplers and images are in tinygltf's model. read_document() fills a document and
 // check_document() checks it once. After that:
-//   1. every index is in range, or -1 if the file gives none;
+//   1. every index in nodes of the scene and in drawn meshes is in range, or -1 if the file gives
+//      none;
 //   2. every accessor that is read has the type its use requires. Its bytes are inside its buffer
 //      view, the view is inside its buffer, and the buffer is inside the existing bytes;
 //   3. nodes form trees, and `roots` have no parents.
@@ -118,13 +119,14 @@ struct Primitive {
   PrimitiveSurface surface;
   std::shared_ptr<const DracoExtension> draco;  // null: not compressed
 
-  bool makes_triangles() const { return mode >= kTriangleList; }
+  bool makes_triangles() const { return mode >= kTriangleList && position >= 0; }
 };
 
 struct Mesh {
   std::string name;
   std::vector<Primitive> primitives;
   std::vector<double> weights;
+  bool is_drawn = false;  // a node of the scene draws it; set by check_document()
 };
 
 // Accessors of EXT_mesh_gpu_instancing; -1 for missing ones.

@@ -1,5 +1,6 @@
 #include "scene/gltf/mesh_data/vertex_source.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <unordered_map>
@@ -71,13 +72,15 @@ VertexSource::VertexSource(const Document& document, BufferReader& buffers,
                            const Primitive& primitive, std::span<const double> weights,
                            std::span<const Transform> joints)
     : charge_(buffers.budget(),
-              sizeof(Target) * weights.size() + sizeof(Influences) * primitive.joint_sets.size(),
+              sizeof(Target) * std::min(weights.size(), primitive.targets.size()) +
+                  sizeof(Influences) * primitive.joint_sets.size(),
               document.path + ": a primitive with its morph targets and joints"),
       positions_(document, buffers, primitive.position),
       joints_(joints) {
-  targets_.reserve(weights.size());
+  const size_t weighted = std::min(weights.size(), primitive.targets.size());
+  targets_.reserve(weighted);
   influences_.reserve(joints.empty() ? 0 : primitive.joint_sets.size());
-  for (size_t t = 0; t < weights.size(); ++t)
+  for (size_t t = 0; t < weighted; ++t)
     if (weights[t] != 0 && primitive.targets[t] >= 0)
       targets_.push_back({AccessorReader(document, buffers, primitive.targets[t]), weights[t]});
   if (joints.empty()) return;

@@ -26,9 +26,10 @@ PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buf
 
 class VertexSource : public PositionSource {
  public:
-  // `weights` are the morph weights of the node or, if it has none, of the mesh. `joints` are the
-  // matrices of the node's skin, empty without a skin. All arguments must outlive the source.
-  // Throws Error{kOutOfMemory} if the targets and joint sets do not fit the budget of `buffers`.
+  // `weights` are the morph weights of the node or, if it has none, of the mesh. Missing weights
+  // are 0, and weights without a target are ignored. `joints` are the matrices of the node's skin,
+  // empty without a skin. All arguments must outlive the source. Throws Error{kOutOfMemory} if the
+  // targets and joint sets do not fit the budget of `buffers`.
   VertexSource(const Document& document, BufferReader& buffers, const Primitive& primitive,
                std::span<const double> weights, std::span<const Transform> joints);
 
