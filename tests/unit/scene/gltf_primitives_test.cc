@@ -118,6 +118,84 @@ TEST(GltfPrimitives, WithoutJointsBesideSkinnedOnes) {
   expect_scene(scene.glb(), {by_node}, "unskinned-primitives");
 }
 
+// Replaces the weights of skinned().
+template <class T>
+SceneBuilder weighted(int type, const std::vector<T>& weights, bool is_normalized) {
+  SceneBuilder scene = skinned();
+  Json more = Json::object();
+  if (is_normalized) more["normalized"] = true;
+  primitives_of(scene)[0]["attributes"]["WEIGHTS_0"] =
+      scene.add_accessor("VEC4", type, weights, more);
+  return scene;
+}
+
+template <class T>
+std::vector<T> per_vertex(T a, T b, T c = 0, T d = 0) {
+  return {a, b, c, d, a, b, c, d, a, b, c, d};
+}
+
+TEST(GltfPrimitives, WeightsAreDividedByTheirSum) {
+  const std::vector<Corners> expected = {moved(kAtRest, 10, 0, 0)};
+  const auto expect = [&](const SceneBuilder& scene, const char* code) {
+    expect_scene(scene.glb(), expected, code, *code ? 3 : 0);
+  };
+  expect(weighted<float>(kF32, per_vertex(0.5f, 0.f), false), "unnormalized-weights");
+  expect(weighted<float>(kF32, per_vertex(2.f, 1.f, 1.f), false), "unnormalized-weights");
+  expect(weighted<float>(kF32, per_vertex(0.f, 0.f, 0.f, 1e-3f), false), "unnormalized-weights");
+  expect(weighted<uint8_t>(kU8, per_vertex<uint8_t>(127, 127), true), "unnormalized-weights");
+  expect(weighted<uint8_t>(kU8, per_vertex<uint8_t>(128, 128), true), "unnormalized-weights");
+  expect(weighted<uint8_t>(kU8, per_vertex<uint8_t>(128, 127), true), "");
+  expect(weighted<uint8_t>(kU8, per_vertex<uint8_t>(64, 64, 64, 63), true), "");
+  expect(weighted<uint16_t>(kU16, per_vertex<uint16_t>(32767, 32767), true),
+         "unnormalized-weights");
+  expect(weighted<uint16_t>(kU16, per_vertex<uint16_t>(65535, 0), true), "");
+  // Integers that lack "normalized".
+  expect(weighted<uint8_t>(kU8, per_vertex<uint8_t>(255, 0), false), "unnormalized-weights");
+  expect(weighted<uint16_t>(kU16, per_vertex<uint16_t>(128, 128), false), "unnormalized-weights");
+}
+
+// The weights of all sets are added up.
+TEST(GltfPrimitives, WeightsOfSeveralSetsAreOneSum) {
+  SceneBuilder scene = weighted<float>(kF32, per_vertex(0.25f, 0.25f), false);
+  Json& attributes = primitives_of(scene)[0]["attributes"];
+  attributes["JOINTS_1"] = attributes["JOINTS_0"];
+  attributes["WEIGHTS_1"] = attributes["WEIGHTS_0"];
+  const std::vector<Corners> expected = {moved(kAtRest, 10, 0, 0)};
+  expect_scene(scene.glb(), expected, "");
+  attributes["WEIGHTS_1"] = scene.add_accessor<float>("VEC4", kF32, per_vertex(0.f, 0.f));
+  expect_scene(scene.glb(), expected, "unnormalized-weights", 3);
+}
+
+// Sums that differ from 1 by rounding change nothing: the matrix is the plain sum.
+TEST(GltfPrimitives, RoundedWeightsAreUsedUnchanged) {
+  const float third = 1.f / 3;
+  const double sum = 3 * static_cast<double>(third);
+  ASSERT_NE(sum, 1);
+  const auto triangles =
+      triangles_of_file(weighted<float>(kF32, per_vertex(third, third, third), false).glb());
+  EXPECT_EQ(triangles[0][1][0], sum + 10 * sum);
+}
+
+TEST(GltfPrimitives, TheFirstJointMovesVerticesWithoutWeights) {
+  const std::vector<float> weights = {0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0};
+  SceneBuilder scene = weighted(kF32, weights, false);
+  expect_scene(scene.glb(), {moved(kAtRest, 10, 0, 0)}, "no-weights", 2);
+  const int joint = scene.add_root({{"translation", {0, 20, 0}}});
+  scene.root["skins"][0]["joints"].push_back(joint);
+  primitives_of(scene)[0]["attributes"]["JOINTS_0"] =
+      scene.add_accessor<uint8_t>("VEC4", kU8, {0, 1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0});
+  expect_scene(scene.glb(), {{{{10, 0, 0}, {1, 20, 0}, {0, 21, 0}}}}, "no-weights", 2);
+  scene.root["skins"][0]["joints"] = {joint};
+  EXPECT_THAT(error_of_file(scene.glb()).message(), testing::HasSubstr("is not a finite position"));
+}
+
+// Weights of meshes that no skin moves do not matter.
+TEST(GltfPrimitives, WeightsWithoutASkinAreIgnored) {
+  SceneBuilder scene = weighted<float>(kF32, per_vertex(0.f, 0.f), false);
+  scene.root["nodes"][0].erase("skin");
+  expect_scene(scene.glb(), {moved(kAtRest, 0, 0, 7)}, "");
+}
+
 // Meshes, skins and nodes that the scene does not draw may have any fault.
 TEST(GltfPrimitives, UnusedOnesMayBeBroken) {
   const Json kBroken[] = {{{"attributes", {{"POSITION", 77}}}},
