@@ -1,8 +1,10 @@
-// Reads a PNG or JPEG image row by row. Detects the format by its first bytes. Ignores profiles,
-// gamma and orientation, as glTF requires.
+// Reads a PNG, JPEG, WebP or AVIF image row by row. Detects the format by its first bytes. Ignores
+// profiles, gamma and orientation, as glTF requires.
 //
-// Decoders: libpng, and libjpeg-turbo with its accurate integer transform and smooth upsampling.
-// All invalid bytes cause BrokenImage, whatever image size they declare. Not thread-safe.
+// Decoders: libpng, libjpeg-turbo with its accurate integer transform and smooth upsampling, and,
+// if voxdag was built with them, libwebp and libavif. WebP and AVIF images are decoded in one
+// piece, in memory that is charged, by the first read_row(). All invalid bytes cause BrokenImage,
+// whatever image size they declare. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +27,7 @@ class EncodedBytes {
 };
 
 // Thrown for an image that cannot be decoded. The message completes "<image> ...", for example "is
-// a WebP image, expected PNG or JPEG".
+// a GIF image, which voxdag does not read: convert it to PNG".
 struct BrokenImage {
   std::string message;
 };
@@ -64,5 +66,13 @@ enum class ImageUse { kPixels, kSize };
 // Error{kOutOfMemory} if decoding does not fit the budget, and the source's errors.
 std::unique_ptr<ImageReader> open_image(EncodedBytes& source, MemoryBudget& budget,
                                         ImageUse use = ImageUse::kPixels);
+
+// True if this program has a decoder for the format. `head`: the first bytes of the image, at least
+// kImageHeadBytes unless the image is shorter.
+inline constexpr size_t kImageHeadBytes = 64;
+bool is_readable_format(std::span<const std::byte> head);
+
+// Returns the formats that this program reads: "PNG, JPEG or WebP".
+std::string readable_image_formats();
 
 }  // namespace voxdag

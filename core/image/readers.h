@@ -1,4 +1,4 @@
-// The readers of the two formats, for open_image().
+// The readers of the formats, for open_image().
 #pragma once
 
 #include <algorithm>
@@ -6,13 +6,15 @@
 #include <exception>
 #include <memory>
 
+#include "core/base/page_buffer.h"
 #include "core/image/image_reader.h"
 
 namespace voxdag {
 
-// A source of bytes. head() returns its first bytes, up to 16, which read() also returns. read()
-// stores an exception of the source instead of throwing it, because exceptions must not pass
-// through a decoder written in C. It then returns fewer bytes, and rethrow() throws the exception.
+// A source of bytes. head() returns its first bytes, up to kImageHeadBytes, which read() also
+// returns. read() stores an exception of the source instead of throwing it, because exceptions must
+// not pass through a decoder written in C. It then returns fewer bytes, and rethrow() throws the
+// exception.
 class PeekedSource {
  public:
   explicit PeekedSource(EncodedBytes& source) : source_(source) {
@@ -37,14 +39,29 @@ class PeekedSource {
 
  private:
   EncodedBytes& source_;
-  std::byte head_[16];
+  std::byte head_[kImageHeadBytes];
   size_t head_size_ = 0, head_read_ = 0;
   std::exception_ptr failure_;
+};
+
+// The bytes of a complete file, for decoders that need all bytes at once.
+class WholeFile {
+ public:
+  // Reads the source to its end. Throws Error{kOutOfMemory} if the bytes do not fit in the budget,
+  // and the source's errors.
+  WholeFile(PeekedSource& source, MemoryBudget& budget);
+  std::span<const uint8_t> bytes() const { return {bytes_.data(), size_}; }
+
+ private:
+  PageBuffer<uint8_t> bytes_;
+  size_t size_ = 0;
 };
 
 std::unique_ptr<ImageReader> open_png(std::unique_ptr<PeekedSource> source, MemoryBudget& budget,
                                       ImageUse use);
 std::unique_ptr<ImageReader> open_jpeg(std::unique_ptr<PeekedSource> source, MemoryBudget& budget,
                                        ImageUse use);
+std::unique_ptr<ImageReader> open_webp(std::unique_ptr<PeekedSource> source, MemoryBudget& budget);
+std::unique_ptr<ImageReader> open_avif(std::unique_ptr<PeekedSource> source, MemoryBudget& budget);
 
 }  // namespace voxdag

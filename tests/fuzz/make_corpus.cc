@@ -16,6 +16,7 @@
 #include "tests/fuzz/scene/compressed_scenes.h"
 #include "tests/fuzz/scene/rich_scene.h"
 #include "tests/support/image_files.h"
+#include "tests/support/modern_image_files.h"
 #include "tests/unit/core/format/color/valued_files.h"
 #include "tests/unit/core/format/test_artifacts.h"
 #include "tests/unit/core/format/test_files.h"
@@ -226,6 +227,17 @@ void add_images(const Corpus& corpus) {
   jpeg("color_progressive", 3, true);
   jpeg("cmyk", 4, false);
   corpus.add("image_file", "webp", std::string("RIFF\x24\0\0\0WEBPVP8 ", 16));
+#ifdef VOXDAG_HAS_WEBP
+  for (const bool is_lossless : {false, true})
+    corpus.add("image_file", is_lossless ? "lossless.webp" : "lossy.webp",
+               webp_file(20, 16, pixels.substr(0, 4 * 20 * 16), is_lossless));
+#endif
+#ifdef VOXDAG_HAS_AVIF
+  for (const int chroma : {420, 444})
+    corpus.add("image_file", "chroma_" + std::to_string(chroma) + ".avif",
+               avif_file({.width = 20, .height = 16, .chroma = chroma, .matrix = 6},
+                         pixels.substr(0, 4 * 20 * 16)));
+#endif
   corpus.add("image_file", "ktx2", "\xabKTX 20\xbb\r\n\x1a\n");
 }
 

@@ -1,4 +1,4 @@
-// Images: PNG and JPEG without changes, and PNG also with corrected checksums of its chunks, so
+// Images: without changes, and PNG also with corrected checksums of its chunks, so
 // that a mutation reaches the code that follows. Any bytes give either pixels, which are the same
 // each time, or a problem.
 #include <zlib.h>
@@ -15,7 +15,7 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kMemoryBytes = uint64_t{8} << 20;
+constexpr uint64_t kMemoryBytes = uint64_t{32} << 20;
 // Only the first rows of a large image are decoded.
 constexpr uint64_t kMaxPixels = uint64_t{1} << 20;
 

@@ -4,95 +4,20 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
-#include <cstring>
-#include <memory>
 #include <span>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "core/base/error.h"
-#include "core/image/image_reader.h"
 #include "core/image/png_writer.h"
 #include "tests/support/image_files.h"
+#include "tests/unit/core/image/image_source.h"
 
 namespace voxdag::test {
 namespace {
 
 using ::testing::HasSubstr;
-
-struct StringSource : EncodedBytes {
-  explicit StringSource(std::string all) : bytes(std::move(all)) {}
-  size_t read(std::span<std::byte> out) override {
-    const size_t size = std::min(out.size(), bytes.size() - at);
-    std::memcpy(out.data(), bytes.data() + at, size);
-    at += size;
-    return size;
-  }
-  const std::string bytes;
-  size_t at = 0;
-};
-
-struct Decoded {
-  uint32_t width = 0, height = 0;
-  int bits = 0;
-  std::vector<uint16_t> channels;  // four of each pixel
-  std::array<uint16_t, 4> at(uint32_t x, uint32_t y) const {
-    const uint16_t* const pixel = &channels[4 * (size_t{width} * y + x)];
-    return {pixel[0], pixel[1], pixel[2], pixel[3]};
-  }
-};
-using Pixel = std::array<uint16_t, 4>;
-
-Decoded decode(const std::string& file, uint64_t memory = uint64_t{16} << 20) {
-  MemoryBudget budget(memory);
-  StringSource source(file);
-  const auto reader = open_image(source, budget);
-  Decoded out{reader->width(), reader->height(), reader->bits(), {}};
-  const size_t channel_bytes = static_cast<size_t>(out.bits) / 8;
-  std::vector<std::byte> row(4 * channel_bytes * out.width);
-  for (uint32_t y = 0; y < out.height; ++y) {
-    reader->read_row(row);
-    for (size_t i = 0; i < row.size(); i += channel_bytes) {
-      uint16_t value = std::to_integer<uint16_t>(row[i]);
-      if (channel_bytes == 2) std::memcpy(&value, &row[i], 2);
-      out.channels.push_back(value);
-    }
-  }
-  return out;
-}
-
-// What is wrong with the image; "" if nothing is.
-std::string problem_of(const std::string& file, uint64_t memory = uint64_t{16} << 20) {
-  try {
-    decode(file, memory);
-    return "";
-  } catch (const BrokenImage& broken) {
-    return broken.message;
-  }
-}
-
-// Smooth, so that JPEG loses little of it.
-std::string gradient(uint32_t width, uint32_t height, uint32_t components) {
-  std::string pixels;
-  for (uint32_t y = 0; y < height; ++y)
-    for (uint32_t x = 0; x < width; ++x)
-      for (uint32_t c = 0; c < components; ++c)
-        pixels += static_cast<char>(255 *
-                                    (c == 0   ? x
-                                     : c == 1 ? y
-                                              : x + y) /
-                                    (c < 2 ? std::max(width, height) : width + height));
-  return pixels;
-}
-std::string noise(size_t size) {
-  std::string bytes(size, '\0');
-  uint32_t state = 7;
-  for (char& c : bytes) c = static_cast<char>((state = state * 1664525 + 1013904223) >> 24);
-  return bytes;
-}
 
 void expect_gradient(const std::string& file, uint32_t width, uint32_t height,
                      uint32_t components) {
@@ -284,11 +209,38 @@ TEST(Png, DecompressionBombs) {
             (Pixel{'a', 'b', 'c', 'd'}));
 }
 
+// Formats without decoder are named, with a command that converts them.
 TEST(Images, OtherFormats) {
-  EXPECT_THAT(problem_of(std::string("RIFF\x24\0\0\0WEBPVP8 ", 16)), HasSubstr("a WebP image"));
-  EXPECT_THAT(problem_of("\xabKTX 20\xbb\r\n\x1a\n"), HasSubstr("a KTX2 image"));
-  EXPECT_THAT(problem_of("GIF89a......"), HasSubstr("unknown format"));
+  const std::string start(12, '.');
+  const std::pair<std::string, const char*> kFormats[] = {
+      {"\xabKTX 20\xbb\r\n\x1a\n", "a KTX2 image"},
+      {"\xabKTX 11\xbb\r\n\x1a\n", "a KTX image"},
+      {"DDS |" + start, "a DDS image"},
+      {"GIF89a" + start, "a GIF image"},
+      {"BM" + start, "a BMP image"},
+      {std::string("II*\0", 4) + start, "a TIFF image"},
+      {std::string("MM\0*", 4) + start, "a TIFF image"},
+      {"#?RADIANCE\n" + start, "a Radiance HDR image"},
+      {"\x76\x2f\x31\x01" + start, "an OpenEXR image"},
+      {"8BPS" + start, "a Photoshop image"},
+      {std::string("\0\0\0\x18"
+                   "ftypheic\0\0\0\0mif1heic",
+                   24),
+       "an HEIF image"},
+      {"<svg xmlns", "an SVG drawing"}};
+  for (const auto& [bytes, name] : kFormats) {
+    const std::string problem = problem_of(bytes);
+    EXPECT_THAT(problem, HasSubstr("is " + std::string(name) + ", expected PNG, JPEG"));
+    EXPECT_THAT(problem, HasSubstr("(convert ")) << name;
+  }
+  EXPECT_THAT(problem_of("\xabKTX 20"), HasSubstr("gltf-transform ktxdecompress IN.glb OUT.glb"));
+  EXPECT_THAT(problem_of("0123456789"), HasSubstr("unknown format"));
   EXPECT_THAT(problem_of(""), HasSubstr("empty"));
+}
+
+TEST(Images, GitLfsPointers) {
+  EXPECT_THAT(problem_of("version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n"),
+              HasSubstr("is a Git LFS pointer, not the image itself"));
 }
 
 TEST(Images, MemoryIsRefused) {
@@ -353,7 +305,7 @@ TEST(Images, ErrorsOfTheSource) {
   struct Failing : StringSource {
     using StringSource::StringSource;
     size_t read(std::span<std::byte> out) override {
-      if (at >= 16) throw Error(ErrorCode::kIo, "disk");
+      if (at >= kImageHeadBytes) throw Error(ErrorCode::kIo, "disk");
       return StringSource::read(out);
     }
   };
@@ -361,7 +313,13 @@ TEST(Images, ErrorsOfTheSource) {
        {png_file({9, 9, 8, 6, ""}, noise(4 * 81)), jpeg_file(16, 16, 3, gradient(16, 16, 3))}) {
     MemoryBudget budget(16 << 20);
     Failing source(file);
-    EXPECT_THROW(open_image(source, budget), Error);
+    EXPECT_THROW(
+        {
+          const auto image = open_image(source, budget);
+          std::vector<std::byte> row(size_t{4} * image->width());
+          for (uint32_t y = 0; y < image->height(); ++y) image->read_row(row);
+        },
+        Error);
     EXPECT_EQ(budget.used(), 0u);
   }
 }

@@ -1,0 +1,21 @@
+// Recognizes image formats by their first bytes.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+namespace voxdag {
+
+enum class ImageDecoder { kNone, kPng, kJpeg, kWebp, kAvif };
+
+struct ImageFormat {
+  const char* name;                            // "a GIF image"
+  const char* remedy = "";                     // how a user gets a readable image
+  ImageDecoder decoder = ImageDecoder::kNone;  // decoder of the format, perhaps not in this program
+};
+
+// Returns the format of an image with these first bytes; null if it is unknown.
+const ImageFormat* image_format_of(std::span<const std::byte> head);
+
+}  // namespace voxdag

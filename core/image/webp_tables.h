@@ -1,0 +1,16 @@
+// Upper bound of the memory for the decoding tables of a lossless WebP stream. An image may declare
+// 65536 sets of tables in a few kilobytes, so the bound is needed before the stream is decoded.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace voxdag {
+
+// Reads a lossless stream ("VP8L") up to the number of its sets of Huffman tables. `stream` begins
+// with the transforms. Returns nothing for a broken stream.
+std::optional<uint64_t> webp_table_bytes(std::span<const uint8_t> stream, uint32_t width,
+                                         uint32_t height);
+
+}  // namespace voxdag
