@@ -13,7 +13,7 @@ uint64_t largest_vertex_count(const Document& document) {
   uint64_t largest = 0;
   for (const Mesh& mesh : document.meshes)
     for (const Primitive& primitive : mesh.primitives)
-      if (mesh.is_drawn && primitive.makes_triangles())
+      if (primitive.makes_triangles())
         largest =
             std::max(largest, document.accessors[static_cast<size_t>(primitive.position)].count);
   return largest;
@@ -159,14 +159,13 @@ void TriangleReader::bind_draw() {
 void TriangleReader::bind(const Node& node, size_t primitive_index) {
   const Mesh& mesh = document_.meshes[static_cast<size_t>(node.mesh)];
   const std::vector<double>& weights = node.weights.empty() ? mesh.weights : node.weights;
-  const Primitive& primitive = mesh.primitives[primitive_index];
-  const int skin = primitive.joint_sets.empty() ? -1 : node.skin;
-  const Binding next{node.mesh, primitive_index, weights.data(), skin};
+  const Binding next{node.mesh, primitive_index, weights.data(), node.skin};
   if (next == binding_) return;
-  if (skin != binding_.skin) {
+  const Primitive& primitive = mesh.primitives[primitive_index];
+  if (node.skin != binding_.skin) {
     binding_ = {};
     joints_ = {};
-    if (skin >= 0) joints_ = joint_matrices(document_, buffers_, skin);
+    if (node.skin >= 0) joints_ = joint_matrices(document_, buffers_, node.skin);
   }
   binding_ = {};
   vertices_.emplace(document_, buffers_, primitive, weights,

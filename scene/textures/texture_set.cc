@@ -59,8 +59,23 @@ std::string user_of(const SceneMaterials& materials, uint32_t image) {
   const auto found = std::ranges::find(materials.materials, image, &Material::image);
   if (found == materials.materials.end()) return "";
   const auto index = static_cast<int>(found - materials.materials.begin());
-  return ", the base color of material " + numbered(index, found->name) + ",";
+  return ", the base color of material " + numbered(index, found->name);
 }
+
+// Unreadable images with the same problem.
+struct UnreadableImages {
+  std::string problem;
+  std::string first;  // the first of the images, and a material that uses it
+  uint64_t images = 0, materials = 0;
+
+  Warning warning() const {
+    const std::string effect = materials == 1
+                                   ? "; the base color factor of this material is used alone"
+                                   : "; the base color factors of " + std::to_string(materials) +
+                                         " materials are used alone";
+    return {"unusable-image", first, problem + effect, images};
+  }
+};
 
 // Runs `body`, concurrently with other threads that do the same. If the memory does not suffice,
 // runs it again while no other thread does.
@@ -87,9 +102,11 @@ std::string image_digest(FileSystem& files, const ImageSource& source, const Can
   std::vector<std::byte> buffer(64 << 10);
   try {
     ImageBytes bytes(files, source);
-    while (const size_t size = bytes.read(buffer)) {
+    for (bool is_first = true; const size_t size = bytes.read(buffer); is_first = false) {
       cancel.check();
-      hash.add(std::span(buffer).first(size));
+      const std::span<const std::byte> part = std::span(buffer).first(size);
+      if (is_first && !is_readable_format(part)) return "unreadable";
+      hash.add(part);
     }
   } catch (const BrokenImage&) {
     hash.add(buffer);  // a decoder may use the bytes before the damaged part
@@ -222,7 +239,7 @@ class TextureSet::Builder {
     });
   }
 
-  // Removes unreadable images from the materials, with a warning for each.
+  // Removes unreadable images from the materials, with a warning for each problem.
   std::unique_ptr<TextureSet> finish(Progress& progress) {
     for (const Warning& warning : materials_.warnings.list()) progress.warn_of_input(warning);
     set_->materials_ = materials_.materials;
@@ -230,17 +247,26 @@ class TextureSet::Builder {
     for (size_t i = 0; i < levels_.size(); ++i) {
       layout.first_level.push_back(static_cast<uint32_t>(layout.levels.size()));
       std::ranges::copy(levels_[i], std::back_inserter(layout.levels));
-      if (problems_[i].empty()) continue;
-      progress.warn_of_input({"unusable-image", materials_.images[i].name + users_[i],
-                              problems_[i] + "; its base color factor is used alone"});
-      for (Material& material : set_->materials_)
-        if (material.image == i) material.image = Material::kNoImage;
+      if (!problems_[i].empty()) remove_image(i);
     }
     layout.first_level.push_back(static_cast<uint32_t>(layout.levels.size()));
+    for (const UnreadableImages& group : unreadable_) progress.warn_of_input(group.warning());
     return std::move(set_);
   }
 
  private:
+  void remove_image(size_t i) {
+    auto group = std::ranges::find(unreadable_, problems_[i], &UnreadableImages::problem);
+    if (group == unreadable_.end())
+      group = unreadable_.insert(group, {problems_[i], materials_.images[i].name + users_[i]});
+    ++group->images;
+    for (Material& material : set_->materials_) {
+      if (material.image != i) continue;
+      material.image = Material::kNoImage;
+      ++group->materials;
+    }
+  }
+
   // Calls body(image reader), or records the problem of a broken image. Ignores unused images.
   template <class Body>
   void with_image(size_t i, const Body& body) {
@@ -291,6 +317,7 @@ class TextureSet::Builder {
   std::shared_mutex mutex_;
   // For each image: the material that uses it, for messages ("": none), and why it is unreadable.
   std::vector<std::string> users_, problems_;
+  std::vector<UnreadableImages> unreadable_;
   std::vector<std::vector<TextureLevel>> levels_;
 };
 

@@ -6,11 +6,11 @@
 // The pyramids are kept in memory if they take at most half of the free budget. Otherwise they are
 // in a scratch file. Images are decoded row by row.
 //
-// An image can be missing, broken, larger than the limits of ImageReader, or neither PNG nor JPEG
-// (WebP, KTX2). In these cases, one warning names the image and a material that uses it, and the
-// materials of this image keep only their base color factors. A valid image whose decoder exceeds
-// the budget (progressive JPEG, interlaced PNG) is an error, because memory must not decide the
-// colors.
+// An image can be missing, broken, larger than the limits of ImageReader, or in a format without
+// decoder (KTX2, DDS). In these cases, the materials of the image keep only their base color
+// factors. A warning for each problem names the first image, a material that uses it, and the
+// number of materials. A valid image whose decoder exceeds the budget (progressive JPEG, interlaced
+// PNG, WebP, AVIF) is an error, because memory must not decide the colors.
 #pragma once
 
 #include <cstdint>
@@ -74,7 +74,8 @@ uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, Memor
                        const CancelToken& cancel);
 
 // Returns the SHA-256 of each image's stored bytes, as lower-case hex digits. For an image that
-// cannot be read to its end, returns a different text, which is never such a digest. Reads all
+// cannot be read to its end, or for whose format this program has no decoder, returns a different
+// text, which is never such a digest. Reads all
 // images, but decodes none. Throws the same errors as TextureSet::prepare().
 std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
                                        unsigned threads, const CancelToken& cancel);

@@ -23,7 +23,6 @@ class MaterialResolver {
 
   void resolve() {
     for (size_t m = 0; m < document_.meshes.size(); ++m) {
-      if (!document_.meshes[m].is_drawn) continue;
       std::vector<Primitive>& primitives = document_.meshes[m].primitives;
       for (size_t p = 0; p < primitives.size(); ++p) {
         if (!primitives[p].makes_triangles()) continue;
@@ -49,6 +48,7 @@ class MaterialResolver {
     }
     append(source.material, source.transform);
     texcoords_.push_back(source.texcoord);
+    only_emits_.push_back(source.only_emits);
   }
 
   uint32_t append(const Material& material, const TextureTransform& transform) {
@@ -64,6 +64,7 @@ class MaterialResolver {
     int set = 0;
     if (primitive.material >= 0 && static_cast<size_t>(primitive.material) < texcoords_.size()) {
       surface.material = static_cast<uint32_t>(primitive.material);
+      if (only_emits_[surface.material]) surface.color = -1;
       if (result_.materials[surface.material].image != Material::kNoImage) {
         set = texcoords_[surface.material];
         surface.texture_coordinates = texture_coordinates(primitive, set);
@@ -150,7 +151,9 @@ class MaterialResolver {
 
   Document& document_;
   DocumentMaterials result_;
-  std::vector<int> texcoords_;  // for each of the file's materials, the n of its TEXCOORD_n
+  // For each of the file's materials: the n of its TEXCOORD_n, and MaterialSource::only_emits.
+  std::vector<int> texcoords_;
+  std::vector<bool> only_emits_;
   std::optional<uint32_t> plain_;
   std::map<uint32_t, uint32_t> without_image_;
   std::string where_;

@@ -72,34 +72,36 @@ Wrap wrap_of(int mode) {
   return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::kMirroredRepeat : Wrap::kRepeat;
 }
 
-// Returns the texture's image. If it has none, returns the image that an extension gives in a file
-// format such as WebP, or -1.
-int image_of(const tinygltf::Texture& texture) {
-  if (texture.source >= 0) return texture.source;
-  for (const char* name :
-       {"EXT_texture_webp", "KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif"}) {
-    const auto extension = texture.extensions.find(name);
-    if (extension == texture.extensions.end()) continue;
-    const int image = whole_number_or(extension->second, "source", -1);
-    if (image >= 0) return image;
-  }
-  return -1;
-}
-
 template <class T>
 bool exists(const std::vector<T>& all, int index) {
   return index >= 0 && static_cast<size_t>(index) < all.size();
 }
 
-void read_texture(const tinygltf::Model& model, const TextureUse& use, MaterialSource& out) {
+// Returns the texture's image. If it has none, returns the first image that an extension gives in
+// another file format, or an index that does not exist.
+int image_of(const tinygltf::Model& model, const tinygltf::Texture& texture) {
+  int image = texture.source;
+  for (const char* name :
+       {"EXT_texture_webp", "EXT_texture_avif", "KHR_texture_basisu", "MSFT_texture_dds"}) {
+    if (exists(model.images, image)) break;
+    const auto extension = texture.extensions.find(name);
+    if (extension != texture.extensions.end())
+      image = whole_number_or(extension->second, "source", image);
+  }
+  return image;
+}
+
+// `kind`: the purpose of the texture, for messages.
+void read_texture(const tinygltf::Model& model, const TextureUse& use, const char* kind,
+                  MaterialSource& out) {
   if (use.texture < 0) return;
-  const std::string name = "its base color texture " + std::to_string(use.texture);
+  const std::string name = std::string("its ") + kind + " texture " + std::to_string(use.texture);
   if (!exists(model.textures, use.texture)) {
     out.problem = name + " does not exist";
     return;
   }
   const tinygltf::Texture& texture = model.textures[static_cast<size_t>(use.texture)];
-  const int image = image_of(texture);
+  const int image = image_of(model, texture);
   if (!exists(model.images, image)) {
     out.problem =
         name + (image < 0 ? " has no image"
@@ -112,6 +114,45 @@ void read_texture(const tinygltf::Model& model, const TextureUse& use, MaterialS
   if (!exists(model.samplers, texture.sampler)) return;
   const tinygltf::Sampler& sampler = model.samplers[static_cast<size_t>(texture.sampler)];
   out.material.wrap = {wrap_of(sampler.wrapS), wrap_of(sampler.wrapT)};
+}
+
+// The light that a material emits.
+struct Emission {
+  std::array<double, 3> factor{};
+  TextureUse use;
+};
+
+Emission read_emission(const tinygltf::Material& in) {
+  Emission emission;
+  if (in.extensions.contains("KHR_materials_unlit")) return emission;
+  const auto extension = in.extensions.find("KHR_materials_emissive_strength");
+  double strength = 1;
+  if (extension != in.extensions.end())
+    strength = number_or(extension->second, "emissiveStrength", strength);
+  if (in.emissiveFactor.size() == emission.factor.size())
+    for (size_t c = 0; c < emission.factor.size(); ++c)
+      emission.factor[c] = in.emissiveFactor[c] * strength;
+  emission.use = read_use(in.emissiveTexture);
+  return emission;
+}
+
+template <size_t N>
+bool is_black(const std::array<double, N>& factor) {
+  return std::all_of(factor.begin(), factor.begin() + 3,
+                     [](double c) { return intensity_of(c) == 0; });
+}
+
+// Replaces a black base color by the emitted light. The alpha of MASK and BLEND is in the base
+// color texture, so for these modes both textures must be the same.
+void use_emission(const tinygltf::Material& in, std::array<double, 4>& factor, TextureUse& use,
+                  MaterialSource& out) {
+  const Emission emission = read_emission(in);
+  if (!is_black(factor) || is_black(emission.factor)) return;
+  const bool is_opaque = out.material.alpha_mode == AlphaMode::kOpaque;
+  if (!is_opaque && emission.use.texture != use.texture) return;
+  std::copy(emission.factor.begin(), emission.factor.end(), factor.begin());
+  use = emission.use;
+  out.only_emits = true;
 }
 
 }  // namespace
@@ -136,8 +177,9 @@ MaterialSource read_material(const tinygltf::Model& model, int index) {
     if (given.size() == factor.size()) std::copy(given.begin(), given.end(), factor.begin());
     use = read_use(in.pbrMetallicRoughness.baseColorTexture);
   }
+  use_emission(in, factor, use, out);
   for (size_t c = 0; c < factor.size(); ++c) out.material.factor[c] = intensity_of(factor[c]);
-  read_texture(model, use, out);
+  read_texture(model, use, out.only_emits ? "emissive" : "base color", out);
   return out;
 }
 

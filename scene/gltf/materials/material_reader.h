@@ -14,7 +14,8 @@ struct MaterialSource {
   int image = -1;     // index in the model
   int texcoord = 0;   // the n of TEXCOORD_n
   TextureTransform transform;
-  std::string problem;  // why the texture cannot be read; "" for a readable or missing texture
+  bool only_emits = false;  // the color is the emitted light, which vertex colors do not change
+  std::string problem;      // why the texture cannot be read; "" for a readable or missing texture
 };
 
 // Reads material `index` of the model. Uses KHR_materials_pbrSpecularGlossiness, if the material

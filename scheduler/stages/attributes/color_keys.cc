@@ -7,7 +7,7 @@ namespace {
 
 // Version of the color rule, the decoders, the blocks and the region records. Increase it with any
 // change to them, so that colors baked by an earlier version are not reused.
-constexpr uint32_t kColorVersion = 1;
+constexpr uint32_t kColorVersion = 2;
 
 }  // namespace
 

@@ -177,6 +177,111 @@ TEST(Materials, FactorsAndAlphaModes) {
   EXPECT_EQ(surfaces_of(*open.source).at(0).material, 1u);
 }
 
+// The first material of textured(), with these members, and the color of a corner whose vertex
+// color is half red.
+struct EmissiveCase {
+  Json members;
+  std::array<uint16_t, 4> factor;
+  bool has_image;
+  uint16_t vertex_red;
+};
+
+// A material with a black base color has the color of the light that it emits. Vertex colors do not
+// change this light.
+TEST(Materials, EmittedLight) {
+  const Json black = {{"baseColorFactor", {0, 0, 0, 0.5}}};
+  const Json black_texture = {{"baseColorFactor", {0, 0, 0, 1}},
+                              {"baseColorTexture", {{"index", 0}}}};
+  const Json light = {1, 0, 0.5};
+  const std::array<uint16_t, 4> emitted{65535, 0, 32768, 65535}, half{65535, 0, 32768, 32768};
+  const Json strong = {{"KHR_materials_emissive_strength", {{"emissiveStrength", 4}}}};
+  const Json image = {{"index", 0}};
+  const EmissiveCase kCases[] = {
+      {{{"pbrMetallicRoughness", black}, {"emissiveFactor", light}}, half, false, 65535},
+      {{{"pbrMetallicRoughness", black_texture}, {"emissiveFactor", light}}, emitted, false, 65535},
+      {{{"pbrMetallicRoughness", black}, {"emissiveFactor", light}, {"emissiveTexture", image}},
+       half,
+       true,
+       65535},
+      {{{"pbrMetallicRoughness", black},
+        {"emissiveFactor", {0.5, 0, 0.125}},
+        {"extensions", strong}},
+       half,
+       false,
+       65535},
+      {{{"extensions",
+         {{"KHR_materials_pbrSpecularGlossiness", {{"diffuseFactor", {0, 0, 0, 0.5}}}}}},
+        {"emissiveFactor", light}},
+       half,
+       false,
+       65535},
+      // The alpha of these modes is in the base color texture.
+      {{{"pbrMetallicRoughness", black_texture}, {"emissiveFactor", light}, {"alphaMode", "MASK"}},
+       {0, 0, 0, 65535},
+       true,
+       32896},
+      {{{"pbrMetallicRoughness", black_texture},
+        {"emissiveFactor", light},
+        {"emissiveTexture", image},
+        {"alphaMode", "MASK"}},
+       emitted,
+       true,
+       65535},
+      {{{"pbrMetallicRoughness", black},
+        {"emissiveFactor", light},
+        {"extensions", {{"KHR_materials_unlit", Json::object()}}}},
+       {0, 0, 0, 32768},
+       false,
+       32896},
+      {{{"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0.5, 1}}}}, {"emissiveFactor", light}},
+       {0, 0, 32768, 65535},
+       false,
+       32896},
+      {{{"pbrMetallicRoughness", black}, {"emissiveTexture", image}},
+       {0, 0, 0, 32768},
+       false,
+       32896},
+  };
+  for (const EmissiveCase& expected : kCases) {
+    SceneBuilder scene = textured("");
+    scene.root["materials"][0] = expected.members;
+    only_primitive(scene)["attributes"]["COLOR_0"] = scene.add_accessor<uint8_t>(
+        "VEC3", kU8, {128, 0, 0, 128, 0, 0, 128, 0, 0}, {{"normalized", true}});
+    OpenScene open(scene.glb());
+    const SceneMaterials materials = open.source->materials();
+    const Material& material = materials.materials[0];
+    EXPECT_EQ(material.factor, expected.factor) << expected.members;
+    EXPECT_EQ(material.image != Material::kNoImage, expected.has_image) << expected.members;
+    EXPECT_EQ(surfaces_of(*open.source)[0].corners[0].color[0], expected.vertex_red)
+        << expected.members;
+  }
+}
+
+// The image of a texture is its source, if that exists. Otherwise it is an image that an extension
+// names, in a format with decoder if possible.
+TEST(Materials, ImagesOfExtensions) {
+  const auto image_of = [](const Json& texture) {
+    SceneBuilder scene = textured("");
+    scene.root["images"] = {{{"uri", "0"}}, {{"uri", "1"}}, {{"uri", "2"}}};
+    scene.root["textures"][0] = texture;
+    OpenScene open(scene.glb());
+    const SceneMaterials materials = open.source->materials();
+    return materials.images.empty() ? "" : materials.images[0].name;
+  };
+  const Json webp = {{"EXT_texture_webp", {{"source", 1}}}},
+             avif = {{"EXT_texture_avif", {{"source", 2}}}};
+  const Json ktx = {{"KHR_texture_basisu", {{"source", 0}}}};
+  Json both = ktx;
+  both.update(avif);
+  EXPECT_THAT(image_of({{"source", 0}, {"extensions", webp}}), HasSubstr("image 0"));
+  EXPECT_THAT(image_of({{"source", 7}, {"extensions", webp}}), HasSubstr("image 1"));
+  EXPECT_THAT(image_of({{"extensions", webp}}), HasSubstr("image 1"));
+  EXPECT_THAT(image_of({{"extensions", avif}}), HasSubstr("image 2"));
+  EXPECT_THAT(image_of({{"extensions", ktx}}), HasSubstr("image 0"));
+  EXPECT_THAT(image_of({{"extensions", both}}), HasSubstr("image 2"));
+  EXPECT_EQ(image_of({{"extensions", Json::object()}}), "");
+}
+
 TEST(Materials, WrapModes) {
   SceneBuilder scene = textured("");
   EXPECT_EQ(materials_of(scene).at(0).wrap, (std::array{Wrap::kRepeat, Wrap::kRepeat}));

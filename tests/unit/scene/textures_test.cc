@@ -7,6 +7,7 @@
 #include "tests/support/error_of.h"
 #include "tests/support/faulty_files.h"
 #include "tests/support/image_files.h"
+#include "tests/support/modern_image_files.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {
@@ -169,7 +170,8 @@ TEST(Textures, BrokenImages) {
   flipped[60] = static_cast<char>(flipped[60] ^ 1);
   for (const std::string& image :
        {huge, flipped, good.substr(0, good.size() / 2), std::string("RIFF....WEBP"),
-        std::string("\xabKTX 20\xbb\r\n\x1a\n"), std::string("\xff\xd8\xff\xe0"), std::string()}) {
+        std::string("\xabKTX 20\xbb\r\n\x1a\n"), std::string("DDS 1234"),
+        std::string("\xff\xd8\xff\xe0"), std::string()}) {
     Textures t(textured(image).glb());
     ASSERT_EQ(t.warnings.all.size(), 1u);
     EXPECT_NE(t.warnings.all[0].find("image 0 \"wood\""), std::string::npos);
@@ -177,6 +179,44 @@ TEST(Textures, BrokenImages) {
     EXPECT_EQ(t.set->materials()[0].image, Material::kNoImage);
   }
 }
+
+// One warning counts the images and materials that have the same problem.
+TEST(Textures, MaterialsWithUnreadableImages) {
+  SceneBuilder scene = textured("\xabKTX 20\xbb\r\n\x1a\n");
+  scene.root["images"].push_back(scene.root["images"][0]);
+  scene.root["textures"].push_back({{"source", 1}});
+  for (const int texture : {0, 1})
+    scene.root["materials"].push_back(
+        {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}});
+  Textures t(scene.glb());
+  ASSERT_EQ(t.warnings.all.size(), 1u);
+  for (const char* part : {"image 0 \"wood\"", "material 0 \"floor\"", "a KTX2 image",
+                           "gltf-transform ktxdecompress", "of 3 materials", "(2 times)"})
+    EXPECT_NE(t.warnings.all[0].find(part), std::string::npos) << t.warnings.all[0];
+}
+
+#ifdef VOXDAG_HAS_WEBP
+TEST(Textures, WebpImages) {
+  const std::string pixels = noise(4 * 9 * 7);
+  Textures webp(textured(webp_file(9, 7, pixels)).glb()), png(textured(png_of(9, 7, pixels)).glb());
+  ASSERT_TRUE(webp.warnings.all.empty()) << webp.warnings.all[0];
+  const auto a = webp.set->open(0), b = png.set->open(0);
+  for (uint32_t y = 0; y < 7; ++y)
+    for (uint32_t x = 0; x < 9; ++x) ASSERT_EQ(a->texel(0, 0, x, y), b->texel(0, 0, x, y));
+}
+#endif
+
+#ifdef VOXDAG_HAS_AVIF
+TEST(Textures, AvifImages) {
+  const std::string pixels = noise(4 * 9 * 7);
+  Textures avif(textured(avif_file({.width = 9, .height = 7}, pixels)).glb()),
+      png(textured(png_of(9, 7, pixels)).glb());
+  ASSERT_TRUE(avif.warnings.all.empty()) << avif.warnings.all[0];
+  const auto a = avif.set->open(0), b = png.set->open(0);
+  for (uint32_t y = 0; y < 7; ++y)
+    for (uint32_t x = 0; x < 9; ++x) ASSERT_EQ(a->texel(0, 0, x, y), b->texel(0, 0, x, y));
+}
+#endif
 
 }  // namespace
 }  // namespace voxdag::test
