@@ -11,6 +11,7 @@
 #include "scene/gltf/document/read_document.h"
 #include "scene/gltf/materials/document_materials.h"
 #include "scene/gltf/materials/image_sources.h"
+#include "scene/gltf/mesh_data/skin_weights.h"
 #include "scene/gltf/triangle_reader.h"
 
 namespace voxdag::gltf {
@@ -76,7 +77,10 @@ class GltfScene : public TriangleSource {
         document_(read_checked(*file_, budget, cancel)),
         external_files_(file_->path(), budget),
         decoded_(files, options.scratch_path, document_, budget) {
-    buffers(1).check_lengths();
+    BufferReader reader = buffers(1);
+    reader.check_lengths();
+    warnings_ = document_.warnings;
+    warn_of_weights(document_, reader, warnings_);
     declared_ = count_triangles(document_, budget);
   }
 
@@ -104,7 +108,7 @@ class GltfScene : public TriangleSource {
     for (const SourceFile& file : external_files_.all()) all.push_back(file);
     return all;
   }
-  std::vector<Warning> warnings() const override { return document_.warnings.list(); }
+  std::vector<Warning> warnings() const override { return warnings_.list(); }
 
  private:
   BufferReader buffers(unsigned readers) {
@@ -119,6 +123,7 @@ class GltfScene : public TriangleSource {
   const Document document_;
   ExternalFiles external_files_;
   DecodedBuffers decoded_;
+  WarningList warnings_;
   uint64_t declared_ = 0;
 };
 

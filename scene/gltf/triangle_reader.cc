@@ -13,7 +13,7 @@ uint64_t largest_vertex_count(const Document& document) {
   uint64_t largest = 0;
   for (const Mesh& mesh : document.meshes)
     for (const Primitive& primitive : mesh.primitives)
-      if (primitive.makes_triangles())
+      if (mesh.is_drawn && primitive.makes_triangles())
         largest =
             std::max(largest, document.accessors[static_cast<size_t>(primitive.position)].count);
   return largest;
@@ -159,13 +159,14 @@ void TriangleReader::bind_draw() {
 void TriangleReader::bind(const Node& node, size_t primitive_index) {
   const Mesh& mesh = document_.meshes[static_cast<size_t>(node.mesh)];
   const std::vector<double>& weights = node.weights.empty() ? mesh.weights : node.weights;
-  const Binding next{node.mesh, primitive_index, weights.data(), node.skin};
-  if (next == binding_) return;
   const Primitive& primitive = mesh.primitives[primitive_index];
-  if (node.skin != binding_.skin) {
+  const int skin = primitive.joint_sets.empty() ? -1 : node.skin;
+  const Binding next{node.mesh, primitive_index, weights.data(), skin};
+  if (next == binding_) return;
+  if (skin != binding_.skin) {
     binding_ = {};
     joints_ = {};
-    if (node.skin >= 0) joints_ = joint_matrices(document_, buffers_, node.skin);
+    if (skin >= 0) joints_ = joint_matrices(document_, buffers_, skin);
   }
   binding_ = {};
   vertices_.emplace(document_, buffers_, primitive, weights,

@@ -36,6 +36,7 @@ class BlockIndex {
   const Entry& at(uint64_t element) const {
     return entries_[static_cast<size_t>(element / stride_)];
   }
+  Entry& at(uint64_t element) { return entries_[static_cast<size_t>(element / stride_)]; }
   // Returns the number of the first element of the last block whose entry is at most `value` in
   // `member`, which does not decrease from entry to entry.
   uint64_t find(uint64_t value, uint64_t Entry::*member) const {

@@ -14,12 +14,13 @@ namespace voxdag::obj {
 
 class ObjMesh : public IndexedMesh {
  public:
-  // The file must have triangles. The references must outlive the mesh.
-  ObjMesh(const ObjFile& obj, const ObjMaterials& materials, MemoryBudget& budget)
+  // The file must have triangles. The references must outlive the mesh. `cursors` is the number of
+  // cursors that share the memory.
+  ObjMesh(const ObjFile& obj, const ObjMaterials& materials, unsigned cursors, MemoryBudget& budget)
       : obj_(obj),
         materials_(materials),
         budget_(budget),
-        faces_(obj, budget),
+        faces_(obj, cursors, budget),
         positions_(obj, budget) {}
 
   const std::string& path() const override { return obj_.file().path(); }
@@ -32,7 +33,7 @@ class ObjMesh : public IndexedMesh {
                      SurfaceTriangle* out) override;
   std::string place_of(uint64_t triangle) override { return faces_.place_of(triangle); }
   std::string name_index(uint64_t triangle, int corner, uint32_t) override {
-    return "index " + std::to_string(faces_.index_in_file(triangle, corner));
+    return "index " + std::to_string(faces_.index_in_file(triangle, static_cast<size_t>(corner)));
   }
   // Like the indices in the file, the number counts from 1.
   std::string name_vertex(uint32_t index) override {

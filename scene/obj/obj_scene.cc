@@ -22,8 +22,9 @@ class ObjScene : public TriangleSource {
 
   std::unique_ptr<TriangleCursor> open(unsigned cursors) override {
     if (obj_.triangles() == 0) return std::make_unique<NoTriangles>();
-    return std::make_unique<IndexedCursor>(std::make_unique<ObjMesh>(obj_, materials_, budget_),
-                                           options_.skip_invalid, cursors, budget_, cancel_);
+    return std::make_unique<IndexedCursor>(
+        std::make_unique<ObjMesh>(obj_, materials_, cursors, budget_), options_.skip_invalid,
+        cursors, budget_, cancel_);
   }
   uint64_t declared_triangles() const override { return obj_.triangles(); }
   SceneMaterials materials() const override { return materials_.scene; }

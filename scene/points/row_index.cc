@@ -1,38 +1,22 @@
 #include "scene/points/row_index.h"
 
 #include <algorithm>
-#include <array>
-#include <span>
 #include <string_view>
 
 namespace voxdag::points {
-namespace {
-
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-
-// Returns the place of the first line, after the byte order mark of UTF-8 if there is one.
-LineReader::Place first_line(const ReadableFile& file) {
-  std::array<char, kByteOrderMark.size()> first{};
-  if (file.size() < first.size()) return {};
-  file.read_at(0, std::as_writable_bytes(std::span(first)));
-  const bool has_mark = std::string_view(first.data(), first.size()) == kByteOrderMark;
-  return {has_mark ? kByteOrderMark.size() : 0, 1};
-}
-
-}  // namespace
 
 RowIndex::RowIndex(const ReadableFile& file, const std::string& columns, MemoryBudget& budget,
                    const CancelToken& cancel)
     : charge_(budget, "the rows of " + file.path()) {
-  LineReader lines(file, budget);
-  lines.seek(first_line(file));
-  if (!lines.next()) return;
-  set_columns(lines.text(), columns);
-  const LineReader::Place begin = has_header_ ? lines.end() : lines.place();
-  lines.seek(begin);
-  if (columns_.has_colors()) check_colors(lines);
-  lines.seek(begin);
-  count_rows(lines, cancel);
+  RowReader rows(file, budget);
+  if (!rows.next()) return;
+  set_columns(rows.text(), columns);
+  if (has_header_ && !rows.next()) return;
+  const RowReader::Place begin = rows.place();
+  rows.seek(begin);
+  if (columns_.has_colors()) check_colors(rows);
+  rows.seek(begin);
+  count_rows(rows, cancel);
 }
 
 void RowIndex::set_columns(std::string_view first_row, const std::string& names) {
@@ -50,26 +34,26 @@ void RowIndex::set_columns(std::string_view first_row, const std::string& names)
 
 // Sets full_color_ from the first rows. If the colors are only assumed, and one of these rows has a
 // number that is not a color, the columns get no colors.
-void RowIndex::check_colors(LineReader& lines) {
+void RowIndex::check_colors(RowReader& rows) {
   double low = 0, high = 0;
   bool has_fraction = false;
   Columns::Values values{};
-  for (uint64_t row = 0; row < kBlockRows && lines.next(); ++row) {
-    if (!columns_.read(lines.text(), values)) continue;
+  for (uint64_t row = 0; row < kBlockRows && rows.next(); ++row) {
+    if (!columns_.read(rows.text(), values)) continue;
     low = std::min({low, values[3], values[4], values[5]});
     high = std::max({high, values[3], values[4], values[5]});
-    has_fraction = has_fraction || columns_.has_color_fraction(lines.text());
+    has_fraction = has_fraction || columns_.has_color_fraction(rows.text());
   }
   full_color_ = high <= 1 && has_fraction ? 1 : 255;
   if (are_colors_assumed_ && (low < 0 || high > 255)) columns_ = Columns::standard(false);
 }
 
-void RowIndex::count_rows(LineReader& lines, const CancelToken& cancel) {
-  for (; lines.next(); ++rows_) {
+void RowIndex::count_rows(RowReader& rows, const CancelToken& cancel) {
+  for (; rows.next(); ++rows_) {
     if (rows_ % kBlockRows != 0) continue;
     cancel.check();
-    charge_.add(sizeof(LineReader::Place));
-    blocks_.push_back(lines.place());
+    charge_.add(sizeof(RowReader::Place));
+    blocks_.push_back(rows.place());
   }
 }
 

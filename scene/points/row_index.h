@@ -10,7 +10,7 @@
 #include "core/io/file_system.h"
 #include "scene/growing_charge.h"
 #include "scene/points/columns.h"
-#include "scene/points/line_reader.h"
+#include "scene/points/row_reader.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::points {
@@ -30,19 +30,19 @@ class RowIndex {
   double full_color() const { return full_color_; }
   uint64_t rows() const { return rows_; }
   // The places of every kBlockRows-th row.
-  const std::deque<LineReader::Place>& blocks() const { return blocks_; }
+  const std::deque<RowReader::Place>& blocks() const { return blocks_; }
 
  private:
   void set_columns(std::string_view first_row, const std::string& names);
-  void check_colors(LineReader& lines);
-  void count_rows(LineReader& lines, const CancelToken& cancel);
+  void check_colors(RowReader& rows);
+  void count_rows(RowReader& rows, const CancelToken& cancel);
 
   Columns columns_ = Columns::standard(false);
   bool has_header_ = false;
   bool are_colors_assumed_ = false;  // six columns without names: the last three may be colors
   double full_color_ = 255;
   uint64_t rows_ = 0;
-  std::deque<LineReader::Place> blocks_;
+  std::deque<RowReader::Place> blocks_;
   GrowingCharge charge_;  // charge for the blocks
 };
 

@@ -10,14 +10,16 @@
 
 #include "core/color/surface.h"
 #include "scene/points/light_table.h"
-#include "scene/points/line_reader.h"
 #include "scene/points/point_scene.h"
 #include "scene/points/row_index.h"
+#include "scene/points/row_reader.h"
 #include "scene/surface_numbers.h"
 #include "scene/text/characters.h"
 
 namespace voxdag::points {
 namespace {
+
+constexpr uint64_t kSniffedBytes = uint64_t{64} << 10;
 
 class TextFile : public PointFile {
  public:
@@ -40,12 +42,12 @@ class TextFile : public PointFile {
 class TextReader : public PointReader {
  public:
   TextReader(const TextFile& file, MemoryBudget& budget)
-      : index_(file.index()), lines_(file.file(), budget) {}
+      : index_(file.index()), rows_(file.file(), budget) {}
 
   void read(uint64_t first, size_t count, double* xyz) override {
     Columns::Values values{};
     for (const uint64_t end = first + count; first < end; ++first, xyz += 3) {
-      if (go_to(first) && index_.columns().read(lines_.text(), values))
+      if (go_to(first) && index_.columns().read(rows_.text(), values))
         std::copy_n(values.data(), 3, xyz);
       else
         std::fill_n(xyz, 3, std::numeric_limits<double>::quiet_NaN());
@@ -56,14 +58,14 @@ class TextReader : public PointReader {
     if (!light_) light_.emplace(uint16_t{255});
     Columns::Values values{};
     for (const uint64_t end = first + count; first < end; ++first, ++out)
-      if (go_to(first) && index_.columns().read(lines_.text(), values))
+      if (go_to(first) && index_.columns().read(rows_.text(), values))
         *out = {light_of(values[3]), light_of(values[4]), light_of(values[5]), kFullIntensity};
   }
 
   std::string fault_of(uint64_t point) override {
     if (!go_to(point)) return "ends before row " + std::to_string(point);
-    return "line " + std::to_string(lines_.place().line) + ": " +
-           index_.columns().fault_of(lines_.text());
+    return "line " + std::to_string(rows_.place().line) + ": " +
+           index_.columns().fault_of(rows_.text());
   }
 
  private:
@@ -72,10 +74,10 @@ class TextReader : public PointReader {
     constexpr uint64_t kRows = RowIndex::kBlockRows;
     if (row < next_row_ || row / kRows != next_row_ / kRows || next_row_ % kRows == 0) {
       next_row_ = row / kRows * kRows;
-      lines_.seek(index_.blocks()[static_cast<size_t>(row / kRows)]);
+      rows_.seek(index_.blocks()[static_cast<size_t>(row / kRows)]);
     }
     for (; next_row_ <= row; ++next_row_)
-      if (!lines_.next()) return false;
+      if (!rows_.next()) return false;
     return true;
   }
 
@@ -86,8 +88,8 @@ class TextReader : public PointReader {
   }
 
   const RowIndex& index_;
-  LineReader lines_;
-  uint64_t next_row_ = 0;  // the row that lines_ reads next
+  RowReader rows_;
+  uint64_t next_row_ = 0;  // the row that rows_ reads next
   std::optional<LightTable> light_;
 };
 
@@ -119,7 +121,7 @@ std::string_view take_line(std::string_view& text, bool is_complete) {
 }  // namespace
 
 bool is_text_points(const ReadableFile& file) {
-  std::string begin(std::min<uint64_t>(file.size(), LineReader::kMaxLine), '\0');
+  std::string begin(std::min(file.size(), kSniffedBytes), '\0');
   file.read_at(0, std::as_writable_bytes(std::span(begin)));
   std::string_view text = begin;
   if (text.find('\0') != std::string_view::npos) return false;

@@ -45,10 +45,8 @@ class AsciiFacets : public Facets {
     for (const uint64_t end = first + count;;) {
       for (const uint64_t polygon_end = std::min(end, this->polygon_end()); first < polygon_end;
            ++first, ++out) {
-        const auto k = static_cast<size_t>(first - first_triangle_);
-        std::ranges::copy(polygons_.vertex(0), out->v[0]);
-        std::ranges::copy(polygons_.vertex(k + 1), out->v[1]);
-        std::ranges::copy(polygons_.vertex(k + 2), out->v[2]);
+        const auto triangle = static_cast<size_t>(first - first_triangle_);
+        for (size_t k = 0; k < 3; ++k) std::ranges::copy(polygons_.vertex(triangle, k), out->v[k]);
       }
       if (first == end) return;
       load();
@@ -93,9 +91,7 @@ class AsciiFacets : public Facets {
   }
 
   // Returns the number of the first triangle of the next polygon.
-  uint64_t polygon_end() const {
-    return first_triangle_ + (polygons_.corners() < 3 ? 0 : polygons_.corners() - 2);
-  }
+  uint64_t polygon_end() const { return first_triangle_ + polygons_.triangles(); }
 
   const StlFile& stl_;
   PolygonReader polygons_;

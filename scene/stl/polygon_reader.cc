@@ -25,6 +25,25 @@ void PolygonReader::seek(uint64_t offset, uint64_t line) {
 }
 
 bool PolygonReader::next() {
+  if (!read_vertices()) return false;
+  is_split_ = false;
+  if (vertices_.size() > 3) triangulate();
+  return true;
+}
+
+void PolygonReader::triangulate() {
+  xyz_.clear();
+  for (const auto& vertex : vertices_) xyz_.insert(xyz_.end(), vertex.begin(), vertex.end());
+  is_split_ = triangulator_.triangulate(xyz_);
+}
+
+const std::array<double, 3>& PolygonReader::vertex(size_t triangle, size_t k) const {
+  if (is_split_) return vertices_[triangulator_.triangles()[3 * triangle + k]];
+  return vertices_[k == 0 ? 0 : triangle + k];
+}
+
+// Returns false at the end of the file.
+bool PolygonReader::read_vertices() {
   vertices_.clear();
   for (;;) {
     const std::string_view word = next_word(rest_);

@@ -1,7 +1,7 @@
-// Reads the polygons of an ASCII STL file one after another. A polygon is a sequence of "vertex x y
-// z" without another keyword in between; it usually has three vertices. All other words (normals,
-// names, loops) do not affect the triangles. Keywords may be in any case, and several may be in one
-// line. Not thread-safe.
+// Reads the polygons of an ASCII STL file one after another, and triangulates them. A polygon is a
+// sequence of "vertex x y z" without another keyword in between; it usually has three vertices. All
+// other words (normals, names, loops) do not affect the triangles. Keywords may be in any case, and
+// several may be in one line. Not thread-safe.
 #pragma once
 
 #include <array>
@@ -12,6 +12,7 @@
 
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
+#include "scene/polygon/triangulator.h"
 #include "scene/text/line_reader.h"
 
 namespace voxdag::stl {
@@ -23,7 +24,9 @@ class PolygonReader {
 
   // The file must outlive the reader.
   PolygonReader(const ReadableFile& file, MemoryBudget& budget)
-      : file_(file), lines_(file, budget, LineReader::Join::kNone) {}
+      : file_(file),
+        lines_(file, budget, LineReader::Join::kNone),
+        triangulator_(budget, "a polygon of " + file.path()) {}
 
   // Moves to the polygon whose first word "vertex" is at `offset`, in line `line`.
   void seek(uint64_t offset, uint64_t line);
@@ -31,9 +34,13 @@ class PolygonReader {
   // the line if a vertex does not have three numbers.
   bool next();
 
-  // Return the vertices of the polygon, and the place of its first one.
-  size_t corners() const { return vertices_.size(); }
-  const std::array<double, 3>& vertex(size_t i) const { return vertices_[i]; }
+  // Returns the number of the polygon's triangles; 0 if it has fewer than three vertices.
+  size_t triangles() const { return vertices_.size() < 3 ? 0 : vertices_.size() - 2; }
+  // Returns vertex k of a triangle.
+  const std::array<double, 3>& vertex(size_t triangle, size_t k) const;
+  // True if the polygon is doubtful (Triangulator).
+  bool is_doubtful() const { return vertices_.size() > 3 && triangulator_.is_doubtful(); }
+  // Return the place of the first vertex.
   uint64_t offset() const { return offset_; }
   uint64_t line() const { return line_; }
 
@@ -44,6 +51,8 @@ class PolygonReader {
   uint64_t first_unknown_line() const { return first_unknown_line_; }
 
  private:
+  bool read_vertices();
+  void triangulate();
   bool next_line();
   void skip(std::string_view word);
   void skip_normal();
@@ -56,6 +65,9 @@ class PolygonReader {
   bool in_facet_ = false;
   bool is_cut_off_ = false;
   std::vector<std::array<double, 3>> vertices_;
+  polygon::Triangulator triangulator_;
+  std::vector<double> xyz_;  // a copy of the vertices, for triangulator_
+  bool is_split_ = false;    // false if the triangles are the fan of the polygon
   uint64_t offset_ = 0, line_ = 0;
   uint64_t unknown_words_ = 0, first_unknown_line_ = 0;
 };

@@ -56,17 +56,14 @@ void StlFile::count_facets() {
 
 void StlFile::scan_text(MemoryBudget& budget, const CancelToken& cancel) {
   PolygonReader polygons(*file_, budget);
-  uint64_t too_small = 0, first_small_line = 0;
+  uint64_t too_small = 0, first_small_line = 0, doubtful = 0, first_doubtful_line = 0;
   for (uint64_t polygon = 0; polygons.next(); ++polygon) {
     if (polygon % kPolygonsPerCheck == 0) cancel.check();
     if (polygon_index_.wants(polygon))
       polygon_index_.add({polygons.offset(), polygons.line(), triangles_});
-    const size_t corners = polygons.corners();
-    if (corners >= 3) {
-      triangles_ += corners - 2;
-    } else if (too_small++ == 0) {
-      first_small_line = polygons.line();
-    }
+    triangles_ += polygons.triangles();
+    if (polygons.triangles() == 0 && too_small++ == 0) first_small_line = polygons.line();
+    if (polygons.is_doubtful() && doubtful++ == 0) first_doubtful_line = polygons.line();
   }
   const auto place = [&](uint64_t line) {
     return file_->path() + ": line " + std::to_string(line);
@@ -77,6 +74,12 @@ void StlFile::scan_text(MemoryBudget& budget, const CancelToken& cancel) {
   if (too_small > 0)
     warnings_.add({"degenerate-faces", place(first_small_line),
                    "a facet of fewer than three vertices makes no voxels", too_small});
+  if (doubtful > 0)
+    warnings_.add(
+        {"crossing-edges", place(first_doubtful_line),
+         "the edges of a facet cross each other, so its area is doubtful; it is read as a "
+         "fan",
+         doubtful});
   if (polygons.unknown_words() > 0)
     warnings_.add({"unknown-statements", place(polygons.first_unknown_line()),
                    "words that are not part of STL are ignored", polygons.unknown_words()});

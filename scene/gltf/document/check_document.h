@@ -9,9 +9,10 @@
 
 namespace voxdag::gltf {
 
-// Checks nodes, scenes, meshes, skins, instancing and accessors. Afterwards the invariants of
-// Document hold, except that buffers may be shorter than declared. Throws Error{kInvalidInput} with
-// the node, mesh and primitive, skin or accessor that violates an invariant.
+// Checks nodes, scenes, and the meshes, skins, instancing and accessors of the chosen scene.
+// Afterwards the invariants of Document hold, except that buffers may be shorter than declared.
+// Throws Error{kInvalidInput} with the node, mesh and primitive, skin or accessor that violates an
+// invariant.
 void check_document(Document& document);
 
 // A use of an accessor, which determines the accessor's type.
@@ -22,6 +23,9 @@ struct AccessorUse {
   std::vector<int> may_be_normalized = {};  // component types that may be normalized
 };
 
+// Checks that `index` is below `size`. `what` is the kind of the element: "child node".
+void check_index(const Document& document, size_t size, int index, const std::string& where,
+                 const char* what);
 // If `index` is not -1, checks that this accessor exists and has a type that the use allows. Checks
 // that the accessor's bytes are inside its view and inside the declared length of its buffer.
 // Throws Error{kInvalidInput}.

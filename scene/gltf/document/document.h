@@ -2,7 +2,8 @@
 // scene are compact structs, each charged to the memory budget. Asset, extensions, materials,
 // textures, samplers and images are in tinygltf's model. read_document() fills a document and
 // check_document() checks it once. After that:
-//   1. every index is in range, or -1 if the file gives none;
+//   1. every index in nodes of the scene and in drawn meshes is in range, or -1 if the file gives
+//      none;
 //   2. every accessor that is read has the type its use requires. Its bytes are inside its buffer
 //      view, the view is inside its buffer, and the buffer is inside the existing bytes;
 //   3. nodes form trees, and `roots` have no parents.
@@ -118,13 +119,14 @@ struct Primitive {
   PrimitiveSurface surface;
   std::shared_ptr<const DracoExtension> draco;  // null: not compressed
 
-  bool makes_triangles() const { return mode >= kTriangleList; }
+  bool makes_triangles() const { return mode >= kTriangleList && position >= 0; }
 };
 
 struct Mesh {
   std::string name;
   std::vector<Primitive> primitives;
   std::vector<double> weights;
+  bool is_drawn = false;  // a node of the scene draws it; set by check_document()
 };
 
 // Accessors of EXT_mesh_gpu_instancing; -1 for missing ones.
@@ -152,6 +154,11 @@ struct Skin {
   int inverse_bind = -1;  // -1: identity matrices
 };
 
+struct Asset {
+  std::string version = "2.0";
+  std::string min_version;  // empty if it is absent
+};
+
 struct Document {
   Document(std::string scene_path, MemoryBudget& budget)
       : path(std::move(scene_path)), charge(budget, "the structure of " + path) {}
@@ -160,8 +167,11 @@ struct Document {
   GrowingCharge charge;        // charge for the arrays
   GrowingCharge model_charge;  // charge for the model
 
-  // The asset, the extensions, materials, textures, samplers and images, as read by tinygltf. The
-  // model's other arrays are empty. No image is loaded: a data: URI ends at its comma.
+  Asset asset;
+  std::deque<std::string> extensions_used;
+  std::deque<std::string> extensions_required;
+  // Materials, textures, samplers and images, as read by tinygltf. The model's other arrays are
+  // empty. No image is loaded: a data: URI ends at its comma.
   std::shared_ptr<tinygltf::Model> model;
   std::vector<RawString> image_uris;  // one per image of the model; size 0 for an image without uri
 

@@ -5,6 +5,7 @@
 #include <climits>
 #include <exception>
 #include <new>
+#include <utility>
 
 #include "scene/gltf/document/tinygltf.h"
 #include "scene/messages.h"
@@ -18,45 +19,17 @@ constexpr size_t kMaxReasonBytes = 200;
 
 // Memory of an entry of a std::map, with the allocations of its key and value.
 constexpr uint64_t kBytesPerMember = 112;
-// Copies of the text in memory during parsing: text_ grows by doubling, and the strings in
-// tinygltf's JSON tree are copies of its parts.
+// Copies of the text in memory during parsing: the section, which grows by doubling, the text of
+// all sections, and the strings in tinygltf's JSON tree.
 constexpr uint64_t kTextCopies = 4;
 constexpr uint64_t kTreeBytesPerValue = 128;
 
-// Returns the bytes that `value` and the values in it take in tinygltf's model. The model has a
-// Value for each value in an extension, and a Parameter for each member of a material. Adds the
-// number of these values to `values`.
-uint64_t model_bytes(const Json& value, bool is_in_extensions, uint64_t& values) {
-  ++values;
-  uint64_t bytes = is_in_extensions ? 3 * sizeof(tinygltf::Value) : 3 * sizeof(double);
-  if (value.is_string()) bytes += value.get_ref<const std::string&>().size();
-  for (auto m = value.begin(); value.is_structured() && m != value.end(); ++m) {
-    bool inside = is_in_extensions;
-    if (value.is_object()) {
-      inside = inside || m.key() == "extensions";
-      bytes += kBytesPerMember + m.key().size() + sizeof(tinygltf::Parameter);
-    }
-    bytes += model_bytes(*m, inside, values);
-  }
-  return bytes;
-}
-
-// Returns the bytes of an element in the model's array for `section`. A growing vector needs this
-// memory twice.
-uint64_t element_bytes(std::string_view section) {
-  if (section == "materials") return 2 * sizeof(tinygltf::Material);
-  if (section == "textures") return 2 * sizeof(tinygltf::Texture);
-  if (section == "samplers") return 2 * sizeof(tinygltf::Sampler);
-  return 2 * sizeof(std::string) + kBytesPerMember;
-}
-
-void check(const JsonElement& element) {
-  if (element.key() == "asset") {
-    element.at("version").as_string();
-    if (const auto minimum = element.find("minVersion")) minimum->as_string();
-  } else if (element.key().starts_with("extensions")) {
-    element.as_string();
-  }
+// Returns the bytes that an element's values take in tinygltf's model. The model has a Value for
+// each value in an extension, and a Parameter for each member of a material.
+uint64_t model_bytes(const ElementText& element) {
+  return element.values * 3 * sizeof(double) +
+         element.values_in_extensions * 3 * sizeof(tinygltf::Value) +
+         element.members * (kBytesPerMember + sizeof(tinygltf::Parameter)) + element.string_bytes;
 }
 
 std::string string_or_empty(const Json& object, const char* key) {
@@ -71,22 +44,21 @@ ModelReader::ModelReader(const std::string& scene_path, MemoryBudget& budget)
       model_charge_(budget, "the description of the materials in " + scene_path),
       parse_charge_(budget, "the description of the materials in " + scene_path) {}
 
-void ModelReader::add(const JsonElement& element) {
-  check(element);
-  uint64_t values = 0;
-  model_charge_.add(element_bytes(element.key()) + model_bytes(element.value(), false, values));
-  const std::string text = element.value().dump();
-  parse_charge_.add(kTextCopies * text.size() + kTreeBytesPerValue * values);
-  if (element.key() == section_) {
-    text_ += ',';
-  } else {
-    if (section_is_open_) text_ += ']';
-    section_ = element.key();
-    section_is_open_ = element.is_in_array();
-    text_.append(text_.size() > 1 ? "," : "").append(Json(section_).dump()).append(":");
-    if (section_is_open_) text_ += '[';
-  }
-  text_ += text;
+void ModelReader::add(std::string& section, const ElementText& element, uint64_t bytes) {
+  // A growing vector needs its memory twice.
+  model_charge_.add(2 * bytes + model_bytes(element));
+  parse_charge_.add(kTextCopies * element.text.size() + kTreeBytesPerValue * element.values);
+  section.append(section.empty() ? "" : ",").append(element.text);
+}
+
+void ModelReader::add_material(const ElementText& element) {
+  add(materials_, element, sizeof(tinygltf::Material));
+}
+void ModelReader::add_texture(const ElementText& element) {
+  add(textures_, element, sizeof(tinygltf::Texture));
+}
+void ModelReader::add_sampler(const ElementText& element) {
+  add(samplers_, element, sizeof(tinygltf::Sampler));
 }
 
 void ModelReader::add_image(const JsonElement& element) {
@@ -109,17 +81,18 @@ void ModelReader::add_image(const JsonElement& element) {
 }
 
 void ModelReader::parse(Document& document) {
-  // Padded, because tinygltf refuses texts of less than four characters.
-  text_ += section_is_open_ ? "]}  " : "}  ";
+  const std::string text = R"({"materials":[)" + std::exchange(materials_, {}) +
+                           R"(],"textures":[)" + std::exchange(textures_, {}) +
+                           R"(],"samplers":[)" + std::exchange(samplers_, {}) + "]}";
   std::string errors, warnings;
   bool is_loaded = false;
   std::vector<tinygltf::Image> images = std::move(model_->images);
   try {
-    if (text_.size() > INT_MAX)
+    if (text.size() > INT_MAX)
       errors = "over 2 GiB of JSON";
     else
       is_loaded = tinygltf::TinyGLTF().LoadASCIIFromString(
-          model_.get(), &errors, &warnings, text_.data(), static_cast<unsigned>(text_.size()), "",
+          model_.get(), &errors, &warnings, text.data(), static_cast<unsigned>(text.size()), "",
           tinygltf::NO_REQUIRE);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::kOutOfMemory,
@@ -138,7 +111,6 @@ void ModelReader::parse(Document& document) {
   document.model = std::move(model_);
   document.image_uris = std::move(image_uris_);
   document.model_charge = std::move(model_charge_);
-  text_ = {};
   parse_charge_ = {};
 }
 

@@ -1,6 +1,6 @@
-// The part of a scene file that tinygltf reads: asset, extensions, materials, textures and
-// samplers. The elements are collected as text, which tinygltf parses once. ModelReader itself puts
-// the images into tinygltf's model, because tinygltf would load them.
+// The part of a scene file that tinygltf reads: materials, textures and samplers. Their text is
+// collected, and tinygltf parses it once. ModelReader itself puts the images into tinygltf's model,
+// because tinygltf would load them.
 #pragma once
 
 #include <memory>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "scene/gltf/document/document.h"
+#include "scene/gltf/json/element_text.h"
 #include "scene/gltf/json/json_element.h"
 
 namespace voxdag::gltf {
@@ -16,10 +17,11 @@ class ModelReader {
  public:
   ModelReader(const std::string& scene_path, MemoryBudget& budget);
 
-  // Adds an element of a top-level section (asset, materials, ...) to the JSON text that parse()
-  // passes to tinygltf. Throws Violation if the asset's version or minVersion, or the name of an
-  // extension, is not a string. Throws Error{kOutOfMemory} if the model would not fit the budget.
-  void add(const JsonElement& element);
+  // Each appends an element to the JSON text that parse() passes to tinygltf, or to the images.
+  // Throws Error{kOutOfMemory} if the model would not fit the budget.
+  void add_material(const ElementText& element);
+  void add_texture(const ElementText& element);
+  void add_sampler(const ElementText& element);
   void add_image(const JsonElement& element);
 
   // Sets the model of the document and its image_uris. Materials, textures and samplers that
@@ -27,9 +29,10 @@ class ModelReader {
   void parse(Document& document);
 
  private:
-  std::string text_ = "{";
-  std::string section_;           // last section in text_
-  bool section_is_open_ = false;  // the section's array needs a closing bracket
+  // Appends the element to `section`. `bytes` is its size in the array of tinygltf's model.
+  void add(std::string& section, const ElementText& element, uint64_t bytes);
+
+  std::string materials_, textures_, samplers_;  // elements with commas between them
   std::shared_ptr<tinygltf::Model> model_;
   std::vector<RawString> image_uris_;
   GrowingCharge model_charge_;

@@ -33,17 +33,17 @@ bool may_change_geometry(const std::string& extension) {
          std::ranges::none_of(kHarmless, [&](auto p) { return extension.starts_with(p); });
 }
 
-void check_required_extensions(const std::string& path, const std::vector<std::string>& required) {
+void check_required_extensions(const std::string& path, const std::deque<std::string>& required) {
   for (const std::string& name : required)
     if (may_change_geometry(name))
       refuse(path, "requires the extension " + printable(name) + ", which voxdag does not read");
 }
 
-void check_version(const std::string& path, const tinygltf::Asset& asset) {
+void check_version(const std::string& path, const Asset& asset) {
   if (asset.version != "2" && !asset.version.starts_with("2."))
     refuse(path, "is glTF version " + printable(asset.version) + ", expected 2.0");
-  if (!asset.minVersion.empty() && asset.minVersion != "2.0")
-    refuse(path, "needs glTF version " + printable(asset.minVersion) + ", voxdag reads 2.0");
+  if (!asset.min_version.empty() && asset.min_version != "2.0")
+    refuse(path, "needs glTF version " + printable(asset.min_version) + ", voxdag reads 2.0");
 }
 
 // Makes the BIN chunk the source of the first buffer, if this buffer has no uri.
@@ -72,7 +72,6 @@ auto store(Document& document, std::deque<T>& array, T (*read)(const JsonElement
 // Reads all sections; returns the message of the first violation, or "".
 std::string read_structure(const ReadableFile& file, FileRange json, Document& d,
                            ModelReader& model, MemoryBudget& budget, const CancelToken& cancel) {
-  const auto add_to_model = [&](const JsonElement& element) { model.add(element); };
   bool has_asset = false;
   constexpr bool kArray = true, kWhole = false, kChecked = true, kUnchecked = false;
   const std::string violation = read_sections(
@@ -80,13 +79,16 @@ std::string read_structure(const ReadableFile& file, FileRange json, Document& d
       {{"asset", kWhole, kChecked,
         [&](const JsonElement& element) {
           has_asset = true;
-          model.add(element);
+          d.asset = read_asset(element);
         }},
-       {"extensionsUsed", kArray, kChecked, add_to_model},
-       {"extensionsRequired", kArray, kChecked, add_to_model},
-       {"materials", kArray, kUnchecked, add_to_model},
-       {"textures", kArray, kUnchecked, add_to_model},
-       {"samplers", kArray, kUnchecked, add_to_model},
+       {"extensionsUsed", kArray, kChecked, store(d, d.extensions_used, read_string)},
+       {"extensionsRequired", kArray, kChecked, store(d, d.extensions_required, read_string)},
+       {"materials", kArray, kUnchecked,
+        [&](const ElementText& material) { model.add_material(material); }},
+       {"textures", kArray, kUnchecked,
+        [&](const ElementText& texture) { model.add_texture(texture); }},
+       {"samplers", kArray, kUnchecked,
+        [&](const ElementText& sampler) { model.add_sampler(sampler); }},
        {"images", kArray, kUnchecked,
         [&](const JsonElement& element) { model.add_image(element); }},
        {"buffers", kArray, kChecked,
@@ -121,15 +123,15 @@ Document read_document(const ReadableFile& file, MemoryBudget& budget, const Can
   ModelReader model(file.path(), budget);
   const std::string violation = read_structure(file, container.json, d, model, budget, cancel);
   model.parse(d);
-  check_version(d.path, d.model->asset);
-  check_required_extensions(d.path, d.model->extensionsRequired);
+  check_version(d.path, d.asset);
+  check_required_extensions(d.path, d.extensions_required);
   if (!violation.empty()) refuse(d.path, violation);
   place_bin_chunk(container, d);
 
-  for (const auto* names : {&d.model->extensionsUsed, &d.model->extensionsRequired})
+  for (const auto* names : {&d.extensions_used, &d.extensions_required})
     for (const std::string& name : *names)
       d.quantized = d.quantized || name == "KHR_mesh_quantization";
-  for (const std::string& name : d.model->extensionsUsed)
+  for (const std::string& name : d.extensions_used)
     if (may_change_geometry(name))
       d.warn("ignored-extension", "", "the optional extension " + printable(name) + " is ignored");
   trim_heap();  // returns the parser's freed blocks to the system

@@ -189,6 +189,15 @@ uint64_t bytes_of(const std::vector<T>& v) {
 
 }  // namespace
 
+Asset read_asset(const JsonElement& element) {
+  Asset asset;
+  asset.version = element.at("version").as_string();
+  if (const auto minimum = element.find("minVersion")) asset.min_version = minimum->as_string();
+  return asset;
+}
+
+std::string read_string(const JsonElement& element) { return element.as_string(); }
+
 BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_file,
                          MemoryBudget& budget) {
   BufferSource out;

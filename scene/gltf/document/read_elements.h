@@ -11,6 +11,8 @@
 
 namespace voxdag::gltf {
 
+Asset read_asset(const JsonElement& element);
+std::string read_string(const JsonElement& element);
 // Reads a buffer. If it is a data: URI with JSON escapes, reads its characters into memory. Throws
 // Error{kOutOfMemory} if they do not fit the budget.
 BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_file,
@@ -29,6 +31,7 @@ std::vector<int> read_scene(const JsonElement& element);
 inline uint64_t heap_bytes(const BufferView& view) {
   return view.meshopt ? sizeof(MeshoptView) : 0;
 }
+inline uint64_t heap_bytes(const std::string& text) { return text.capacity(); }
 uint64_t heap_bytes(const Accessor& accessor);
 uint64_t heap_bytes(const Mesh& mesh);
 uint64_t heap_bytes(const Skin& skin);

@@ -23,8 +23,11 @@ constexpr size_t kMaxNesting = 32;
 constexpr uint64_t kBytesPerArrayElement = 3 * sizeof(Json);
 constexpr uint64_t kBytesPerObjectMember = 112;
 constexpr uint64_t kBytesPerContainer = 64;
+// A growing string needs its memory twice.
+constexpr uint64_t kTextCopies = 2;
 
-// Receives the parser's events and makes a Json value of each element of a section.
+// Receives the parser's events. Makes a Json value, or the filtered text, of each element of a
+// section.
 class SectionParser : public nlohmann::json_sax<Json> {
  public:
   SectionParser(const std::string& path, const JsonWindow& window,
@@ -42,7 +45,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
   bool number_unsigned(number_unsigned_t v) override { return scalar(v); }
   bool number_float(number_float_t v, const string_t&) override { return scalar(v); }
   bool string(string_t& v) override {
-    if (open_.size() == 1 && key_ == "uri") uri_ = window_.last_string();
+    if (depth_ == 1 && key_ == "uri") uri_ = window_.last_string();
     if (skipped_depth_ == 0 && !skips_next_) element_bytes_ += v.size() + sizeof(string_t);
     return scalar(std::move(v));
   }
@@ -55,7 +58,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
 
   bool key(string_t& name) override {
     if (skipped_depth_ > 0) return true;
-    if (!open_.empty()) {
+    if (depth_ > 0) {
       key_ = std::move(name);
       skips_next_ = key_ == "extras";
       return true;
@@ -80,7 +83,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
 
   Place next_place() {
     if (skipped_depth_ > 0 || std::exchange(skips_next_, false)) return Place::kSkipped;
-    if (!open_.empty()) return Place::kInElement;
+    if (depth_ > 0) return Place::kInElement;
     if (!in_root_) return Place::kRoot;
     return section_->is_array && !in_section_ ? Place::kSection : Place::kElement;
   }
@@ -90,15 +93,15 @@ class SectionParser : public nlohmann::json_sax<Json> {
     if (place == Place::kRoot || place == Place::kSection) {
       violate_type(value);
     } else if (place != Place::kSkipped) {
-      insert(place, std::move(value));
-      if (open_.empty()) finish_element();
+      add_scalar(place, std::move(value));
+      if (depth_ == 0) finish_element();
     }
     return true;
   }
 
   bool start(Json value) {
     const Place place = next_place();
-    const bool is_nested_too_deep = open_.size() == kMaxNesting;
+    const bool is_nested_too_deep = depth_ == kMaxNesting;
     if (place == Place::kSkipped || is_nested_too_deep) {
       ++skipped_depth_;
     } else if (place == Place::kRoot || place == Place::kSection) {
@@ -109,8 +112,8 @@ class SectionParser : public nlohmann::json_sax<Json> {
         ++skipped_depth_;
       }
     } else {
-      element_bytes_ += kBytesPerContainer;
-      open_.push_back(insert(place, std::move(value)));
+      start_container(place, std::move(value));
+      ++depth_;
     }
     return true;
   }
@@ -118,13 +121,36 @@ class SectionParser : public nlohmann::json_sax<Json> {
   bool end() {
     if (skipped_depth_ > 0) {
       --skipped_depth_;
-    } else if (!open_.empty()) {
-      open_.pop_back();
-      if (open_.empty()) finish_element();
+    } else if (depth_ > 0) {
+      end_container();
+      if (--depth_ == 0) finish_element();
     } else {
       in_section_ = false;
     }
     return true;
+  }
+
+  void add_scalar(Place place, Json value) {
+    if (!section_->is_read_as_text()) {
+      insert(place, std::move(value));
+      return;
+    }
+    writer_.add_scalar(key_, value);
+    charge_.grow_to(kTextCopies * writer_.written().text.size());
+  }
+  void start_container(Place place, Json value) {
+    if (section_->is_read_as_text()) {
+      writer_.start(key_, value);
+    } else {
+      element_bytes_ += kBytesPerContainer;
+      open_.push_back(insert(place, std::move(value)));
+    }
+  }
+  void end_container() {
+    if (section_->is_read_as_text())
+      writer_.end();
+    else
+      open_.pop_back();
   }
 
   // Inserts the value and returns its address.
@@ -149,7 +175,10 @@ class SectionParser : public nlohmann::json_sax<Json> {
   }
   void finish_element() {
     try {
-      section_->read(element());
+      if (section_->is_read_as_text())
+        std::get<1>(section_->read)(writer_.take());
+      else
+        std::get<0>(section_->read)(element());
     } catch (const Violation& v) {
       violate(v.message);
     }
@@ -186,8 +215,10 @@ class SectionParser : public nlohmann::json_sax<Json> {
   bool in_section_ = false;  // inside the array of *section_
   int64_t index_ = 0;        // index of the element within its section
 
+  uint64_t depth_ = 0;  // open objects and arrays of the element that contain the next value
   Json element_;
-  std::vector<Json*> open_;  // objects and arrays that contain the next value, within element_
+  std::vector<Json*> open_;   // these objects and arrays within element_
+  ElementTextWriter writer_;  // used instead of element_ if the section is read as text
   uint64_t element_bytes_ = 0;
   RawString uri_;
   std::string key_;  // key of the next value, if it is a member

@@ -5,10 +5,12 @@
 
 #include <functional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
+#include "scene/gltf/json/element_text.h"
 #include "scene/gltf/json/json_element.h"
 #include "voxdag/cancel_token.h"
 
@@ -18,8 +20,12 @@ struct JsonSection {
   std::string name;
   bool is_array;    // each element is read separately; otherwise the section is one element
   bool is_checked;  // a Violation in it is reported; otherwise it is ignored
-  // May throw Violation. The element is valid during the call.
-  std::function<void(const JsonElement&)> read;
+  // Receives each element as a value or as text. May throw Violation. The argument is valid during
+  // the call.
+  std::variant<std::function<void(const JsonElement&)>, std::function<void(const ElementText&)>>
+      read;
+
+  bool is_read_as_text() const { return read.index() == 1; }
 };
 
 // Passes the elements of `sections` to their readers in the order of the file. Returns the message

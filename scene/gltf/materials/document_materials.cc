@@ -23,6 +23,7 @@ class MaterialResolver {
 
   void resolve() {
     for (size_t m = 0; m < document_.meshes.size(); ++m) {
+      if (!document_.meshes[m].is_drawn) continue;
       std::vector<Primitive>& primitives = document_.meshes[m].primitives;
       for (size_t p = 0; p < primitives.size(); ++p) {
         if (!primitives[p].makes_triangles()) continue;

@@ -1,16 +1,16 @@
 #include "scene/gltf/mesh_data/vertex_source.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <unordered_map>
 
+#include "scene/gltf/mesh_data/skin_weights.h"
 #include "scene/growing_charge.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {
-
-constexpr size_t kInfluencesOfSet = 4;
 
 // Computes the global transforms of nodes: the products of all transforms from the root to the
 // node. Stores them, because joints share most of their ancestors.
@@ -71,13 +71,15 @@ VertexSource::VertexSource(const Document& document, BufferReader& buffers,
                            const Primitive& primitive, std::span<const double> weights,
                            std::span<const Transform> joints)
     : charge_(buffers.budget(),
-              sizeof(Target) * weights.size() + sizeof(Influences) * primitive.joint_sets.size(),
+              sizeof(Target) * std::min(weights.size(), primitive.targets.size()) +
+                  sizeof(Influences) * primitive.joint_sets.size(),
               document.path + ": a primitive with its morph targets and joints"),
       positions_(document, buffers, primitive.position),
       joints_(joints) {
-  targets_.reserve(weights.size());
+  const size_t weighted = std::min(weights.size(), primitive.targets.size());
+  targets_.reserve(weighted);
   influences_.reserve(joints.empty() ? 0 : primitive.joint_sets.size());
-  for (size_t t = 0; t < weights.size(); ++t)
+  for (size_t t = 0; t < weighted; ++t)
     if (weights[t] != 0 && primitive.targets[t] >= 0)
       targets_.push_back({AccessorReader(document, buffers, primitive.targets[t]), weights[t]});
   if (joints.empty()) return;
@@ -99,31 +101,50 @@ void VertexSource::add_target(Target& target, uint64_t first, size_t count, doub
 }
 
 void VertexSource::skin(uint64_t first, size_t count, double* positions) {
-  blended_.assign(count, Transform{{{0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}}});
+  blended_.assign(count, Blend{});
   indices_.resize(kInfluencesOfSet * count);
   weights_.resize(kInfluencesOfSet * count);
   for (Influences& set : influences_) {
     set.joints.read(first, count, indices_.data());
     set.weights.read(first, count, weights_.data());
+    if (&set == &influences_.front())
+      for (size_t i = 0; i < count; ++i) blended_[i].first_joint = indices_[kInfluencesOfSet * i];
     for (size_t i = 0; i < count; ++i)
       blend(&indices_[kInfluencesOfSet * i], &weights_[kInfluencesOfSet * i], blended_[i]);
   }
   for (size_t i = 0; i < count; ++i) {
+    if (!is_normalized(blended_[i].weights)) normalize(blended_[i]);
     double skinned[3];
-    apply(blended_[i], positions + 3 * i, skinned);
+    apply(blended_[i].sum, positions + 3 * i, skinned);
     for (size_t axis = 0; axis < 3; ++axis) positions[3 * i + axis] = skinned[axis];
   }
 }
 
-void VertexSource::blend(const uint32_t* joints, const double* weights, Transform& sum) const {
+void VertexSource::blend(const uint32_t* joints, const double* weights, Blend& blend) const {
   for (size_t k = 0; k < kInfluencesOfSet; ++k) {
     if (weights[k] == 0) continue;
-    const bool exists = joints[k] < joints_.size();
-    for (int row = 0; row < 3; ++row)
-      for (int column = 0; column < 4; ++column)
-        sum.m[row][column] += exists ? weights[k] * joints_[joints[k]].m[row][column]
-                                     : std::numeric_limits<double>::quiet_NaN();
+    blend.weights += weights[k];
+    add(joints[k], weights[k], blend.sum);
   }
+}
+
+// Adds the joint's matrix, multiplied by the weight. A joint that does not exist makes the sum NaN.
+void VertexSource::add(uint32_t joint, double weight, Transform& sum) const {
+  const bool exists = joint < joints_.size();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column)
+      sum.m[row][column] += exists ? weight * joints_[joint].m[row][column]
+                                   : std::numeric_limits<double>::quiet_NaN();
+}
+
+// Divides the sum by the weights. Without weights, the first joint of the vertex moves it.
+void VertexSource::normalize(Blend& blend) const {
+  if (blend.weights == 0) {
+    blend.sum = Blend{}.sum;
+    return add(blend.first_joint, 1, blend.sum);
+  }
+  for (auto& row : blend.sum.m)
+    for (double& entry : row) entry /= blend.weights;
 }
 
 }  // namespace voxdag::gltf

@@ -3,29 +3,28 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "scene/obj/file/corners.h"
 #include "scene/obj/file/obj_file.h"
-#include "scene/text/line_reader.h"
+#include "scene/obj/file/polygon_reader.h"
+#include "scene/obj/file/vertex_reader.h"
+#include "scene/polygon/face_splitter.h"
 
 namespace voxdag::obj {
 
 class FaceReader {
  public:
-  // Maximum number of corners of a face.
-  static constexpr size_t kMaxCorners = 32768;
-
   // Texture coordinates and materials of triangles.
   struct Surfaces {
     std::vector<uint32_t> texcoords;  // three indices per triangle; kNoIndex: none
     std::vector<uint32_t> materials;  // number in ObjFile::materials()
   };
 
-  // The file must outlive the reader.
-  FaceReader(const ObjFile& obj, MemoryBudget& budget)
-      : obj_(obj), lines_(obj.file(), budget, LineReader::Join::kBackslash) {}
+  // `cursors` is the number of cursors that share the memory. The file must outlive the reader.
+  FaceReader(const ObjFile& obj, unsigned cursors, MemoryBudget& budget);
 
   // Writes the vertex indices of triangles [first, first + count) to `corners`, three per triangle,
   // and replaces `surfaces`, if it is not null. The triangles must exist, but their indices may be
@@ -34,26 +33,30 @@ class FaceReader {
   // Returns the face and line of a triangle, for messages.
   std::string place_of(uint64_t triangle);
   // Returns the vertex index of a corner as written in the file.
-  int64_t index_in_file(uint64_t triangle, int corner);
+  int64_t index_in_file(uint64_t triangle, size_t corner);
 
  private:
+  struct Splitter {
+    Positions vertices;
+    polygon::FaceSplitter faces;
+
+    Splitter(const ObjFile& obj, unsigned cursors, MemoryBudget& budget)
+        : vertices(obj, budget), faces(vertices, obj.file().path(), cursors, budget) {}
+  };
+
   void seek(uint64_t triangle);
-  void load();
-  void parse(std::string_view arguments);
+  void load(uint64_t first_triangle);
   uint64_t face_end() const;
-  size_t entry_of(uint64_t triangle, int corner) const;
-  std::string place() const;
-  uint32_t texcoord(size_t entry) const { return resolve(entries_[entry].texture, texcoords_); }
+  size_t corner_of(uint64_t triangle, size_t k) const;
 
   const ObjFile& obj_;
-  LineReader lines_;
-  // The current face: its number, corners and first triangle, the statements before it, and its
-  // material. Valid only if is_loaded_ is true.
+  PolygonReader polygons_;
+  std::unique_ptr<Splitter> splitter_;  // if a face is not a fan
+  // The first triangle of the current face, and its triangles if it is not a fan. Valid only if
+  // is_loaded_ is true.
   bool is_loaded_ = false;
-  uint64_t face_ = 0, first_triangle_ = 0;
-  uint64_t vertices_ = 0, texcoords_ = 0;
-  uint32_t material_ = 0;
-  std::vector<Corner> entries_;
+  uint64_t first_triangle_ = 0;
+  std::span<const uint32_t> split_;
 };
 
 }  // namespace voxdag::obj

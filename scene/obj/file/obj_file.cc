@@ -6,7 +6,10 @@
 #include "scene/messages.h"
 #include "scene/obj/file/corners.h"
 #include "scene/obj/file/numbers.h"
+#include "scene/obj/file/polygon_reader.h"
 #include "scene/obj/file/statement.h"
+#include "scene/obj/file/vertex_reader.h"
+#include "scene/polygon/face_splitter.h"
 #include "scene/text/line_reader.h"
 
 namespace voxdag::obj {
@@ -48,6 +51,7 @@ class ObjFile::Scan {
   }
 
   IgnoredStatements points_or_lines, unknown, small_faces;
+  bool has_polygons = false;  // true if a face has more than three corners
 
  private:
   void read(const Statement& statement) {
@@ -106,6 +110,7 @@ class ObjFile::Scan {
     const size_t corners = count_words(statement.arguments);
     if (corners < 3) return small_faces.add(statement, lines_.number());
     obj_.triangles_ += corners - 2;
+    has_polygons = has_polygons || corners > 3;
     UsedMaterials::Use& use = obj_.materials_.all()[material_];
     ++use.faces;
     if (!has_texture(statement.arguments)) ++use.faces_without_texture;
@@ -144,6 +149,7 @@ ObjFile::ObjFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget,
   Scan scan(*this, budget, cancel);
   scan.run();
   add_warnings(scan);
+  if (scan.has_polygons) find_splits(budget, cancel);
 }
 
 void ObjFile::add_warnings(const Scan& scan) {
@@ -157,6 +163,28 @@ void ObjFile::add_warnings(const Scan& scan) {
   const std::string unknown =
       "the unknown statement \"" + printable(scan.unknown.keyword) + "\" is ignored";
   add("unknown-statements", scan.unknown, unknown.c_str());
+}
+
+// Sets has_splits of the blocks with faces that are not fans, and counts doubtful faces.
+void ObjFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
+  PolygonReader polygons(*this, budget);
+  Positions vertices(*this, budget);
+  polygon::FaceSplitter splitter(vertices, file_->path(), 1, budget);
+  uint64_t doubtful = 0;
+  std::string first_doubtful;
+  polygons.seek(face_index_.at(0), 0);
+  for (uint64_t face = 0; face < faces_; ++face) {
+    if (face % kStatementsPerCheck == 0) cancel.check();
+    polygons.next();
+    if (polygons.size() < 4) continue;
+    if (!splitter.split(polygons.vertices()).empty())
+      has_splits_ = face_index_.at(face).has_splits = true;
+    if (splitter.is_doubtful() && doubtful++ == 0) first_doubtful = polygons.place();
+  }
+  if (doubtful > 0)
+    warnings_.add({"crossing-edges", file_->path() + ": " + first_doubtful,
+                   "its edges cross each other, so its area is doubtful; it is read as a fan",
+                   doubtful});
 }
 
 }  // namespace voxdag::obj

@@ -1,7 +1,8 @@
 // An open OBJ file after one pass over it: the number of its vertices, texture coordinates, faces
 // and triangles, the places of every n-th of them (block_index.h), and the names of its materials
-// and libraries. A polygon of n corners has n - 2 triangles. A polygon with fewer than three
-// corners has no triangle.
+// and libraries. A face of n corners has n - 2 triangles (scene/polygon); a face with fewer than
+// three corners has none. If there are faces of more than three corners, a second pass finds the
+// blocks of faces with concave polygons.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +21,9 @@ namespace voxdag::obj {
 
 class ObjFile {
  public:
-  // Throws Error{kInvalidInput} with the line for a free-form curve or surface, or a call of
-  // another file; Error{kLimit} for a line that is too long, or 2^32 - 1 vertices or texture
-  // coordinates; Error{kOutOfMemory}.
+  // Throws Error{kInvalidInput} with the line for a free-form curve or surface, a call of another
+  // file, or a damaged polygon; Error{kLimit} for a line that is too long, or 2^32 - 1 vertices or
+  // texture coordinates; Error{kOutOfMemory}.
   ObjFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
   // The beginning of a line.
@@ -35,6 +36,7 @@ class ObjFile {
     uint64_t first_triangle;
     uint64_t vertices, texcoords;  // number of v and vt statements before the face
     uint32_t material;             // number in materials()
+    bool has_splits = false;       // true if some faces of the block are not fans
   };
   struct Library {
     std::string names;  // the arguments of the statement
@@ -48,6 +50,8 @@ class ObjFile {
   const BlockIndex<LinePlace>& vertex_index() const { return vertex_index_; }
   const BlockIndex<LinePlace>& texcoord_index() const { return texcoord_index_; }
   const BlockIndex<FacePlace>& face_index() const { return face_index_; }
+  // True if a face is not a fan.
+  bool has_splits() const { return has_splits_; }
   // True if a vertex has a color.
   bool has_colors() const { return has_colors_; }
   // The number that stands for full intensity of a color: 1, or 255 if a number is larger than 1.
@@ -60,12 +64,13 @@ class ObjFile {
   class Scan;
 
   void add_warnings(const Scan& scan);
+  void find_splits(MemoryBudget& budget, const CancelToken& cancel);
 
   const std::unique_ptr<ReadableFile> file_;
   uint64_t vertices_ = 0, texcoords_ = 0, faces_ = 0, triangles_ = 0;
   BlockIndex<LinePlace> vertex_index_, texcoord_index_;
   BlockIndex<FacePlace> face_index_;
-  bool has_colors_ = false;
+  bool has_splits_ = false, has_colors_ = false;
   double full_color_ = 1;
   UsedMaterials materials_;
   std::vector<Library> libraries_;

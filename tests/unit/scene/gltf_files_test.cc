@@ -236,6 +236,34 @@ TEST(GltfMemory, JointMatricesAreCharged) {
   }
 }
 
+// The text that tinygltf parses is written from the parser's events: without extras, with escaped
+// strings, and with several elements per section.
+TEST(GltfModel, TextOfMaterialsIsFiltered) {
+  SceneBuilder scene = one_triangle();
+  const std::string name = "a \"quoted\" \\ name\n\u00e9";
+  scene.root["materials"] = {
+      {{"extras", {{"name", "wrong"}}}, {"name", name}},
+      {{"extensions", {{"X", {{"list", {1, -2.5, true, {{"deep", "x"}}}}}}}}, {"name", "second"}}};
+  scene.root["samplers"] = nlohmann::json::array();
+  MemoryFiles files;
+  files.contents["scene"] = scene.glb();
+  MemoryBudget budget(uint64_t{1} << 20);
+  const gltf::Document document =
+      gltf::read_document(*files.open_read("scene"), budget, CancelToken());
+  const auto& materials = document.model->materials;
+
+  ASSERT_EQ(materials.size(), 2u);
+  EXPECT_EQ(materials[0].name, name);
+  EXPECT_FALSE(materials[0].extras.Has("name"));
+  EXPECT_EQ(materials[1].name, "second");
+  const auto& list = materials[1].extensions.at("X").Get("list");
+  ASSERT_EQ(list.ArrayLen(), 4u);
+  EXPECT_EQ(list.Get(0).GetNumberAsInt(), 1);
+  EXPECT_EQ(list.Get(1).GetNumberAsDouble(), -2.5);
+  EXPECT_TRUE(list.Get(2).Get<bool>());
+  EXPECT_EQ(list.Get(3).Get("deep").Get<std::string>(), "x");
+}
+
 // tinygltf's model contains materials, textures, samplers and images. Images are not loaded; a
 // data: URI is replaced by its position in the file.
 TEST(GltfModel, HasTheMaterials) {
@@ -276,7 +304,8 @@ TEST(GltfModel, HasTheMaterials) {
   EXPECT_EQ(model.textures[0].source, 2);
   ASSERT_EQ(model.samplers.size(), 1u);
   EXPECT_EQ(model.samplers[0].wrapS, 33071);
-  EXPECT_EQ(model.extensionsUsed, std::vector<std::string>{"KHR_texture_transform"});
+  ASSERT_EQ(document.extensions_used.size(), 1u);
+  EXPECT_EQ(document.extensions_used[0], "KHR_texture_transform");
 
   ASSERT_EQ(model.images.size(), 3u);
   EXPECT_EQ(model.images[0].name, "inside");

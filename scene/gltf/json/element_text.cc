@@ -1,0 +1,46 @@
+#include "scene/gltf/json/element_text.h"
+
+#include <utility>
+
+namespace voxdag::gltf {
+
+using Json = nlohmann::json;
+
+void ElementTextWriter::add_scalar(std::string_view key, const Json& value) {
+  begin_value(key);
+  if (value.is_string()) written_.string_bytes += value.get_ref<const std::string&>().size();
+  written_.text += value.dump();
+}
+
+void ElementTextWriter::start(std::string_view key, const Json& value) {
+  begin_value(key);
+  const bool is_member = !open_.empty() && open_.back().is_object;
+  const bool is_inside = !open_.empty() && open_.back().is_extensions;
+  open_.push_back({value.is_object(), is_inside || (is_member && key == "extensions"), true});
+  written_.text += value.is_object() ? '{' : '[';
+}
+
+void ElementTextWriter::end() {
+  written_.text += open_.back().is_object ? '}' : ']';
+  open_.pop_back();
+}
+
+ElementText ElementTextWriter::take() {
+  open_.clear();
+  return std::exchange(written_, {});
+}
+
+// Counts a value, and writes the comma and the key before it.
+void ElementTextWriter::begin_value(std::string_view key) {
+  ++written_.values;
+  if (open_.empty()) return;
+  Container& around = open_.back();
+  if (around.is_extensions) ++written_.values_in_extensions;
+  if (!std::exchange(around.is_empty, false)) written_.text += ',';
+  if (!around.is_object) return;
+  ++written_.members;
+  written_.string_bytes += key.size();
+  written_.text.append(Json(key).dump()).append(":");
+}
+
+}  // namespace voxdag::gltf

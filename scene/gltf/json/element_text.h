@@ -1,0 +1,47 @@
+// Writes the JSON text of one element from its values, as a parser delivers them. Numbers, strings
+// and the order of members are kept; blanks are not.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+namespace voxdag::gltf {
+
+// The text of an element, and the numbers of its values, for estimates of their memory.
+struct ElementText {
+  std::string text;
+  uint64_t values = 0;                // all values, with the element itself
+  uint64_t values_in_extensions = 0;  // values inside of a member "extensions"
+  uint64_t members = 0;               // members of objects
+  uint64_t string_bytes = 0;          // strings and keys of members
+};
+
+class ElementTextWriter {
+ public:
+  // Both add a value. `key` is its name if the value is a member of an object; otherwise it is
+  // ignored. `value` of start() is an empty object or array; the following values are inside of it
+  // until end().
+  void add_scalar(std::string_view key, const nlohmann::json& value);
+  void start(std::string_view key, const nlohmann::json& value);
+  void end();
+
+  const ElementText& written() const { return written_; }
+  // Returns the text of the element, and begins the next element.
+  ElementText take();
+
+ private:
+  struct Container {
+    bool is_object;
+    bool is_extensions;  // the container, or one around it, is a member "extensions"
+    bool is_empty;
+  };
+
+  void begin_value(std::string_view key);
+
+  ElementText written_;
+  std::vector<Container> open_;
+};
+
+}  // namespace voxdag::gltf

@@ -1,0 +1,54 @@
+// Reads the polygons of an OBJ file, its f statements, one after another. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "scene/obj/file/corners.h"
+#include "scene/obj/file/obj_file.h"
+#include "scene/text/line_reader.h"
+
+namespace voxdag::obj {
+
+class PolygonReader {
+ public:
+  // Maximum number of corners of a polygon.
+  static constexpr size_t kMaxCorners = 32768;
+
+  // The file must outlive the reader.
+  PolygonReader(const ObjFile& obj, MemoryBudget& budget)
+      : obj_(obj), lines_(obj.file(), budget, LineReader::Join::kBackslash) {}
+
+  // Moves to the polygon at `place`, whose number is `face`.
+  void seek(const ObjFile::FacePlace& place, uint64_t face);
+  // Reads the next polygon, which must exist. Throws Error{kInvalidInput} with face and line for a
+  // corner that is no index.
+  void next();
+
+  // Return the number of the polygon, its corners and their vertex indices, which may be out of
+  // range, and its material.
+  uint64_t face() const { return next_face_ - 1; }
+  size_t size() const { return corners_.size(); }
+  const Corner& corner(size_t k) const { return corners_[k]; }
+  std::span<const uint32_t> vertices() const { return vertices_; }
+  uint32_t material() const { return material_; }
+  // Returns the index of a corner's texture coordinates.
+  uint32_t texcoord(size_t k) const { return resolve(corners_[k].texture, texcoords_before_); }
+  // Returns the polygon and its line, for messages.
+  std::string place() const;
+
+ private:
+  void parse(std::string_view arguments);
+
+  const ObjFile& obj_;
+  LineReader lines_;
+  uint64_t next_face_ = 0;
+  uint64_t vertices_before_ = 0, texcoords_before_ = 0;  // number of v and vt statements
+  uint32_t material_ = 0;
+  std::vector<Corner> corners_;
+  std::vector<uint32_t> vertices_;
+};
+
+}  // namespace voxdag::obj
