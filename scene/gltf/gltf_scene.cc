@@ -11,6 +11,7 @@
 #include "scene/gltf/document/read_document.h"
 #include "scene/gltf/materials/document_materials.h"
 #include "scene/gltf/materials/image_sources.h"
+#include "scene/gltf/mesh_data/index_restarts.h"
 #include "scene/gltf/mesh_data/skin_weights.h"
 #include "scene/gltf/triangle_reader.h"
 
@@ -79,6 +80,7 @@ class GltfScene : public TriangleSource {
         decoded_(files, options.scratch_path, document_, budget) {
     BufferReader reader = buffers(1);
     reader.check_lengths();
+    index_restarts(document_, reader);
     warnings_ = document_.warnings;
     warn_of_weights(document_, reader, warnings_);
     declared_ = count_triangles(document_, budget);
@@ -120,7 +122,7 @@ class GltfScene : public TriangleSource {
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   const std::unique_ptr<ReadableFile> file_;
-  const Document document_;
+  Document document_;
   ExternalFiles external_files_;
   DecodedBuffers decoded_;
   WarningList warnings_;

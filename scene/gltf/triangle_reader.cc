@@ -229,9 +229,9 @@ void TriangleReader::place_all(const uint32_t* corners, uint64_t count) {
 // Adds the surfaces of `count` triangles to the batch, which must have space for them.
 void TriangleReader::place_all_surfaces(const uint32_t* corners, uint64_t count) {
   const bool is_mirrored = mirrors(world_);
-  const bool is_strip =
-      document_.meshes[static_cast<size_t>(binding_.mesh)].primitives[binding_.primitive].mode ==
-      kTriangleStrip;
+  const Primitive& primitive =
+      document_.meshes[static_cast<size_t>(binding_.mesh)].primitives[binding_.primitive];
+  const bool is_strip = primitive.mode == kTriangleStrip && !primitive.restarts;
   for (; count > 0; --count, corners += 3) {
     SurfaceTriangle& surface = surfaces_[batch_size_];
     if (place(corners, surface.position)) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "scene/gltf/document/strip_restarts.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
@@ -49,6 +50,7 @@ const char* component_name(int component_type) { return component_info(component
 
 uint64_t triangle_count(const Document& document, const Primitive& primitive) {
   if (!primitive.makes_triangles()) return 0;
+  if (primitive.restarts) return primitive.restarts->triangles;
   const int source = primitive.indices >= 0 ? primitive.indices : primitive.position;
   const uint64_t corners = document.accessors[static_cast<size_t>(source)].count;
   if (primitive.mode == kTriangleList) return corners / 3;

@@ -27,6 +27,7 @@
 namespace voxdag::gltf {
 
 struct DocumentMaterials;
+struct RestartIndex;
 
 // The source of a buffer's bytes.
 struct BufferSource {
@@ -118,6 +119,8 @@ struct Primitive {
   std::vector<int> texture_coordinates;  // TEXCOORD_n
   PrimitiveSurface surface;
   std::shared_ptr<const DracoExtension> draco;  // null: not compressed
+  // Triangles of a strip or fan that can have restarts, set by index_restarts(); otherwise null.
+  std::shared_ptr<const RestartIndex> restarts;
 
   bool makes_triangles() const { return mode >= kTriangleList && position >= 0; }
 };
@@ -175,7 +178,8 @@ struct Document {
   std::shared_ptr<tinygltf::Model> model;
   std::vector<RawString> image_uris;  // one per image of the model; size 0 for an image without uri
 
-  bool quantized = false;  // KHR_mesh_quantization is used
+  bool quantized = false;     // KHR_mesh_quantization is used
+  bool has_restarts = false;  // KHR_mesh_primitive_restart is used
   // Deques, because a growing vector would need its memory twice.
   std::deque<BufferSource> buffers;
   std::deque<BufferView> views;

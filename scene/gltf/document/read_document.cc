@@ -16,7 +16,8 @@ namespace {
 
 // The extensions that voxdag reads.
 constexpr std::string_view kRead[] = {"EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
-                                      "KHR_draco_mesh_compression", "KHR_mesh_quantization"};
+                                      "KHR_draco_mesh_compression", "KHR_mesh_primitive_restart",
+                                      "KHR_mesh_quantization"};
 
 // Prefixes of extension names for materials, lights, motion and metadata. They do not affect
 // vertices.
@@ -129,8 +130,10 @@ Document read_document(const ReadableFile& file, MemoryBudget& budget, const Can
   place_bin_chunk(container, d);
 
   for (const auto* names : {&d.extensions_used, &d.extensions_required})
-    for (const std::string& name : *names)
+    for (const std::string& name : *names) {
       d.quantized = d.quantized || name == "KHR_mesh_quantization";
+      d.has_restarts = d.has_restarts || name == "KHR_mesh_primitive_restart";
+    }
   for (const std::string& name : d.extensions_used)
     if (may_change_geometry(name))
       d.warn("ignored-extension", "", "the optional extension " + printable(name) + " is ignored");

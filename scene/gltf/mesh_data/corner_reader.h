@@ -1,10 +1,11 @@
 // Reads the triangles of a primitive as three vertex indices each, from triangle lists, strips and
-// fans, indexed or not. Does not correct the winding of strips, because SurfaceTriangle::is_flipped
-// marks every second triangle. Not thread-safe.
+// fans, indexed or not. Does not correct the winding of strips without restarts, because
+// SurfaceTriangle::is_flipped marks every second triangle. Not thread-safe.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -22,10 +23,12 @@ class CornerReader {
 
  private:
   void read_indices(uint64_t first, size_t count, uint32_t* out);
+  void read_restarts(uint64_t first, size_t count, uint32_t* corners);
 
   const int mode_;
-  std::optional<AccessorReader> indices_;  // none: vertices are used in order
-  std::vector<uint32_t> row_;              // consecutive indices of a strip or fan
+  const std::shared_ptr<const RestartIndex> restarts_;  // null: no restarts
+  std::optional<AccessorReader> indices_;               // none: vertices are used in order
+  std::vector<uint32_t> row_;                           // consecutive indices of a strip or fan
 };
 
 }  // namespace voxdag::gltf

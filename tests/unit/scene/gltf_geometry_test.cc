@@ -1,6 +1,8 @@
 // Tests how the vertices and indices of a primitive become triangles, with small generated files.
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag::test {
@@ -188,6 +190,128 @@ TEST(GltfGeometry, LeftoverCornersAreNamedInAWarning) {
   ASSERT_EQ(open.source->warnings().size(), 1u);
   EXPECT_NE(open.source->warnings()[0].text().find("accessor 0: its count is not a multiple"),
             std::string::npos);
+}
+
+// Returns the triangles of strips or fans, which `rows` holds, without restarts: one primitive for
+// each row.
+std::vector<Corners> separate_rows(const std::vector<std::vector<uint32_t>>& rows, int mode,
+                                   const std::vector<float>& positions) {
+  SceneBuilder scene;
+  const int position = scene.add_positions(positions);
+  Json primitives = Json::array();
+  for (const auto& row : rows)
+    primitives.push_back({{"attributes", {{"POSITION", position}}},
+                          {"indices", scene.add_accessor("SCALAR", kU32, row)},
+                          {"mode", mode}});
+  scene.add_root({{"mesh", scene.add("meshes", {{"primitives", primitives}})}});
+  return triangles_of_file(scene.glb());
+}
+
+// Returns a scene with one primitive, whose rows end with the largest number of T.
+template <class T>
+SceneBuilder joined_rows(const std::vector<std::vector<uint32_t>>& rows, int mode,
+                         const std::vector<float>& positions, int component_type) {
+  std::vector<T> indices;
+  for (const auto& row : rows) {
+    for (const uint32_t index : row) indices.push_back(static_cast<T>(index));
+    indices.push_back(std::numeric_limits<T>::max());
+  }
+  SceneBuilder scene;
+  scene.root["extensionsUsed"] = {"KHR_mesh_primitive_restart"};
+  const int position = scene.add_positions(positions);
+  return scene_of(scene, {{"attributes", {{"POSITION", position}}},
+                          {"indices", scene.add_accessor("SCALAR", component_type, indices)},
+                          {"mode", mode}});
+}
+
+// Sorts the corners of each triangle, because restarts correct the winding of strips.
+std::vector<Corners> without_winding(std::vector<Corners> triangles) {
+  for (Corners& corners : triangles) std::ranges::sort(corners);
+  return triangles;
+}
+
+std::vector<float> bumpy_line(size_t vertices) {
+  std::vector<float> xyz;
+  for (size_t i = 0; i < vertices; ++i)
+    xyz.insert(xyz.end(), {static_cast<float>(i), static_cast<float>(i * i % 7), 0});
+  return xyz;
+}
+
+// KHR_mesh_primitive_restart: rows of strips and fans that end with the largest index. The rows
+// include empty ones, and rows too short for a triangle.
+TEST(GltfGeometry, RestartsOfEveryWidth) {
+  const std::vector<std::vector<uint32_t>> rows = {
+      {}, {0, 1, 2, 3, 4}, {5, 6}, {}, {9, 8, 7}, {3}, {10, 3, 5, 4, 4, 6, 200}};
+  const auto positions = bumpy_line(201);
+  for (const int mode : {5, 6}) {
+    const auto expected = without_winding(separate_rows(rows, mode, positions));
+    ASSERT_EQ(expected.size(), 9u);
+    const auto read = [&](SceneBuilder scene) {
+      std::vector<Corners> triangles = triangles_of_file(scene.glb());
+      EXPECT_EQ(without_winding(triangles), expected);
+      scene.root["extensionsRequired"] = scene.root["extensionsUsed"];
+      EXPECT_EQ(triangles_of_file(scene.glb()), triangles);
+    };
+    read(joined_rows<uint8_t>(rows, mode, positions, kU8));
+    read(joined_rows<uint16_t>(rows, mode, positions, kU16));
+    read(joined_rows<uint32_t>(rows, mode, positions, kU32));
+  }
+}
+
+TEST(GltfGeometry, RestartsKeepOneWinding) {
+  const auto scene = joined_rows<uint8_t>({{0, 1, 2, 3}, {0, 1, 2, 3}}, 5, kSquare, kU8);
+  const Corners second_of_strip = {{{0, 1, 0}, {1, 0, 0}, {1, 1, 0}}};
+  OpenScene open(scene.glb());
+  EXPECT_EQ(open.triangles(),
+            (std::vector<Corners>{kLower, second_of_strip, kLower, second_of_strip}));
+  for (const SurfaceTriangle& surface : surfaces_of(*open.source)) EXPECT_FALSE(surface.is_flipped);
+}
+
+// Rows longer than the windows, and thousands of short rows. A cursor can begin at any triangle.
+TEST(GltfGeometry, RestartsCanBeReadFromAnyTriangle) {
+  std::vector<std::vector<uint32_t>> rows(3);
+  for (uint32_t i = 0; i < 9000; ++i) rows[1].push_back(i);
+  for (uint32_t i = 0; i < 5000; ++i) rows.push_back({i, i + 1, i + 2, i + 3});
+  const auto positions = bumpy_line(9000);
+  for (const int mode : {5, 6}) {
+    const auto expected = without_winding(separate_rows(rows, mode, positions));
+    OpenScene open(joined_rows<uint16_t>(rows, mode, positions, kU16).glb());
+    ASSERT_EQ(open.source->declared_triangles(), 18998u);
+    EXPECT_EQ(without_winding(open.triangles()), expected);
+    for (const uint64_t first : {0, 1, 1023, 1024, 5000, 8997, 8998, 9001, 18000}) {
+      std::vector<Corners> part;
+      open.source->open(2)->read(first, 900, [&](std::span<const WorldTriangle> batch) {
+        for (const WorldTriangle& t : batch) {
+          part.emplace_back();
+          for (size_t k = 0; k < 3; ++k) std::copy_n(t.v[k], 3, part.back()[k].begin());
+        }
+      });
+      const auto from = expected.begin() + static_cast<ptrdiff_t>(first);
+      EXPECT_EQ(without_winding(part), std::vector<Corners>(from, from + 900)) << first;
+    }
+  }
+}
+
+// Without the extension, and in triangle lists, the largest index is an index like all others.
+TEST(GltfGeometry, OnlyTheExtensionRestarts) {
+  SceneBuilder scene = joined_rows<uint8_t>({{0, 1, 2, 3}, {0, 1, 2}}, 5, kSquare, kU8);
+  scene.root.erase("extensionsUsed");
+  EXPECT_NE(error_of_file(scene.glb()).message().find("index 255 of accessor 1, there are 4"),
+            std::string::npos);
+  SceneBuilder list = joined_rows<uint8_t>({{0, 1, 2}}, 4, kSquare, kU8);
+  EXPECT_EQ(triangles_of_file(list.glb()), (std::vector<Corners>{kLower}));
+  SceneBuilder all = joined_rows<uint8_t>({{0, 1}}, 4, kSquare, kU8);
+  EXPECT_NE(error_of_file(all.glb()).message().find("index 255"), std::string::npos);
+}
+
+// Restarts in lines do not matter, and a primitive of restarts alone has no triangles.
+TEST(GltfGeometry, RestartsWithoutTriangles) {
+  SceneBuilder scene = joined_rows<uint16_t>({{}, {}, {0, 1}}, 5, kSquare, kU16);
+  Json lines = scene.root["meshes"][0]["primitives"][0];
+  lines["mode"] = 3;
+  scene.root["meshes"][0]["primitives"].push_back(lines);
+  scene.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", 0}}}, {"mode", 5}});
+  EXPECT_EQ(triangles_of_file(scene.glb()).size(), 2u);
 }
 
 // Vertices are moved by the mesh's weights, or by the node's weights if it has any.
