@@ -52,7 +52,13 @@ std::vector<std::string_view> all_endings() {
 std::span<const SceneFormat> scene_formats() { return kFormats; }
 
 bool has_scene_ending(std::string_view name) {
-  return std::ranges::any_of(all_endings(), [&](std::string_view e) { return name.ends_with(e); });
+  const auto is_same_letter = [](char a, char b) {
+    return (a >= 'A' && a <= 'Z' ? a + 32 : a) == b;
+  };
+  return std::ranges::any_of(all_endings(), [&](std::string_view ending) {
+    return name.size() >= ending.size() &&
+           std::ranges::equal(name.substr(name.size() - ending.size()), ending, is_same_letter);
+  });
 }
 
 std::string list_scene_endings(const std::string& separator, const std::string& last_separator) {

@@ -29,7 +29,7 @@ struct SceneFormat {
 
 std::span<const SceneFormat> scene_formats();
 
-// True if the name ends like the files of a format.
+// True if the name ends like the files of a format, in upper or lower case.
 bool has_scene_ending(std::string_view name);
 // Returns all endings, with `separator` between them and `last_separator` before the last one.
 std::string list_scene_endings(const std::string& separator = ", ",

@@ -56,8 +56,13 @@ std::string scene_name_pattern() {
   size_t longest = 0;
   for (const SceneFormat& format : scene_formats())
     for (const std::string_view ending : format.endings) longest = std::max(longest, ending.size());
-  std::string endings = list_scene_endings("|", "|");
-  std::erase(endings, '.');
+  std::string endings;
+  for (const char c : list_scene_endings("|", "|")) {
+    if (c >= 'a' && c <= 'z')
+      endings.append({'[', static_cast<char>(c - 'a' + 'A'), c, ']'});
+    else if (c != '.')
+      endings += c;
+  }
   return "^[A-Za-z0-9][A-Za-z0-9._-]{0," + std::to_string(kMaxNameBytes - 1 - longest) + "}\\.(" +
          endings + ")$";
 }

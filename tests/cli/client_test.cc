@@ -195,9 +195,18 @@ TEST_F(Client, SubmitsEverySceneFormat) {
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
       "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
       "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n");
-  const Json job = run_json({"submit", "square.ply", "-r", "64", "--wait"});
-  EXPECT_EQ(job["state"], "succeeded");
-  EXPECT_THAT(job["scene"][0].get<std::string>(), testing::MatchesRegex("square-[0-9a-f]+.ply"));
+  put("SQUARE.OBJ", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
+  put("square.stl",
+      "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\n"
+      "endloop\nendfacet\nendsolid\n");
+  put("points.xyz", "0 0 0\n1 1 0\n");
+  for (const std::string name : {"square.ply", "SQUARE.OBJ", "square.stl", "points.xyz"}) {
+    const Json job = run_json({"submit", name, "-r", "64", "--wait"});
+    EXPECT_EQ(job["state"], "succeeded") << job;
+    const size_t dot = name.find('.');
+    EXPECT_THAT(job["scene"][0].get<std::string>(),
+                testing::MatchesRegex(name.substr(0, dot) + "-[0-9a-f]+" + name.substr(dot)));
+  }
 }
 
 // Errors have the exit statuses of docs/errors.md.

@@ -1,6 +1,8 @@
 // The triangles of a glTF scene are stored in another format. The build gives the same bytes, even
 // if it is killed during ingest and then run again.
 #include <cstring>
+#include <iomanip>
+#include <sstream>
 
 #include "scene/formats/formats.h"
 #include "tests/crash/crash_fixture.h"
@@ -77,6 +79,45 @@ TEST_P(FormatTest, Ply) {
     for (uint32_t k = 0; k < 3; ++k) append(bytes, corner + k);
   }
   expect_the_same_bytes("scene.ply", bytes);
+}
+
+TEST_P(FormatTest, Obj) {
+  const std::vector<double> all = corners();
+  std::ostringstream text;
+  text << std::setprecision(17);
+  for (size_t i = 0; i < all.size(); i += 3)
+    text << "v " << all[i] << ' ' << all[i + 1] << ' ' << all[i + 2] << '\n';
+  for (size_t corner = 1; corner <= all.size() / 3; corner += 3)
+    text << "f " << corner << ' ' << corner + 1 << "// " << corner + 2 << '\n';
+  expect_the_same_bytes("scene.obj", text.str());
+}
+
+TEST_P(FormatTest, StlBinary) {
+  const std::vector<double> all = corners();
+  std::string bytes(80, ' ');
+  append(bytes, static_cast<uint32_t>(all.size() / 9));
+  for (size_t i = 0; i < all.size(); i += 9) {
+    bytes.append(12, '\0');  // normal
+    for (size_t k = i; k < i + 9; ++k) {
+      EXPECT_EQ(all[k], static_cast<float>(all[k])) << "the scene has other numbers than floats";
+      append(bytes, static_cast<float>(all[k]));
+    }
+    append(bytes, uint16_t{0});
+  }
+  expect_the_same_bytes("scene.stl", bytes);
+}
+
+TEST_P(FormatTest, StlText) {
+  const std::vector<double> all = corners();
+  std::ostringstream text;
+  text << std::setprecision(17) << "solid scene\n";
+  for (size_t i = 0; i < all.size(); i += 3) {
+    if (i % 9 == 0) text << "facet normal 0 0 1\nouter loop\n";
+    text << "vertex " << all[i] << ' ' << all[i + 1] << ' ' << all[i + 2] << '\n';
+    if (i % 9 == 6) text << "endloop\nendfacet\n";
+  }
+  text << "endsolid scene\n";
+  expect_the_same_bytes("text.stl", text.str());
 }
 
 #ifdef VOXDAG_HAS_MESHOPT

@@ -62,6 +62,7 @@ class Scenes : public testing::Test {
 TEST(SceneName, IsAPlainFileName) {
   EXPECT_TRUE(is_scene_name("a.glb"));
   EXPECT_TRUE(is_scene_name("Sponza_2-x.1.gltf"));
+  EXPECT_TRUE(is_scene_name("PART.STL"));
   for (const char* name : {"", ".glb", "a", "a.doc", "../a.glb", "a/b.glb", "-a.glb", "a b.glb",
                            "a\0.glb", "ä.glb", "a.glb\n", "a.glb/"}) {
     SCOPED_TRACE(name);

@@ -1,0 +1,138 @@
+// Builds the same mesh from files of each format, by each command that reads scenes.
+#include <cstring>
+
+#include "tests/cli/command_line.h"
+
+namespace command_line {
+namespace {
+
+// A pyramid: two triangles for its base, four for its sides.
+constexpr float kCorners[][3] = {{0, 0, 0}, {8, 0, 0}, {8, 8, 0}, {0, 8, 0}, {4, 4, 6.25f}};
+constexpr int kTriangles[][3] = {{0, 2, 1}, {0, 3, 2}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}};
+
+std::string corner_text(int corner) {
+  std::string text;
+  for (const float c : kCorners[corner]) text += " " + std::to_string(c);
+  return text;
+}
+
+std::string ply() {
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n";
+  for (int corner = 0; corner < 5; ++corner) text += corner_text(corner) + "\n";
+  for (const auto& t : kTriangles)
+    text += "3 " + std::to_string(t[0]) + ' ' + std::to_string(t[1]) + ' ' + std::to_string(t[2]) +
+            '\n';
+  return text;
+}
+
+std::string obj() {
+  std::string text = "o pyramid\n";
+  for (int corner = 0; corner < 5; ++corner) text += "v" + corner_text(corner) + "\n";
+  for (const auto& t : kTriangles)
+    text += "f " + std::to_string(t[0] + 1) + ' ' + std::to_string(t[1] + 1) + ' ' +
+            std::to_string(t[2] - 5) + '\n';
+  return text;
+}
+
+std::string stl_text() {
+  std::string text = "solid pyramid\n";
+  for (const auto& t : kTriangles) {
+    text += "facet normal 0 0 0\nouter loop\n";
+    for (const int corner : t) text += "vertex" + corner_text(corner) + "\n";
+    text += "endloop\nendfacet\n";
+  }
+  return text + "endsolid pyramid\n";
+}
+
+// Its header begins with "solid", like a text.
+std::string stl_binary() {
+  std::string file = "solid but binary";
+  file.resize(80);
+  file += std::string("\6\0\0\0", 4);
+  for (const auto& t : kTriangles) {
+    file.append(12, '\0');
+    for (const int corner : t)
+      file.append(reinterpret_cast<const char*>(kCorners[corner]), sizeof(kCorners[corner]));
+    file.append(2, '\0');
+  }
+  return file;
+}
+
+class MeshFormats : public CommandLine {
+ protected:
+  void SetUp() override {
+    put("a.ply", ply());
+    put("a.obj", obj());
+    put("text.stl", stl_text());
+    put("BINARY.STL", stl_binary());
+  }
+};
+
+constexpr const char* kOtherFiles[] = {"a.obj", "text.stl", "BINARY.STL"};
+
+TEST_F(MeshFormats, GiveTheSameBytes) {
+  const Json expected = run_json({"build", "a.ply", "-r", "256", "-o", "ply.vdag"});
+  EXPECT_EQ(expected["triangles"], 6);
+  for (const std::string name : kOtherFiles) {
+    const Json report = run_json({"build", name, "-r", "256", "-o", name + ".vdag"});
+    EXPECT_EQ(report["sha256"], expected["sha256"]) << name;
+    EXPECT_EQ(report["warnings"], Json::array()) << name;
+    EXPECT_EQ(run_json({"verify", name + ".vdag", "--against", name})["ok"], true) << name;
+  }
+}
+
+TEST_F(MeshFormats, HaveTheSamePlan) {
+  const Json expected = run_json({"plan", "a.ply", "-r", "1024"});
+  for (const std::string name : kOtherFiles) {
+    const Json plan = run_json({"plan", name, "-r", "1024"});
+    EXPECT_EQ(plan["triangles"], expected["triangles"]) << name;
+    EXPECT_EQ(plan["voxels"], expected["voxels"]) << name;
+  }
+}
+
+// A scene of several files may mix formats.
+TEST_F(MeshFormats, AreMixedInOneScene) {
+  const Json expected = run_json({"build", "a.ply", "-r", "256", "-o", "one.vdag"});
+  const Json report = run_json(
+      {"build", "a.ply", "a.obj", "text.stl", "BINARY.STL", "-r", "256", "-o", "all.vdag"});
+  EXPECT_EQ(report["triangles"], 24);
+  EXPECT_EQ(report["voxels"], expected["voxels"]);
+}
+
+struct Faulty {
+  const char* name;
+  const char* contents;
+  const char* code;
+  uint64_t count;
+};
+
+constexpr Faulty kFaulty[] = {
+    {"lines.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\np 3\n", "points-or-lines", 2},
+    {"pair.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\n", "degenerate-faces", 1},
+    {"words.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nwidget 3\n", "unknown-statements", 1},
+    {"no.obj", "mtllib no.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "missing-file", 1},
+};
+
+// A warning has a code, a count and its first place. With --strict it is the error of the build.
+TEST_F(MeshFormats, ReportWarnings) {
+  for (const Faulty& file : kFaulty) {
+    SCOPED_TRACE(file.name);
+    put(file.name, file.contents);
+    const std::string output = std::string(file.name) + ".vdag";
+    const Answer answer = run({"build", file.name, "-r", "64", "--color", "--json", "-o", output});
+    EXPECT_NE(answer.err.find("warning"), std::string::npos) << answer.err;
+    const Json warnings = Json::parse(answer.out)["warnings"];
+    ASSERT_EQ(warnings.size(), 1u) << warnings;
+    EXPECT_EQ(warnings[0]["code"], file.code);
+    EXPECT_EQ(warnings[0]["count"], file.count);
+    EXPECT_NE(warnings[0]["place"], "") << warnings;
+    expect_error(2, file.name,
+                 {"build", file.name, "-r", "64", "--color", "--strict", "-o", "strict.vdag"});
+    EXPECT_FALSE(exists("strict.vdag"));
+  }
+}
+
+}  // namespace
+}  // namespace command_line
