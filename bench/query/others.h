@@ -1,4 +1,4 @@
-// The same queries with other libraries. A library that is not installed is reported as missing.
+// Measures the queries of a QuerySet with other libraries.
 #pragma once
 
 #include <optional>

@@ -32,7 +32,7 @@ void run(const HealthCommand& command, CommandContext&) {
   if (answer.status != 200 || answer.body.find("\"ready\"") == std::string::npos)
     throw Error(ErrorCode::kIo, "server " + command.url + ": /readyz answers with status " +
                                     std::to_string(answer.status) +
-                                    " and without \"ready\": expected a voxdag service");
+                                    ", expected 200 and \"ready\", as a voxdag service answers");
   std::printf("%s: ready\n", command.url.c_str());
 }
 

@@ -271,8 +271,9 @@ void TriangleReader::report(const uint32_t* corners) const {
   for (int k = 0; k < 3; ++k)
     if (corners[k] >= vertex_count_)
       refuse(document_.path, where + "index " + std::to_string(corners[k]) + " of " +
-                                 document_.name_accessor(primitive.indices) + ", there are " +
-                                 std::to_string(vertex_count_) + " vertices");
+                                 document_.name_accessor(primitive.indices) +
+                                 " does not exist, there are " + std::to_string(vertex_count_) +
+                                 " vertices");
   refuse(document_.path, where + "a vertex of " + document_.name_accessor(primitive.position) +
                              (voxdag::is_finite(world_) ? " is not a finite position"
                                                         : " is not finite once transformed"));

@@ -109,8 +109,9 @@ void IndexedCursor::report(uint64_t triangle, const uint32_t* corners) {
   const std::string where = mesh_->place_of(triangle) + ": ";
   for (int k = 0; k < 3; ++k)
     if (corners[k] >= vertex_count_)
-      refuse(mesh_->path(), where + mesh_->name_index(triangle, k, corners[k]) + ", there are " +
-                                std::to_string(vertex_count_) + " vertices");
+      refuse(mesh_->path(), where + mesh_->name_index(triangle, k, corners[k]) +
+                                " does not exist, there are " + std::to_string(vertex_count_) +
+                                " vertices");
   for (int k = 0; k < 3; ++k)
     if (std::isnan(cache_.at(corners[k])[0]))
       refuse(mesh_->path(), where + mesh_->name_vertex(corners[k]) + " is not a finite position");

@@ -37,7 +37,7 @@ class IndexedMesh {
   virtual std::string place_of(uint64_t triangle) = 0;
   // Returns corner `corner` of a triangle, whose vertex index is out of range, for messages.
   virtual std::string name_index(uint64_t /*triangle*/, int /*corner*/, uint32_t index) {
-    return index == UINT32_MAX ? "an index that is negative or too large"
+    return index == UINT32_MAX ? "a vertex with a negative or too large index"
                                : "index " + std::to_string(index);
   }
   // Returns a vertex for messages.

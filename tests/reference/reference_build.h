@@ -51,7 +51,7 @@ class Reference : public testing::Test {
 
  private:
   // Hundreds of small builds spend their time waiting for the disk. Returns a folder on a disk in
-  // memory if there is one.
+  // memory if one has enough free space.
   static std::string fast_disk();
 
   int files_ = 0;

@@ -135,7 +135,10 @@ class ColorVerifier {
     for (uint64_t b = 0; b < blocks; ++b) {
       const auto there = static_cast<unsigned>(std::min<uint64_t>(32, region.cells - 32 * b));
       if (!is_canonical(region.blocks + 16 * b, there))
-        fail(tier, i, "block " + std::to_string(b) + " is not in the canonical form of its mode");
+        fail(tier, i,
+             "block " + std::to_string(b) +
+                 " is not canonical: expected the larger end first, and weights 0 for "
+                 "missing cells and for equal ends");
     }
   }
   void check_padding(const ColorTier& tier, uint64_t i, const ColorRegion& region) const {

@@ -179,8 +179,9 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
         mesh.face(draco::FaceIndex(static_cast<uint32_t>(std::min(i, faces - 1))));
     for (const draco::PointIndex& corner : face) {
       if (corner.value() >= part.vertices)
-        throw BrokenData{"its Draco data have the index " + std::to_string(corner.value()) +
-                         ", there are " + std::to_string(part.vertices) + " vertices"};
+        throw BrokenData{"index " + std::to_string(corner.value()) +
+                         " of its Draco data does not exist, there are " +
+                         std::to_string(part.vertices) + " vertices"};
       out.add(corner.value());
     }
     out.flush_if_full();

@@ -9,7 +9,7 @@
 
 namespace voxdag::gltf {
 
-// The text of an element, and the numbers of its values, for estimates of their memory.
+// The JSON text of an element, and counts from which the memory of its values is estimated.
 struct ElementText {
   std::string text;
   uint64_t values = 0;                // all values, with the element itself

@@ -144,7 +144,8 @@ void AccessorReader::check_sparse_indices() {
     sparse_directory_.push_back(sparse_indices_.front());
     for (uint32_t index : sparse_indices_) {
       if (index < next)
-        refuse(document_.path, where + std::to_string(index) + " does not increase strictly");
+        refuse(document_.path, where + std::to_string(index) + " follows " +
+                                   std::to_string(next - 1) + ", expected a larger index");
       if (index >= accessor_.count)
         refuse(document_.path, where + std::to_string(index) + " is not below the count of " +
                                    std::to_string(accessor_.count));

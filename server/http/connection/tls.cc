@@ -11,6 +11,15 @@
 #include "core/base/error.h"
 
 namespace voxdag::server {
+namespace {
+
+// Returns the reason of OpenSSL's last error.
+std::string openssl_reason() {
+  const char* reason = ERR_reason_error_string(ERR_peek_last_error());
+  return reason ? reason : "unknown reason";
+}
+
+}  // namespace
 
 void TlsSession::Free::operator()(ssl_st* session) const { SSL_free(session); }
 void TlsContext::Free::operator()(ssl_ctx_st* context) const { SSL_CTX_free(context); }
@@ -82,9 +91,11 @@ TlsContext::TlsContext(const std::string& certificate_file, const std::string& k
   SSL_CTX_set_mode(context_.get(),
                    SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
   if (SSL_CTX_use_certificate_chain_file(context_.get(), certificate_file.c_str()) != 1)
-    fail("TLS certificate " + certificate_file + ": expected a readable PEM file");
+    fail("TLS certificate " + certificate_file + " cannot be loaded (" + openssl_reason() +
+         "): expected a readable PEM file");
   if (SSL_CTX_use_PrivateKey_file(context_.get(), key_file.c_str(), SSL_FILETYPE_PEM) != 1)
-    fail("TLS key " + key_file + ": expected a readable PEM file");
+    fail("TLS key " + key_file + " cannot be loaded (" + openssl_reason() +
+         "): expected a readable PEM file");
   if (SSL_CTX_check_private_key(context_.get()) != 1)
     fail("TLS key " + key_file + " does not belong to the certificate " + certificate_file);
 }

@@ -154,7 +154,7 @@ void cast_rays(const voxdag_reader::File& file) {
   }
 }
 
-// The tile of each level on the way down to the first brick.
+// Encodes a tile at the first node of each level above the bricks.
 void encode_tiles(const voxdag_reader::File& file) {
   const query::DagView view(file);
   uint64_t offset = 0;

@@ -328,7 +328,7 @@ TEST(GltfRefusals, InvalidTriangles) {
   scene.root["accessors"][1]["byteOffset"] = 12;
   EXPECT_NE(error_of_file(scene.glb())
                 .message()
-                .find("triangle 0: index 65535 of accessor 1, there are 5 vertices"),
+                .find("triangle 0: index 65535 of accessor 1 does not exist, there are 5 vertices"),
             std::string::npos);
 }
 

@@ -72,7 +72,7 @@ class BlockMemo {
   uint64_t slot_of(uint64_t key) const { return key * 0x9e3779b97f4a7c15ull >> shift_; }
   bool fits_budget(uint64_t slots) const;
   void set_slots(uint64_t slots);
-  // Quadruples the number of slots if the budget allows it.
+  // Quadruples the number of slots, if the budget and the maximum number of slots allow it.
   void grow();
 
   PooledMemory& memory_;

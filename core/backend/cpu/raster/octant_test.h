@@ -3,15 +3,15 @@
 // triangle (the fourth element is ignored) or to four children.
 //
 // The test need not be exact, because the rasterizers are exact. It may report a child that the
-// triangle does not touch, but two errors must never happen: a touched child is omitted, or a child
-// is reported as inside that the triangle does not cover. Therefore bounds for touched children are
-// widened, and bounds for inside children are narrowed, by more than the rounding error. Vertices
+// triangle does not touch. Two errors must never happen: to omit a touched child, and to report a
+// child as inside (see Entry in triangle_set.h) although the triangle does not cover it. So bounds
+// for touched children are widened by more than the rounding error, and others narrowed. Vertices
 // and edges are exact in doubles (below 2^42). Normals are computed in integers and rounded once.
 // All other values are sums of at most eight products, each with an error of at most 3 * 2^-53 of
 // |coefficient| * |distance|.
 //
-// Quad is a vector of four doubles with load(coordinates, origin), which returns the coordinates
-// relative to the origin, with arithmetic, and with
+// Quad is a vector of four doubles with arithmetic operators. load(coordinates, origin) returns the
+// coordinates relative to the origin. The other functions of a Quad are
 //   rotated()          elements 1, 2, 0, 3
 //   clamp_to_zero()    max(x, 0)
 //   negative()         the sign bits, one per element

@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kFar = 1e30;
 
-// Rays of all kinds around a grid of this edge: parallel and perspective, in all directions, along
-// axes and diagonals, and through edges and corners of the lattice.
+// Returns rays in and around a grid of this edge: from one camera, in random directions, along axes
+// and diagonals, and through edges and corners of the lattice.
 std::vector<Ray> many_rays(int edge, uint64_t seed) {
   oracle::Random random(seed);
   const auto anywhere = [&](int64_t low, int64_t high) {

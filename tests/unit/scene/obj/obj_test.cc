@@ -74,7 +74,7 @@ TEST(Obj, StatementsWithoutVoxelsAreIgnored) {
 TEST(Obj, FaultsNameTheLine) {
   const auto message = [](const std::string& file) { return error_of_file(file).message(); };
   EXPECT_EQ(message(kVertices + "f 1 2 4\n"),
-            "folder/scene: face 0 in line 4: index 4, there are 3 vertices");
+            "folder/scene: face 0 in line 4: index 4 does not exist, there are 3 vertices");
   EXPECT_THAT(message(kVertices + "\nf 1 2 -4\n"), HasSubstr("face 0 in line 5: index -4"));
   EXPECT_THAT(message(kVertices + "f 1 2 0\n"), HasSubstr("index 0"));
   EXPECT_THAT(message(kVertices + "f 1 2 99999999999999999999\n"), HasSubstr("index 9"));

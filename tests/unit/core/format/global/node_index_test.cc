@@ -68,7 +68,7 @@ TEST_P(NodeIndexTest, LevelsOfSeveralSpans) {
   for (const size_t nodes : {1u, 5u, 100'000u}) expect_index(random_level(nodes, nodes, ~0u));
 }
 
-// Every word looks like a child mask, so the guessed starts of spans are wrong.
+// Nearly every word looks like a child mask, so guessed starts of spans are often wrong.
 TEST_P(NodeIndexTest, PointersThatLookLikeMasks) { expect_index(random_level(1, 100'000, 256)); }
 
 // With any number of threads, the message is about the first wrong word.
