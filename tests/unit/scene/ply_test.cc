@@ -286,8 +286,9 @@ TEST(Ply, InvalidTrianglesAreNamedOrSkipped) {
     EXPECT_EQ(skipping.source->declared_triangles(), 5u);
     EXPECT_EQ(skipping.triangles().size(), 2u);
   }
-  for (const auto& [index, text] : {std::pair{7, "face 0: index 7 does not exist, there are 3 vertices"},
-                                    std::pair{-2, "face 0: a vertex with a negative"}}) {
+  for (const auto& [index, text] :
+       {std::pair{7, "face 0: index 7 does not exist, there are 3 vertices"},
+        std::pair{-2, "face 0: a vertex with a negative"}}) {
     PlyWriter ply = mesh_header(PlyFormat::kLittle, 3, 1, "uchar int");
     for (int i = 0; i < 9; ++i) ply.put(0.0f);
     ply.put<uint8_t>(3).put_all<int32_t>({0, 1, index});
