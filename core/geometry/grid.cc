@@ -47,9 +47,9 @@ double largest_extent(const WorldBounds& bounds) {
 // Two numbers per vector register, available on every supported processor.
 using Pair = double __attribute__((vector_size(16)));
 
-// Returns floor(x) for |x| <= 2^51, and otherwise a number near x, which may have a fraction. Rounds
-// to the nearest integer, and subtracts 1 if this has rounded up. A branch would be predicted wrong
-// for half of all numbers.
+// Returns floor(x) for |x| <= 2^51, and otherwise a number near x, which may have a fraction.
+// Rounds to the nearest integer, and subtracts 1 if this has rounded up. A branch would be
+// predicted wrong for half of all numbers.
 Pair floor_of(Pair x) {
   constexpr Pair kNoFraction = {0x1.8p52, 0x1.8p52};
   const Pair nearest = (x + kNoFraction) - kNoFraction;
