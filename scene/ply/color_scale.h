@@ -1,10 +1,9 @@
 // Converts the colors of a PLY file to linear light. Red, green and blue are sRGB; alpha is linear.
 //
-// PLY does not define the number that stands for full intensity. It is derived from the type and
-// from the largest number: it is the smallest of 1 (only for float and double), 255, and 65535 that
-// is at least half of the largest number of the element. Types of 8 bits always have 255. The
-// largest number is common to the channels red, green and blue of one type. Numbers outside of the
-// range from 0 to full intensity are clamped.
+// PLY does not define which number is full intensity. For 8-bit types it is 255. For other types,
+// it follows from the largest number in the element: it is 1 if this number is at most 2 (only for
+// float and double), 255 if it is at most 510, and otherwise 65535. Red, green and blue share the
+// largest number if they have the same type. Numbers below 0 or above full intensity are clamped.
 #pragma once
 
 #include <array>
@@ -24,9 +23,9 @@ class ColorScale {
   // `types` are the types of red, green, blue and, if present, alpha.
   explicit ColorScale(std::vector<Type> types);
 
-  // True if add() must be called for all colors of the element before to_color().
+  // True if add() must be called with all colors of the element before set_full_intensities().
   bool needs_numbers() const;
-  // Takes a color, one number per channel, into account. Ignores numbers that are not finite.
+  // Updates the largest numbers with a color, one number per channel. Ignores non-finite numbers.
   void add(const double* numbers);
   void set_full_intensities();
 

@@ -27,11 +27,11 @@ class FaceReader {
   // `cursors` is the number of cursors that share the memory. The file must outlive the reader.
   FaceReader(const PlyFile& ply, unsigned cursors, MemoryBudget& budget);
 
-  // Also reads these properties of faces from now on.
+  // Makes later calls of read() also return these properties of faces.
   void request(const RequestedProperties& others);
   // Writes the vertex indices of triangles [first, first + count) to `corners`, three per triangle.
-  // If properties are requested, replaces `surfaces`. The triangles must exist, but their vertex
-  // indices may be out of range.
+  // Clears `surfaces`, and fills it if request() was called. The triangles must exist, but their
+  // vertex indices may be out of range.
   void read(uint64_t first, uint64_t count, uint32_t* corners, Surfaces& surfaces);
   // Returns the number of the face that contains a triangle.
   uint64_t face_of(uint64_t triangle);
@@ -57,7 +57,7 @@ class FaceReader {
   MemoryBudget& budget_;
   std::unique_ptr<Rows> rows_;
   bool has_surfaces_ = false;
-  std::unique_ptr<Splitter> splitter_;  // if a face is not a fan
+  std::unique_ptr<Splitter> splitter_;  // null if all faces are fans
   // The face that rows_ read last, its first triangle, its triangles if it is not a fan, and the
   // offset of the next face. Valid only if is_loaded_ is true.
   bool is_loaded_ = false;

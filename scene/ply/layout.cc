@@ -17,7 +17,8 @@ size_t find_element(const Header& header, const char* name) {
   return found == header.elements.size() ? kNone : found;
 }
 
-// Returns the first of the properties that exists and is a list or a number as requested, or kNone.
+// Returns the first property of `names` that exists, and is a list if `is_list` is true and a
+// number if it is false. Returns kNone if there is no such property.
 size_t find_property(const Element& element, std::initializer_list<const char*> names,
                      bool is_list) {
   for (const char* name : names) {

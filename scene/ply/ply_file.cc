@@ -51,8 +51,8 @@ StripReader PlyFile::open_strips(MemoryBudget& budget) const {
           budget};
 }
 
-// Reads all elements up to the last needed one. If rows are not lines, reads all elements, because
-// the file is then only valid if they are all of its text.
+// Reads all elements up to the last one that the layout uses. If a row is not exactly one line,
+// reads all elements, because the file is then valid only if no text follows the last element.
 void PlyFile::pass_over_elements(MemoryBudget& budget, const CancelToken& cancel) {
   uint64_t begin = header_.data_begin;
   for (size_t i = 0; i < header_.elements.size(); ++i) {
@@ -149,7 +149,8 @@ void PlyFile::check_end(uint64_t offset, MemoryBudget& budget) const {
   if (!word.empty()) refuse("has " + printable(word) + " after its last row");
 }
 
-// Clears has_splits in the blocks whose faces are all fans, and counts doubtful faces.
+// Clears has_splits in blocks of which all faces are fans. Warns about doubtful faces
+// (Triangulator).
 void PlyFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
   if (std::ranges::none_of(face_blocks_, [](const FaceBlock& block) { return block.has_splits; }))
     return;

@@ -1,11 +1,12 @@
 // An open PLY file: the positions of its vertices, faces and strips in the file, and the number of
-// triangles. The triangles of the faces are numbered first, then those of the strips. A face of n
-// corners has n - 2 triangles (scene/polygon); a face with fewer than three corners has none.
+// triangles. The triangles of the faces are numbered first, then the triangles of the strips. A
+// face of n corners has n - 2 triangles (scene/polygon); a face with fewer than three corners has
+// none.
 //
 // Rows of faces and strips, all rows of ASCII files, and vertices with lists have no fixed size. So
-// one pass over the file records positions in regular distances. Any other position is found by
-// reading on from the last recorded one before it. A second pass over the faces finds the blocks of
-// faces with concave polygons.
+// one pass over the file records positions at regular intervals. To find any other position, a
+// reader starts at the last recorded position before it. A second pass over the faces finds the
+// blocks that contain faces that are not fans.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +29,7 @@ namespace voxdag::ply {
 
 class PlyFile {
  public:
-  // Rows of vertices and of faces, and triangles of strips, between two recorded positions.
+  // Number of vertices, faces or triangles of strips between two recorded positions.
   static constexpr uint64_t kBlockRows = 1024;
 
   // Throws Error{kInvalidInput} with the line, element or row of the damage, Error{kLimit} for more
@@ -71,7 +72,7 @@ class PlyFile {
   StripReader open_strips(MemoryBudget& budget) const;
 
  private:
-  // `place`: the part of the file; "" is the file.
+  // `place` is the part of the file that the warning is about; "" is the complete file.
   void warn(const char* code, const std::string& place, const std::string& message,
             uint64_t count = 1);
   void warn_about_header();

@@ -77,7 +77,7 @@ bool PlyMesh::read_texture(size_t number, const uint32_t* vertices, SurfaceTrian
   if (!Surfaces::is_usable(*values_, texture) || !find_texcoords(number, vertices, texcoords))
     return false;
   out.material = static_cast<uint32_t>(texture) + 1;
-  // The v of PLY runs upward.
+  // In PLY, v = 0 is the lower edge of the image.
   for (size_t k = 0; k < 3; ++k)
     out.corners[k].texture = {texture_lattice(texcoords[2 * k]),
                               texture_lattice(1 - texcoords[2 * k + 1])};

@@ -32,7 +32,7 @@ class PlyMesh : public IndexedMesh {
  private:
   using Pair = std::array<double, 2>;
 
-  // Properties of vertices, converted to values.
+  // Reads properties of vertices, and caches the values that they are converted to.
   template <class Value>
   struct Cached {
     VertexReader reader;
@@ -59,7 +59,7 @@ class PlyMesh : public IndexedMesh {
   const Surfaces::Values* values_ = nullptr;  // set by open_surfaces()
   std::optional<Cached<Color>> colors_;
   std::optional<Cached<Pair>> texcoords_;
-  // The last call of read_corners(): the number of triangles of faces, and their values.
+  // Results of the last read_corners(): the number of triangles from faces, and their values.
   size_t face_triangles_ = 0;
   FaceReader::Surfaces face_values_;
 };

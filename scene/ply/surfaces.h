@@ -1,4 +1,4 @@
-// The colors and textures of a PLY file, apart from the values of single vertices and faces.
+// The common data of a PLY file's colors and textures: color scales, materials and texture files.
 //
 // A triangle is textured if a texture file is named and can be opened, and if its face, or else its
 // vertices, have texture coordinates. Other triangles have the colors of their vertices or, if the
@@ -54,7 +54,7 @@ class Surfaces {
   static RequestedProperties face_properties(const Layout& layout);
 
  private:
-  // `place`: the part of the file; "" is the file.
+  // `place` is the part of the file that the warning is about; "" is the complete file.
   void warn(const char* code, const std::string& place, const std::string& message,
             uint64_t count = 1);
   void open_textures();

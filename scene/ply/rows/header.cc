@@ -41,8 +41,8 @@ std::vector<std::string_view> words_of(std::string_view line) {
   }
 }
 
-// True if a word that is no keyword resembles one that determines the layout of the file. To ignore
-// it would mean to misread the file.
+// True if an unknown word resembles a keyword that determines the layout of the file. It is then
+// probably a misspelled keyword, without which the file would be misread.
 bool resembles_keyword(std::string_view word) {
   constexpr std::string_view kBegins[] = {"elem", "prop", "form", "end_"};
   return std::ranges::any_of(kBegins, [&](std::string_view begin) {
@@ -88,7 +88,7 @@ class HeaderParser {
   }
 
   // Moves past a line end: LF, CR LF or CR. If all lines before end with CR alone, an LF after CR
-  // is not part of the line end, because the data may begin with any byte.
+  // is not part of the line end, because it may be the first byte of the data.
   void end_line() {
     if (at_ == text_.size()) {
       if (is_whole_file_) refuse("has no end, expected a header that ends with end_header");

@@ -62,8 +62,8 @@ struct Header {
   size_t find(std::string_view element) const;
 };
 
-// Returns the size of the first line of a PLY file with the blanks and line ends before it, but
-// without its line end. Returns 0 if the text does not begin with such a line.
+// Returns the position of the line end of the line "ply", with which a PLY file begins. Blanks and
+// line ends may precede this line. Returns 0 if the text does not begin with this line.
 size_t first_line_bytes(std::string_view text);
 
 // Reads the header of an open file. Throws Error{kInvalidInput} with the number of an invalid line,

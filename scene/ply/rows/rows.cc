@@ -126,7 +126,7 @@ class BinaryRows : public Rows {
     return offset + count * step.value_bytes;
   }
 
-  // Reads in parts, because the list may be larger than the window.
+  // Reads the list in parts, because it may be larger than the window.
   void read_reals(const Step& step, uint64_t row, uint64_t offset, size_t count) {
     constexpr size_t kPart = FileWindow::kBytes / sizeof(double);
     real_count_ = count;

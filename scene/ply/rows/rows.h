@@ -29,8 +29,8 @@ struct RequestedProperties {
 
 class Rows {
  public:
-  // Maximum number of entries in the list of indices, and of corners in the list of reals, two
-  // numbers each.
+  // Maximum number of corners. A corner is one entry of the list of indices, and two entries of the
+  // list of reals.
   static constexpr uint64_t kMaxEntries = 32768;
 
   virtual ~Rows() = default;
@@ -39,7 +39,8 @@ class Rows {
   // Error{kLimit} if a requested list is too long.
   virtual uint64_t read(uint64_t row, uint64_t offset) = 0;
 
-  // Return the requested values of the last row. A negative index is kNoVertex.
+  // Return the requested values of the last row. An index that is negative or needs more than 32
+  // bits is kNoVertex.
   std::span<const uint32_t> indices() const { return {indices_.data(), index_count_}; }
   std::span<const double> reals() const { return {reals_.data(), real_count_}; }
   std::span<const double> numbers() const { return numbers_; }
@@ -53,8 +54,8 @@ class Rows {
        MemoryBudget& budget);
   // Returns the position of a property in numbers(), or kNone.
   size_t number_of(size_t property) const;
-  // Returns the number of entries of a list. Throws Error if it is negative, exceeds the bytes of
-  // the file or exceeds the limit of a requested list.
+  // Returns `count`, the number of entries of a list. Throws Error if it is negative, larger than
+  // the file's size in bytes, or above the limit of a requested list.
   uint64_t checked_count(int64_t count, uint64_t row, size_t property) const;
   [[noreturn]] void refuse(uint64_t row, const std::string& what) const;
 

@@ -85,7 +85,8 @@ void StripReader::skip_properties(size_t begin, size_t end) {
   }
 }
 
-// Reads the number of entries of a list, which is not negative and below the size of the file.
+// Reads the number of entries of a list. Refuses a negative number, and one above the file's size
+// in bytes.
 int64_t StripReader::list_count(const Property& property) {
   const int64_t count = integer(property.count_type);
   if (count < 0 || static_cast<uint64_t>(count) > file_.size())

@@ -1,11 +1,11 @@
 // Reads the triangles of the element tristrips of a PLY file. Each row is a list of vertex indices.
-// Three consecutive indices are a triangle; every second one has its first two corners exchanged,
-// so that all run the same way. The index -1 begins a new strip. So does the largest number of an
-// unsigned type, if no vertex has this index. Triangles with two equal indices only join parts of a
-// strip, and are left out.
+// Every three consecutive indices are a triangle. In every second triangle, the first two corners
+// are exchanged, so that all triangles have the same orientation. The index -1 begins a new strip.
+// The largest number of an unsigned type also does, if no vertex has this index. Triangles with two
+// equal indices only join parts of a strip, and are left out.
 //
-// A row may have any number of entries. So a position between two entries can be recorded and
-// returned to. Not thread-safe.
+// A row may have any number of entries, so position() and seek() also work within a row. Not
+// thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -26,10 +26,10 @@ class StripReader {
   struct Position {
     uint64_t offset = 0;  // offset in the file
     uint64_t row = 0;     // number of rows that have begun
-    uint64_t left = 0;    // entries of the row that are left
+    uint64_t left = 0;    // entries of the row that are not read yet
     uint32_t last[2] = {};
-    uint8_t strip_entries = 0;  // entries of the strip that are known in `last`, up to 2
-    bool is_odd = false;        // the next triangle is an exchanged one
+    uint8_t strip_entries = 0;  // number of valid entries in `last`
+    bool is_odd = false;        // the next triangle has its first two corners exchanged
   };
 
   // `list` is the index of the list among the properties of `element`. `vertices` is the number of
