@@ -27,7 +27,7 @@ class FieldScanner {
 
 class Columns {
  public:
-  // The values of a point in the order of their numbers: x, y, z, red, green, blue.
+  // The values of a point are numbered in the order x, y, z, red, green, blue.
   static constexpr size_t kValues = 6;
   static constexpr size_t kNone = ~size_t{0};
   static constexpr const char* kExpected =
@@ -35,9 +35,9 @@ class Columns {
       "commas between them, such as x,y,z,_,r,g,b";
   using Values = std::array<double, kValues>;
 
-  // Parses a list such as "x,y,z,_,r,g,b". The names are those of the header line, in any case; "_"
-  // is a column that is not used. Returns nullopt unless x, y and z, and either all or none of the
-  // colors, are there once.
+  // Parses a list such as "x,y,z,_,r,g,b". The names are the same as in a header line, in any case;
+  // "_" is a column that is not used. Returns nullopt unless x, y and z each occur once, and the
+  // colors all occur once or not at all.
   static std::optional<Columns> parse(std::string_view list);
   // Like parse(), but throws Error{kInvalidInput} for an invalid list.
   static Columns given(std::string_view list);
@@ -49,7 +49,7 @@ class Columns {
 
   bool has_colors() const { return place_[3] != kNone; }
   // Reads the values of a row. Colors are read only if the columns have them. Returns false for a
-  // row that has too few fields, or a field that is not a finite number.
+  // row that has too few fields, or whose field in one of these columns is not a finite number.
   bool read(std::string_view row, Values& out) const;
   // True if a color of the row is written with a decimal point or an exponent.
   bool has_color_fraction(std::string_view row) const;
@@ -63,7 +63,7 @@ class Columns {
   void finish();
 
   std::array<size_t, kValues> place_;  // number of the column of each value
-  std::vector<size_t> value_in_;       // value of each column up to the last one that is used
+  std::vector<size_t> value_in_;       // value of each column up to the last used column
 };
 
 // Returns the number of fields of a row if all of them are numbers, otherwise 0.

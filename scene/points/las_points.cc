@@ -16,7 +16,7 @@
 namespace voxdag::points {
 namespace {
 
-// Records per window: a batch of records that is decoded in one loop.
+// Maximum number of records that are decoded in one loop.
 constexpr uint64_t kLasWindowRecords = 1024;
 // The number of kept points before every kLasBlockRecords-th record is stored.
 constexpr uint64_t kLasBlockRecords = 1024;
@@ -60,7 +60,8 @@ class LasFile : public PointFile {
   bool has_withheld() const { return count_ != las_.records; }
   // Maximum value of a color: 255 if no color of the file is larger, otherwise 65535.
   uint16_t max_color() const { return max_color_; }
-  // Returns a record at or before the kept point `point`, and the number of kept points before it.
+  // Returns the first record of the block that contains the kept point `point`, and the number of
+  // kept points before this block.
   std::pair<uint64_t, uint64_t> block_of(uint64_t point) const {
     const auto after = std::ranges::upper_bound(kept_before_, point);
     const auto block = after - kept_before_.begin() - 1;
@@ -127,7 +128,7 @@ class LasReader : public PointReader {
   }
 
  private:
-  // Calls visit(record) for points [first, first + count), which are not withheld.
+  // Calls visit(record) for points [first, first + count). Withheld records are not counted.
   template <class Visit>
   void for_each_point(uint64_t first, size_t count, const Visit& visit) {
     if (!file_.has_withheld())

@@ -9,8 +9,8 @@
 namespace voxdag::points {
 namespace {
 
-// Maximum number of triangles in a batch. A batch has all triangles of a point or none, except at
-// the ends of a call.
+// Maximum number of triangles in a batch. A batch has all triangles of a point or none, except for
+// the first and last point of a call.
 constexpr size_t kPointBatch = 1024;
 
 RealTriangle& triangle_in(RealTriangle& triangle) { return triangle; }

@@ -20,7 +20,7 @@ class RowIndex {
   static constexpr uint64_t kBlockRows = 1024;
 
   // `columns` names the columns (SceneOptions::columns); if it is empty, the first row decides.
-  // Throws Error{kInvalidInput} if this text is invalid, Error{kOutOfMemory} if the places do not
+  // Throws Error{kInvalidInput} if `columns` is invalid, Error{kOutOfMemory} if the places do not
   // fit the budget.
   RowIndex(const ReadableFile& file, const std::string& columns, MemoryBudget& budget,
            const CancelToken& cancel);

@@ -105,8 +105,9 @@ bool ends_like_text_points(std::string_view path) {
   return false;
 }
 
-// Removes the first line that is neither blank nor a comment from `text`, and returns it without
-// blanks around it. Returns "" if there is none that ends before the end of `text`.
+// Returns the first line of `text` that is neither blank nor a comment, without blanks around it.
+// Removes this line and all lines before it. Returns "" if there is no such line. The last line of
+// `text` must have a line end unless `is_complete` is true.
 std::string_view take_line(std::string_view& text, bool is_complete) {
   while (!text.empty()) {
     const size_t end = text.find_first_of("\r\n");

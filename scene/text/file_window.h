@@ -23,8 +23,8 @@ class FileWindow {
 
   const ReadableFile& file() const { return file_; }
 
-  // Returns at least `wanted` bytes (at most kBytes) starting at `offset`; fewer, or none, only at
-  // the end of the file. Valid until the next call.
+  // Returns at least `wanted` bytes starting at `offset`, or fewer (even none) at the end of the
+  // file. `wanted` is at most kBytes. The result is valid until the next call.
   std::span<const std::byte> at(uint64_t offset, size_t wanted) {
     if (offset >= file_.size()) return {};
     if (offset < begin_ || offset > end_ || end_ - offset < wanted) load(offset);

@@ -98,7 +98,7 @@ bool LineReader::load_more() {
   return true;
 }
 
-// Drops the bytes of a long comment from the buffer, except for one that stands for the comment.
+// Drops the bytes of a long comment from the buffer, except for one byte, which becomes "#".
 void LineReader::skip_comment() {
   if (!trimmed({buffer_.data(), size_}).starts_with('#'))
     throw Error(ErrorCode::kLimit, file_.path() + ": line " + std::to_string(number_) +
@@ -108,8 +108,8 @@ void LineReader::skip_comment() {
   buffer_[0] = '#';
 }
 
-// If the current line, which ends at `end`, has a backslash there, replaces the backslash and the
-// line end by blanks. Returns true if it did.
+// If the current line ends with a backslash that is not in a comment, replaces the backslash and
+// the line end `end` by blanks, and returns true.
 bool LineReader::join(LineEnd end) {
   size_t last = end.begin;
   while (last > line_ && is_blank(buffer_[last - 1])) --last;

@@ -16,7 +16,7 @@ namespace voxdag {
 
 class LineReader {
  public:
-  // Maximum size of a line, joined lines included. A longer comment is skipped.
+  // Maximum size in bytes of a line, joined lines included. A longer comment is skipped.
   static constexpr size_t kMaxLineBytes = size_t{1} << 20;
 
   // kBackslash: a line that ends with a backslash is joined with the next line, unless the
@@ -29,8 +29,8 @@ class LineReader {
 
   // Moves to the line that begins at `offset`, whose number is `number`.
   void seek(uint64_t offset, uint64_t number);
-  // Reads the next line. Returns false at the end of the file. Throws Error{kLimit} for a line that
-  // is longer than kMaxLineBytes and no comment.
+  // Reads the next line. Returns false at the end of the file. Throws Error{kLimit} for a line of
+  // over kMaxLineBytes, unless it is a comment.
   bool next();
   // Return the line that next() read: its text without line end, valid until the next call; the
   // offset of its first byte; and its number, which counts from 1.
@@ -63,7 +63,7 @@ class LineReader {
   size_t size_ = 0;         // number of bytes in buffer_
   size_t line_ = 0;         // begin of the current line in buffer_
   size_t next_ = 0;         // begin of the next line
-  size_t feed_ = kUnknown;  // the first LF at or after next_, or size_ without one; if known
+  size_t feed_ = kUnknown;  // the first LF at or after next_, or size_ if there is none
   uint64_t number_ = 0, next_number_ = 1;
   std::string_view text_;
 };

@@ -1,4 +1,4 @@
-// Numbers as scene files write them in text.
+// Parses the numbers that text files of scenes contain.
 #pragma once
 
 #include <cstdint>

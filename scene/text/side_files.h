@@ -10,9 +10,9 @@
 namespace voxdag {
 
 // Opens the file `name`, relative to the folder of `from`, the file that refers to it. If it cannot
-// be opened, also tries it with slashes instead of backslashes, and then only its last component.
-// An absolute name is never opened as such. Throws Error, about the first path tried, if no path
-// can be opened.
+// be opened, tries the name with slashes instead of backslashes, and then only its last component.
+// For an absolute name, tries only its last component. Throws Error, about the first path tried, if
+// no path can be opened.
 std::unique_ptr<ReadableFile> open_side_file(FileSystem& files, const std::string& from,
                                              std::string_view name);
 

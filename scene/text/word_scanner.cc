@@ -5,8 +5,8 @@
 namespace voxdag {
 namespace {
 
-// Maximum length of a word. No program writes longer numbers. A longer word is returned in pieces,
-// so the row has too many words and is refused.
+// Maximum length of a word in bytes. No program writes longer numbers. A longer word is returned in
+// pieces, so the row has too many words and is refused.
 constexpr size_t kMaxWord = 64;
 
 }  // namespace

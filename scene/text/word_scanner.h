@@ -18,7 +18,7 @@ class WordScanner {
   void begin_row(uint64_t offset);
   // Returns the next word of the line, valid until the next call; empty at the end of the line.
   std::string_view word();
-  // Moves past the rest of the line. Returns true if it had only blanks.
+  // Moves past blanks and the line end, and returns true. Returns false if a word comes first.
   bool end_row();
   uint64_t offset() const { return offset_; }
 
