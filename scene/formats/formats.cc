@@ -30,7 +30,7 @@ constexpr SceneFormat kFormats[] = {
     {"LAS", kLasEndings, points::is_las, points::open_las},
     {"OBJ", kObjEndings, obj::is_obj, obj::open_obj},
     {"STL", kStlEndings, stl::is_stl, stl::open_stl},
-    // Last: its test of the first bytes is the weakest.
+    // Last, because its sniff() accepts almost any text whose file name has one of the endings.
     {"text points", kTextPointEndings, points::is_text_points, points::open_text_points},
 };
 

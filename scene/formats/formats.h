@@ -29,18 +29,19 @@ struct SceneFormat {
 
 std::span<const SceneFormat> scene_formats();
 
-// True if the name ends like the files of a format, in upper or lower case.
+// True if the name ends with an ending in the table, in upper or lower case.
 bool has_scene_ending(std::string_view name);
 // Returns all endings, with `separator` between them and `last_separator` before the last one.
 std::string list_scene_endings(const std::string& separator = ", ",
                                const std::string& last_separator = " or ");
 
 // Opens scene files, each of any format, as one scene: the triangles of the first file, then the
-// triangles of the next. The format is determined by the contents, not the name. Geometry is read
-// in windows charged to `budget`; images are never read. Opening checks the structure of a file,
-// and reading the triangles checks their contents. `cancel` is checked during both. Throws
-// Error{kInvalidInput}, {kNotFound}, {kLimit} or {kOutOfMemory} with the name of the file. `files`,
-// `budget` and `cancel` must outlive the scene.
+// triangles of the next. The contents determine the format, not the name; only text files with
+// points may also be recognized by their ending. Geometry is read in windows charged to `budget`;
+// images are never read. Opening checks the structure of a file, and reading the triangles checks
+// their contents. `cancel` is checked during both. Throws Error{kInvalidInput}, {kNotFound},
+// {kLimit} or {kOutOfMemory} with the name of the file. `files`, `budget` and `cancel` must outlive
+// the scene.
 std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
                                            const SceneOptions& options, MemoryBudget& budget,
                                            const CancelToken& cancel);

@@ -20,11 +20,11 @@ constexpr const char* kConvert = "convert it first, for example with Blender";
 struct KnownFormat {
   size_t offset;
   std::string_view bytes;
-  const char* name;  // "a file compressed by gzip"
+  const char* name;  // follows "is" in the message: "compressed by gzip"
   const char* remedy = "";
 };
 
-// More specific formats come first.
+// The first matching row is used, so longer patterns come before their prefixes.
 constexpr KnownFormat kKnown[] = {
     {0, "version https://git-lfs.github.com/spec/", "a Git LFS pointer, not the file itself",
      "run git lfs pull"},

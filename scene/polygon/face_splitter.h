@@ -27,9 +27,9 @@ class FaceSplitter {
     cache_.place(Transform{}, nullptr);
   }
 
-  // Triangulates a face of at least three corners. Returns the triangles as three numbers of
-  // corners each, valid until the next call; empty if they are the fan of the face. A face with a
-  // vertex that does not exist is its fan.
+  // Triangulates a face of at least three corners. Returns the triangles as three positions in
+  // `corners` each, valid until the next call. Returns nothing if the triangles are the fan of the
+  // face. A face with a vertex that does not exist becomes its fan.
   std::span<const uint32_t> split(std::span<const uint32_t> corners) {
     is_doubtful_ = false;
     if (corners.size() == 3 || !load(corners)) return {};

@@ -1,4 +1,5 @@
-// Triangulates a ring that is monotone in the order of a sweep.
+// Triangulates a monotone ring: its lower and its upper chain both visit their corners in the order
+// of the sweep.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +17,8 @@ class MonotoneTriangulation {
       : sweep_(sweep), corners_(corners) {}
 
   // Appends the triangles of a ring, three corners each. `ring` lists its corners in
-  // counterclockwise order. Takes O(n). Returns false if the ring is not monotone or a triangle
-  // would be clockwise.
+  // counterclockwise order. Takes O(n) time for n corners. Returns false if the ring is not
+  // monotone or a triangle would be clockwise.
   bool add(std::span<const uint32_t> ring, std::vector<uint32_t>& triangles);
 
  private:
@@ -35,7 +36,7 @@ class MonotoneTriangulation {
   const Sweep& sweep_;
   const std::span<const Point> corners_;
   std::vector<Entry> order_;  // the corners of the ring in the order of the sweep
-  std::vector<Entry> open_;   // corners of one chain that are not in all of their triangles
+  std::vector<Entry> open_;   // corners of one chain that still lack triangles
 };
 
 }  // namespace voxdag::polygon

@@ -18,14 +18,14 @@ Vector cross(const Vector& p, const Vector& q) {
 double length_1(const Vector& v) { return (std::fabs(v[0]) + std::fabs(v[1])) + std::fabs(v[2]); }
 
 // Returns the maximum rounding error of normalized coordinates: half a unit in the last place of 1,
-// as a float if all of them are floats.
+// in float precision if all coordinates are floats and otherwise in double precision.
 double rounding_of(std::span<const double> xyz) {
   const bool are_floats = std::ranges::all_of(
       xyz, [](double c) { return static_cast<double>(static_cast<float>(c)) == c; });
   return are_floats ? 0x1p-25 : 0x1p-54;
 }
 
-// Sums over the triangles of a fan, in the plane without one axis.
+// Sums over the triangles of a fan, in one coordinate plane.
 struct FanInPlane {
   double area = 0, absolute_area = 0;
   bool has_left = false, has_right = false;  // counterclockwise and clockwise triangles
@@ -65,7 +65,7 @@ bool normalize(std::span<double> xyz) {
   double largest = 0, sum = 0;
   for (const double c : xyz) {
     largest = std::max(largest, std::fabs(c));
-    sum += c - c;  // NaN if it is not finite
+    sum += c - c;  // NaN if a coordinate is not finite
   }
   if (sum != 0) return false;
   int exponent;

@@ -9,19 +9,20 @@
 
 namespace voxdag::polygon {
 
-// The plane is chosen by the triangles (c0, c(k), c(k+1)) of the polygon's fan: it is the
-// coordinate plane in which the sum of their areas is largest. Planes of equal sums are tried in
-// the order yz, zx, xy. In the plane, the signed area of the polygon is positive or 0.
+// It is the coordinate plane in which the triangles (c0, c(k), c(k+1)) of the polygon's fan have
+// the largest sum of areas. Of planes with equal sums, it is the first in the order yz, zx, xy. In
+// the plane, the signed area of the polygon is positive or 0.
 struct Projection {
   int axis = 0;              // the axis that the projection drops
   bool is_mirrored = false;  // the other two axes are exchanged
   // True if no triangle of the fan is clockwise in the plane, except by the rounding of the
-  // coordinates. Then the fan lies inside the polygon.
+  // coordinates. Then the fan is inside the polygon.
   bool is_fan = false;
 };
 
-// A fast test for most polygons: if it returns true, choose_projection() would return a fan, or a
-// coordinate is not finite. `xyz` holds three coordinates per corner and need not be normalized.
+// A fast test that suffices for most polygons. If it returns true, the triangles are the fan:
+// choose_projection() would return a fan, or a coordinate is not finite. `xyz` holds three
+// coordinates per corner and need not be normalized.
 bool is_clear_fan(std::span<const double> xyz);
 
 // Multiplies the coordinates by a power of two, so that the largest magnitude is from 1/2 to 1.

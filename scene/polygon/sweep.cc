@@ -51,8 +51,8 @@ Point Sweep::movement(uint32_t corner) const {
   return {-scale * (in.y + out.y), scale * (in.x + out.x)};
 }
 
-// True if a corner is above the lower edge that begins at corner `edge`, which the sweep line at
-// the corner crosses. False for the ends of the edge.
+// True if `corner` is above the lower edge that begins at corner `edge`. The sweep line at `corner`
+// must cross this edge. False if `corner` is an end of the edge.
 bool Sweep::is_above(uint32_t corner, uint32_t edge) const {
   const uint32_t end = next(edge);
   if (corner == edge || corner == end) return false;
@@ -62,7 +62,7 @@ bool Sweep::is_above(uint32_t corner, uint32_t edge) const {
   return along.x * move.y - along.y * move.x > distance_;
 }
 
-// Moves the sweep line to the next corner.
+// Moves the sweep line to `corner`. Returns false if edges are found to cross each other.
 bool Sweep::add(uint32_t corner) {
   const auto above = std::ranges::partition_point(
       edges_, [&](const LowerEdge& edge) { return is_above(corner, edge.from); });
@@ -115,8 +115,9 @@ bool Sweep::add_between(uint32_t corner, size_t below, bool is_lower) {
   return true;
 }
 
-// Connects the helper of a lower edge with a node of the area above that edge, or only if the
-// helper is a merge. Returns the node of the lowest ring that is open to the right.
+// Adds a diagonal from the helper of a lower edge to `node`, which is in the area above that edge.
+// With `only_merges`, adds it only if the helper is a merge. Returns the node that `node`'s corner
+// has in the lowest ring that is open to the right.
 uint32_t Sweep::connect(size_t edge, uint32_t node, bool only_merges) {
   if (only_merges && !edges_[edge].is_merge) return node;
   return rings_.divide(edges_[edge].helper_node, node);

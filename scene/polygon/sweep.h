@@ -4,8 +4,9 @@
 //
 // Corners are swept in increasing x; corners of equal x in increasing y. Corners and edges of a
 // polygon may also touch or coincide. There the order is the order after an infinitely small
-// movement of all edges: into the polygon, which separates the two edges of a bridge from an
-// outline to a hole, or out of it, which opens a neck of width 0 between two parts of the polygon.
+// movement of all edges. kInward moves edges into the polygon, which separates the two edges of a
+// bridge from an outline to a hole. kOutward moves edges out of the polygon, which widens a neck of
+// width 0 between two parts of the polygon.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +24,8 @@ class Sweep {
 
   // Divides the polygon with these corners, which are in counterclockwise order. No three
   // consecutive corners are collinear. The corners must remain valid as long as the rings are used.
-  // Returns false if the edges cross each other so that there is no such division. It may also
-  // return true in this case; the rings are then not monotone, or have clockwise triangles.
+  // If there is no such division because edges cross each other, divide() usually returns false. It
+  // may also return true, but then a ring is not monotone or has clockwise triangles.
   bool divide(std::span<const Point> corners, Move move);
 
   Rings& rings() { return rings_; }
@@ -34,9 +35,9 @@ class Sweep {
  private:
   // A lower edge of the polygon that crosses the sweep line. The area above it is inside.
   struct LowerEdge {
-    uint32_t from;         // its left corner, the one before its right corner in the polygon
+    uint32_t from;         // its left corner; its right corner is the next corner of the polygon
     uint32_t helper_node;  // the last node of the area above it that can see the sweep line
-    bool is_merge;         // true if both edges of this node are to the left of it
+    bool is_merge;         // true if both edges of helper_node are to the left of it
   };
 
   uint32_t previous(uint32_t corner) const { return corner == 0 ? count() - 1 : corner - 1; }
@@ -53,7 +54,7 @@ class Sweep {
   uint32_t connect(size_t edge, uint32_t node, bool only_merges);
 
   std::span<const Point> corners_;
-  double distance_ = 1;  // of the movement; negative if it is outward
+  double distance_ = 1;  // distance of the movement: 1 inward, -1 outward
   std::vector<uint32_t> order_, rank_;
   std::vector<LowerEdge> edges_;  // from bottom to top
   Rings rings_;

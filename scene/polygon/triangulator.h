@@ -36,7 +36,7 @@ class Triangulator {
   Triangulator(MemoryBudget& budget, std::string what) : charge_(budget, std::move(what)) {}
 
   // Triangulates a polygon of at least three corners. `xyz` has three coordinates per corner, and
-  // is changed. Returns false if the triangles are the fan; then triangles() is not set. Throws
+  // may be changed. Returns false if the triangles are the fan; then triangles() is not set. Throws
   // Error{kOutOfMemory} if the memory budget is too small for the corners.
   bool triangulate(std::span<double> xyz);
 
@@ -52,7 +52,7 @@ class Triangulator {
 
   GrowingCharge charge_;
   std::vector<Point> points_;   // all corners in the plane
-  std::vector<uint32_t> kept_;  // the corners that are left by step 3
+  std::vector<uint32_t> kept_;  // the corners that step 3 does not remove
   std::vector<Point> kept_points_;
   std::vector<uint32_t> ring_;
   std::vector<bool> is_visited_;

@@ -6,7 +6,7 @@
 //                       blue. The header has "COLOR=" and four bytes: red, green, blue and alpha
 //                       of all other facets.
 //
-// Colors are sRGB. A facet without color is white.
+// Colors are sRGB. The alpha is not used. A facet without color is white.
 #pragma once
 
 #include <array>

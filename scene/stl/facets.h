@@ -15,7 +15,8 @@ namespace voxdag::stl {
 class Facets {
  public:
   virtual ~Facets() = default;
-  // Writes triangles [first, first + count) to `out`. They must exist, but can be invalid.
+  // Writes triangles [first, first + count) to `out`. The triangles must exist; their coordinates
+  // can be NaN or infinite.
   virtual void read(uint64_t first, size_t count, WorldTriangle* out) = 0;
   // Returns the attributes of the triangles of the last read(); empty if the file has none.
   const std::vector<uint16_t>& attributes() const { return attributes_; }

@@ -42,7 +42,7 @@ const std::array<double, 3>& PolygonReader::vertex(size_t triangle, size_t k) co
   return vertices_[k == 0 ? 0 : triangle + k];
 }
 
-// Returns false at the end of the file.
+// Reads the vertices of the next polygon. Returns false if the file has no other polygon.
 bool PolygonReader::read_vertices() {
   vertices_.clear();
   for (;;) {

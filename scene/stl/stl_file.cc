@@ -35,7 +35,7 @@ void StlFile::count_facets() {
   const uint64_t present = (file_->size() - kHeaderBytes) / kFacetBytes;
   const uint64_t after = file_->size() - kHeaderBytes - kFacetBytes * std::min(declared, present);
   triangles_ = declared;
-  // Writers that do not know the number in advance leave one of these numbers.
+  // Programs that do not know the number of facets in advance write one of these two numbers.
   const bool is_unknown = declared == 0 || declared == std::numeric_limits<uint32_t>::max();
   if (is_unknown && present > 0) {
     triangles_ = present;

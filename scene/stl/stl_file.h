@@ -1,5 +1,5 @@
-// An open STL file: its number of triangles, and the places of every n-th polygon of an ASCII file
-// (block_index.h), which one pass over it finds.
+// An open STL file and its number of triangles. One pass over an ASCII file also records the place
+// of every n-th polygon (block_index.h).
 #pragma once
 
 #include <cstdint>

@@ -32,8 +32,8 @@ std::string next_keyword(std::string_view& text) {
   return word;
 }
 
-// True if the text begins with "solid", and "facet" or "endsolid" begins the next line that is not
-// blank. The rest of the first line is a name.
+// True if the text begins with "solid", and the next line that is not blank begins with "facet",
+// "endsolid" or "color" or does not exist. The rest of the first line is a name.
 bool is_ascii(std::string_view text) {
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   if (next_keyword(text) != "solid") return false;
@@ -44,7 +44,8 @@ bool is_ascii(std::string_view text) {
   return second.empty() || second == "facet" || second == "endsolid" || second == "color";
 }
 
-// True if the coordinates are usual numbers, and the normal is about a unit vector or 0.
+// True if the coordinates are 0 or have usual magnitudes, and the normal is roughly a unit vector
+// or is 0.
 bool is_plausible(const Facet& facet) {
   double square = 0;
   for (const double n : facet.normal) square += n * n;

@@ -7,9 +7,9 @@
 //   facet: normal (3 floats), three vertices (9 floats), attribute (2 bytes); little-endian
 //
 // Many headers begin with "solid", like ASCII files. So a file of 84 + 50 n bytes is binary,
-// however it begins. A file of any other size is ASCII if it begins like an ASCII file. It is
-// binary if its first facets are plausible; then n does not match the size, because the file is cut
-// off or has other data after the facets.
+// however it begins. A file of any other size is ASCII if it begins like an ASCII file. Otherwise
+// it is binary if its first facets are plausible. Then n does not match the size because the file
+// is cut off, has other data after the facets, or has an unknown number of facets.
 #pragma once
 
 #include <cstdint>

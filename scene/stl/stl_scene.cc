@@ -95,7 +95,7 @@ class StlCursor : public TriangleCursor {
   const CancelToken& cancel_;
   const std::unique_ptr<Facets> facets_;
   PageBuffer<RealTriangle> batch_;
-  std::vector<uint16_t> attributes_;  // of the triangles of the batch
+  std::vector<uint16_t> attributes_;  // attributes of the triangles in batch_
   // Allocated by the first read_surfaces().
   PageBuffer<SurfaceTriangle> surfaces_;
   std::optional<FacetColors> colors_;
