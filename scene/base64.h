@@ -1,4 +1,4 @@
-// Base64 (RFC 4648, section 4), decoded by groups of four characters.
+// Decodes Base64 (RFC 4648, section 4) in groups of four characters.
 #pragma once
 
 #include <cstddef>
@@ -8,13 +8,13 @@
 namespace voxdag {
 
 // Returns the number of bytes that `character_count` base64 characters encode. The characters may
-// end with padding ("=") or without it. `tail` is the last two characters, or all if there are
-// fewer; it shows how many are padding.
+// end with padding ("=") or without it. `tail` holds the last two characters, or all if there are
+// fewer. It shows how many of them are padding.
 uint64_t base64_bytes(uint64_t character_count, std::span<const std::byte> tail);
 
-// Decodes fewer than 2^31 characters. The last group of four may be shorter, if its padding is
-// absent. `out` has space for three bytes per group, including an incomplete group. Returns false
-// if the characters are not base64.
+// Decodes fewer than 2^31 characters. The last group may have fewer than four characters if the
+// padding is absent. `out` has space for three bytes per group, including an incomplete group.
+// Returns false if the characters are not base64.
 bool decode_base64(std::span<const std::byte> characters, std::byte* out);
 
 }  // namespace voxdag

@@ -1,5 +1,6 @@
-// A charge to the memory budget for data whose size becomes known while it is read. It grows in
-// steps, so that small additions do not call the budget. Not thread-safe.
+// A charge to the memory budget for data whose size is not known before it is read. The charge
+// grows in steps of 64 KiB, so that most small additions need no call of the budget. Not
+// thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -17,15 +18,15 @@ class GrowingCharge {
   GrowingCharge(MemoryBudget& budget, std::string what)
       : charge_(budget, 0, what), what_(std::move(what)) {}
 
-  // Increases the charge to at least `bytes` in total. Throws Error{kOutOfMemory} if this total
-  // does not fit the budget.
+  // Increases the charge to at least `bytes` in total. Throws Error{kOutOfMemory} if `bytes` and
+  // one step more do not fit the budget.
   void grow_to(uint64_t bytes) {
     if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
     throw Error(ErrorCode::kOutOfMemory, "out of memory: " + what_ + " needs over " +
                                              std::to_string(bytes) +
                                              " bytes, more than the memory budget has left");
   }
-  // Charges `bytes` in addition to all previous calls of add().
+  // Charges `bytes` more. The total is the sum of all calls of add().
   void add(uint64_t bytes) { grow_to(added_ += bytes); }
 
  private:

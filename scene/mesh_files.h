@@ -1,7 +1,7 @@
 // Presents a mesh in memory as a scene file. MeshFiles is a file system with one additional path,
-// under which it provides the mesh as a PLY file. It forwards calls for all other paths. The build
-// reads the PLY file in windows, like every scene file. Each read generates the requested bytes
-// from the mesh.
+// under which it provides the mesh as a PLY file. All other paths refer to the underlying file
+// system. The build reads the PLY file in windows, like every scene file. Each read generates the
+// requested bytes from the mesh.
 #pragma once
 
 #include <memory>
@@ -21,7 +21,8 @@ class MeshFiles : public ForwardingFiles {
   // object and its files.
   MeshFiles(FileSystem& files, const Mesh& mesh);
 
-  // Opens the mesh. Its identity is unknown, so no build relies on data from an earlier read.
+  // Opens the mesh or another file. The mesh has no known identity, so no build relies on data from
+  // an earlier read of it.
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override;
   bool exists(const std::string& path) override;
 

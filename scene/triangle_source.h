@@ -36,7 +36,7 @@ class TriangleCursor {
   // Visits the declared triangles [first, first + count) in the scene's order, in batches of 1 to
   // 1024 triangles. An invalid triangle is dropped if SceneOptions::skip_invalid is set. Otherwise
   // read() throws an Error that names the scene file and the node, mesh, primitive, accessor or
-  // face. So all visited vertices are finite. Going back to earlier triangles takes longer.
+  // face. So all visited vertices are finite. Increasing ranges are the fastest to read.
   virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
   // Like read(), but with each vertex snapped to `grid`.
   virtual void read_snapped(uint64_t first, uint64_t count, const Grid& grid, const Visitor& visit);
@@ -47,8 +47,8 @@ class TriangleCursor {
   virtual WorldBounds read_bounds(uint64_t first, uint64_t count);
 };
 
-// The place where an image of a scene is stored. The image should be a PNG or JPEG, but is not
-// checked when the scene is opened. The range [offset, offset + size) of `file` holds bytes, or
+// The place where an image of a scene is stored. The image should be a PNG or JPEG, but
+// open_scene() does not check this. The range [offset, offset + size) of `file` holds bytes, or
 // base64 characters that encode bytes. The first `skip` of these bytes do not belong to the image.
 // The following `bytes` bytes are the image.
 struct ImageSource {
@@ -74,8 +74,8 @@ struct SceneMaterials {
     for (Material& material : materials) material.image = Material::kNoImage;
     images.clear();
   }
-  // Gives one common new number to all materials without a number, which are the materials of
-  // triangles without material. Appends their name, "", to `names`.
+  // Gives the next number, with the name "", to all materials without a number. These are the
+  // materials of triangles for which the file gives no material.
   void name_unlisted() {
     for (Material& material : materials)
       if (material.number == Material::kNoNumber)
@@ -89,8 +89,8 @@ class TriangleSource {
   using Visitor = TriangleCursor::Visitor;
 
   virtual ~TriangleSource() = default;
-  // Returns a cursor. `cursors` is the number of cursors that share the memory. The source must
-  // outlive the cursor.
+  // Returns a cursor. `cursors` is the number of open cursors that share the memory budget. The
+  // source must outlive the cursor.
   virtual std::unique_ptr<TriangleCursor> open(unsigned cursors) = 0;
   // Calls `visit` with all triangles, in batches as in TriangleCursor::read().
   void for_each_batch(const Visitor& visit) { open(1)->read(0, declared_triangles(), visit); }

@@ -53,8 +53,8 @@ class City {
     const Vec3 center{
         kPitch * (static_cast<double>(2 * column) - static_cast<double>(columns_ - 1)) / 2, 0,
         kPitch * (static_cast<double>(2 * row) - static_cast<double>(rows_ - 1)) / 2};
-    // The street uses the random numbers before it is decided whether the block is a park. With
-    // colors, the ground's color depends on this decision, so the ground is added after it.
+    // make_street() draws its random numbers before the block becomes a park or not. With colors,
+    // the ground's color depends on this decision, so the ground is then added after the street.
     if (!scene_.has_colors()) make_ground(center, false);
     make_street(center, random);
     const bool is_park = random.chance(10);

@@ -22,7 +22,7 @@ struct Tier {
   double top() const { return y + kFloorHeight * floors; }
 };
 
-// Adds a wall. Its bays are counted from the left end as seen from outside.
+// Adds a wall, bay by bay from its left end as seen from outside.
 void add_wall(SceneBuilder& scene, const CityParts& parts, const Tier& tier, uint32_t direction) {
   static constexpr int kAlong[4][2] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};
   const auto [ax, az] = kAlong[direction];

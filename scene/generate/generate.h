@@ -31,7 +31,7 @@ struct SceneKindInfo {
   SceneKind kind;
   const char* name;
   const char* summary;
-  uint64_t default_triangles;  // 0 for the kind whose size is given by its level
+  uint64_t default_triangles;  // 0 for menger, whose size is its level
   void (*make)(const GenerateOptions& options, SceneBuilder& scene);
   std::span<const SceneMaterial> materials;  // empty for a kind without colors
 };

@@ -63,7 +63,7 @@ class GlbLayout : public BlockSink {
   uint64_t instance_count_ = 0;
 };
 
-// Returns the bytes of an array of `count` indices in the file.
+// Returns the size in bytes of an array of `count` indices in the file, padding included.
 inline uint64_t padded_index_bytes(uint64_t count) { return (2 * count + 3) / 4 * 4; }
 
 }  // namespace voxdag

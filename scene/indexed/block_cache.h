@@ -32,8 +32,9 @@ class BlockCache {
     slot_mask_ = static_cast<size_t>(slots) - 1;
   }
 
-  // Returns a value, valid until the next call. `element` must be below `count`. Calls
-  // load(first, n, out) for the values of elements [first, first + n).
+  // Returns the value of `element`, which must be below `count`. The reference is valid until the
+  // next call. If the value is not cached, calls load(first, n, out), which writes the values of
+  // elements [first, first + n).
   template <class Load>
   const Value& at(uint64_t element, const Load& load) {
     const uint64_t block = element / kBlockSize;

@@ -1,6 +1,6 @@
-// The places of every n-th element of a file whose elements vary in size, within a fixed amount of
-// memory. An element between two recorded ones is found by reading on from the recorded one. n is
-// 1024 at first. When the index is full, it drops every second entry and doubles n.
+// Records the place of every n-th element of a file whose elements vary in size, within a fixed
+// amount of memory. To find any other element, a reader starts at the last recorded element before
+// it. n is 1024 at first. When the index is full, it drops every second entry and doubles n.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ class BlockIndex {
   BlockIndex(MemoryBudget& budget, size_t max_entries, const std::string& what)
       : max_entries_(max_entries), charge_(budget, what) {}
 
-  // True if add() is to be called for the element with this number. Elements come in order.
+  // True if the caller must call add() for the element with this number. Elements come in order.
   bool wants(uint64_t element) const { return (element & (stride_ - 1)) == 0; }
   void add(const Entry& entry) {
     charge_.grow_to((entries_.size() + 1) * sizeof(Entry));
@@ -37,8 +37,8 @@ class BlockIndex {
     return entries_[static_cast<size_t>(element / stride_)];
   }
   Entry& at(uint64_t element) { return entries_[static_cast<size_t>(element / stride_)]; }
-  // Returns the number of the first element of the last block whose entry is at most `value` in
-  // `member`, which does not decrease from entry to entry.
+  // Finds the last block whose entry has at most `value` in `member`, and returns the number of its
+  // first element. `member` must not decrease from entry to entry.
   uint64_t find(uint64_t value, uint64_t Entry::*member) const {
     const auto after = std::ranges::upper_bound(entries_, value, {}, member);
     return static_cast<uint64_t>(after - entries_.begin() - 1) * stride_;

@@ -1,5 +1,5 @@
-// A mesh whose triangles are vertex indices, as one thread reads it from a scene file. It is the
-// input of an IndexedCursor, so that a format implements only what its files store. Not
+// Reads a mesh with vertex indices from a scene file, for one thread. IndexedCursor does all that
+// formats have in common, so that a format implements only the reading of its files. Not
 // thread-safe.
 #pragma once
 
@@ -28,19 +28,20 @@ class IndexedMesh {
   // Prepares read_surfaces(). `cursors` is the number of cursors that share the memory. Returns
   // false if all triangles are white, with material 0.
   virtual bool open_surfaces(unsigned /*cursors*/) { return false; }
-  // Sets material and corners of out[i], for triangle first + numbers[i] of the last call of
-  // read_corners(), which wrote `corners`. The vertices of these triangles exist.
+  // Sets the material and corners of out[i] for triangle first + numbers[i], where the last call of
+  // read_corners() received `first` and wrote `corners`. The vertices of these triangles exist.
   virtual void read_surfaces(std::span<const uint32_t> /*numbers*/, const uint32_t* /*corners*/,
                              SurfaceTriangle* /*out*/) {}
 
   // Returns the place of a triangle in the file for messages, such as "face 5".
   virtual std::string place_of(uint64_t triangle) = 0;
-  // Returns corner `corner` of a triangle, whose vertex index is out of range, for messages.
+  // Describes the vertex index of corner `corner` of a triangle, which is out of range, for
+  // messages.
   virtual std::string name_index(uint64_t /*triangle*/, int /*corner*/, uint32_t index) {
     return index == UINT32_MAX ? "a vertex with a negative or too large index"
                                : "index " + std::to_string(index);
   }
-  // Returns a vertex for messages.
+  // Returns the name of a vertex for messages.
   virtual std::string name_vertex(uint32_t index) { return "vertex " + std::to_string(index); }
 };
 

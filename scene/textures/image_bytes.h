@@ -27,7 +27,7 @@ class ImageBytes : public EncodedBytes {
   const std::unique_ptr<ReadableFile> file_;
   uint64_t at_, end_;  // the range of the file that is not read yet
   const bool is_base64_;
-  uint64_t left_;  // bytes of the image that are not returned yet
+  uint64_t left_;  // bytes of the image that read() has not returned yet
   std::vector<std::byte> window_;
   size_t window_at_ = 0;
   bool has_ended_ = false;

@@ -48,7 +48,7 @@ class TextureReader {
   // Makes a reader of pyramids in memory. `layout` and `pages` must outlive the reader.
   TextureReader(const TextureLayout& layout, const uint64_t* pages)
       : layout_(layout), all_(pages) {}
-  // Makes a reader of pyramids in a file. Caches pages in about `memory_bytes`, at least two.
+  // Makes a reader of pyramids in a file. Caches at least two pages, in about `memory_bytes`.
   // `checksums` has one value per page. `layout`, `file`, `checksums` and `budget` must outlive the
   // reader.
   TextureReader(const TextureLayout& layout, const ReadableFile& file, const uint32_t* checksums,

@@ -77,8 +77,8 @@ struct UnreadableImages {
   }
 };
 
-// Runs `body`, concurrently with other threads that do the same. If the memory does not suffice,
-// runs it again while no other thread does.
+// Runs `body` while other threads may also run one. If `body` runs out of memory, runs it again
+// while no other thread runs one.
 template <class Body>
 void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const Body& body) {
   try {

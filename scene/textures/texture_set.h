@@ -69,7 +69,7 @@ class TextureSet {
   PageBuffer<uint32_t> checksums_;  // checksums of the pages in the file
 };
 
-// Returns the value that TextureSet::bytes() would have. Reads the headers of the images.
+// Returns the value that TextureSet::bytes() would have. Reads only the headers of the images.
 uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
                        const CancelToken& cancel);
 

@@ -25,7 +25,7 @@ class UsedVertices {
   bool add_to(WorldBounds& bounds, VertexCache& positions, uint64_t count) const;
 
  private:
-  // Maximum difference of two indices up to which duplicates are removed.
+  // Duplicates are removed if no two indices differ by more than this.
   static constexpr uint32_t kMaxRange = 65536;
 
   std::vector<uint32_t> vertices_;

@@ -21,8 +21,8 @@ namespace voxdag {
 
 class VertexCache {
  public:
-  // The caches of all readers of a scene together take at most 1/kShareOfFree of the free bytes of
-  // the memory budget.
+  // All caches of a scene together take at most 1/kShareOfFree of the bytes that are free in the
+  // memory budget.
   static constexpr uint64_t kShareOfFree = 4;
 
   // Makes one of `caches` caches that divide this share equally. It has space for `vertices`
@@ -57,9 +57,9 @@ class VertexCache {
   void read(uint64_t block, std::span<double> out);
 
   PageBuffer<double> positions_;  // transformed and snapped
-  // The untransformed vertices of the source, if all of them fit here. Then place() does not cause
-  // vertices to be read again. is_read_ has a flag for each block that was read; it is empty for a
-  // larger source.
+  // The untransformed vertices of the source, if all of them fit here. Then vertices are not read
+  // again after place(). is_read_ has a flag per block, which is true once the block was read; it
+  // is empty for a source that does not fit.
   PageBuffer<double> untransformed_;
   std::vector<bool> is_read_;
   Transform world_;
