@@ -1,4 +1,4 @@
-// Checks of a build's spec before anything is read or written.
+// Checks a build's spec before the build starts.
 #pragma once
 
 #include <span>
@@ -14,9 +14,10 @@ namespace voxdag {
 BuildSpec checked(const BuildSpec& spec);
 
 // Throws Error{kInvalidInput} if the scene reads one of `outputs` or a file of the work folder,
-// because the build would overwrite or remove that file. Files that are named only inside the
-// scene, such as its buffers, are checked only in two cases: the work folder has files but no job
-// store, so that no earlier build has checked them, or one of `outputs` begins with a zero byte.
+// because the build would overwrite or remove that file. Files that only the scene names, such as
+// its buffers, are checked in two cases. First, the work folder has files but no job store, so no
+// earlier build has checked them. Second, one of `outputs` begins with a zero byte, so it may be a
+// file of voxdag or any other file.
 void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
                       std::span<const std::string> outputs, const BuildContext& context);
 

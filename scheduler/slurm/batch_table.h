@@ -1,8 +1,8 @@
 // The open batches of a cluster build and their accounting: which subvolumes they contain, which
 // attempts failed, and the totals of built batches. A batch is a set of subvolumes that one cluster
-// task builds, and an attempt is one run of such a task. A batch is open until a record of it is
-// accepted, or until it is split or given up. The table is stored in cluster.json
-// (cluster_state.h), which is written by one process only. Used by one thread.
+// task builds, and an attempt is one run of such a task. A batch is open until its completion
+// record is accepted, or until it is split or given up. Only the submitting process stores the
+// table, in cluster.json (cluster_state.h). Used by one thread.
 //
 // Losing cluster.json is harmless: the subvolumes of open batches are still planned in the job
 // store, so the next run makes new batches of them. Building a batch twice is harmless too: both

@@ -22,7 +22,7 @@ struct ClusterContext {
   Slurm slurm;
 };
 
-// Returns the build's command runner: the one from its options (tests), else the system's.
+// Returns the command runner that the options name, or else the system's. Only tests name one.
 CommandRunner& commands_of(const BuildSpec& spec);
 // Returns `path` in the form that tasks on other machines need: absolute and normalized.
 std::string absolute_path(const std::string& path);

@@ -18,7 +18,7 @@ class TaskPoller {
  public:
   TaskPoller(ClusterContext& cluster, BatchTable& batches) : cluster_(cluster), batches_(batches) {}
 
-  // Forgets earlier failures. For each task of an earlier run, the next failure is not counted.
+  // Forgets earlier failures. If a task of an earlier run fails, its failure is not counted.
   void begin_run();
   // Queries Slurm once for all tasks, then submits batches without a task. An attempt has failed if
   // Slurm no longer lists its task and, after a grace period for the shared file system, its batch

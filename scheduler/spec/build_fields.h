@@ -1,7 +1,7 @@
 // The description of a build's options (core/fields/field.h). The command line, the service's job
 // request and its schema, and the Python keywords and their checks derive from it.
-// docs/architecture.md shows how to add an option. Members of BuildSpec without a description here
-// are not offered by any of these interfaces.
+// docs/architecture.md shows how to add an option. None of these interfaces offers a member of
+// BuildSpec that has no description here.
 #pragma once
 
 #include <string>

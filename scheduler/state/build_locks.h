@@ -13,8 +13,8 @@
 namespace voxdag {
 
 // Calls `try_lock` until it returns a lock, and returns this lock; null after `max_s` seconds
-// without a lock. Warns, with a text that begins with `what`, after 0.3 s: `voxdag status` holds a
-// lock for a shorter time.
+// without a lock. Warns, with a text that begins with `what`, after 0.3 s. A shorter wait needs no
+// warning, because `voxdag status` also holds a lock briefly.
 std::unique_ptr<FileLock> wait_for_lock(const std::function<std::unique_ptr<FileLock>()>& try_lock,
                                         const std::string& what, double max_s,
                                         const BuildContext& context);

@@ -7,7 +7,7 @@
 //   2. Subvolumes form a forest: a split subvolume has its octants with triangles as children. Only
 //      leaves are built.
 //   3. Every row that determines the result has a checksum; a mismatch is Error{kCorrupt}.
-//      Subvolumes are numbered from 1, and the job's row has their number, so a missing row is also
+//      The ids of n subvolumes are 1 to n, and the job's row has n, so a missing row is also
 //      Error{kCorrupt}.
 //   4. All rows of one call are committed together or not at all.
 //
@@ -117,7 +117,7 @@ class JobStore {
   // or the next job. Throws Error{kCorrupt} if it does not match its checksum.
   std::optional<std::vector<std::byte>> ingest();
   void save_ingest(std::span<const std::byte> record);
-  // Removes the progress of ingest, and the warnings. Does not write to a store without both.
+  // Removes the progress of ingest, and the warnings. Does not write if the store has neither.
   void forget_ingest();
 
   // Stores a warning about the scene. Replaces a warning with the same code and message, because a

@@ -52,7 +52,7 @@ class DurableStore : public TriangleStore {
   void release(BinId bin) override;
   uint64_t file_bytes() const override;
 
-  // Lists all chunks in the file. The returned state is valid after a sync of file().
+  // Appends the list of new chunks to the file. The returned state is valid after a sync of file().
   DurableStoreState checkpoint();
   // The file, for syncs in the background and for other data that belongs to a checkpoint.
   const std::shared_ptr<TriangleFile>& file() const { return file_; }

@@ -1,5 +1,5 @@
 // The files of a cluster build and their names. The files are in the folder `cluster` of the work
-// folder, on the shared disk. Files with other names are not removed, except temporary files
+// folder, on the shared disk. voxdag removes no files with other names, except temporary files
 // (NAME.partial, .nfs*).
 //
 //   cluster.json                       state of the submitting process (cluster_state.h)

@@ -18,8 +18,8 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
                                    const ClusterFolder::Entry& entry, const ClusterState& state,
                                    std::span<const ExpectedSubvolume> subvolumes);
 
-// Path of a record's segment: in the attempt's folder, or in the work folder if the accepting
-// process was killed before it recorded the batch.
+// Path of a record's segment: in the attempt's folder, or in the work folder if a process that
+// accepted the record was killed before it recorded the batch.
 std::string segment_of_record(FileSystem& files, const ClusterFolder& folder,
                               const CompletionRecord& record);
 

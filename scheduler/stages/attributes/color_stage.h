@@ -46,8 +46,8 @@ class ColorStage {
   // report is correct only if that file has the sections of this digest.
   std::string digest_of(FileSystem& files, const std::string& output,
                         std::optional<ColorReport>& report);
-  // Adds the sections to `out`, which has all its levels and is not sealed. Does nothing for a file
-  // without levels. May be called only once.
+  // Adds the sections to `out`, which has all its levels and is not sealed
+  // (GlobalFileWriter::seal()). Does nothing for a file without levels. May be called only once.
   ColorReport add_to(GlobalFileWriter& out);
 
  private:

@@ -28,7 +28,7 @@ void check_backend(const RunOptions& options);
 // GPU.
 BackendChoice choose_backend(const RunOptions& options, Progress& progress);
 
-// The machine's GPUs. Tests pass others.
+// The machine's GPUs. Tests pass simulated GPUs.
 struct Gpus {
   int count = 0;
   std::function<std::unique_ptr<Backend>(int device)> open;

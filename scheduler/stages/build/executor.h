@@ -28,7 +28,7 @@ struct QueuedSubvolume {
 struct ExecutorOptions {
   DagShape shape;
   unsigned threads = 1;
-  uint64_t built = 0;  // already built subvolumes, for the progress
+  uint64_t built = 0;  // subvolumes built by earlier runs, for the progress
   // Subvolumes with longer edges are split without an attempt to build them.
   int64_t longest_edge = INT64_MAX;
   std::function<std::unique_ptr<Backend>()> open_backend;

@@ -93,8 +93,8 @@ class TopTree {
   }
   uint64_t occupied_cells() const;
 
-  // Returns the largest occupied cubes of weight <= `max_weight`, in Morton order. Single cells may
-  // have a greater weight.
+  // Returns the largest occupied cubes of weight <= `max_weight`, in Morton order. Includes single
+  // cells of greater weight, which cannot be divided.
   std::vector<SubvolumePlan> subvolumes_by_weight(double max_weight) const;
   // Returns the occupied cubes of this edge (or of the cells' edge if that is larger), in Morton
   // order.
