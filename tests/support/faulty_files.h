@@ -69,7 +69,7 @@ class FaultyFiles : public voxdag::ForwardingFiles {
   const FaultPlan plan_;
   std::atomic<uint64_t> operations_{0};
   std::atomic<uint64_t> reads_{0};
-  std::mutex mutex_;                                   // guards the state after a power cut
+  std::mutex mutex_;                                   // guards the members below
   std::map<std::string, std::string> synced_;          // written files: contents at the last sync
   std::map<std::string, std::string> unsynced_names_;  // new name -> old name, "" for a new file
   std::map<std::string, std::string> replaced_;        // contents of files replaced by a rename

@@ -7,7 +7,7 @@
 
 namespace voxdag {
 
-// Flips these bits of one byte of the file. A second call restores the file.
+// Flips the bits of `bits` in the byte at offset `at`. A second call restores the file.
 inline void flip_bits(const std::string& path, uint64_t at, int bits) {
   std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
   file.seekg(static_cast<std::streamoff>(at));

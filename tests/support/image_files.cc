@@ -68,7 +68,7 @@ std::string png_file(const PngFormat& f, const std::string& pixels) {
 
 namespace {
 
-// `prepare` chooses the scans.
+// Returns a JPEG file. prepare(jpeg) may choose its scans.
 template <class Prepare>
 std::string compressed(uint32_t width, uint32_t height, int components, const std::string& pixels,
                        const Prepare& prepare) {

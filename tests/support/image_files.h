@@ -14,17 +14,18 @@ struct PngFormat {
   std::string chunks;  // between IHDR and IDAT
   bool is_interlaced = false;
 };
-// Length, type, data and checksum.
+// Returns a chunk of a PNG file: length, type, data and checksum.
 std::string png_chunk(const std::string& type, const std::string& data);
 std::string big_endian(uint32_t value);
 // Returns a PNG file. `pixels` has no filter bytes. Each row begins at a whole byte; in an
 // interlaced file, each pixel does.
 std::string png_file(const PngFormat& format, const std::string& pixels);
 
-// `pixels` has 1 (gray), 3 (RGB) or 4 (CMYK) bytes per pixel.
+// Returns a JPEG file. `pixels` has 1 (gray), 3 (RGB) or 4 (CMYK) bytes per pixel.
 std::string jpeg_file(uint32_t width, uint32_t height, int components, const std::string& pixels,
                       bool is_progressive = false);
-// `pixels` is RGB. Each channel has a separate scan, and the last scan is repeated `repeats` times.
+// Returns a JPEG file of RGB `pixels` with one scan per channel. The last scan occurs `repeats`
+// times.
 std::string jpeg_of_scans(uint32_t width, uint32_t height, const std::string& pixels, int repeats);
 
 }  // namespace voxdag::test

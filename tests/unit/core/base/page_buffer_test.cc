@@ -19,7 +19,7 @@ TEST(PageBuffer, IsZeroFilled) {
   }
 }
 
-// Bytes are charged while a buffer lives, whoever owns it.
+// Bytes are charged once, from allocation to release, even if the buffer is moved.
 TEST(PageBuffer, ChargesWhatItHolds) {
   MemoryBudget budget(10000);
   {

@@ -31,7 +31,7 @@ TEST_F(CgroupTest, WalksUpInVersion2) {
   EXPECT_EQ(cgroup_memory("0::/slice/box\n", mount()), 3000000000u);
   write("slice/box/memory.max", "2000000000\n");
   EXPECT_EQ(cgroup_memory("0::/slice/box\n", mount()), 2000000000u);
-  // As a container sees itself.
+  // In a container, the process's own group looks like the root.
   EXPECT_EQ(cgroup_memory("0::/\n", mount()), UINT64_MAX);
   write("memory.max", "500000000\n");
   EXPECT_EQ(cgroup_memory("0::/\n", mount()), 500000000u);

@@ -23,7 +23,7 @@ double degrees_between(const Vector& a, const Vector& b) {
   return std::acos(std::clamp(dot / (length(a) * length(b)), -1.0, 1.0)) * 180 / std::acos(-1.0);
 }
 
-// The octahedron's formulas as papers have them.
+// Decodes a normal with the published formulas of the octahedral encoding.
 Vector direction_of(NormalCode code) {
   const double p = ((code & 255) - 127.0) / 127, q = ((code >> 8) - 127.0) / 127;
   Vector v{p, q, 1 - std::abs(p) - std::abs(q)};
@@ -97,7 +97,7 @@ TEST(ValueOfParent, FollowsTheChildren) {
   EXPECT_EQ(of(Attribute::kNormal, {0u, 0u}), 0u);
 }
 
-// What a cell has, by brute force.
+// The values of a cell, computed by brute force.
 struct ExpectedCell {
   double weight = 0, alpha = 0;
   Vector area{}, turned{};
@@ -155,7 +155,7 @@ class BruteForce {
           const int64_t e = (b[x] - a[x]) * (py - a[y]) - (b[y] - a[y]) * (px - a[x]);
           is_inside &= n[z] > 0 ? e >= 0 : e <= 0;
         }
-        // n_z (height - low) >= 0, and so on, with n_z > 0.
+        // Compares heights multiplied by |n_z|, to avoid a division.
         const double sign = n[z] > 0 ? 1 : -1;
         const double at = -sign * (n[x] * static_cast<double>(px - t.v[0][x]) +
                                    n[y] * static_cast<double>(py - t.v[0][y]));
@@ -197,14 +197,15 @@ double largest_of(const Vector& v) {
   return std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
 }
 
-// Scenes have triangles of all kinds, some of them flipped, and materials with different alpha.
+// The baked values are near the brute-force values. Scenes have triangles of all kinds, some of
+// them flipped, and materials with different alpha.
 TEST(Attributes, AreThoseOfTheTriangles) {
   TestLooks looks;
   for (uint32_t i = 0; i < looks.materials.size(); ++i) {
     Material& m = looks.materials[i];
     m.image = Material::kNoImage;
     m.factor[3] = static_cast<uint16_t>(7000 * i);
-    m.number = i / 2;  // two may be one
+    m.number = i / 2;  // two materials share a number
   }
   size_t cells_seen = 0, turned_cells = 0, mixed_cells = 0;
   for (const oracle::SceneKind kind : oracle::kAllKinds) {
@@ -266,7 +267,7 @@ TEST(Attributes, AreThoseOfTheTriangles) {
   EXPECT_GT(mixed_cells, 500u);
 }
 
-// In whatever order and in whichever parts they come.
+// The values do not depend on the order of the triangles or their division into parts.
 TEST(Attributes, AreFunctionsOfTheCell) {
   TestLooks looks;
   for (uint32_t i = 0; i < looks.materials.size(); ++i) looks.materials[i].number = i;

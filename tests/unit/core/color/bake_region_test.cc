@@ -15,7 +15,7 @@ namespace {
 
 using oracle::SceneKind;
 
-// Sums by position in the whole grid.
+// Sums of cells, by position in the grid.
 using Sums = std::map<std::array<uint32_t, 3>, ColorSum>;
 
 void collect(const ColorGrid& grid, const Cube& region, const std::vector<ColoredCell>& cells,
@@ -33,7 +33,7 @@ void collect(const ColorGrid& grid, const Cube& region, const std::vector<Colore
   }
 }
 
-// All cubes of a level, one after the other.
+// Bakes all cubes of a level, one after the other.
 Sums bake_grid(const ColorGrid& grid, uint32_t level, const std::vector<FixedSurface>& surfaces,
                const TestLooks& looks) {
   Sums sums;
@@ -120,8 +120,8 @@ TEST(BakeRegion, TrianglesMayComeInParts) {
   }
 }
 
-// Triangles that cover no column wait for the end of the region. If too many wait, they are added
-// earlier.
+// RegionBaker adds triangles that cover no column at the end of the region, or earlier if they are
+// too many. The sums do not depend on this.
 TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   TestLooks looks;
   const ColorGrid grid{10, 2};
@@ -129,7 +129,7 @@ TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   oracle::Triangles triangles;
   for (int i = 0; i < 150000; ++i) {
     const int64_t at = random.odd(1, 1 << 18);
-    // None has a column, but for the last, in the first cell.
+    // These triangles cover no column. Only the last triangle does, in the first cell.
     triangles.push_back({{{at, 3, 5}, {at | 2, 7, 5}, {at, 3, 9}}});
   }
   triangles.push_back({{{1, 1, 1}, {60001, 60001, 1}, {1, 60001, 1}}});
@@ -178,7 +178,7 @@ TEST(BakeRegion, WorkedExample) {
   FixedSurface surface;
   surface.position = fixed({{{1, 1, 129}, {1023, 1, 129}, {1, 1023, 129}}});
   const Sums sums = bake_grid({2, 2}, 0, {surface}, looks);
-  EXPECT_EQ(sums.size(), 13u);  // the longest edge passes through corners of three
+  EXPECT_EQ(sums.size(), 13u);  // 10 cells, and 3 that only touch the longest edge at a corner
   EXPECT_EQ(sums.at({0, 0, 0}).weight, 1024u);
   EXPECT_EQ(color_of(sums.at({0, 0, 0})), (Color{{188, 255, 255}, 255}));
 }

@@ -40,7 +40,7 @@ std::vector<std::vector<Color>> many_blocks(size_t count) {
   return blocks;
 }
 
-// The same bytes as ever.
+// The encoder must always write the same bytes.
 TEST(BlockCodec, GoldenDigest) {
   uint64_t digest = 0;
   for (const auto& block : many_blocks(4000))

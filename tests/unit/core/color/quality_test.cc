@@ -1,5 +1,5 @@
-// Compares the rule's colors, and the stored colors, with the oracle's mean color of the surface in
-// each cell. The bounds are up to 1 dB below the measured values.
+// Compares the baked colors (the rule), and the colors stored in blocks, with the oracle's mean
+// color of the surface in each cell. The bounds are up to 1 dB below the measured values.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -63,7 +63,7 @@ struct Sheet {
   }
 };
 
-// The same things in the oracle's terms.
+// The sheet and its image in the oracle's types.
 struct OracleScene {
   OracleScene(const Sheet& sheet, const TestImages& images) {
     const TestLevel& from = images.image(0);
@@ -91,7 +91,7 @@ struct OracleScene {
       }
     }
   }
-  // Those whose boxes reach the cube.
+  // Returns the surfaces whose bounding boxes reach the cube.
   std::vector<const oracle::Surface*> near(const oracle::Point& low, int64_t edge) const {
     std::vector<const oracle::Surface*> out;
     for (const oracle::Surface& surface : surfaces) {
@@ -199,7 +199,7 @@ TEST_F(ColorOracle, WeighsByAreaInLinearLight) {
   blue.factor = {0, 0, 1, 1};
   add(-800, 64, red);
   add(64, 5000, blue);
-  EXPECT_EQ(mean(), (Bytes{137, 0, 225}));  // of 1/4 and 3/4
+  EXPECT_EQ(mean(), (Bytes{137, 0, 225}));  // 1/4 red, 3/4 blue
   blue.factor[3] = 1.0 / 3;
   blue.transparency = oracle::Transparency::kBlend;
   EXPECT_EQ(mean(), (Bytes{188, 0, 188}));
@@ -233,7 +233,7 @@ TEST_F(ColorOracle, HasNoColorWithoutArea) {
 
 constexpr ColorGrid kFine{5, 5}, kCoarse{11, 5};
 
-// From a fifth of a texel along a cell's edge to 10.
+// The textures have from 0.2 to 10 texels along the edge of a cell.
 TEST_F(ColorQuality, OfTextures) {
   for (const ColorGrid grid : {kFine, kCoarse}) {
     SCOPED_TRACE(grid.levels);
@@ -244,7 +244,8 @@ TEST_F(ColorQuality, OfTextures) {
   }
 }
 
-// At the border of an image, the coarser levels of its pyramid are less sharp than the image.
+// At the border of an image, the coarser levels of its pyramid are less sharp than the image, so
+// the bounds are lower.
 TEST_F(ColorQuality, OfBorders) {
   for (const Wrap wrap : {Wrap::kClampToEdge, Wrap::kMirroredRepeat}) {
     Material material = textured();

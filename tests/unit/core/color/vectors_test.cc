@@ -1,5 +1,5 @@
-// Compares the rule's vector code with plain code, and its divisions in doubles with divisions of
-// integers.
+// Compares the vector code that bakes colors with plain code, and its divisions in doubles with
+// divisions of integers.
 #include <gtest/gtest.h>
 
 #include "core/color/color_of.h"
@@ -16,7 +16,7 @@ TEST(ColorVectors, ColumnsAreThoseOfPlainCode) {
   for (int i = 0; i < 50000; ++i) {
     const int64_t most = int64_t{1} << random.between(0, 59);
     const int64_t a = random.between(-most, most), b = random.between(-most, most);
-    // Often exactly 0 at a column.
+    // In half of the rounds, the value is within 1 of 0 at a column.
     const int64_t first = -a * random.between(0, 3) - b * random.between(0, 3) +
                           (random.coin() ? random.between(-1, 1) : random.between(-most, most));
     const uint32_t columns = color::negative_columns(first, a, b);
@@ -102,7 +102,7 @@ TEST(ColorVectors, StoredColorsAreThoseOfTheDefinition) {
     sum.seen_weight = sum.weight * alpha;
     for (size_t c = 0; c < 3; ++c) {
       const uint64_t threshold = kThresholds.of[random.between(0, 255)];
-      // Half a unit below the threshold, or one part less.
+      // The mean is exactly half a unit below the threshold, or slightly less.
       const uint64_t twice = 2 * threshold - 1;
       const uint64_t less = random.coin() ? 1 : 0;
       sum.plain[c] = sum.weight / 2 * twice - less;

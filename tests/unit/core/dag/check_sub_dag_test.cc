@@ -28,7 +28,7 @@ SubDag right_one(int hash_bits) {
                             kGridLevels);
 }
 
-// Where the children of node i begin.
+// Returns the index of node i's first child in `nodes.children`.
 size_t first_child(const SubDag::Nodes& nodes, size_t i) {
   size_t at = 0;
   for (size_t k = 0; k < i; ++k) at += static_cast<size_t>(popcount64(nodes.masks[k]));
@@ -53,7 +53,7 @@ uint64_t right_hash(const SubDag& dag, size_t level, size_t i, uint32_t bits) {
 
 struct Damage {
   const char* what;
-  const char* message;  // a part of the error's
+  const char* message;  // a part of the error message
   std::function<void(SubDag&)> apply;
 };
 
@@ -110,7 +110,7 @@ void expect_corrupt(const SubDag& dag, uint32_t bits, const std::string& part) {
   }
 }
 
-// Every invariant, broken on its own, is found and named.
+// Each damage breaks one invariant. The error names this invariant.
 TEST(CheckSubDag, FindsEachBrokenInvariant) {
   const SubDag right = right_one(64);
   ASSERT_NO_THROW(check_sub_dag(right, shape_of(64)));
@@ -122,7 +122,7 @@ TEST(CheckSubDag, FindsEachBrokenInvariant) {
   }
 }
 
-// With 4 hash bits many nodes have equal hashes. They must be in the order of mask and children.
+// With 4 hash bits, many bricks have equal hashes. Such bricks must be in the order of their masks.
 TEST(CheckSubDag, KnowsTheOrderOfTies) {
   const SubDag right = right_one(4);
   ASSERT_NO_THROW(check_sub_dag(right, shape_of(4)));

@@ -18,7 +18,8 @@ int compare(const Node& a, const Node& b) {
   return compare_nodes(a.hash, a.mask, a.children.data(), b.hash, b.mask, b.children.data());
 }
 
-// Hash before mask before children, children from the first one on, all as unsigned numbers.
+// The order compares hashes, then masks, then children from the first to the last, all as unsigned
+// numbers.
 TEST(TotalOrder, ComparesHashMaskChildren) {
   const std::vector<Node> sorted = {{0, 0x80, {9}},
                                     {1, 0x01, {7}},
@@ -38,7 +39,7 @@ TEST(TotalOrder, ComparesHashMaskChildren) {
     }
 }
 
-// Children beyond the mask's count are not looked at.
+// Children beyond the number of bits in the mask are ignored.
 TEST(TotalOrder, StopsAtTheLastChild) {
   EXPECT_EQ(compare({5, 0x11, {1, 2, 3}}, {5, 0x11, {1, 2, 4}}), 0);
   const uint32_t a[] = {1, 2}, b[] = {1, 3};

@@ -39,7 +39,7 @@ bool is_number(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
 }
 
-// The bytes that a hexdump in a document stands for.
+// Returns the bytes of the hexdump in a document.
 ByteString parse_hexdump(const std::vector<std::string>& lines) {
   ByteString bytes;
   bool inside = false, repeat = false;
@@ -51,7 +51,7 @@ ByteString parse_hexdump(const std::vector<std::string>& lines) {
     while (repeat && bytes.size() < offset) bytes += bytes.substr(bytes.size() - 16);
     repeat = false;
     EXPECT_EQ(bytes.size(), offset) << line;
-    // Three columns a byte, with one more blank in the middle.
+    // Each byte takes three columns. There is one more blank in the middle.
     std::istringstream digits(line.substr(8, 51));
     for (std::string byte; digits >> byte;)
       bytes += static_cast<char>(std::stoul(byte, nullptr, 16));
@@ -99,7 +99,7 @@ TEST(FormatDocTest, HeaderTableIsTheLayout) {
   EXPECT_EQ(found, fields);
 }
 
-// The test vectors of the node hash.
+// The code gives the test vectors of the node hash in docs/format.md.
 TEST(FormatDocTest, NodeHashVectorsHold) {
   const uint64_t one = hash_brick(1), all = hash_brick(~uint64_t{0});
   const uint64_t two[] = {one, all}, eight[] = {all, all, all, all, all, all, all, all};
@@ -122,7 +122,7 @@ TEST(FormatDocTest, NodeHashVectorsHold) {
   EXPECT_THAT(found, testing::ElementsAreArray(expected));
 }
 
-// docs/errors.md is the table of core/base/error.cc.
+// docs/errors.md has the same table as core/base/error.cc.
 TEST(ErrorsDocTest, TableIsThatOfTheCode) {
   std::map<std::string, std::pair<int, int>> documented, coded;
   for (const std::string& line : lines_of("errors.md")) {

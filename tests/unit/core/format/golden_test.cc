@@ -39,7 +39,7 @@ TEST(GoldenTest, SceneIsRead) {
         EXPECT_EQ(file->voxel(x, y, z), y == 0 || (x == 0 && z == 0)) << x << y << z;
 }
 
-// One kind of damage each, and the error that is reported.
+// Each variant has one kind of damage. The error names it.
 TEST(GoldenTest, CorruptVariantsAreNamed) {
   struct Variant {
     const char* what;
@@ -74,7 +74,7 @@ TEST(GoldenTest, CorruptVariantsAreNamed) {
               testing::HasSubstr("the file has 12000 bytes, expected 12296"));
 }
 
-// A segment as an earlier build, and its zstd, left it.
+// A segment that an earlier voxdag wrote, with its version of zstd, remains readable.
 TEST(GoldenTest, SegmentIsRead) {
   ArtifactRef ref;
   ref.offset = 32;

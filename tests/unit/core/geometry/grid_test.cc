@@ -144,7 +144,7 @@ TEST(GridLimits, AGridOutOfTheRangeOfDoublesIsRefused) {
   EXPECT_TRUE(std::isfinite(Grid::with_voxel_size({}, 1e304, 10).origin[0]));
 }
 
-// Four to 2^20 voxels per edge, powers of two only.
+// Resolutions are powers of two from 4 to 2^20 voxels per edge.
 TEST(Grid, ResolutionsAreLimited) {
   for (uint32_t levels = 2; levels <= 20; ++levels) {
     EXPECT_EQ(levels_of_resolution(uint64_t{1} << levels), levels);

@@ -7,7 +7,7 @@
 namespace voxdag {
 namespace {
 
-// The definition, bit by bit.
+// Interleaves the bits one by one, as in the definition.
 uint64_t interleave(uint32_t x, uint32_t y, uint32_t z) {
   uint64_t code = 0;
   for (int i = 20; i >= 0; --i)

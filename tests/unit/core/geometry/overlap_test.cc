@@ -41,7 +41,7 @@ Box box_near(const Triangle& t, Random& random) {
   box.edge = 256 << random.between(0, random.coin() ? 2 : 8);
   const int64_t a = random.between(0, 1024), b = random.between(0, 1024 - a), c = 1024 - a - b;
   for (int k = 0; k < 3; ++k) {
-    // Fits: coordinates are below 2^40, weights at most 2^10.
+    // The sum fits in 64 bits: coordinates are below 2^40, weights at most 2^10.
     const int64_t at = (a * t[0][k] + b * t[1][k] + c * t[2][k]) / 1024;
     const int64_t cell = (at & ~(box.edge - 1)) + box.edge * random.between(-1, 1);
     box.low[k] = std::clamp(cell, -(int64_t{1} << 40), (int64_t{1} << 40) - box.edge);

@@ -49,7 +49,7 @@ TEST(Jpeg, CmykIsRefused) {
   EXPECT_THAT(problem_of(jpeg_file(16, 16, 4, gradient(16, 16, 4))), HasSubstr("CMYK"));
 }
 
-// A few hundred bytes for each pass over all coefficients.
+// A scan of a few hundred bytes costs a pass over all coefficients, so the number is limited.
 TEST(Jpeg, ManyScans) {
   const std::string pixels = gradient(48, 40, 3);
   expect_gradient(jpeg_of_scans(48, 40, pixels, 1), 48, 40, 3);
@@ -191,13 +191,13 @@ TEST(Png, HugeSizes) {
   EXPECT_THAT(problem_of(claiming(0x7fffffff, 2, false)), HasSubstr("2147483647 x 2 pixels"));
   EXPECT_THAT(problem_of(claiming(65535, 65535, false)), HasSubstr("65535 x 65535 pixels"));
   EXPECT_THAT(problem_of(claiming(0, 2, false)), HasSubstr("PNG"));
-  // Within the limits; there is less than that.
+  // The size is within the limits, but the file has fewer pixels.
   EXPECT_THAT(problem_of(claiming(16384, 16384, false)), HasSubstr("broken PNG"));
   EXPECT_THROW(decode(claiming(16384, 16384, true)), Error);
 }
 
-// Megabytes that compress to a thousandth of their size: surplus rows after the image, and
-// compressed texts.
+// Megabytes that compress to a thousandth of their size need only little memory: surplus rows after
+// the image, and compressed texts.
 TEST(Png, DecompressionBombs) {
   std::string rows = png_file({2, 512, 8, 6, ""}, std::string(4 << 20, '\0'));
   rows.replace(8, 25,
@@ -300,7 +300,7 @@ TEST(Images, DamagedAnywhere) {
   }
 }
 
-// What the source throws passes through the decoders.
+// Errors of the source pass through the decoders.
 TEST(Images, ErrorsOfTheSource) {
   struct Failing : StringSource {
     using StringSource::StringSource;

@@ -5,7 +5,7 @@
 namespace voxdag {
 namespace {
 
-// Like dirname(1).
+// parent_directory() gives the same results as dirname(1).
 TEST(ParentDirectory, IsThatOfDirname) {
   const struct {
     const char *path, *parent;

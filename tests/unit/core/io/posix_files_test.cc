@@ -115,7 +115,7 @@ TEST_F(PosixFiles, MissingThingsAreNotFound) {
   EXPECT_FALSE(files_.exists(gone));
 }
 
-// A file in the place of a folder, and the other way round.
+// A file in the place of a folder is an error, and a folder in the place of a file.
 TEST_F(PosixFiles, FilesAreNotFolders) {
   put(path_, "x");
   EXPECT_FALSE(files_.exists(path_ + "/below"));
@@ -206,7 +206,7 @@ TEST_F(PosixFiles, LocksAreExclusive) {
   expect_error(ErrorCode::kNotFound, "gone", [&] { files_.try_lock(folder_.file("gone/lock")); });
 }
 
-// Who may only read can see whether a file is locked.
+// A process that may only read a file can see whether the file is locked.
 TEST_F(PosixFiles, LocksAreVisible) {
   put(path_, "holder");
   EXPECT_FALSE(files_.is_locked(path_));
@@ -275,7 +275,7 @@ TEST_F(PosixFiles, IdentityTellsAChange) {
   const auto identity = [&] { return files_.open_read(path_)->identity(); };
   const FileIdentity first = identity();
   EXPECT_EQ(first.bytes, 5u);
-  // Longer than the clock of the times stands still.
+  // Waits longer than one tick of the clock of file times.
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_EQ(identity(), first);
   const auto time = std::filesystem::last_write_time(path_);

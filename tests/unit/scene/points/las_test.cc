@@ -1,4 +1,4 @@
-// LAS files made by the tests: every version and point format, and the errors of broken files.
+// Reads LAS files made here: every version and point format, and broken files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ TEST(Las, EveryVersionAndPointFormat) {
       }
 }
 
-// LAS 1.4 has a 64-bit count, and some programs set only the 32-bit count.
+// LAS 1.4 has a 64-bit count of points, but some programs set only the old 32-bit count.
 TEST(Las, EitherCountSuffices) {
   for (const bool has_old : {true, false}) {
     LasBuilder las;
@@ -48,13 +48,13 @@ TEST(Las, EitherCountSuffices) {
   }
 }
 
-// The light of an sRGB value from 0 to 1.
+// Returns the linear light, from 0 to 65535, of an sRGB value from 0 to 1.
 uint16_t light_of(double v) {
   const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
   return static_cast<uint16_t>(std::lround(linear * 65535));
 }
 
-// Colors have 16 bits. If no color exceeds 255, they have 8.
+// Full intensity of a color is 65535, or 255 if no color of the file exceeds 255.
 TEST(Las, ColorsOfSixteenAndOfEightBits) {
   using Color = std::array<uint16_t, 4>;
   for (const uint8_t format : {2, 3, 5, 7, 8, 10}) {
@@ -76,7 +76,8 @@ TEST(Las, ColorsOfSixteenAndOfEightBits) {
             (Color{65535, 65535, 65535, 65535}));
 }
 
-// Withheld points are left out and counted, wherever they are. Any range of the others can be read.
+// The scene leaves out withheld points, and a warning counts them. Any range of the other points
+// can be read.
 TEST(Las, WithheldPointsAreLeftOut) {
   for (const uint8_t format : {0, 6}) {
     LasBuilder las;
@@ -133,7 +134,7 @@ TEST(Las, TruncatedFilesAreRefused) {
   }
 }
 
-// Changes one number of a valid header, and returns the message.
+// Changes one number of a valid header, and returns the error message.
 template <class T>
 std::string message_with(size_t offset, T value, uint8_t minor = 4) {
   LasBuilder las;
@@ -162,7 +163,7 @@ TEST(Las, BrokenHeadersAreNamed) {
   EXPECT_THAT(message_with<double>(155, HUGE_VAL), HasSubstr("offset of X"));
 }
 
-// A scale that makes coordinates infinite is an error of these points only.
+// Only points whose coordinates the scale makes infinite are invalid.
 TEST(Las, PointsThatAreNotFiniteAreNamedOrSkipped) {
   LasBuilder las;
   las.scale[1] = std::numeric_limits<double>::max();

@@ -47,8 +47,8 @@ TEST(Points, InvalidPointsAreNamedOrSkipped) {
   EXPECT_EQ(open.triangles().size(), 2u);
 }
 
-// The triangles are a closed surface: each edge is there once in each direction. Their volume is
-// the cube's.
+// The triangles form a closed surface: each edge occurs once in each direction. They enclose the
+// volume of the cube.
 TEST(Points, CubeIsClosedAndFacesOutward) {
   OpenScene open("1 2 3\n", {.point_radius = 0.5});
   const auto triangles = open.triangles();
@@ -73,8 +73,8 @@ TEST(Points, CubeIsClosedAndFacesOutward) {
   EXPECT_EQ(bounds.high, (std::array{1.5, 2.5, 3.5}));
 }
 
-// Any range of triangles can be read, also a part of a cube. Snapped triangles are the snapped
-// vertices.
+// Any range of triangles can be read, even a part of a cube. read_snapped() gives the same
+// triangles with snapped vertices.
 TEST(Points, RangesOfCubes) {
   std::string file;
   for (int i = 0; i < 3000; ++i)

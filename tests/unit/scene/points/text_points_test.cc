@@ -53,7 +53,7 @@ TEST(TextPoints, CommentsBlankLinesAndByteOrderMark) {
 TEST(TextPoints, HeaderLineNamesColumns) {
   EXPECT_EQ(points_of("id,Z,\"X\",y,note\n1,30000,0.1,-2,a\n2,6,4,5.5,\"b, c\"\n"), kTwo);
   EXPECT_EQ(points_of("note;x;y;z\n\"a;b\";0.1;-2;3e4\n;4;5.5;6\n"), kTwo);
-  // A header line without points.
+  // The only row has no line end.
   EXPECT_EQ(points_of("x,y,z\n1,2,3").size(), 1u);
 }
 
@@ -66,7 +66,7 @@ TEST(TextPoints, GivenColumns) {
         << columns;
 }
 
-// Decimal commas must not become separators.
+// Bad rows are refused with line and reason, or skipped. Rows with decimal commas are bad.
 TEST(TextPoints, BadRowsAreNamedOrSkipped) {
   const auto check = [](const std::string& row, const std::string& message) {
     const std::string file = "# comment\r\n1 2 3\r\n\r\n" + row + "\r\n4 5 6\r\n";
@@ -91,7 +91,7 @@ TEST(TextPoints, LongLinesAreRefused) {
   EXPECT_EQ(points_of("1 2 3\n4 5 6 " + std::string(1000000, '1')).size(), 2u);
 }
 
-// The light of an sRGB value from 0 to 1.
+// Returns the linear light, from 0 to 65535, of an sRGB value from 0 to 1.
 uint16_t light_in_text(double v) {
   const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
   return static_cast<uint16_t>(std::lround(linear * 65535));
@@ -106,10 +106,10 @@ TEST(TextPoints, Colors) {
   const Color white{65535, 65535, 65535, 65535};
   EXPECT_EQ(color_of("1 2 3 255 0 10\n"), (Color{65535, 0, light_in_text(10 / 255.0), 65535}));
   EXPECT_EQ(color_of("1 2 3 1.0 0 0.5\n"), (Color{65535, 0, light_in_text(0.5), 65535}));
-  // Without a decimal point, 1 is one of 255.
+  // Without a decimal point, 1 means 1/255 of full intensity.
   EXPECT_EQ(color_of("1 2 3 1 0 0\n"), (Color{light_in_text(1 / 255.0), 0, 0, 65535}));
   EXPECT_EQ(color_of("1 2 3 0.5 0 0\n1 2 3 2 0 0\n")[0], light_in_text(0.5 / 255));
-  // Normals and other numbers are no colors. Only six columns are taken for colors.
+  // Normals and other numbers are not colors. Without names, only six columns may have colors.
   EXPECT_EQ(color_of("1 2 3 0 0 1\n1 2 3 0 -1 0\n"), white);
   EXPECT_EQ(color_of("1 2 3 0 0 300\n"), white);
   EXPECT_EQ(color_of("1 2 3 0 0 0 0\n"), white);
@@ -120,7 +120,7 @@ TEST(TextPoints, Colors) {
   EXPECT_THAT(message_of("1 2 3 0 0 0\n4 5 6 1 2 red\n"), HasSubstr("\"red\" in column 6 (b)"));
 }
 
-// Windows and blocks of rows: any range of rows is read, and a line may cross windows.
+// Any range of rows can be read, in a file with many blocks of rows and several windows.
 TEST(TextPoints, ManyRowsFromAnyRowOn) {
   std::string file = "x,y,z\n";
   for (int i = 0; i < 40000; ++i) {
@@ -143,14 +143,14 @@ TEST(TextPoints, ManyRowsFromAnyRowOn) {
   }
 }
 
-// The contents decide, and a file of another format is not taken for points.
+// The name has no ending here, so the contents decide: other text files are refused.
 TEST(TextPoints, OtherTextFilesAreRefused) {
   for (const char* file : {"v 1 2 3\nf 1 2 3\n", "OFF\n8 6 12\n0 0 0\n", "# .PCD v.7\nVERSION .7\n",
                            "1 2\n3 4\n", "version https://git-lfs\n", "x,y,z\na,b,c\n", "", "\n\n"})
     EXPECT_THAT(message_of(file), HasSubstr("folder/scene: ")) << file;
 }
 
-// The name decides for a text whose first row is bad.
+// A text whose first row is bad is read as points because of its ending.
 TEST(TextPoints, EndingsMakeTextAFileOfPoints) {
   for (const char* name : {"a.xyz", "a.TXT", "b.csv"}) {
     MemoryFiles files;

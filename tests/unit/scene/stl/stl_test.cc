@@ -1,4 +1,4 @@
-// STL files made here, binary and ASCII.
+// Reads STL files made here, binary and ASCII.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

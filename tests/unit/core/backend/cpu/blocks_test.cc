@@ -101,7 +101,7 @@ TEST_F(Memos, FindWholeBlocksOnly) {
       if (memo.find(key_of(block), block)) continue;
       memo.insert(key_of(block), block, {word(), i, 1, 1});
       const BlockMemo::Node* found = memo.find(key_of(block), block);
-      // Growing may have moved it to the slot of its block_key().
+      // If the memo grew, it moved the block to the slot of its block_key().
       if (found == nullptr) found = memo.find(block_key(block), block);
       ASSERT_NE(found, nullptr) << i;
       ASSERT_EQ(found->id, i);

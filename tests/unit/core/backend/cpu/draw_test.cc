@@ -46,8 +46,8 @@ TEST(Draw, WideEqualsOracle) {
   EXPECT_GT(wide_ones, 50);
 }
 
-// Planes that pass exactly through voxel corners, or miss them by very little, where heights in
-// fixed point are ambiguous: slopes that are ratios of small numbers, at every offset.
+// The kernels equal the oracle even where heights in fixed point are ambiguous: for planes that
+// pass through voxel corners or just miss them. Their slopes are ratios of small numbers.
 TEST(Draw, AmbiguousHeightsAreExact) {
   oracle::Random random(2);
   const oracle::Region region{{512, 1024, 4096}, 16};
@@ -73,8 +73,9 @@ TEST(Draw, AmbiguousHeightsAreExact) {
   }
 }
 
-// The bounds that edges give are computed in doubles. The tests use edges of every length, also
-// parallel to an axis, that pass through voxel corners or miss them by very little.
+// The kernels compute the bounds from edges in doubles, but equal the oracle even for edges that
+// pass through voxel corners or just miss them. The edges have every length; some are parallel to
+// an axis.
 TEST(Draw, AmbiguousEdgesAreExact) {
   oracle::Random random(4);
   const int64_t middle = int64_t{1} << 19;

@@ -1,5 +1,5 @@
-// Compares the two DAG constructions, and tests the verification sweep that makes the second one
-// exact.
+// Compares the DAG constructions by pointers and by hashes, and tests the verification sweep that
+// makes the construction by hashes exact.
 #include <gtest/gtest.h>
 
 #include "core/backend/parallel/dag/dag_by_hashes.h"

@@ -48,7 +48,7 @@ TEST_P(HostSpaceTest, ScanGivesExclusiveSumsAndTheTotal) {
     std::vector<uint32_t> counts(n);
     for (uint32_t& c : counts) c = static_cast<uint32_t>(random() % 9);
     auto buffer = filled(counts, 1);
-    buffer.data()[n] = 12345;  // what stands there does not matter
+    buffer.data()[n] = 12345;  // scan() overwrites this element with the total
     space.scan(buffer.data(), n);
     counts.push_back(0);
     std::exclusive_scan(counts.begin(), counts.end(), counts.begin(), 0u);

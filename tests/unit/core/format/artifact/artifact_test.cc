@@ -70,7 +70,7 @@ TEST_F(ArtifactTest, ChildIndicesOfFourBytesComeBack) {
   MemoryBudget budget(uint64_t{1} << 30);
   SegmentWriter segment(system_files(), folder_.path(), 0, budget);
   ArtifactWriter writer(segment, {.grid_levels = 10, .hash_bits = 4});
-  // With 4 bits all of these have hash 0 only if chosen so; the first `count` masks that do.
+  // The bricks are the first `count` masks whose 4-bit hash is 0.
   writer.begin_level(8);
   std::vector<uint64_t> masks;
   uint64_t written = 0;
@@ -95,7 +95,7 @@ TEST_F(ArtifactTest, ChildIndicesOfFourBytesComeBack) {
   EXPECT_EQ(frame.children, children);
 }
 
-// A level may be appended in pieces of any size.
+// A level may be appended in pieces of any size. The artifact has the same bytes.
 TEST_F(ArtifactTest, PiecesMakeTheSameArtifactAsAWhole) {
   const SubDag dag = random_rows(3, 10000, 9, 1, 64);
   SegmentWriter segment(system_files(), folder_.path(), 0, budget_);

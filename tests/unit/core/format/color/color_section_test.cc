@@ -136,7 +136,7 @@ TEST_F(ColorSectionTest, LargeSumsDoNotOverflow) {
     all.add(gray(kBright, 32));
     for (uint32_t level = 2; level <= levels; ++level)
       EXPECT_EQ(file->color(0, 0, 0, level)->g, dust) << level;
-    const int half_step = (bright - dark + 13) / 14;  // of the colors in a block
+    const int half_step = (bright - dark + 13) / 14;  // half a step between the colors of a block
     EXPECT_NEAR(file->color(0, 0, 0, 1)->g, dust, half_step);
     EXPECT_NEAR(file->color(0, 0, 1, 1)->g, dark, half_step);
     EXPECT_NEAR(file->color(1, 1, 1, 1)->g, bright, half_step);

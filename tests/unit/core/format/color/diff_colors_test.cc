@@ -1,5 +1,5 @@
-// Compares the differences of colors with a comparison of all colors of both files, decoded by
-// independent code.
+// Compares diff_colors() with a comparison of all colors of both files, decoded by independent
+// code.
 #include "core/format/global/diff_colors.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ class DiffColors : public testing::Test {
     const auto a = open_global_file(path("a.vdag")), b = open_global_file(path("b.vdag"));
     return diff_colors(*a, *b, threads, CancelToken());
   }
-  // By brute force.
+  // Returns the expected differences, by brute force.
   ColorDiff expected(const ColoredScene& a, const ColoredScene& b) const {
     const ByteString bytes_a = read_bytes(path("a.vdag")), bytes_b = read_bytes(path("b.vdag"));
     const SectionDecoder in_a(bytes_a, a), in_b(bytes_b, b);

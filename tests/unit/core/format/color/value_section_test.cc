@@ -27,7 +27,7 @@ class ValueSectionTest : public testing::Test {
     verify_global_file(*open_global_file(path), 2, budget, progress, {}, narrow_words);
   }
 
-  // What a reader finds, as the number that is stored.
+  // Returns the stored number that a reader finds; nullopt for a cell that is not set.
   static std::optional<uint32_t> value_in(const voxdag_reader::File& file, Attribute attribute,
                                           const uint32_t (&at)[3], uint32_t level) {
     uint64_t i;
@@ -99,7 +99,7 @@ TEST_F(ValueSectionTest, MaterialsAreAsWideAsTheyMustBe) {
   for (const size_t count : {1u, 256u, 257u, 65536u, 65537u}) check(scene, materials, count);
 }
 
-// Any of them, with and without colors and wide levels.
+// A file can have any set of attributes, with and without wide levels.
 TEST_F(ValueSectionTest, AreIndependent) {
   const ColoredScene scene{7, 6, random_codes(4, 7, 300), smooth_colors(6, 4)};
   for (int bits = 1; bits < 16; ++bits) {
@@ -206,7 +206,7 @@ TEST_F(ValueSectionTest, DamageIsAnError) {
   EXPECT_GT(found, 100u);
 }
 
-// What a section says of itself must fit.
+// The entries of the attribute table must match the sections and the DAG.
 TEST_F(ValueSectionTest, SectionsThatDoNotFitAreRefused) {
   const ColoredScene scene{3, 3, random_codes(2, 3, 60), smooth_colors(3, 60)};
   write_valued(path_, scene, kValues, 3);

@@ -47,7 +47,7 @@ TEST_F(DiffTest, CountsTheVoxelsThatDiffer) {
     }
 }
 
-// One voxel more, in a large scene of shared parts.
+// The second file has one voxel more, in a large scene of shared parts.
 TEST_F(DiffTest, FindsASingleVoxel) {
   oracle::Voxels voxels = random_voxels(1, 128);
   write_global(a_, voxels);

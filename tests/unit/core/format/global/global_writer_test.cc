@@ -101,7 +101,7 @@ TEST_F(GlobalWriterTest, OrderAndThreadsDoNotShow) {
   EXPECT_EQ(read_bytes(path_), bytes);
 }
 
-// No voxels: a header and nothing else.
+// The file of a scene without voxels has only the header page.
 TEST_F(GlobalWriterTest, EmptySceneIsAHeaderPage) {
   EXPECT_EQ(write_global(path_, oracle::Voxels(16)).bytes, kPageBytes);
   EXPECT_EQ(read_bytes(path_).size(), kPageBytes);
@@ -243,7 +243,7 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
   EXPECT_EQ(error_of([&] { writer.resume(saved); }).code(), ErrorCode::kCorrupt);
 }
 
-// A level of over 2^32 words is a limit error that names the level, at every place where the size
+// A level of over 2^40 words is a limit error that names the level, at every place where the size
 // is checked.
 TEST_F(GlobalWriterTest, LevelsOverTheLimitAreRefused) {
   GlobalFileWriter writer(system_files(), path_, grid_of(16), 64);

@@ -1,4 +1,4 @@
-// For any words, the index of a level that is made from several spans equals the index of a single
+// For any words, an index that is made from several spans of a level equals the index of a single
 // walk.
 #include "core/format/global/node_index.h"
 
@@ -20,7 +20,7 @@ struct Walked {
 
 class NodeIndexTest : public testing::TestWithParam<Pointers> {
  protected:
-  // Nodes of random masks, whose pointers are below `limit`.
+  // Returns nodes with random masks and with pointers below `limit`.
   Walked random_level(uint64_t seed, size_t nodes, uint32_t limit) const {
     std::mt19937_64 random(seed);
     Walked level;
@@ -68,7 +68,8 @@ TEST_P(NodeIndexTest, LevelsOfSeveralSpans) {
   for (const size_t nodes : {1u, 5u, 100'000u}) expect_index(random_level(nodes, nodes, ~0u));
 }
 
-// Nearly every word looks like a child mask, so guessed starts of spans are often wrong.
+// Nearly every word looks like a child mask, so guessed starts of spans are often wrong. The index
+// must be right nevertheless.
 TEST_P(NodeIndexTest, PointersThatLookLikeMasks) { expect_index(random_level(1, 100'000, 256)); }
 
 // With any number of threads, the message is about the first wrong word.

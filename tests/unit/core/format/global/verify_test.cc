@@ -103,7 +103,7 @@ TEST_F(VerifyTest, TrailingBytesAreCaught) {
   }
 }
 
-// A block in the middle of a large file is named.
+// The error names the damaged block in the middle of a large file.
 TEST_F(VerifyTest, DamagedBlockIsNamed) {
   oracle::Random random(1);
   oracle::Voxels noise(128);
@@ -136,7 +136,7 @@ void add_lonely_brick(oracle::Dag& dag) {
     for (uint32_t& child : node.children) child += child >= at;
 }
 
-// The root without its last child as one more root.
+// Adds a second root: a copy of the root without its last child.
 void add_second_root(oracle::Dag& dag) {
   std::vector<oracle::Node>& roots = dag.levels.back();
   oracle::Node root = roots[0];
@@ -193,8 +193,8 @@ INSTANTIATE_TEST_SUITE_P(
         BrokenDag{"octree nodes counted", [](auto& dag) { --dag.svo_nodes; },
                   "octree nodes, the DAG has "}));
 
-// Word offsets of children that are within the level but not at the start of a node, or that are
-// beyond the level.
+// The error names a child whose word offset is within a node of the next level, or beyond this
+// level.
 TEST_F(VerifyTest, ChildrenThatBeginNoNodeAreNamed) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(7, 32), 64);
   for (const uint32_t offset : {1u, 1000000u, 0xffffffffu}) {
@@ -210,7 +210,7 @@ TEST_F(VerifyTest, ChildrenThatBeginNoNodeAreNamed) {
   }
 }
 
-// Bytes that must be zero, with right checksums.
+// The error names a byte that must be zero but is not, even if all checksums are right.
 TEST_F(VerifyTest, NonZeroReservedBytesAndPaddingAreCaught) {
   write_global(path_, random_voxels(5, 8));
   const ByteString bytes = read_bytes(path_);

@@ -111,7 +111,7 @@ TEST_F(WideFileTest, OtherThresholdsAreNotCanonical) {
               MatchesRegex(".*level 1: pointers of 32 bits into [0-9]+ words, expected 64"));
 }
 
-// The high half of a pointer counts.
+// A wide pointer is the low word plus 2^32 times the high word.
 TEST(WideNodeTest, HasPointersOfTwoWords) {
   const uint32_t words[] = {5, 255, 7, 0};
   const voxdag_reader::Node node{0x82, words, true};
@@ -125,14 +125,14 @@ TEST(WideNodeTest, HasPointersOfTwoWords) {
 TEST_F(WideFileTest, VersionAndFeaturesBelongTogether) {
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{0}).message(),
               HasSubstr("pointers of 64 bits, expected 32"));
-  // What version 1 has reserved is not 0.
+  // The file has bytes other than 0 that are reserved in version 1.
   EXPECT_EQ(error_with(kVersionAt, uint32_t{1}).code(), ErrorCode::kCorrupt);
   make_narrow();
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{1}).message(), HasSubstr("reserved"));
   EXPECT_EQ(error_with(kVersionAt, uint32_t{2}).code(), ErrorCode::kCorrupt);
 }
 
-// A level of more words than pointers of 32 bits can count.
+// A level may not have more words than its pointers can address.
 TEST_F(WideFileTest, NarrowPointersReachTwoToThe32) {
   const size_t bricks = kLevelsAt + kBrickLevel * kLevelEntryBytes;
   EXPECT_THAT(error_with(bricks + 16, (uint64_t{1} << 40) + 1).message(),
