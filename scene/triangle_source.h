@@ -47,8 +47,8 @@ class TriangleCursor {
   virtual WorldBounds read_bounds(uint64_t first, uint64_t count);
 };
 
-// The place where an image of a scene is stored. The image should be a PNG or JPEG, but
-// open_scene() does not check this. The range [offset, offset + size) of `file` holds bytes, or
+// The place where an image of a scene is stored. open_scene() does not read the image, so the image
+// may be damaged or of any format. The range [offset, offset + size) of `file` holds bytes, or
 // base64 characters that encode bytes. The first `skip` of these bytes do not belong to the image.
 // The following `bytes` bytes are the image.
 struct ImageSource {

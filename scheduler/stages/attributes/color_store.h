@@ -51,9 +51,9 @@ class ColorStore {
   void read(const Place& place, std::vector<std::byte>& out) const;
   // Adds part `number`, counted from 0. Also throws the error of an earlier background sync.
   Place add(const Checksum128& key, uint64_t number, bool is_last, std::span<const std::byte> part);
-  // Removes artifacts with other keys if they take more space than artifacts with these keys and 64
-  // KiB. Does not remove them if the disk has no space for a copy of the file. Call it before
-  // add(). An interruption leaves the old or the new file, both complete.
+  // Removes artifacts with other keys if they take more space than the artifacts with these keys
+  // plus 64 KiB. Does not remove them if the disk has no space for a copy of the file. Call it
+  // before add(). An interruption leaves the old or the new file, both complete.
   void keep_only(std::span<const Checksum128> keys, const CancelToken& cancel);
   // Bytes of the file.
   uint64_t file_bytes() const;

@@ -1,6 +1,6 @@
 // The dense top tree. It stores for every cell of a coarse level the number of triangles that touch
-// the cell and their expected work. These counters decide which cubes of the grid become
-// subvolumes. Threads fill separate tallies, which are added to the tree serially.
+// the cell, and the cell's share of their expected work. These counters decide which cubes of the
+// grid become subvolumes. Threads fill separate tallies, which are added to the tree serially.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ ExpectedWork expected_work(const SnappedTriangle& triangle);
 
 struct SubvolumePlan {
   Cube cube;
-  double weight = 0;       // sum of the expected bricks of each triangle
+  double weight = 0;       // expected bricks; a triangle's are divided among the cells it touches
   uint64_t triangles = 0;  // upper bound of the triangles that touch the cube
 };
 

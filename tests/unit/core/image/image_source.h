@@ -29,7 +29,7 @@ struct StringSource : EncodedBytes {
 struct Decoded {
   uint32_t width = 0, height = 0;
   int bits = 0;
-  std::vector<uint16_t> channels;  // four of each pixel
+  std::vector<uint16_t> channels;  // four per pixel
   std::array<uint16_t, 4> at(uint32_t x, uint32_t y) const {
     const uint16_t* const pixel = &channels[4 * (size_t{width} * y + x)];
     return {pixel[0], pixel[1], pixel[2], pixel[3]};
@@ -55,7 +55,7 @@ inline Decoded decode(const std::string& file, uint64_t memory = uint64_t{16} <<
   return out;
 }
 
-// What is wrong with the image; "" if nothing is.
+// Returns the problem that the decoder reports; "" if it reports none.
 inline std::string problem_of(const std::string& file, uint64_t memory = uint64_t{16} << 20) {
   try {
     decode(file, memory);
@@ -65,7 +65,7 @@ inline std::string problem_of(const std::string& file, uint64_t memory = uint64_
   }
 }
 
-// Smooth, so that JPEG loses little of it.
+// Returns the pixels of a smooth image, which JPEG changes only little.
 inline std::string gradient(uint32_t width, uint32_t height, uint32_t components) {
   std::string pixels;
   for (uint32_t y = 0; y < height; ++y)

@@ -88,7 +88,7 @@ TEST(Jpeg, MemoryOfProgressiveImages) {
   }
 }
 
-// The size is in the frame header, after the header's length and the precision.
+// Files that declare huge sizes are refused. The frame header has the size at byte 5.
 TEST(Jpeg, HugeSizes) {
   std::string file = jpeg_file(16, 16, 3, gradient(16, 16, 3), true);
   const size_t frame = file.find("\xff\xc2");

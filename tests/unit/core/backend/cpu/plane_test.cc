@@ -61,8 +61,8 @@ oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t
   return t;
 }
 
-// Compares the node of a cube from the memo with the drawn node, and does the same for the cube's
-// children down to the smallest size. Returns the number of compared cubes.
+// Compares the node of a cube from the memo with the drawn node, and does the same for three of the
+// cube's children, down to the smallest size. Returns the number of compared cubes.
 int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, const LatticeCube& box,
             int size_log2, TileBricks& tile) {
   const OctreeCounts before = by_memo.tables.counts();

@@ -1,4 +1,5 @@
-// Both voxelizations give the oracle's bricks, with any size of batches and slices.
+// Voxelization by list and by tiles both give the oracle's bricks, with any size of batches and
+// slices.
 #include <gtest/gtest.h>
 
 #include <algorithm>
