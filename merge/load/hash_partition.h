@@ -91,8 +91,9 @@ class HashPartition {
                 const HashInterval& interval, uint64_t bucket_rows, uint32_t position_words,
                 PartitionMemory& memory, MemoryBudget& budget);
 
-  // Reads the rows and replaces their children by positions, which `child_maps` has for the level
-  // below. `child_maps` may be null if the rows are bricks or all runs are already rewired.
+  // Reads the rows and replaces their children by positions from `child_maps`, the position maps of
+  // the level below. `child_maps` may be null if the rows are bricks or all runs are already
+  // rewired.
   void load(const PositionMaps* child_maps, const PartitionWorkers& workers, MemoryBudget& budget,
             const CancelToken& cancel);
 

@@ -1,7 +1,7 @@
 // Merges one level of all runs, one hash partition after another: loads the partition, sorts its
 // buckets in parallel, writes the unique rows in order, and stores the position of every row for
-// the level above. Buckets and groups of equal hashes that do not fit in memory are merged by the
-// code in fallback/.
+// the level above. The code in fallback/ merges buckets and groups of equal hashes that do not fit
+// in memory.
 #pragma once
 
 #include "merge/plan/merge_context.h"

@@ -21,7 +21,7 @@ struct PassTask {
   std::span<const ArtifactReader> artifacts;
 };
 
-// The progress of a pass: the data of the merged levels that the merge of the next levels reads.
+// The progress of a pass: data of the merged levels that merging the next level needs.
 struct PassProgress {
   std::optional<uint32_t> level;     // the last merged level; nullopt before the first
   std::optional<PositionMaps> maps;  // position maps of this level

@@ -1,5 +1,5 @@
-// Reads the triangles of the faces of a PLY file as three vertex indices each, starting at any
-// triangle. Not thread-safe.
+// Reads the triangles of a PLY file's faces, three vertex indices each, starting at any triangle.
+// Not thread-safe.
 #pragma once
 
 #include <array>

@@ -54,8 +54,8 @@ class MergeJob {
   virtual const std::string& request() const = 0;
   // Returns the report of a finished merge job with the same request whose output exists.
   virtual std::optional<BuildReport> finished() const = 0;
-  // True if the work folder still has a job store although the build does not keep its work folder:
-  // the merge job is still removing the folder, or was stopped before it removed the folder.
+  // True if the work folder still has a job store although the build does not keep its work folder.
+  // Then the merge job is still removing the folder, or it was stopped before it did so.
   virtual bool has_remaining_work() const = 0;
   // Removes the report that finished() returns, if any, so that it is not taken for the report of a
   // new merge job.

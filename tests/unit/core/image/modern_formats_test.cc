@@ -1,5 +1,5 @@
 // WebP and AVIF images decode to the stored pixels, within the memory that is charged. Without the
-// libraries, the images are named.
+// libraries, the error names the format.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// The largest difference of a channel.
+// Returns the largest difference of a channel between the image and `pixels`, 8-bit RGBA.
 [[maybe_unused]] int difference(const Decoded& image, const std::string& pixels) {
   int largest = 0;
   for (size_t i = 0; i < image.channels.size(); ++i)
@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 }
 
 #ifdef VOXDAG_HAS_WEBP
-// Many areas of different noise, which the encoder gives different tables.
+// Returns pixels with many areas of different noise, for which the encoder uses different tables.
 std::string patchwork(uint32_t width, uint32_t height) {
   std::string pixels = noise(size_t{4} * width * height);
   for (size_t i = 0; i < pixels.size(); ++i) {
@@ -118,7 +118,7 @@ TEST(Avif, PlanesOfColorsAreExact) {
   EXPECT_EQ(difference(image, pixels), 0);
 }
 
-// The conversion differs from the library's conversion by rounding only.
+// The pixels differ from the library's own conversion only by rounding.
 TEST(Avif, EveryKindOfPlanes) {
   const std::string pixels = gradient(75, 66, 4);
   for (const int bits : {8, 10, 12})

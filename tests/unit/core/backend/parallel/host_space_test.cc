@@ -128,8 +128,8 @@ TEST_P(HostSpaceTest, SortsAreStableByTheBitsGiven) {
     }
 }
 
-// Some sources have no outputs, also the first and the last one. Any part of the sources can be
-// expanded.
+// expand() visits each output once, with its source and rank. Some sources have no outputs. Any
+// range of the sources can be expanded.
 TEST_P(HostSpaceTest, ExpandVisitsEveryOutputOfItsSource) {
   for (const uint32_t n : {1u, 2u, 100u, 5000u}) {
     std::vector<uint32_t> offsets(n + 1);
