@@ -1,4 +1,4 @@
-// A sample of the colored cells of a file, and the triangles near each cell.
+// A sample of the colored cells of a file, and a search for the sampled cells near a triangle.
 #pragma once
 
 #include <array>
@@ -15,17 +15,18 @@ using CellPosition = std::array<uint32_t, 3>;
 
 class SampledCells {
  public:
-  // Selects about `wanted` of the file's colored cells by a hash of their positions, so every file
-  // with these cells has the same sample. The file must have colors.
+  // Selects about `wanted` of the file's colored cells by a hash of their positions. So two files
+  // with the same cells have the same sample. The file must have colors.
   SampledCells(const voxdag_reader::File& file, uint64_t wanted);
 
   // In Morton order.
   const std::vector<CellPosition>& positions() const { return positions_; }
   // Number of colored cells on the file's finest color level.
   uint64_t file_cells() const { return file_cells_; }
-  // log2 of a cell's edge in lattice units.
+  // log2 of a cell's edge in lattice units (1/256 voxel).
   int cell_bits() const { return cell_bits_; }
-  // Appends the indices of all cells that the closed triangle touches, and of some cells near it.
+  // Appends the indices in positions() of all cells that the closed triangle touches, and of some
+  // cells near it.
   void find_near(const FixedTriangle& triangle, std::vector<uint32_t>& cells) const;
 
  private:

@@ -1,5 +1,6 @@
-// The scene's appearance for the oracle: decoded images, materials and surfaces. It shares only the
-// scene readers and the image decoders with voxdag's own code for colors.
+// Converts a scene's images, materials and surfaces for the oracle (tests/oracle), a second
+// implementation of the color rule. Only the scene readers and the image decoders are voxdag's own
+// code.
 #pragma once
 
 #include <memory>
@@ -15,7 +16,7 @@ class SceneLooks {
  public:
   // Decodes all images, with 16 bytes per texel. Ignores broken images.
   SceneLooks(const SceneMaterials& materials, MemoryBudget& budget);
-  // The result refers to the materials in this object.
+  // Converts a surface. The result refers to this object's materials.
   oracle::Surface surface(const FixedSurface& surface) const;
   size_t texels() const;
 

@@ -1,5 +1,5 @@
-// Synthetic artifacts for the benchmarks of the merge: runs of random bricks and nodes in the total
-// order. Runs share some of their nodes, as neighboring subvolumes do.
+// Synthetic artifacts for the benchmarks of the merge. Each is a run: random bricks and nodes,
+// sorted by (hash, mask, children). Runs have some nodes in common, like neighboring subvolumes.
 #pragma once
 
 #include <algorithm>
@@ -13,15 +13,15 @@
 namespace voxdag {
 
 // A run consists of blocks; a block is a small DAG. Two runs that contain the same block share its
-// nodes. The children of a node are random nodes of its block, because real nodes are in the order
-// of their hashes.
+// nodes. The children of a node are random nodes of its block. This is realistic, because runs are
+// sorted by hash, so the children of a real node are far apart.
 class SyntheticRuns {
  public:
-  static constexpr uint32_t kLevels = 5;  // of nodes, above the bricks
+  static constexpr uint32_t kLevels = 5;  // levels of nodes above the bricks
   static constexpr uint32_t kGridLevels = 14;
 
-  // Writes `runs` artifacts of about `rows` rows in total to one segment. Half of each run's blocks
-  // come from a common pool, and each block of the pool is drawn about four times.
+  // Writes `runs` artifacts with about `rows` rows (bricks and nodes) in total to one segment. Half
+  // of each run's blocks come from a common pool. Each block of the pool is drawn about four times.
   SyntheticRuns(const std::string& folder, size_t runs, uint64_t rows) {
     segment_path_ = segment_path(folder, 0);
     SegmentWriter segment(system_files(), folder, 0, budget_);
@@ -48,13 +48,13 @@ class SyntheticRuns {
     uint64_t hash = 0;
     uint64_t brick = 0;
     uint8_t mask = 0;
-    std::vector<uint32_t> children;  // rows of the level below, in the order of adding
+    std::vector<uint32_t> children;  // indices of rows in the level below
   };
   using Levels = std::vector<std::vector<Row>>;
 
   static void add_block(Levels& levels, uint64_t seed) {
     std::mt19937_64 random(seed);
-    size_t count = 128;  // 128 bricks, then 64, 32, ... nodes, of 3.5 children on average
+    size_t count = 128;  // 128 bricks, then 64, 32, ... nodes with 3.2 children on average
     size_t first_below = 0;
     for (size_t l = 0; l < levels.size(); ++l, count /= 2) {
       const size_t first = levels[l].size(), below = 2 * count;
@@ -114,7 +114,7 @@ class SyntheticRuns {
       writer.end_level();
       index_below = index;
     }
-    // One root per run.
+    // Each run has one root. Different runs have roots in different cubes.
     const uint32_t top = kGridLevels - 2 - kLevels;
     const uint32_t x = static_cast<uint32_t>(run);
     const ArtifactRoot root{{top, {x >> 8, x >> 4 & 15, x & 15}}, 0, 1, 1, 1};

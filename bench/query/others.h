@@ -8,14 +8,17 @@
 
 namespace voxdag::query {
 
-// Measures a BoolGrid of the set cells. Lookups use an accessor. Rays use the volume ray
-// intersector, which finds the first leaf of the tree (8x8x8 cells) that a ray hits, not the cell.
-// Boxes use copyToDense() on one thread, and counts use the masks of the leaves. Returns nothing if
-// OpenVDB is not installed.
+// Measures an OpenVDB BoolGrid that contains the set cells. Returns nullopt if OpenVDB is not
+// installed.
+//   Lookups use an accessor.
+//   Rays use the volume ray intersector, which finds the first leaf of the tree (8x8x8 cells) that
+//   a ray hits, not the first cell.
+//   Boxes use copyToDense() on one thread. Counts use the masks of the leaves.
 std::optional<Timings> measure_openvdb(const DagFile& dag, uint32_t grid_levels,
                                        const QuerySet& queries);
-// Measures an OcTree of the set cells. Lookups use search(), rays castRay(), boxes and counts the
-// iterator over the leaves of a box.
+// Measures an OctoMap OcTree that contains the set cells. Returns nullopt if OctoMap is not
+// installed. Lookups use search(), and rays use castRay(). Boxes and counts iterate over the leaves
+// in a box.
 std::optional<Timings> measure_octomap(const DagFile& dag, uint32_t grid_levels,
                                        const QuerySet& queries);
 

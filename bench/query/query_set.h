@@ -12,20 +12,21 @@ namespace voxdag::query {
 struct QuerySet {
   std::vector<Position> uniform;                 // points of the grid
   std::vector<Position> set_cells;               // random set cells
-  std::vector<Coordinates> origins, directions;  // of a picture's pixels, in tiles of 8 x 8
+  std::vector<Coordinates> origins, directions;  // rays of a picture, in tiles of 8 x 8 pixels
 };
 
-// Boxes of 64^3 cells around the first set cells. Boxes at the edge of the grid extend beyond it.
+// Number of boxes, and their edge in cells. Box i is around the i-th set cell of the queries. A box
+// at the border of the grid extends beyond it.
 inline constexpr size_t kBoxes = 2000;
 inline constexpr int64_t kBoxEdge = 64;
 Region box_around(const QuerySet& queries, size_t i);
 
-// Returns `points` uniform points and `points` set cells of the grid of 2^grid_levels cells per
-// edge, and the rays through the pixels of a square picture, in cells of this grid. The camera has
-// the position that `voxdag render` would choose.
+// Makes queries for the grid of 2^grid_levels cells per edge: `points` uniform points, `points` set
+// cells, and the rays through the pixels of a square picture. Positions are in cells of this grid.
+// The camera has the position that `voxdag render` would choose.
 QuerySet make_queries(const DagFile& dag, uint32_t grid_levels, size_t points, int picture_edge);
 
-// The speed of a benchmark, and a count by which the results of libraries are compared.
+// The speed of a benchmark in items per second, and a result to compare between libraries.
 struct Timing {
   double per_second = 0;
   uint64_t found = 0;
@@ -37,11 +38,11 @@ struct Timings {
   Timing uniform, set_cells, rays, boxes, counts;
 };
 
-// CPU time of this thread.
+// Returns the CPU time of the calling thread, in seconds.
 double thread_seconds();
 
-// Calls run() three times. Returns the highest speed, by CPU time of this thread, and run()'s
-// result.
+// Calls run() three times. Returns the highest speed, in `items` per second of CPU time of this
+// thread, and the result of run().
 template <class Run>
 Timing best_of_three(size_t items, const Run& run) {
   Timing best;
@@ -54,7 +55,8 @@ Timing best_of_three(size_t items, const Run& run) {
   return best;
 }
 
-// Measures make_box(i) for kBoxes boxes. It fills `cells` with box i, z fastest.
+// Measures make_box(i) for the kBoxes boxes. make_box(i) writes box i to `cells`, z fastest. The
+// result's `found` is the number of set cells in all boxes.
 template <class MakeBox>
 Timing measure_boxes(const std::vector<uint8_t>& cells, const MakeBox& make_box) {
   Timing timing = best_of_three(kBoxes, [&] {

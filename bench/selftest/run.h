@@ -25,8 +25,8 @@ bool compare_with_cpu(const std::vector<Subject>& subjects, bool quick);
 struct BenchOptions {
   uint32_t grid_levels = 12;
   int64_t subvolume_edge = 0;  // in voxels; 0 for an eighth of the grid's edge
-  unsigned workers = 2;        // workers of a subject, each with its own backend
-  unsigned cpu_workers = 1;
+  unsigned workers = 2;        // threads of a subject, each with its own backend
+  unsigned cpu_workers = 1;    // threads of the CPU backend
   uint64_t worker_bytes = uint64_t{8} << 30;
 };
 

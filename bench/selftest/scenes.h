@@ -1,5 +1,5 @@
-// Scenes for the self-test, made from a seed with only the standard library: triangles on the
-// lattice of a grid of 2^grid_levels voxels.
+// Generated scenes for the self-test: triangles in lattice units (1/256 voxel) of a grid of
+// 2^grid_levels voxels per edge. The code uses only the standard library.
 #pragma once
 
 #include <cstdint>

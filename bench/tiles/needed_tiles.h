@@ -1,7 +1,7 @@
-// Finds the tiles needed for a picture. A tile is needed if, without it, the first cell of some ray
-// would be coarser than requested. A tile contains cells from three levels below its root on. The
-// cells one and two levels below the root are known from the tile above, as the root's coarse
-// brick.
+// Finds the tiles that a viewer needs to draw a picture. A tile is needed if, without it, the first
+// cell of some ray would be coarser than requested. A tile with its root at level l contains the
+// cells from level l + 3 on. The tile above contains the cells of levels l + 1 and l + 2, as the
+// coarse brick of the root.
 #pragma once
 
 #include <algorithm>
@@ -19,11 +19,11 @@ class NeededTiles {
  public:
   using Addresses = std::set<std::pair<uint32_t, uint64_t>>;
 
-  // Cells of up to `pixels` pixels are drawn without finer cells.
+  // A cell that is at most `pixels` pixels wide is drawn as one cell.
   NeededTiles(const DagView& dag, double pixels) : dag_(dag), pixels_(pixels) {}
 
-  // Returns kMaxTileLevels + 1 sets: element d has the tiles that a picture needs with d levels per
-  // tile. Element 0 has only the root.
+  // Returns kMaxTileLevels + 1 sets of tiles. Element d has the needed tiles if a tile has at most
+  // d levels. Element 0 has only the tile of the root.
   std::vector<Addresses> find(const Placement& placement, int width, int height) {
     tiles_.assign(kMaxTileLevels + 1, {});
     for (Addresses& tiles : tiles_) tiles.insert({0, 0});
@@ -59,13 +59,13 @@ class NeededTiles {
     return span;
   }
 
-  // Records, for each depth, the tile that is needed to know the children of the cell at `level` on
-  // the current path.
+  // Records the tiles that contain the children of the cell at `level` on the current path: one
+  // tile for each maximum number of levels per tile.
   void mark(uint32_t level) {
-    if (level < 2) return;  // known with the first tile
+    if (level < 2) return;  // the first tile has these children
     const uint32_t bricks = dag_.grid_levels() - 2;
     for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) {
-      // Cells down to two levels below the root are in the tile above.
+      // The tile above contains the cells down to two levels below the root of a tile.
       uint32_t root = std::min(level - 2, bricks);
       while (root > 0 && (bricks - root) % depth != 0) --root;
       if (root == 0 || root == bricks) continue;
@@ -104,8 +104,8 @@ class NeededTiles {
   Ray ray_;
   double inverse_[3] = {};
   int nearest_ = 0;                  // the child that a ray of this direction meets first
-  std::array<uint64_t, 24> path_{};  // contents of the cells on the way down, by level
-  std::array<std::array<uint64_t, 24>, kMaxTileLevels + 1> marked_{};  // noted last, plus 1
+  std::array<uint64_t, 24> path_{};  // contents of the cells on the current path, by level
+  std::array<std::array<uint64_t, 24>, kMaxTileLevels + 1> marked_{};  // recorded last, + 1
   std::vector<Addresses> tiles_;
 };
 
