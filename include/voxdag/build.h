@@ -11,8 +11,8 @@
 // geometry options, never on memory, threads or folders.
 //
 // build() and plan() throw voxdag::Error with one of the codes in voxdag/error.h and a message that
-// names the problem, the place and the expectation. Both functions are thread-safe. Two builds with
-// the same output or work folder cannot run at the same time. docs/library.md has the details.
+// names the problem, its place and the expected input. Both functions are thread-safe. Two builds
+// with the same output or work folder cannot run at the same time. docs/library.md has the details.
 #pragma once
 
 #include <array>
@@ -44,12 +44,12 @@ struct BuildOptions {
   // Geometry options.
   uint64_t resolution = 0;  // voxels per edge of the grid, a power of two from 4 to 2^20
   // The cube of the grid, in the units of the scene. `bounds` gives its low corner (x, y, z) and
-  // its edge. `voxel_size` gives the edge of a voxel; the cube is then centered on the scene. At
-  // most one of them can be given. If neither is given, the cube encloses the scene.
+  // its edge. `voxel_size` gives the edge of a voxel; the cube is then centered on the scene. Set
+  // at most one of the two. If neither is set, the cube encloses the scene.
   std::optional<std::array<double, 4>> bounds;
   std::optional<double> voxel_size;
-  // Half edge of the cube that replaces each point of a file of points. If it is not given, a point
-  // sets exactly one voxel.
+  // Half the edge, in the units of the scene, of the cube that replaces each point of a point file.
+  // If it is not set, a point sets exactly one voxel.
   std::optional<double> point_radius;
   // Names of the columns of text files with points, such as "x,y,z,_,r,g,b" (docs/scenes.md). If it
   // is empty, the file's header line or first row decides.
@@ -114,7 +114,7 @@ struct BuildResult {
   uint64_t bytes = 0;  // size of the output
   uint32_t grid_levels = 0;
   std::array<double, 3> origin{};  // the low corner of the grid, in the units of the scene
-  double edge = 0;                 // edge of the grid
+  double edge = 0;                 // edge of the grid, in the units of the scene
   uint64_t triangles = 0;          // triangles that may touch the grid
   uint64_t dropped_outside = 0;    // triangles that miss the grid
   uint64_t dropped_invalid = 0;    // invalid triangles (see skip_invalid)

@@ -51,7 +51,7 @@ inline Region cut_to_grid(const Region& region, uint32_t grid_levels) {
   return cut;
 }
 
-// The cells of a region of one grid.
+// A region of the grid of 2^grid_levels cells per edge.
 struct Selection {
   uint32_t grid_levels = 0;
   Region region;

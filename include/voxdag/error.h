@@ -8,7 +8,7 @@
 namespace voxdag {
 
 enum class ErrorCode {
-  kInvalidInput,        // a scene, option or request that breaks its rules
+  kInvalidInput,        // a scene, option or request that is not valid
   kNotFound,            // a file, job or scene that does not exist
   kCorrupt,             // bytes written by voxdag that fail their checks
   kUnsupportedVersion,  // a format version this build does not read
@@ -20,15 +20,15 @@ enum class ErrorCode {
   kLimit,               // a limit of the format or of the arithmetic; the message names the limit
 };
 
-// The message is one sentence that names the problem, the place (file, subvolume, scene node) and
-// the expectation.
+// An error. The message is one sentence: the problem, its place (file, subvolume, scene node) and
+// the expected input.
 class Error : public std::exception {
  public:
   Error(ErrorCode code, std::string message) : code_(code), message_(std::move(message)) {}
   ErrorCode code() const { return code_; }
   const std::string& message() const { return message_; }
-  // True if a file written by voxdag may be damaged, missing or of a different version, so that
-  // work depending on it must be repeated. All other errors imply nothing about the files.
+  // True if a file written by voxdag may be damaged, missing or of a different version. The work
+  // that depends on this file must then be repeated. Other codes imply nothing about the files.
   bool is_corruption() const {
     return code_ == ErrorCode::kCorrupt || code_ == ErrorCode::kNotFound ||
            code_ == ErrorCode::kUnsupportedVersion;

@@ -9,10 +9,10 @@
 // to `threads` threads including the caller's, and allocates nothing per item. The results do not
 // depend on the threads. All spans of one call have the same length.
 //
-// All functions are const and thread-safe. They throw Error{kInvalidInput} for arguments that break
-// their rules, and Error{kCorrupt} that names the file if the bytes they read are damaged. They
-// check the offsets that they follow, but not the checksums (`voxdag verify` does). docs/library.md
-// describes conventions and units.
+// All functions are const and thread-safe. They throw Error{kInvalidInput} for invalid arguments,
+// and Error{kCorrupt} that names the file if the bytes they read are damaged. They check the
+// offsets that they follow, but not the checksums (`voxdag verify` does). docs/library.md describes
+// conventions and units.
 #pragma once
 
 #include <array>
@@ -68,13 +68,13 @@ struct Nearest {
   bool found = false;
 };
 
-// Maximum absolute value of a coordinate of a point for nearest(), in cells. Within this limit,
+// Maximum magnitude of the coordinates of points for nearest(), in cells. Within this limit,
 // squares of distances fit in 64 bits.
 inline constexpr int64_t kMaxCoordinate = int64_t{1} << 30;
 
 class DagFile {
  public:
-  // Default limit of the memory for the node counts that count() stores, in bytes.
+  // Default memory limit for the node counts that count() stores, in bytes.
   static constexpr uint64_t kDefaultMemory = uint64_t{1} << 30;
 
   // Opens and maps the file, which must not be shortened while it is open. The node counts that
@@ -124,7 +124,7 @@ class DagFile {
   void materials(std::span<const Position> points, uint32_t grid_levels,
                  std::span<uint32_t> materials, unsigned threads = 1) const;
   // Returns the names of the materials. The last name is "", for triangles without a material. The
-  // list is empty if the file does not have the attribute.
+  // list is empty if the file has no materials.
   const std::vector<std::string>& material_names() const;
 
   // Finds the first set cell on each ray. Directions may have any length except 0. Origins and
