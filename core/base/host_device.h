@@ -1,5 +1,5 @@
 // VOXDAG_HD marks a function that runs on the host and, in CUDA sources, also on the device (the
-// GPU). Only this file and core/backend/ test whether a CUDA compiler compiles them.
+// GPU). Only this file and core/backend/ contain conditions on the CUDA compiler.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 #define VOXDAG_HD
 #endif
 
-// Defined where code may use SSE2 instructions. Every x86-64 CPU has them; device code does not.
+// VOXDAG_SSE2 is defined where code may use SSE2: on every x86-64 CPU, but not in device code.
 #if defined(__SSE2__) && !defined(__CUDA_ARCH__)
 #define VOXDAG_SSE2
 #endif

@@ -1,6 +1,6 @@
-// Accounts for large buffers, so that a build never exceeds its memory limit (--memory). Each
-// buffer is charged here before it is allocated. If the charge fails, the buffer's owner spills
-// data to disk, splits the work or refuses it.
+// Accounts for large buffers, so that a build never exceeds its memory limit (--memory). The owner
+// of a buffer charges its size here before it allocates the buffer. If the charge fails, the owner
+// spills data to disk, splits the work or refuses the work.
 //
 // Invariants:
 //   1. used() <= limit() at any time.
@@ -15,8 +15,8 @@
 
 namespace voxdag {
 
-// Thrown if a budget, or the memory of a GPU, cannot hold a piece of work. The caller can catch it
-// and split the work.
+// Thrown if a budget, or the memory of a GPU, is too small for a piece of work. The caller can
+// catch it and split the work.
 struct OutOfBudget {};
 
 class MemoryBudget {
@@ -35,8 +35,8 @@ class MemoryBudget {
 
   // Charges `bytes`. Returns false and charges nothing if they do not fit.
   bool try_charge(uint64_t bytes);
-  // Charges `bytes`. Throws an Error{kOutOfMemory} that names `what`, the buffer, if they do not
-  // fit.
+  // Charges `bytes`. Throws Error{kOutOfMemory} if they do not fit. The message contains `what`,
+  // the name of the buffer.
   void charge(uint64_t bytes, std::string_view what);
   void release(uint64_t bytes);
 

@@ -15,11 +15,11 @@
 
 namespace voxdag {
 
-// Returns zero-filled pages for `bytes` bytes. Throws an Error{kOutOfMemory} that names `what`, the
-// purpose of the pages, if the system refuses them.
+// Returns zero-filled pages for `bytes` bytes. Throws Error{kOutOfMemory} if the system refuses.
+// The message contains `what`, the purpose of the pages.
 void* allocate_pages(size_t bytes, std::string_view what);
 // Grows an allocation from `bytes` to `new_bytes` bytes and returns its address, which may have
-// changed. The new pages are zero-filled. Pages may move to other addresses, but their bytes are
+// changed. The new pages are zero-filled. The old pages may get new addresses, but their bytes are
 // not copied (except in builds with ThreadSanitizer). Throws like allocate_pages().
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what);
 void free_pages(void* pages, size_t bytes);
@@ -30,8 +30,8 @@ class PageBuffer {
 
  public:
   PageBuffer() = default;
-  // Allocates `size` zero elements and charges them to `budget`. Throws an Error{kOutOfMemory} that
-  // names `what`, the purpose of the buffer, if they do not fit.
+  // Allocates `size` zero elements and charges them to `budget`. Throws Error{kOutOfMemory} if they
+  // do not fit. The message contains `what`, the purpose of the buffer.
   PageBuffer(MemoryBudget& budget, size_t size, std::string_view what)
       : charge_(budget, byte_count(size), what),
         data_(size ? static_cast<T*>(allocate_pages(byte_count(size), what)) : nullptr),

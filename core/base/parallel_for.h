@@ -1,5 +1,5 @@
 // Loops over items on several threads. A thread that has finished an item takes the next one.
-// Results can be committed in the order of the items.
+// parallel_for_in_order() also commits the results in the order of the items.
 #pragma once
 
 #include <algorithm>
@@ -73,7 +73,7 @@ class Turns {
     ++turn_;
     changed_.notify_all();
   }
-  // True if an earlier item has failed.
+  // True if an earlier item has failed, so that `item` gets no turn.
   bool is_lost(size_t item) {
     const std::lock_guard lock(mutex_);
     return item > failed_;
@@ -92,9 +92,9 @@ class Turns {
   size_t failed_ = SIZE_MAX;
 };
 
-// Calls prepare(worker, item) for the items 0 to count - 1, on several threads like parallel_for().
+// Calls prepare(worker, item) for the items 0 to count - 1 on several threads, like parallel_for().
 // Calls commit(worker, item) sequentially, in the order of the items. If prepare() or commit()
-// throws for an item, the items before the first such item are still committed, and no others.
+// throws for some items, the items before the first of them are still committed, and no others.
 template <class Prepare, class Commit>
 void parallel_for_in_order(unsigned workers, size_t count, Prepare&& prepare, Commit&& commit) {
   Turns turns;

@@ -1,14 +1,14 @@
 // Counts the bits set in a byte, with a table. x86-64 without extensions has no instruction for
-// this, so std::popcount would be a function call.
+// counting bits, so std::popcount would be a function call.
 #pragma once
 
 #include <cstdint>
 
 namespace voxdag {
 
-// The table is a plain array because indexing a std::array calls an inline function. Sources
-// compiled for different instruction sets would share one copy of that function, and the CPU might
-// not be able to run this copy.
+// The table is a plain array because indexing a std::array calls an inline function. The linker
+// keeps only one copy of an inline function, even if sources are compiled for different instruction
+// sets. The CPU might not be able to run the copy that is kept.
 struct Popcount8Table {
   uint8_t of[256] = {};
   constexpr Popcount8Table() {

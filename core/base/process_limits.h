@@ -1,6 +1,6 @@
-// Returns the memory and CPUs that a build may use on this machine, and the memory that this
-// process uses. Also changes allocator settings: with the default settings the process would use
-// more memory than is charged to its budget. Thread-safe.
+// The memory and CPUs that a build may use on this machine, and the memory that this process uses.
+// Two functions also make the C library return freed memory to the system. Without them the process
+// would use more memory than is charged to its budget. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -31,12 +31,12 @@ uint64_t resident_bytes();
 uint64_t max_open_files();
 
 // Makes the C library return freed memory to the system immediately, so that resident memory
-// follows the charges of a MemoryBudget. Only main() calls this: the setting applies to the whole
-// process, so a library must leave it to its host program. No effect without glibc.
+// follows the charges of a MemoryBudget. Only main() calls this function. A library must not,
+// because the setting applies to the complete process of its user. No effect without glibc.
 void return_freed_memory_to_system();
 // Returns the pages of small freed blocks to the system. The C library retains these pages even
-// after return_freed_memory_to_system(). Call it after many small blocks were freed. No effect
-// without glibc.
+// after return_freed_memory_to_system(). Call trim_heap() after many small blocks were freed. No
+// effect without glibc.
 void trim_heap();
 
 }  // namespace voxdag

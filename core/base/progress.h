@@ -31,20 +31,20 @@ struct SubvolumeStatus {
 struct ClusterTasks {
   uint64_t batches = 0;                           // total
   uint64_t built = 0;                             // built batches
-  uint64_t waiting = 0;                           // waiting tasks
+  uint64_t waiting = 0;                           // tasks that wait for a node
   uint64_t failed_attempts = 0;                   // failed attempts of tasks
-  std::map<std::string, uint64_t> running;        // running tasks, by node
-  std::map<std::string, uint64_t> built_of_node;  // built batches, by node
+  std::map<std::string, uint64_t> running;        // number of running tasks, by node
+  std::map<std::string, uint64_t> built_of_node;  // number of built batches, by node
 };
 
 class Progress {
  public:
   virtual ~Progress() = default;
-  // A stage starts. It has `total` units of work, 0 if unknown; `unit` is their name ("triangles",
-  // "subvolumes", "nodes").
+  // Reports that a stage starts. The stage has `total` units of work, or 0 if the number is
+  // unknown. `unit` is the plural name of a unit ("triangles", "subvolumes", "nodes").
   virtual void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) = 0;
-  // The stage continues where an earlier run ended. The `done` units count toward the total, but
-  // not toward the displayed rate. Called after begin_stage(), if at all.
+  // Reports that an earlier run has done `done` units of the stage. They count toward the total,
+  // but not toward the displayed rate. Called after begin_stage(), if at all.
   virtual void resume_at(uint64_t done) = 0;
   // Reports that `count` more units are done.
   virtual void advance(uint64_t count) = 0;
@@ -63,11 +63,11 @@ class Progress {
   // Reports all subvolumes of the build, including subvolumes built by an earlier run. `resolution`
   // is the number of voxels along an edge of the grid. Replaces all earlier reports of subvolumes.
   virtual void set_subvolumes(uint64_t /*resolution*/, std::span<const SubvolumeStatus> /*all*/) {}
-  // A worker has begun to build a planned subvolume. The subvolume is finished when
+  // Reports that a worker has begun to build a planned subvolume. The subvolume is finished when
   // subvolume_built() or subvolume_split() is called.
   virtual void subvolume_begun(int64_t /*id*/) {}
   virtual void subvolume_built(const SubvolumeStatus& /*built*/) {}
-  // `parts` replace the subvolume `id`.
+  // Reports that `parts` replace the subvolume `id`.
   virtual void subvolume_split(int64_t /*id*/, std::span<const SubvolumeStatus> /*parts*/) {}
   // Reports the current resource usage: resident memory, and disk space of the work folder.
   virtual void set_usage(uint64_t /*memory_bytes*/, uint64_t /*disk_bytes*/) {}

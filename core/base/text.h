@@ -15,9 +15,9 @@
 
 namespace voxdag {
 
-// Parses a size in bytes: "512MiB", "8GiB", "64M" (also binary), "1000000". Throws
-// Error{kInvalidInput} unless the text is a number with an optional unit; the message begins with
-// `option`.
+// Parses a size in bytes, such as "512MiB", "8GiB", "64M" (the same as "64MiB") or "1000000".
+// Throws Error{kInvalidInput} unless the text is a number with an optional unit. The message begins
+// with `option`, the name of the option.
 uint64_t parse_size(const std::string& text, const std::string& option);
 // Returns a size as text: "1.25 GiB".
 std::string size_text(uint64_t bytes);
@@ -26,13 +26,13 @@ std::string count_text(uint64_t count);
 // Returns a duration as text: "1 m 04 s" or "12.3 s".
 std::string duration_text(double seconds);
 
-// Returns the shortest text that parses to the same number. It does not depend on the locale.
+// Returns the shortest text that parses to the same number. The text does not depend on the locale.
 std::string number_text(double number);
 
 // Formats a Unix time in UTC, with a format of strftime().
 std::string utc_text(time_t time, const char* format);
 
-// Returns bytes as text, with two lower-case hexadecimal digits per byte.
+// Returns bytes as text: two lower-case hexadecimal digits per byte.
 std::string hex_text(std::span<const unsigned char> bytes);
 // Decodes a percent-encoded text (RFC 3986). Returns nullopt if a '%' is not followed by two
 // hexadecimal digits.

@@ -15,7 +15,7 @@ struct Warning {
   std::string message;  // one sentence about this place
   uint64_t count = 1;   // number of places
 
-  // Returns place and message and, if there are several places, their number.
+  // Returns `place` and `message`, and the number of places if there are several.
   std::string text() const;
   bool operator==(const Warning&) const = default;
 };
