@@ -158,8 +158,8 @@ int64_t SqlDatabase::integer(const std::string& sql) {
 }
 
 SqlTransaction::SqlTransaction(SqlDatabase& database, Durable durable) : database_(database) {
-  // In WAL mode FULL syncs the log at each commit. NORMAL does not; the next commit with FULL syncs
-  // its changes.
+  // In WAL mode, FULL syncs the log at each commit, and NORMAL does not. The next commit with FULL
+  // also syncs the changes of commits with NORMAL.
   database_.execute(durable == Durable::kNow ? "PRAGMA synchronous = FULL"
                                              : "PRAGMA synchronous = NORMAL");
   database_.execute("BEGIN IMMEDIATE");

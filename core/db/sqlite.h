@@ -1,4 +1,4 @@
-// A small wrapper of SQLite: a connection that closes itself, statements with bound parameters, and
+// An interface to SQLite: a connection that closes itself, statements with bound parameters, and
 // errors as voxdag::Error. table_rows.h reads and writes complete rows. Not thread-safe: a
 // connection and its statements must not be used concurrently. Only sqlite.cc includes sqlite3.h.
 #pragma once

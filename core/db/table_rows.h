@@ -94,8 +94,8 @@ ColumnNames column_names() {
   return names;
 }
 
-// Runs the statement "`before` (COLUMNS) `between` (VALUES) `after`", with the names of the
-// record's columns and its values.
+// Runs the statement "`before` (COLUMNS) `between` (VALUES) `after`". COLUMNS are the names of the
+// record's columns, and VALUES are the values of its members.
 template <class Record>
 void write_row(SqlDatabase& database, const std::string& before, const char* between,
                const std::string& after, Record record) {
@@ -115,8 +115,8 @@ void put_row(SqlDatabase& database, const std::string& table, Record record) {
   write_row(database, "INSERT OR REPLACE INTO " + table, "VALUES", "", std::move(record));
 }
 
-// Writes the record to all rows of `table` that satisfy `condition`. It changes the rows in place.
-// put_row() instead deletes and inserts a row, which also deletes the rows that refer to it with ON
+// Writes the record to all rows of `table` that satisfy `condition`, in place. put_row() would
+// delete a row and insert a new one. Deleting a row also deletes the rows that refer to it with ON
 // DELETE CASCADE.
 template <class Record>
 void update_row(SqlDatabase& database, const std::string& table, const std::string& condition,
@@ -124,8 +124,8 @@ void update_row(SqlDatabase& database, const std::string& table, const std::stri
   write_row(database, "UPDATE " + table + " SET", "=", "WHERE " + condition, std::move(record));
 }
 
-// Returns a statement that selects the rows of `table`. `rest` is the end of the SQL; it may filter
-// and order the rows.
+// Returns a statement that selects the rows of `table`. `rest` is the end of the SQL statement,
+// which may filter and order the rows.
 template <class Record>
 SqlStatement select_rows(SqlDatabase& database, const std::string& table,
                          const std::string& rest = "") {

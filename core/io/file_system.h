@@ -1,5 +1,5 @@
-// All file access of voxdag uses this interface, so that tests can replace the disk: with a full
-// disk, or a disk that loses unsynced data or flips bits. Paths are plain byte strings.
+// All file access of voxdag uses this interface. So tests can replace the disk by a full disk, or
+// by a disk that loses unsynced data or flips bits. Paths are plain byte strings.
 //
 // Error codes are kNotFound, kNoSpace (for ENOSPC, EDQUOT and EFBIG) and kIo. The message names the
 // call, the path, the offset if there is one, and the system's reason. Implementations handle short
@@ -113,11 +113,11 @@ class FileSystem {
 // Returns the file system of this machine.
 FileSystem& system_files();
 
-// Returns the folder for temporary files: $TMPDIR or /tmp, the first that is writable, or else the
-// current folder.
+// Returns the folder for temporary files: $TMPDIR if it is writable, else /tmp if it is writable,
+// else the current folder.
 std::string temporary_parent();
-// Creates a folder that only this user may enter, and returns its path: `prefix`, which may contain
-// slashes, plus six unpredictable characters.
+// Creates a folder that only this user may enter, and returns its path. The path is `prefix`, which
+// may contain slashes, followed by six unpredictable characters.
 std::string make_temporary_folder(const std::string& prefix);
 
 // Removes the contents of a folder, if it exists.

@@ -1,5 +1,5 @@
-// A file system and files that forward every call to another file system or file. They are base
-// classes for implementations that change a few calls.
+// A file system and files that forward every call to another file system or file. A derived class
+// overrides only the calls that it changes.
 #pragma once
 
 #include <memory>

@@ -1,10 +1,10 @@
-// A lock that prevents two processes from writing the same output. They would use the same
+// A lock that prevents two processes from writing the same output, because they would use the same
 // temporary files.
 //
-// Only the holder of the lock removes the lock file. A process that tries to lock the file at that
-// moment notices the removal and creates a new file. A killed process leaves the empty lock file
-// behind, and the next process locks this file. The partial output file cannot serve as the lock
-// file: after its rename, its name would be free while the lock is still held.
+// Only the holder of the lock removes the lock file. If another process tries to lock the file at
+// that moment, it notices the removal and creates a new file. A killed process leaves the empty
+// lock file behind, and the next process locks this file. The partial output file cannot serve as
+// the lock file: after its rename, its name would be free while the lock is still held.
 #pragma once
 
 #include <memory>

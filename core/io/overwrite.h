@@ -21,9 +21,10 @@ std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string
 void refuse_inputs(FileSystem& files, std::span<const std::string> paths,
                    std::span<const std::string> inputs);
 
-// Throws Error{kInvalidInput} if `path` exists but is not a regular file, or if the file has
-// contents that the program did not write, so that is_own(file) is false. `otherwise` is appended
-// to the message; it names an option that helps, such as " (--force replaces it)".
+// Throws Error{kInvalidInput} if `path` exists but is not a regular file. Also throws if the file
+// is not empty and is_own(file) is false, which means that the program did not write it.
+// `otherwise` is appended to the message; it names an option that helps, such as " (--force
+// replaces it)".
 void refuse_foreign_file(FileSystem& files, const std::string& path,
                          const std::function<bool(const ReadableFile& file)>& is_own,
                          const std::string& otherwise = "");

@@ -56,7 +56,7 @@ int open_retrying(const std::string& path, int flags) {
 enum class Contents { kKeep, kEmpty };
 
 // Opens or creates a file for writing, and returns its descriptor. Refuses symbolic and hard links,
-// because writing through a link would change a file elsewhere.
+// because writing through a link would change a file elsewhere. Accepts character devices.
 int open_to_change(const char* call, const std::string& path, Contents contents) {
   const auto refuse = [&](const char* what) {
     throw Error(ErrorCode::kInvalidInput,
@@ -126,8 +126,8 @@ class PosixWritableFile : public WritableFile {
       data = data.subspan(static_cast<size_t>(n));
     }
   }
-  // Releases only complete blocks. For a part of a block, the system would write zeros instead,
-  // which frees nothing.
+  // Releases only complete blocks. For a part of a block, the system would write zeros, which frees
+  // no space.
   void release(uint64_t offset, uint64_t bytes) override {
     constexpr uint64_t kBlock = 4096;
     const uint64_t begin = (offset + kBlock - 1) / kBlock * kBlock;
@@ -229,7 +229,7 @@ class PosixFileSystem : public FileSystem {
       return nullptr;
     }
     // Between open() and flock(), another process may have released its lock and removed the file.
-    // Then this lock is on a file without a name, and does not lock `path`.
+    // Then this lock is on a file without a name, so the file at `path` must be locked instead.
     struct stat held {
     }, named{};
     const bool same = fstat(fd, &held) == 0 && stat(path.c_str(), &named) == 0 &&

@@ -1,4 +1,4 @@
-// Makes unpredictable names. Two calls practically never return the same name.
+// Makes unpredictable names. The probability that two calls return the same name is negligible.
 #pragma once
 
 #include <string>

@@ -10,8 +10,7 @@
 namespace voxdag {
 namespace {
 
-// A watched mapping. The signal handler reads the slots. It must not take a lock, so all members
-// are atomic.
+// A watched mapping. The signal handler reads the slots without a lock, so all members are atomic.
 struct Slot {
   std::atomic<bool> taken{false};
   std::atomic<uintptr_t> begin{0}, end{0};  // `end` is 0 while `begin` changes
@@ -31,8 +30,8 @@ void on_bus_error(int number, siginfo_t* info, void* context) {
   if (info->si_code == BUS_ADRERR) {
     for (Slot& slot : g_slots) {
       const uintptr_t begin = slot.begin, end = slot.end;
-      // The second comparison ensures that `begin` and `end` belong to the same mapping, even if
-      // the slot has been reused since.
+      // Reads `begin` and `end` a second time. If both are unchanged, they belong to the same
+      // mapping, even if another mapping took the slot in between.
       if (address < begin || address >= end || slot.begin != begin || slot.end != end) continue;
       slot.damaged = true;
       void* page = reinterpret_cast<void*>(address / g_page_bytes * g_page_bytes);
@@ -46,9 +45,9 @@ void on_bus_error(int number, siginfo_t* info, void* context) {
   if (g_before.sa_flags & SA_SIGINFO) return g_before.sa_sigaction(number, info, context);
   if (g_before.sa_handler != SIG_DFL && g_before.sa_handler != SIG_IGN)
     return g_before.sa_handler(number);
-  // There is no previous handler. When this handler returns, the access is repeated, and the
-  // default action ends the process. A signal that was not caused by an access of this thread would
-  // not occur again, so it is raised again.
+  // There is no previous handler, so SIGBUS must end the process. After this handler returns, the
+  // access is repeated and fails again, now with the default action. A signal that was not caused
+  // by an access of this thread would not occur again, so the handler raises it again.
   signal(SIGBUS, SIG_DFL);
   const bool was_sent = info->si_code <= 0 || info->si_code == BUS_MCEERR_AO;
   if (was_sent) raise(number);

@@ -15,7 +15,7 @@ class WatchedMapping {
 
   // Watches `bytes` bytes from `begin`. The first WatchedMapping installs a handler for SIGBUS,
   // which remains until the process exits. Faults outside watched mappings still end the process,
-  // unless it had a handler before.
+  // unless the process had another SIGBUS handler before.
   WatchedMapping(const void* begin, uint64_t bytes);
   // Destroy this object before the memory is unmapped.
   ~WatchedMapping();
