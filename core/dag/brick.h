@@ -13,7 +13,7 @@
 
 namespace voxdag {
 
-inline constexpr int kBrickLevels = 2;  // a brick is a cube of level L - 2
+inline constexpr int kBrickLevels = 2;  // log2(kBrickEdge); bricks are cubes of level L - 2
 inline constexpr int kBrickEdge = 4;    // voxels
 
 VOXDAG_HD inline int brick_bit(int x, int y, int z) {

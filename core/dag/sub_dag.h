@@ -20,9 +20,9 @@ struct DagShape {
   bool operator==(const DagShape&) const = default;
 };
 
-// The position of a sub-DAG in the grid's octree, and the hash of its nodes. This is a struct so
-// that callers name the numbers (`{.cube_level = 2, .grid_levels = 11, .hash_bits = 64}`); as
-// adjacent parameters, they could be swapped by mistake.
+// The position of a sub-DAG in the octree, and the hash bits of its nodes. This is a struct so that
+// callers name the numbers (`{.cube_level = 2, .grid_levels = 11, .hash_bits = 64}`). As adjacent
+// parameters, the numbers could be swapped by mistake.
 struct SubDagShape {
   uint32_t cube_level = 0;   // level of the root
   uint32_t grid_levels = 2;  // L; bricks are level L-2
@@ -41,8 +41,8 @@ struct SubDagSummary {
 };
 
 // Receives a sub-DAG from the bricks upwards: bricks() once, then nodes() for every level from L-3
-// up to the cube's own level. The last array has exactly one node, the root. For an empty
-// subvolume, no function is called. The views are only valid during the call.
+// up to the level of the subvolume's cube. The last array has exactly one node, the root. For an
+// empty subvolume, no function is called. The views are only valid during the call.
 class SubDagSink {
  public:
   virtual ~SubDagSink() = default;
@@ -50,7 +50,7 @@ class SubDagSink {
   virtual void nodes(const NodeLevelView& level) = 0;
 };
 
-// A complete sub-DAG in memory, for tests, benchmarks and the check of a backend.
+// A complete sub-DAG in memory, for tests, benchmarks and the check of a backend before a build.
 struct SubDag : SubDagSink {
   struct Nodes {
     uint32_t level = 0;

@@ -13,8 +13,8 @@
 // object() makes a nested JSON object from members of the same struct. derived() adds a computed
 // value, which is written but not read.
 //
-// A visitor decides by the type of a member how to read and write it. An enumeration needs a
-// function enum_names(E), which returns the names of its values. A set of names needs a
+// A visitor decides by the type of a member how to read and write the member. An enumeration needs
+// a function enum_names(E), which returns the names of its values. A set of names needs a
 // specialization of NameSetTraits.
 //
 // `fields` takes the struct by reference because some visitors set its members. Visitors that only
@@ -43,8 +43,9 @@ namespace voxdag {
 // also offer the option.
 enum class Scope { kSubmit, kPlan, kBuild };
 
-// A member's name, and its documentation and limits, from which all interfaces are made. The name
-// is also the JSON member, the Python keyword and, with dashes, the command-line option.
+// Describes a member: its name, its documentation and its limits. All interfaces are made from this
+// description. The name is also the JSON member, the Python keyword and, with dashes, the
+// command-line option.
 struct Field {
   const char* name;
   const char* help = "";
@@ -55,7 +56,7 @@ struct Field {
   const char* excluded = "";      // another field that must not be given together with this one
   const char* needed = "";        // another field that must be given together with this one
   Scope scope = Scope::kSubmit;
-  // Limits, inclusive: of an integer, of a size in bytes, or of the number of characters.
+  // Inclusive limits of an integer, of a size in bytes, or of the number of characters in a text.
   std::optional<int64_t> min, max;
   size_t max_items = 0;  // if not 0, a list must have 1 to max_items items
   bool is_power_of_two = false;
@@ -67,8 +68,8 @@ struct Field {
   bool is_required = false;
   bool is_positional = false;     // positional on the command line
   bool is_left_if_empty = false;  // JSON omits the member if it is empty
-  // Controls geometry_json(), which identifies a build's options: true if it always contains the
-  // field, false if never. If not set, it contains the field if the value differs from the default.
+  // geometry_json(), which identifies a build's options, always contains a field if `in_key` is
+  // true, and never if it is false. If not set: only if the value differs from the default.
   std::optional<bool> in_key;
 
   constexpr Field(const char* its_name, const char* its_help = "")
@@ -105,7 +106,7 @@ struct Field {
   constexpr Field needs(const char* other) const { return with(&Field::needed, other); }
 };
 
-// Thrown for a value that a decoder refuses. The message names the field and the expected value.
+// Thrown if a decoder refuses a value. The message names the field and the expected value.
 struct FieldError : Error {
   FieldError(std::string its_field, std::string its_expectation)
       : Error(ErrorCode::kInvalidInput, "'" + its_field + "': expected " + its_expectation),
@@ -120,9 +121,9 @@ concept NamedEnum = std::is_enum_v<E> && requires(E e) {
   enum_names(e);
 };
 
-// Describes a set of names, such as AttributeSet. Members: `names(set)` returns the names in the
-// set; `add(set, name)` adds a name, or returns false if it is unknown; `all()` returns all known
-// names.
+// Makes a type usable as a set of names, such as AttributeSet. Members: `names(set)` returns the
+// names in the set; `add(set, name)` adds a name, or returns false if it is unknown; `all()`
+// returns all known names.
 template <class T>
 struct NameSetTraits;
 template <class T>
@@ -151,8 +152,8 @@ struct IsNumbers : std::false_type {};
 template <size_t kCount>
 struct IsNumbers<std::array<double, kCount>> : std::true_type {};
 
-// A visitor that does nothing. The concept Described tests `fields` functions with it, so they may
-// use only the members of NoVisitor.
+// A visitor that does nothing. The concept Described calls `fields` functions with a NoVisitor, so
+// these functions may use only the members of NoVisitor.
 struct NoVisitor {
   template <class T>
   void operator()(const Field&, T&) {}

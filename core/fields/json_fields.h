@@ -19,7 +19,7 @@ using FieldJson = nlohmann::ordered_json;
 namespace json_fields {
 
 [[noreturn]] void refuse(const std::string& name, const std::string& expected);
-// Also shows the refused value, shortened, in the message.
+// Like the function above, but the message also shows the refused value, shortened.
 [[noreturn]] void refuse(const std::string& name, const std::string& expected,
                          const FieldJson& found);
 // Reads a whole number, which may be written as 64.0. Calls `take_unsigned` or `take_signed` with
@@ -192,8 +192,8 @@ class Decoder {
   }
   void derived(const char* name, const auto&) { known_.emplace_back(name); }
 
-  // Throws FieldError if the object has a member that the struct does not have. `where` is the
-  // object's name for the message.
+  // Throws FieldError if the object has a member that the struct does not have. `where` is the name
+  // of the object in the message.
   void refuse_unknown_members(const std::string& where) const;
 
  private:

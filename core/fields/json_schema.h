@@ -103,8 +103,8 @@ void write_schema(FieldJson& schema, Members members) {
 
 }  // namespace json_fields
 
-// Returns the schema of a record (json_fields.h). It requires all members, except optional members
-// and members with omit_empty().
+// Returns the schema of a record (json_fields.h). The schema requires all members, except optional
+// members and members with omit_empty().
 template <class T>
 FieldJson record_schema() {
   FieldJson schema;
@@ -112,8 +112,8 @@ FieldJson record_schema() {
   return schema;
 }
 
-// Returns the schema of options (json_fields.h). It requires only the members whose Field is
-// required().
+// Returns the schema of options (json_fields.h). The schema requires only the members whose Field
+// is required().
 template <class T>
 FieldJson options_schema() {
   FieldJson schema;

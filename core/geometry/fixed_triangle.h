@@ -8,10 +8,10 @@
 
 namespace voxdag {
 
-// Lattice units along the edge of a voxel.
+// Lattice units along the edge of a voxel, kUnitsPerVoxel, and log2 of this number.
 inline constexpr int kUnitBits = 8;
 inline constexpr int64_t kUnitsPerVoxel = int64_t{1} << kUnitBits;
-// Limit of the coordinates' magnitudes, so that the products of the overlap test fit in 128 bits.
+// Maximum magnitude of a coordinate, so that products of the overlap test fit in 128 bits.
 inline constexpr int64_t kCoordinateLimit = int64_t{1} << 40;
 
 struct FixedTriangle {

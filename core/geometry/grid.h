@@ -1,4 +1,4 @@
-// The voxel grid in world space and how world positions are snapped to its fixed-point lattice.
+// The voxel grid in world space, and how world positions are snapped to its fixed-point lattice.
 //
 // All values are computed in IEEE doubles with only + - * /, and compiled without fused
 // multiply-add, so that every machine snaps to the same positions. For a scene with the bounds lo

@@ -22,11 +22,11 @@ inline bool contains(const Cube& outer, const Cube& inner) {
   return inner.level >= outer.level && ancestor(inner, outer.level) == outer;
 }
 
-// The interior of a cube. Consecutive triangles of a scene are usually in the same cube, so callers
-// test the last triangle's cube before they descend the octree.
+// Tests whether a triangle is inside a cube. Consecutive triangles of a scene are usually in the
+// same cube, so callers test the last triangle's cube before they descend the octree.
 class CubeInside {
  public:
-  // Creates an empty interior, which contains no triangle.
+  // Creates an empty cube, which contains no triangle.
   CubeInside() = default;
   CubeInside(const Cube& cube, uint32_t grid_levels)
       : shift_(kUnitBits + static_cast<int>(grid_levels - cube.level)) {
@@ -44,7 +44,7 @@ class CubeInside {
   int shift_ = 0;
 };
 
-// The cells of a level that a triangle's box touches.
+// The range of cells, on one level of the octree, that a triangle's bounding box touches.
 struct CellBox {
   CellBox(const FixedTriangle& triangle, uint32_t grid_levels, uint32_t cell_level)
       : level(cell_level) {

@@ -13,8 +13,8 @@
 
 namespace voxdag {
 
-// Runs the test with products of type `Int`: 64 bits if the cube's edge and the triangle's
-// coordinates relative to the cube are below kNarrowReach, 128 bits if they are below 2^41.
+// The plane test and the edge tests, with products of type `Int`: 64 bits if the cube's edge and
+// the triangle's coordinates relative to the cube are below kNarrowReach, 128 bits if below 2^41.
 template <class Int>
 VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int64_t (&low)[3],
                                                int64_t edge) {
@@ -27,7 +27,7 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
     normal[a] = static_cast<Int>(e[0][b]) * e[1][c] - static_cast<Int>(e[0][c]) * e[1][b];
   }
 
-  // Plane: n.(p - v0) changes sign over the cube's corners p, or is 0 at one of them.
+  // Plane test: n.(p - v0) changes sign over the cube's corners p, or is 0 at one of them.
   Int lowest = 0, highest = 0;
   for (int a = 0; a < 3; ++a) {
     const Int near = normal[a] * (low[a] - t.v[0][a]);
@@ -37,8 +37,8 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
   }
   if (lowest > 0 || highest < 0) return false;
 
-  // Edges in the projection along axis c onto (a, b). The edge functions are multiplied by the sign
-  // of the normal (+ for 0), so that all three are >= 0 inside the triangle.
+  // Edge tests, in the projection along axis c onto (a, b). The edge functions are multiplied by
+  // the sign of the normal (+ for 0), so that all three are >= 0 inside the triangle.
   for (int c = 0; c < 3; ++c) {
     const int a = (c + 1) % 3, b = (c + 2) % 3;
     const int64_t sign = normal[c] < 0 ? -1 : 1;
@@ -55,7 +55,7 @@ VOXDAG_HD inline bool triangle_touches_cube_in(const FixedTriangle& t, const int
 }
 
 // Limit of the cube's edge and of the triangle's coordinates relative to the cube. Below this limit
-// 64-bit products suffice: the triangle's edges are below 2^20, its normal is below 2^41, and the
+// 64-bit products suffice: edges of the triangle are below 2^20, its normal is below 2^41, and the
 // sums of the plane test are below 2^63.
 inline constexpr int64_t kNarrowReach = int64_t{1} << 19;
 

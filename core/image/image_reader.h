@@ -17,7 +17,7 @@
 
 namespace voxdag {
 
-// The bytes of an image file, from front to back.
+// A source of the bytes of an image file, which are read in order.
 class EncodedBytes {
  public:
   virtual ~EncodedBytes() = default;
@@ -34,10 +34,10 @@ struct BrokenImage {
 
 class ImageReader {
  public:
-  // Max width and height, and max number of pixels. Larger images are refused.
+  // Maximum width and height, and maximum number of pixels. Larger images are refused.
   static constexpr uint32_t kMaxEdge = 65535;
   static constexpr uint64_t kMaxPixels = uint64_t{1} << 28;
-  // Images whose decoder needs more bytes of memory are refused.
+  // Maximum memory of a decoder, in bytes. Images that need more are refused.
   static constexpr uint64_t kMaxDecoderBytes = uint64_t{2} << 30;
 
   virtual ~ImageReader() = default;
@@ -46,8 +46,8 @@ class ImageReader {
   // Bits of a channel, 8 or 16.
   int bits() const { return bits_; }
   // Reads the next row: red, green, blue and alpha of each pixel, bits() bits each, in the
-  // machine's byte order. `row` has exactly the size of a row. Throws BrokenImage and the source's
-  // errors.
+  // machine's byte order. `row` must have exactly the size of a row. Throws BrokenImage and the
+  // errors of the source.
   virtual void read_row(std::span<std::byte> row) = 0;
 
  protected:
@@ -63,7 +63,7 @@ class ImageReader {
 enum class ImageUse { kPixels, kSize };
 
 // Opens an image and reads its header. The source must outlive the reader. Throws BrokenImage,
-// Error{kOutOfMemory} if decoding does not fit the budget, and the source's errors.
+// Error{kOutOfMemory} if decoding does not fit the budget, and the errors of the source.
 std::unique_ptr<ImageReader> open_image(EncodedBytes& source, MemoryBudget& budget,
                                         ImageUse use = ImageUse::kPixels);
 

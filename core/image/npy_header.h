@@ -10,7 +10,7 @@ namespace voxdag {
 // floats of 4 bytes), `shape` is "(7, 3)".
 inline std::string npy_header(const std::string& type, const std::string& shape) {
   std::string text = "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + shape + ", }";
-  // Ten bytes come before this text, and an end of line after it.
+  // The header has ten bytes before this text, and an end of line after it.
   text.append(63 - (10 + text.size()) % 64, ' ');
   text += '\n';
   std::string header("\x93NUMPY\x01\x00", 8);

@@ -1,4 +1,4 @@
-// The readers of the formats, for open_image().
+// The readers of the image formats, for open_image().
 #pragma once
 
 #include <algorithm>
@@ -11,10 +11,10 @@
 
 namespace voxdag {
 
-// A source of bytes. head() returns its first bytes, up to kImageHeadBytes, which read() also
-// returns. read() stores an exception of the source instead of throwing it, because exceptions must
-// not pass through a decoder written in C. It then returns fewer bytes, and rethrow() throws the
-// exception.
+// A source of bytes whose first bytes (up to kImageHeadBytes) can be seen in advance with head().
+// read() returns all bytes, including the first. read() stores an exception of the source instead
+// of throwing it, because exceptions must not pass through a decoder written in C. In this case
+// read() returns fewer bytes, and rethrow() throws the exception.
 class PeekedSource {
  public:
   explicit PeekedSource(EncodedBytes& source) : source_(source) {

@@ -1,9 +1,10 @@
 // The unique bricks of one subvolume: an open-addressing table from masks to ids 0, 1, 2, ...
 //
-// The slot of a brick is at the top bits of its hash, or, if that slot is taken, the next free slot
-// (linear probing). So the slots are almost in the order of the hash. The table therefore grows in
-// one sequential pass, and sort_slots(), which makes the level array, only has to sort a nearly
-// sorted array. Not thread-safe. Throws OutOfBudget when the budget cannot hold more.
+// The number of a brick's slot is the top bits of its hash. If that slot is taken, the brick gets
+// the next free slot (linear probing). So the slots are almost in the order of the hashes. The
+// table therefore grows in one sequential pass, and sort_slots(), which makes the level array, only
+// has to sort a nearly sorted array. Not thread-safe. Throws OutOfBudget if the budget is too
+// small.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +26,7 @@ class BrickTable {
 
   uint64_t size() const { return count_; }
 
-  // Reserves slots for `more` bricks beyond size(). Call it before the functions below.
+  // Reserves slots for `more` bricks beyond size(). The functions below do not reserve slots.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow(count_ + more);
   }
@@ -54,8 +55,8 @@ class BrickTable {
       if (slot.mask != 0) visit(slot.mask, slot.id);
   }
 
-  // Returns all used slots, sorted by (hash truncated to `hash_bits`, mask). Afterwards the table
-  // cannot be searched.
+  // Returns all used slots, sorted by (hash truncated to `hash_bits`, mask). After this call, the
+  // table cannot be searched.
   std::span<const Slot> sort_slots(uint32_t hash_bits);
 
  private:
@@ -64,7 +65,7 @@ class BrickTable {
   PooledMemory& memory_;
   PooledArray<Slot> slots_;
   uint64_t capacity_ = 0;
-  int shift_ = 64;  // index of a hash = hash >> shift_
+  int shift_ = 64;  // slot of a hash = hash >> shift_
   uint64_t count_ = 0;
 };
 

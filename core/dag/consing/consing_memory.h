@@ -1,5 +1,6 @@
-// Memory that only makes hash-consing faster: finding equal nodes by their hashes while a sub-DAG
-// is built. If such memory would exceed its limit, less or none of it is used; the DAG is the same.
+// Limits for memory that only makes hash-consing faster: finding equal nodes by their hashes while
+// a sub-DAG is built. If such memory would exceed its limit, the build uses less of it or none. The
+// DAG is the same.
 #pragma once
 
 #include <algorithm>
@@ -8,17 +9,17 @@
 namespace voxdag {
 
 struct ConsingMemory {
-  // Maximum size of the free pages that are retained for the next sub-DAG. They are not charged,
-  // and are freed before an allocation that would not fit next to them in the budget. A budget of
-  // less than eight times kMinPageBytes can be exceeded by kMinPageBytes; the division of the
-  // memory among workers allows for this (scheduler/spec/memory_plan.h).
+  // Maximum size of the free pages that are retained for the next sub-DAG. Retained pages are not
+  // charged to the budget. They are freed before an allocation that would not fit in the budget
+  // next to them. A budget of less than eight times kMinPageBytes can be exceeded by kMinPageBytes;
+  // the division of the memory among workers allows for this (scheduler/spec/memory_plan.h).
   static constexpr uint64_t kMinPageBytes = uint64_t{8} << 20;
   static constexpr uint64_t kMaxPageBytes = uint64_t{128} << 20;
   static constexpr uint64_t page_bytes(uint64_t budget_bytes) {
     return std::clamp(budget_bytes / 8, kMinPageBytes, kMaxPageBytes);
   }
-  // Maximum total size of the brick and node tables that are reserved in advance, at the sizes that
-  // they had for the last sub-DAG.
+  // Maximum total size of the brick and node tables that a build reserves in advance. The sizes
+  // that the tables had for the last sub-DAG are the estimate.
   static constexpr uint64_t table_bytes(uint64_t free_bytes) { return free_bytes / 4; }
 };
 

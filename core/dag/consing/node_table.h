@@ -1,14 +1,14 @@
 // The unique nodes of one level of one subvolume, found by their hashes (hash-consing).
 //
 //   slots     [tag | id]  [tag | id] ...           8 bytes each; tag: upper half of the node's hash
-//   records   hash (2 words), child mask, children        words of 32 bits; id = first word
+//   records   hash (2 words), child mask, children        32-bit words; id: index of first word
 //
-// The slot of a node is at the top bits of its hash, or, if that slot is taken, the next free slot
-// (linear probing). So the slots are almost in the order of the hash. The table therefore grows in
-// one sequential pass over the slots, and sort_slots(), which makes the level array, only has to
-// sort a nearly sorted array. Records keep their positions, in the order in which they were added,
-// so neighbors in space are neighbors in memory. Not thread-safe. Throws OutOfBudget when the
-// budget, or 2^32 words, cannot hold more.
+// The number of a node's slot is the top bits of its hash. If that slot is taken, the node gets the
+// next free slot (linear probing). So the slots are almost in the order of the hashes. The table
+// therefore grows in one sequential pass over the slots, and sort_slots(), which makes the level
+// array, only has to sort a nearly sorted array. Records keep their positions, in the order in
+// which they were added, so neighbors in space are neighbors in memory. Not thread-safe. Throws
+// OutOfBudget if the budget is too small, or if the records need more than 2^32 words.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@
 
 namespace voxdag {
 
-// of[count] has all bits set in its first `count` words, and no others. It selects the children
-// that a node has.
+// Masks for comparing lists of up to eight children without branches. In of[count], the first
+// `count` words have all bits set, and the other words are 0.
 struct FirstWords {
   alignas(32) uint32_t of[9][8] = {};
   constexpr FirstWords() {
@@ -58,8 +58,8 @@ class NodeTable {
   Record record(uint32_t id) { return {&records_[id]}; }
 
   // Makes room for `more` nodes beyond size(). Call it before find_or_add() and the prefetch
-  // functions, which do not grow the table. The room is for eight children per node, so eight
-  // children can be read from any record, even if its node has fewer.
+  // functions, which do not grow the table. The room is for eight children per node, so that eight
+  // words of children can be read from any record, even if its node has fewer children.
   void reserve(uint64_t more) {
     if (count_ + more > capacity_) grow_slots(count_ + more);
     const uint64_t words = kFirstId + used_ + more * (Record::kWords + 8);
@@ -73,7 +73,7 @@ class NodeTable {
   }
 
   // Returns the id of the node with this hash, mask (not 0) and popcount(mask) children; adds the
-  // node if it is new. Eight elements of `children` must be readable, even if there are fewer.
+  // node if it is new. Eight elements of `children` must be readable, even if the node has fewer.
   uint32_t find_or_add(uint64_t hash, uint32_t mask, const uint32_t* children, int child_count) {
     uint64_t at = hash >> shift_;
     while (const uint64_t slot = slots_[at]) {
@@ -84,7 +84,7 @@ class NodeTable {
     return add(at, hash, mask, children, child_count);
   }
 
-  // Calls visit(Record) for every node in the order in which they were added.
+  // Calls visit(Record) for every node, in the order in which the nodes were added.
   template <class Visit>
   void for_each_record(Visit visit) {
     for (uint64_t at = kFirstId; at < used_ + kFirstId;) {
@@ -95,8 +95,8 @@ class NodeTable {
   }
 
   // Returns all used slots, sorted by (hash, mask, children) of their records. The lower half of a
-  // slot is the id of its record. `hashes_changed`: records were given new hashes after they were
-  // added. Afterwards the table cannot be searched.
+  // slot is the id of its record. `hashes_changed`: true if records got new hashes after they were
+  // added. After this call, the table cannot be searched.
   std::span<const uint64_t> sort_slots(bool hashes_changed);
 
  private:
@@ -121,7 +121,7 @@ class NodeTable {
   PooledArray<uint64_t> slots_;  // 0: free
   PooledArray<uint32_t> records_;
   uint64_t capacity_ = 0;
-  int shift_ = 64;  // index of a hash = hash >> shift_
+  int shift_ = 64;  // slot of a hash = hash >> shift_
   uint64_t count_ = 0;
   uint64_t used_ = 0;  // number of words that the records occupy; they begin at word kFirstId
 };

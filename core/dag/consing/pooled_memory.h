@@ -1,5 +1,6 @@
-// Memory for the build of one subvolume: arrays charged to its budget. Their pages are cached
-// between subvolumes, because getting new pages from the system takes longer than filling them.
+// Memory for the build of one subvolume: arrays charged to its budget. The pages of a freed array
+// are cached for later arrays, because getting new pages from the system takes longer than filling
+// them.
 #pragma once
 
 #include <cstddef>
@@ -44,8 +45,8 @@ class PagePool {
 };
 
 // Allocates the arrays of one build. An array is charged to `budget` during its lifetime. Cached
-// pages are not charged. All of them are freed if the budget cannot hold them in addition to a new
-// allocation.
+// pages are not charged. If the budget cannot hold the cached pages and a new allocation together,
+// all cached pages are freed.
 class PooledMemory {
  public:
   MemoryBudget& budget;
@@ -64,7 +65,7 @@ class PooledMemory {
   void charge(size_t bytes);
 };
 
-// An array of at least `size` elements, on cached or new pages. Throws like
+// An array of at least `size` elements, in cached or new pages. Throws like
 // PooledMemory::allocate().
 template <class T>
 class PooledArray {
@@ -85,8 +86,8 @@ class PooledArray {
     if (pages_.data) memory_->free(pages_);
   }
 
-  // Increases the size to at least `size`, and by at least a quarter. Old elements are preserved;
-  // new elements are undefined.
+  // Increases the size to at least `size`, and by at least a quarter. The old elements are
+  // preserved; the new elements are undefined.
   void grow(PooledMemory& memory, size_t size) {
     if (!pages_.data) {
       *this = PooledArray(memory, size);

@@ -1,5 +1,5 @@
-// Functions that BrickTable and NodeTable share: the number of their slots, and a sort of the
-// slots, which linear probing leaves nearly in hash order.
+// Functions that BrickTable and NodeTable share: they compute the number of slots, and sort the
+// slots, which linear probing leaves nearly in the order of their hashes.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 
 namespace voxdag {
 
-// Returns the maximum number of entries in a table: 5/8 of `slots`, its number of slots, which is a
-// power of two.
+// Returns the maximum number of entries in a table of `slots` slots: 5/8 of the slots. The number
+// of slots is a power of two.
 inline uint64_t entries_for(uint64_t slots) { return slots / 8 * 5; }
 // Returns the smallest number of slots that can hold `entries` entries; at least 512.
 inline uint64_t slots_for(uint64_t entries) {
@@ -20,9 +20,9 @@ inline uint64_t slots_for(uint64_t entries) {
   return slots;
 }
 
-// Moves the used slots to the front without changing their order, and returns them. The entries
-// with the highest hashes can have wrapped around to the first slots; they go behind all other
-// entries. `tag(slot)` is the upper half of the hash.
+// Moves the used slots to the front without changing their order, and returns them. Linear probing
+// can have put entries with the highest hashes into the first slots; these entries go behind all
+// others. `tag(slot)` is the upper half of the hash.
 template <class Slot, class InUse, class Tag>
 std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   std::vector<Slot> wrapped;
@@ -33,8 +33,8 @@ std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
     else
       slots[count++] = slots[i];
   }
-  // Always writes the slot. If it is unused, the next write replaces it. A branch would be
-  // mispredicted half the time.
+  // Writes every slot without a branch, which would be mispredicted half the time. If the slot is
+  // unused, the next write replaces it.
   for (; i < slots.size(); ++i) {
     const bool used = in_use(slots[i]);
     slots[count] = slots[i];
@@ -50,9 +50,8 @@ std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
 template <class Slot, class Tag, class Less>
 void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
   if (slots.empty()) return;
-  // First pass: does most of the work, almost without branches. Goes from the back to the front and
-  // carries the slot with the smallest tag so far along, until it meets a slot whose tag is not
-  // larger.
+  // First pass, from the back to the front: carries a slot forward until it meets a slot whose tag
+  // is not larger, then carries that slot. This does most of the work, almost without branches.
   Slot down = slots.back();
   for (size_t i = slots.size() - 1; i-- > 0;) {
     const Slot other = slots[i];

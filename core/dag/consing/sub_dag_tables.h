@@ -12,9 +12,9 @@
 
 namespace voxdag {
 
-// A node in the table of its level: its id in the table, and its complete hash, so that a parent
-// can be hashed without a lookup of its children. `exists` is false for an empty cube, which has no
-// node.
+// A node in the table of its level: its id in the table, and its complete hash. With the hash, a
+// parent can be hashed without a lookup of its children. `exists` is false for an empty cube, which
+// has no node.
 struct NodeRef {
   uint64_t hash = 0;
   uint32_t id = 0;
@@ -44,8 +44,8 @@ struct TableSizes {
   uint64_t entries[kMaxGridLevels + 1] = {};
 };
 
-// The tables of a cube. A cube of `size_log2` = s has an edge of 2^s voxels; bricks have s = 2.
-// `expected` estimates the sizes of the tables, for which memory is reserved.
+// The tables of a cube. A cube of `size_log2` = s has an edge of 2^s voxels; bricks have s = 2. The
+// constructor reserves memory for tables of the sizes in `expected`, an estimate.
 class SubDagTables {
  public:
   SubDagTables(PooledMemory& memory, int size_log2, const TableSizes& expected = {});
@@ -73,8 +73,8 @@ class SubDagTables {
   OctreeCounts counts_;
 };
 
-// Passes the level arrays to the sink and returns the totals. Throws OutOfBudget before the first
-// call of the sink if the budget cannot hold the largest level array in addition to the tables.
+// Passes the level arrays to the sink and returns the totals. Throws OutOfBudget if the budget
+// cannot hold the largest level array in addition to the tables; the sink is then not called.
 SubDagSummary emit_levels(SubDagTables& tables, const SubDagShape& shape, SubDagSink& sink);
 
 }  // namespace voxdag
