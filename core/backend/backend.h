@@ -9,7 +9,7 @@
 //   3. All large buffers are charged to the given budget. If the budget cannot hold the subvolume,
 //      build() returns kNeedsSplit without calling the sink, and the caller splits the cube and
 //      tries again. A cube with an edge of kSmallestEdge never needs more than kSmallestBudget.
-//   4. A backend is used for many subvolumes, by one thread, and may keep caches between them.
+//   4. One thread uses a backend for many subvolumes. The backend may keep caches between builds.
 //
 // tests/conformance tests every backend.
 #pragma once
@@ -28,10 +28,10 @@
 
 namespace voxdag {
 
-// Edge in voxels of the smallest subvolume. The scheduler does not split subvolumes further.
+// Edge of the smallest subvolumes, in voxels. The scheduler does not split these subvolumes.
 inline constexpr int64_t kSmallestEdge = 64;
-// Bytes of budget that suffice for a subvolume with an edge of kSmallestEdge, for any number of
-// triangles.
+// Budget, in bytes, that is enough to build a subvolume with an edge of kSmallestEdge, for any
+// number of triangles.
 inline constexpr uint64_t kSmallestBudget = uint64_t{8} << 20;
 
 // The triangles that may touch a subvolume, in no particular order; can be read repeatedly.
@@ -45,7 +45,7 @@ class TriangleStream {
   virtual size_t read(std::span<FixedTriangle> out) = 0;
 };
 
-// Everything that defines a subvolume task except its triangles.
+// The task to build one subvolume. Its triangles come separately, from a TriangleStream.
 struct SubvolumeTask {
   uint32_t grid_levels = 2;  // L: the grid has 2^L voxels per edge
   Cube cube;                 // its level is at most L-2
@@ -91,11 +91,11 @@ enum class Method {
 };
 
 // Creates a backend that runs the parallel pipeline (core/backend/parallel) on `threads` threads of
-// the host, for tests and comparisons. 0 threads: one for each hardware thread.
+// the host, for tests and comparisons. If `threads` is 0, uses one for each hardware thread.
 std::unique_ptr<Backend> make_parallel_host_backend(Method method, unsigned threads = 1);
 
-// Returns the number of GPUs that make_cuda_backend() can open. 0 if this build has no CUDA, or if
-// the machine has no driver or device. Never throws.
+// Returns the number of GPUs that make_cuda_backend() can open. Returns 0 if this build has no
+// CUDA, or if the machine has no driver or device. Never throws.
 int cuda_device_count();
 inline bool cuda_device_available() { return cuda_device_count() > 0; }
 // Returns the reason why no device is usable, as a message; "" if a device is usable.

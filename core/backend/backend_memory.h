@@ -16,11 +16,11 @@
 namespace voxdag {
 
 struct BackendMemory : ConsingMemory {
-  // Maximum size of each table of the plane memo.
+  // Maximum bytes of each table of the plane memo, a cache (plane_memo.h).
   static constexpr uint64_t plane_table_bytes(uint64_t budget_bytes, uint64_t free_bytes) {
     return std::min(budget_bytes / 16, free_bytes / 8);
   }
-  // Maximum size of the block memo.
+  // Maximum bytes of the block memo, a cache (block_memo.h).
   static constexpr uint64_t block_memo_bytes(uint64_t free_bytes) { return free_bytes / 16; }
 };
 

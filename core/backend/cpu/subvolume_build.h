@@ -1,6 +1,6 @@
 // Builds the sub-DAG of one subvolume. Descends the octree to tiles (cubes of at most 64^3 voxels)
-// and passes each triangle to the children of a cube that it may touch. The triangles of a tile are
-// drawn, and the drawn tile is reduced to a node. On the way back, nodes are combined up to the
+// and passes each triangle of a cube to the children that the triangle may touch. Then draws the
+// triangles of each tile and reduces the tile to a node. On the way back, combines nodes up to the
 // root.
 #pragma once
 

@@ -121,7 +121,7 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   void* memory = nullptr;
   cudaError_t status = cudaMallocAsync(&memory, bytes, stream());
   if (status == cudaErrorMemoryAllocation) {
-    // The memory retained by the pool may be fragmented: return it to the device and try again.
+    // The memory retained by the pool may be fragmented. Returns it to the device and tries again.
     cudaGetLastError();
     check_call(cudaStreamSynchronize(stream()), "cudaStreamSynchronize", where);
     check_call(cudaMemPoolTrimTo(pool_, 0), "cudaMemPoolTrimTo", where);
@@ -131,7 +131,7 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   return memory;
 }
 
-// CUB returns the thread's last error as its own result, so the last error must be cleared.
+// If the call fails, clears the thread's last error, because CUB would return it as its own result.
 void CudaDevice::release(void* memory) noexcept {
   if (cudaFreeAsync(memory, stream()) != cudaSuccess) cudaGetLastError();
 }

@@ -1,5 +1,5 @@
-// One GPU for one backend: a stream and pinned host memory for small transfers. Used for many
-// subvolumes, by one thread.
+// One GPU for one backend: a stream, and pinned host memory for small transfers. One thread uses it
+// for many subvolumes.
 #pragma once
 
 #include <cstdint>
@@ -36,8 +36,8 @@ class CudaDevice {
   // Returns a pinned staging area of kStagingTriangles triangles. Waits until the last copy from
   // this area is complete. For `where`, see check_call().
   std::span<FixedTriangle> free_staging(const std::string& where);
-  // Copies the first `count` triangles of the area that free_staging() returned most recently, in
-  // stream order.
+  // Copies triangles to device memory at `to`, in stream order: the first `count` triangles of the
+  // area that free_staging() returned last.
   void send_staging(size_t count, FixedTriangle* to, const std::string& where);
 
   // Returns the free bytes of the device, including the bytes that the device's memory pool

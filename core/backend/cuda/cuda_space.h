@@ -71,8 +71,8 @@ class CudaSpace {
   template <class T>
   void upload(const T* from, T* to, uint64_t n) {
     transfer(from, to, n, cudaMemcpyHostToDevice);
-    // The caller may free `from` after this call. It depends on the system whether an asynchronous
-    // copy would still be reading `from` then.
+    // Waits for the copy, because the caller may free `from` after this call. On some systems an
+    // asynchronous copy would still read `from` then.
     check(cudaStreamSynchronize(stream()), "cudaStreamSynchronize");
   }
   template <class T>

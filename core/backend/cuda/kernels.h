@@ -23,7 +23,7 @@ __global__ void __launch_bounds__(kThreadsPerBlock) run_for_each(uint32_t n, F f
   if (i < n) f(i);
 }
 
-// A thread block kernel (core/backend/parallel/space/thread_block.h), launched with
+// Runs a thread block kernel (core/backend/parallel/space/thread_block.h). The launch must request
 // sizeof(Kernel::Shared) bytes of shared memory.
 template <class Kernel>
 __global__ void __launch_bounds__(Kernel::kThreads, Kernel::kMinResidentBlocks)
@@ -64,7 +64,7 @@ struct Grid {
   size_t shared_bytes = 0;
 };
 
-// Launches a kernel. All launches use this function. `where`: as in check_call().
+// Launches a kernel. All launches use this function. For `where`, see check_call().
 template <class... Parameters>
 void launch(const Grid& grid, cudaStream_t stream, const std::string& where,
             void (*kernel)(Parameters...), std::type_identity_t<Parameters>... arguments) {

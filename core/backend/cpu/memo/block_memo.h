@@ -10,9 +10,9 @@
 // the cache is not used for a while. This happens for scanned 3D models, where almost no blocks are
 // equal.
 //
-// The cache is charged to the budget. It grows beyond its minimum size only up to a sixteenth of
-// the memory that is still free in the budget. Throws OutOfBudget if not even the minimum size
-// fits. Not thread-safe.
+// The cache is charged to the budget. It grows beyond its minimum size only up to 5 MiB, and only
+// up to a sixteenth of the memory that is still free in the budget. Throws OutOfBudget if not even
+// the minimum size fits. Not thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,7 @@
 
 namespace voxdag::cpu {
 
-// Trivially copyable, 24 KiB. Only for planes with Plane::fractional. Not thread-safe.
+// Trivially copyable, at most 24 KiB. Only for planes with Plane::fractional. Not thread-safe.
 class PlaneDirection {
  public:
   static constexpr int kSizeLog2 = 3;  // log2 of the edge of the nodes' cubes, in voxels
@@ -55,8 +55,8 @@ class PlaneDirection {
     while (values_[i + 1] <= f) ++i;
     return i;
   }
-  // Returns the bucket of an offset f. It is monotonic in f. bucket_ was built with this function,
-  // so the rounding of the doubles does not matter.
+  // Returns the bucket of an offset f. The bucket never decreases if f increases. The rounding of
+  // the doubles does not matter, because bucket_ was made with this function.
   int bucket(int64_t f) const {
     return static_cast<int>(static_cast<double>(f - values_[0]) * buckets_per_unit_);
   }

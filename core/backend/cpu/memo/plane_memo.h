@@ -1,6 +1,6 @@
-// The memo of planes. With it, large flat surfaces cost a lookup per cube instead of rasterization.
-// It is used for cubes that one triangle covers (see Entry in triangle_set.h) and no other triangle
-// touches.
+// The plane memo: a cache of the nodes of flat surfaces. With it, a cube on a large flat surface
+// costs a lookup instead of rasterization. The memo is used for cubes that one triangle covers (see
+// Entry in triangle_set.h) and no other triangle touches. There are two kinds of planes:
 //
 //   small normals    Planes whose |n_a| sum to at most 64, such as walls, floors and slopes of 45
 //                    degrees. The nodes for every offset and size of cube are in a hash table. Its
@@ -33,8 +33,8 @@ class PlaneMemo {
   static constexpr int kSmallestLog2 = 4;
 
   // Sets `node` to the node of a cube that the triangle `entry` covers and no other triangle
-  // touches. `node` has no node (NodeRef::exists) if the plane misses the cube. Returns false if
-  // the memo does not contain the plane (yet), or if Plane::fits() is false for cubes of this size.
+  // touches. If the plane misses the cube, sets node.exists to false. Returns false if the memo
+  // does not contain the plane (yet), or if Plane::fits() is false for cubes of this size.
   bool build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube, int size_log2,
              NodeRef& node);
   // True if build() would succeed for cubes of up to 64^3 voxels that the triangle covers.

@@ -30,8 +30,8 @@ class TileReducer {
 
   // Returns the node of a cube with an edge of 2^size_log2 voxels, from its nodes with an edge of
   // 2^from_log2 voxels. Bit m of `existing` is set if the m-th cube of this smaller size, in Morton
-  // order, has a node; next(m) returns the node's id and hash. Counts only the nodes above these
-  // nodes.
+  // order, has a node; next(m) returns that node's id and hash. Adds only the nodes above the
+  // smaller cubes to the tables' counts.
   template <class Next>
   NodeRef reduce_nodes(const uint64_t* existing, int from_log2, int size_log2, Next next) {
     const int words = words_of(size_log2 - from_log2);
@@ -90,9 +90,9 @@ class TileReducer {
   uint32_t ids_[kTileBlocks + kChildren] = {};
   uint64_t hashes_[kTileBlocks];
   Parents parents_;  // nodes of the next coarser level
-  // The non-empty voxel blocks of the tile: their indexes in TileBricks::blocks, and their keys.
-  // New blocks are the blocks that were not in the memo: their positions in blocks_, and their
-  // voxel counts.
+  // blocks_ and keys_: the non-empty voxel blocks of the tile, as indexes in TileBricks::blocks,
+  // and their keys. new_blocks_ and new_voxels_: the blocks that were not in the memo, as positions
+  // in blocks_, and their voxel counts.
   uint16_t blocks_[kTileBlocks + 1];
   uint64_t keys_[kTileBlocks + 1];
   uint16_t new_blocks_[kTileBlocks];

@@ -34,7 +34,7 @@ struct Kernels {
   // Sets exactly the voxels of the tile that the triangle touches.
   void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
   // Finds the children of the cube that the triangle may touch. Requires that the triangle touches
-  // the cube. `inside`: the triangle covers the complete cube.
+  // the cube. `inside`: true if the triangle covers the cube (see Entry in triangle_set.h).
   Octants (*test_octants)(const NarrowTriangle& triangle, const LatticeCube& cube, bool inside);
   // Sets bit i of `bits` iff low <= values[i] <= high, for `count` values, a multiple of 4; the
   // other bits of the last word are 0.
@@ -53,13 +53,14 @@ struct Kernels {
 };
 
 const Kernels& portable_kernels();
-// The kernels for AVX2 and AVX-512; null if they were not built or this machine cannot run them.
+// Return the kernels for AVX2 and for AVX-512, or null if this build does not have them or this
+// machine cannot run them.
 const Kernels* avx2_kernels();
 const Kernels* avx512_kernels();
 
 // The rasterizers: each sets exactly the voxels of the tile that the triangle touches.
 //
-// Plain integer code, for narrow, wide (triangle_set.h) and degenerate triangles.
+// draw_exactly() is plain integer code, for narrow, wide (triangle_set.h) and degenerate triangles.
 template <class Coordinate>
 void draw_exactly(const TileTriangle<Coordinate>& triangle, TileBricks& tile);
 // Requires a machine with AVX2, FMA and BMI2.

@@ -20,7 +20,7 @@ inline constexpr uint32_t kSpread[16] = {
 
 struct TileBricks {
   VoxelBlock blocks[kTileBlocks] = {};  // in Morton order
-  // For each voxel block: not 0 if it may have voxels.
+  // touched[i] is not 0 if voxel block i may have voxels.
   alignas(64) uint8_t touched[kTileBlocks] = {};
 
   uint64_t& brick(uint32_t index) {

@@ -20,8 +20,8 @@ struct Triangle {
 };
 
 // A narrow triangle has |coordinates| < 2^30 and an extent of at most 2^28 (2^20 voxels) along
-// every axis, like every triangle inside the largest grid. Others are wide, with |coordinates| <
-// 2^40.
+// every axis, like every triangle inside the largest grid. All other triangles are wide, with
+// |coordinates| < 2^40.
 using NarrowTriangle = Triangle<int32_t>;
 using WideTriangle = Triangle<int64_t>;
 

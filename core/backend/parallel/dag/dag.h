@@ -47,7 +47,7 @@ struct HashBrick {
   }
 };
 
-// Returns the lowest bit that can be set in a truncated hash: only bits [64 - hash_bits, 64) can.
+// Returns the lowest bit that can be set in a truncated hash. Bits [64 - hash_bits, 64) can be set.
 inline int first_hash_bit(uint32_t hash_bits) { return 64 - static_cast<int>(hash_bits); }
 
 // Counts the children of each octree node in `items`. The prefix sums of these counts are the
@@ -66,7 +66,8 @@ struct SameWord {
   VOXDAG_HD bool operator()(uint32_t a, uint32_t b) const { return words[a] == words[b]; }
 };
 
-// Marks each item in a sorted list: 1 if it differs from the previous item, else 0.
+// Marks each item in a sorted list: 1 if it is the first item or differs from the item before it,
+// else 0.
 template <class Same>
 struct MarkFirstOfEquals {
   Same same;

@@ -35,7 +35,8 @@ struct HashOctreeNode {
   }
 };
 
-// Lists the candidates of a level, with their hashes: the octree nodes whose parents survive.
+// Lists the candidates of a level, with their hashes. A candidate is a child of a survivor of the
+// level above. The survivors of a level are its candidates without duplicates.
 struct EmitCandidates {
   OctreeNodes nodes;
   const uint32_t* parents;  // octree nodes
@@ -49,10 +50,9 @@ struct EmitCandidates {
   }
 };
 
-// Copies the survivors among the candidates. For every candidate, also sets its entry in the child
-// list of its parent to the position of its survivor. The candidate at sorted index i has the
-// original index items[i] and the compact index marked[i + 1] - 1, which is its survivor's
-// position.
+// Copies the survivors of a level: the first candidate with each hash. For every candidate, also
+// sets its entry in its parent's child list to the position of its survivor. The candidate at
+// sorted index i has the original index items[i]. Its survivor has the position marked[i + 1] - 1.
 struct RemoveDuplicates {
   const uint32_t* marked;  // prefix sums of the marks of MarkFirstOfEquals
   const uint32_t* items;

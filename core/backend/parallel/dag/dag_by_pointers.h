@@ -20,8 +20,8 @@
 
 namespace voxdag::parallel {
 
-// One reduced level: the surviving octree nodes, and for each octree node the survivor that
-// replaces it.
+// One reduced level: the surviving octree nodes (one of each group of equal nodes), and for each
+// octree node the survivor that replaces it.
 template <class Space>
 struct Reduced {
   uint32_t count = 0;
@@ -87,7 +87,7 @@ struct TakeFirstOfEquals {
   }
 };
 
-// Sets index_of of each item to the place of the item's group among the survivors.
+// Sets index_of of each item to the position of the item's group among the survivors.
 struct RewireThroughGroups {
   const uint32_t* marked;
   const uint32_t* items;
@@ -172,7 +172,8 @@ Reduced<Space> reduce_bricks(Space& space, const Octree<Space>& tree, uint32_t h
                        });
 }
 
-// `child_hashes`: the hashes of the `child_count` survivors of the level below.
+// Removes duplicates from a level above the bricks. `child_hashes`: the hashes of the `child_count`
+// survivors of the level below.
 template <class Space>
 Reduced<Space> reduce_nodes(Space& space, uint32_t node_count, const LinkedNodes& links,
                             const uint64_t* child_hashes, uint32_t child_count,

@@ -1,5 +1,5 @@
-// A DAG's level arrays on the host. All of them are copied before the first call of the sink,
-// because the sink must not be called for a subvolume that does not fit.
+// A DAG's level arrays on the host. All arrays are copied before the first call of the sink,
+// because the sink must not be called for a subvolume that does not fit in the budget.
 #pragma once
 
 #include <cstdint>

@@ -23,7 +23,7 @@ struct OctreeLevel {
   SpaceArray<Space, uint8_t> masks;
 };
 
-// The arrays of an octree level, for functors.
+// Pointers to the arrays of an OctreeLevel, for functors.
 struct OctreeNodes {
   const uint32_t* first_child;
   const uint8_t* masks;

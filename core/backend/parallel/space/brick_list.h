@@ -43,8 +43,8 @@ class BrickList {
     if (needed > codes_.size() / 4 * 3) grow(std::max(2 * needed, kMinSize));
     return size_;
   }
-  // `sorted`: the added bricks have ascending codes without duplicates, all above the codes of
-  // earlier bricks.
+  // Adds `count` bricks, which were written to the reserved places. `sorted`: true if their codes
+  // ascend without duplicates and are all above the codes of earlier bricks.
   void commit(uint32_t count, bool sorted) {
     sorted_ = sorted_ && sorted;
     size_ += count;

@@ -94,7 +94,7 @@ class HostSpace {
   void upload_staged(std::span<const FixedTriangle>, FixedTriangle*) {}
 
  private:
-  // Calls body(begin, end) for parts of [0, n). A small range runs only on the caller's thread.
+  // Calls body(begin, end) for chunks of [0, n). A single chunk runs on the thread of the caller.
   template <class Body>
   void for_chunks(uint64_t n, Body body) {
     constexpr uint64_t kChunk = 4096;

@@ -32,7 +32,7 @@ VOXDAG_HD inline void or_shared(uint64_t& word, uint64_t bits) {
 #endif
 }
 
-// Sets a flag that any thread of any thread block may set; nothing reads it during the kernel.
+// Sets a flag that any thread of any thread block may set. No thread reads it during the kernel.
 VOXDAG_HD inline void raise_flag(uint32_t* flag) {
 #if defined(__CUDA_ARCH__)
   atomicOr(flag, 1u);

@@ -138,9 +138,9 @@ class PairExpansion {
   static constexpr uint64_t kBytesPerPair = sizeof(uint64_t) * 2 + sizeof(uint32_t) * 2;
   uint32_t window() const { return window_; }
 
-  // Expands triangles [first, last) of `triangles`, at most window() of them. The pairs of the last
-  // level are written to out.span(), a PairSpan, and then counted by out.commit(n). out.flush() is
-  // called to make space if the new pairs of one pair do not fit in the span.
+  // Expands triangles [first, last) of `triangles`, at most window() of them. Writes the pairs of
+  // the last level to out.span(), a PairSpan, and then reports their number with out.commit(n). If
+  // the new pairs of one pair do not fit in the span, calls out.flush() to make space.
   template <class Out>
   void run(const FixedTriangle* triangles, uint32_t first, uint32_t last, Out& out) {
     triangles_ = triangles;

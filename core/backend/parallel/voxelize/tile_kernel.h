@@ -44,8 +44,8 @@ struct DrawTile {
   const uint32_t* tile_starts;  // first pair of each tile
   uint32_t tile_count, pair_count, first_tile;
 
-  // The output. Each thread block has space for kTileBricks bricks, and writes the number of its
-  // bricks to `brick_counts`.
+  // The output arrays have space for kTileBricks bricks per thread block. Each thread block writes
+  // its number of bricks to `brick_counts`.
   uint64_t* brick_codes;
   uint64_t* brick_masks;
   uint32_t* brick_counts;

@@ -18,7 +18,7 @@
 
 namespace voxdag::parallel {
 
-// All (triangle, cell) pairs of a subvolume, as the output of PairExpansion::run().
+// Collects all (triangle, cell) pairs of a subvolume, as the `out` of PairExpansion::run().
 template <class Space>
 class CellPairs {
  public:

@@ -117,7 +117,7 @@ struct TriangleOnLattice {
     return repeat_along<N>(axis == 2 ? 1 : 2, cells);
   }
 
-  // Returns the cells with corners on both sides of the plane.
+  // Returns the cells that the plane touches: cells with corners on both sides of it, or on it.
   template <int N, class Int>
   VOXDAG_HD uint64_t at_plane(const int (&at)[3], Int far) const {
     int128 here = plane;
@@ -176,7 +176,8 @@ VOXDAG_HD inline uint64_t touched_cells_one_by_one(const FixedTriangle& t, const
   return cells;
 }
 
-// Returns false if the bounding box misses a cube of edge 2^shift.
+// Returns false if the triangle's bounding box misses the cube with the low corner `low` and an
+// edge of 2^shift lattice units.
 VOXDAG_HD inline bool box_touches_cube(const FixedTriangle& t, const int64_t (&low)[3], int shift) {
   for (int a = 0; a < 3; ++a)
     if (t.high(a) < low[a] || t.low(a) > low[a] + (int64_t{1} << shift)) return false;

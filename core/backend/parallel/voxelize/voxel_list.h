@@ -74,8 +74,8 @@ uint32_t fitting_count(Space& space, uint64_t share, uint64_t bytes_each, uint64
 
 // Copies up to `max_count` of the next triangles to `out`, which is in the memory of the space.
 // Returns their number, 0 at the end of the stream. The triangles pass through a staging area on
-// the host. A GPU has two areas, so that one is filled while the other is copied. On the host the
-// staging area is the destination itself.
+// the host. A GPU has two staging areas, so that one is filled while the other is copied. In a
+// HostSpace, the staging area is the destination itself.
 template <class Space>
 uint32_t upload_triangles(Space& space, TriangleStream& stream, FixedTriangle* out,
                           uint32_t max_count) {

@@ -12,8 +12,9 @@
 //   3. The heights become one bit per voxel of each brick. This step is the only difference between
 //      the rasterizers for AVX2 and AVX-512.
 //
-// No branch depends on which edges cross a column of bricks, because the CPU would mispredict it. A
-// triangle perpendicular to an axis touches one layer of voxels, so it needs no heights.
+// No branch depends on which edges cross a column of bricks, because the CPU would mispredict such
+// a branch. A triangle perpendicular to an axis touches one layer of voxels, so it needs no
+// heights.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -29,8 +30,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// bit[i] is the bit of voxel column i in Footprint::inside. A vector has a 16-bit lane for each
-// voxel column.
+// bit[i] is the bit of voxel column i in Footprint::inside. Loaded as a vector, the array has a
+// 16-bit lane for each voxel column.
 struct InsideBits {
   alignas(32) uint16_t bit[16] = {};
   constexpr InsideBits() {

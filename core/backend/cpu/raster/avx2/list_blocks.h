@@ -23,7 +23,7 @@ struct BlockSummary {
   bool has_voxels;
 };
 
-// `summarize(block)` returns a BlockSummary.
+// Does the work of Kernels::list_blocks. `summarize(block)` returns a BlockSummary.
 template <class Summarize>
 VOXDAG_INLINE int list_blocks_with(TileBricks& tile, int groups, uint8_t* existing,
                                    uint16_t* numbers, uint64_t* keys, Summarize summarize) {
