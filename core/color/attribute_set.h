@@ -69,8 +69,8 @@ class AttributeSet {
   bool has_[std::size(kAttributeTable)] = {};
 };
 
-// Returns the attribute with a name. Throws Error{kInvalidInput} if no attribute has this name. The
-// message begins with `option`, the option whose value the name is.
+// Returns the attribute named `name`. Throws Error{kInvalidInput} if no attribute has this name.
+// The message begins with `option`, the option to which the user gave the name.
 inline Attribute attribute_named(std::string_view name, const std::string& option) {
   std::string expected = kAttributeTable[0].name;
   for (const AttributeTraits& row : kAttributeTable) {

@@ -1,7 +1,7 @@
-// The attributes of voxels, one row of kAttributeTable each, and the encodings of attribute values,
-// one row of kEncodingTable each. Code that treats all attributes alike loops over the tables. A
-// new attribute with one of these encodings needs only a row here, and code in the few places that
-// docs/architecture.md, "Adding things", lists.
+// Two tables: kAttributeTable has a row for each attribute of voxels, and kEncodingTable has a row
+// for each encoding of attribute values. Code that treats all attributes alike loops over the
+// tables. A new attribute with one of these encodings needs only a row here, and code in the few
+// places that docs/architecture.md, "Adding things", lists.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace voxdag {
 struct CellValues;
 struct ColorSum;
 
-// The numbers are the kinds of sections in the global file.
+// The number of an attribute is the kind of its section in the global file.
 enum class Attribute : uint32_t { kColor = 1, kAlpha = 2, kNormal = 3, kMaterial = 4 };
 
 // How the global file stores the value of a cell.
@@ -56,8 +56,8 @@ uint32_t alpha_of_cell(const ColorSum& sum, const CellValues& values);
 uint32_t normal_of_cell(const ColorSum& sum, const CellValues& values);
 uint32_t material_of_cell(const ColorSum& sum, const CellValues& values);
 
-// The next three functions return the value of a cell from the values of its 1 to 8 set children,
-// in Morton order.
+// The next three functions compute the value of a cell from the values of its 1 to 8 set children,
+// which are in Morton order.
 //
 // Returns the mean, rounded to nearest (half up).
 uint32_t mean_alpha(std::span<const uint32_t> children);
@@ -76,8 +76,9 @@ struct AttributeTraits {
   Encoding encoding;
   bool uses_images = false;       // depends on the scene's textures
   const char* ply_properties[3];  // names of a value's components
-  // The functions return the value of a baked cell, and the value of a coarser cell from its set
-  // children. They are null for colors, which are encoded from the cells' sums.
+  // value_of_cell() returns the value of a baked cell. value_of_parent() returns the value of a
+  // coarser cell from its set children. Both are null for colors, which are encoded from the cells'
+  // sums.
   uint32_t (*value_of_cell)(const ColorSum& sum, const CellValues& values) = nullptr;
   uint32_t (*value_of_parent)(std::span<const uint32_t> children) = nullptr;
 
@@ -141,8 +142,8 @@ constexpr uint32_t value_bytes(Attribute attribute, uint64_t names) {
   return names <= 256 ? 1 : names <= 65536 ? 2 : 4;
 }
 
-// Returns the expectation that a stored value violates, for a message. Returns null if the value is
-// valid.
+// Returns null if a stored value is valid, otherwise the expectation that it violates, as a text
+// for a message.
 constexpr const char* value_error(Encoding encoding, uint32_t value, uint64_t names) {
   if (encoding == Encoding::kOctahedral && ((value & 255) == 255 || value >> 8 == 255))
     return "expected bytes up to 254";

@@ -94,8 +94,9 @@ VOXDAG_HD inline uint8_t alpha_of(const ColorSum& sum) {
   return static_cast<uint8_t>(alpha < 255 ? alpha : 255);
 }
 
-// Returns the color of a sum whose weight is above 0. It is a mean over the surfaces, weighted by
-// weight times alpha. If all surfaces are transparent (alpha is 0), it is weighted by weight alone.
+// Returns the color of a sum whose weight is above 0: the mean over the surfaces, each weighted by
+// its weight times its alpha. If all surfaces are transparent (alpha is 0), uses only their
+// weights.
 VOXDAG_HD inline Color color_of(const ColorSum& sum) {
   const bool visible = sum.seen_weight != 0;
   const std::array<uint64_t, 3>& channels = visible ? sum.seen : sum.plain;

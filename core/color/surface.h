@@ -54,7 +54,7 @@ struct Material {
   std::string name;
   // Index into SceneMaterials::names; kNoNumber if the file gives the triangle no material.
   uint32_t number = kNoNumber;
-  // Base color, linear, and alpha; kFullIntensity for 1.
+  // Base color (linear) and alpha. kFullIntensity stands for 1.
   std::array<uint16_t, 4> factor{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   uint16_t alpha_cutoff = kFullIntensity / 2;  // for kMask

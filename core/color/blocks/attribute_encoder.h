@@ -21,9 +21,9 @@ class AttributeEncoder {
         levels_(levels),
         colors_(levels) {}
 
-  // Adds baked cells in increasing order of their codes, to which `first_code` is added. `values`
-  // has an element for each cell if the attribute is in the list of AttributeSums
-  // (attribute_sums.h). Otherwise it may be empty.
+  // Adds baked cells in increasing order of their codes. The code of a cell in the region is
+  // `first_code` + cell.code. If the attribute is in the list of AttributeSums (attribute_sums.h),
+  // `values` must have an element for each cell. Otherwise `values` may be empty.
   void add(std::span<const ColoredCell> cells, std::span<const CellValues> values,
            uint32_t first_code);
   bool empty() const { return traits_.is_color() ? colors_.empty() : values_.empty(); }

@@ -21,7 +21,8 @@ inline constexpr size_t kBlockBytes = 16;
 
 using ColorBlock = std::array<std::byte, kBlockBytes>;
 
-// Encodes 1 to 32 colors. Their alpha is not stored. The weights of missing cells are 0.
+// Encodes 1 to 32 colors. Their alpha is not stored. If there are fewer than 32 colors, the weights
+// of the missing cells are 0.
 using EncodeBlock = ColorBlock (*)(const Color* colors, size_t count);
 ColorBlock encode_block_portable(const Color* colors, size_t count);
 // Returns the AVX2 version, which has the same results. Returns null if this version was not built

@@ -19,9 +19,9 @@
 
 namespace voxdag {
 
-// The entries of EncodedRegion::prefix are for cubes this many levels above the cells of a table's
-// level. A reader adds the entry of a cell's ancestor to the cell's rank within this ancestor. The
-// sum is the cell's rank among all cells of its level in the region.
+// Distance in levels between the cells of a table in EncodedRegion::prefix and the cubes for which
+// the table has entries. A reader adds the entry of a cell's cube to the cell's rank within this
+// cube. The sum is the cell's rank among all cells of its level in the region.
 inline constexpr uint32_t kPrefixLevels = 4;
 
 struct EncodedRegion {
@@ -46,12 +46,12 @@ using CellColor = std::function<Color(uint32_t up, const ColoredCell& cell)>;
 class RegionEncoder {
  public:
   // `levels` is the number of levels from the region down to its finest cells: kRegionLevels, or
-  // less if fewer levels are above the finest cells. If `color` is not null, it returns the colors
+  // less if the grid of these cells has fewer levels. If `color` is not null, it returns the colors
   // of the cells. Otherwise colors are computed from the cells' sums.
   explicit RegionEncoder(uint32_t levels, CellColor color = nullptr)
       : levels_(levels), color_(std::move(color)) {}
-  // Adds cells of the finest level in increasing order of their codes, to which `first_code` is
-  // added. The resulting codes are below 8^levels.
+  // Adds cells of the finest level in increasing order of their codes. The code of a cell in the
+  // region is `first_code` + cell.code, which is below 8^levels.
   void add(std::span<const ColoredCell> cells, uint32_t first_code = 0);
   bool empty() const { return colors_.empty(); }
   // Returns the encoded region. Call it once, at the end. Requires at least one cell.

@@ -1,5 +1,6 @@
-// The sums of a region's cells for the attributes that do not follow from the ColorSum: a list with
-// one class for each such attribute. RegionCells numbers the cells.
+// The sums of a region's cells for the attributes that do not follow from the ColorSum: normals and
+// materials. There is a list of classes, one for each such attribute. RegionCells numbers the
+// cells.
 //
 // A class of the list has
 //     static constexpr Attribute kAttribute;

@@ -48,8 +48,8 @@ class RegionBaker {
   static constexpr uint32_t kTriangleCells = 4u << (2 * kRegionLevels);
 
   // The references must outlive this object. Each triangle's material is an index into `materials`.
-  // `wanted`: the values that finish() computes in addition to colors. Material values are the
-  // materials' numbers.
+  // `wanted`: the values that finish() computes in addition to colors. The value for materials is
+  // Material::number.
   RegionBaker(const ColorGrid& grid, std::span<const Material> materials, Textures& textures,
               const AttributeSet& wanted = {})
       : grid_(grid), materials_(materials), textures_(textures), cells_(wanted) {
@@ -68,8 +68,8 @@ class RegionBaker {
     finish(cells);
   }
 
-  // begin(), add() and finish() do the same as bake() for triangles that come in any number of
-  // parts. add() stops when the region has more than `max_cells` cells.
+  // Together, begin(), add() and finish() do the same as bake(), but triangles may come in any
+  // number of parts. add() stops when the region has more than `max_cells` cells.
   void begin(const Cube& region, uint32_t max_cells = color::RegionCells::kMaxCells) {
     max_cells_ = max_cells;
     cells_.reserve(std::min(max_cells + kTriangleCells, color::RegionCells::kMaxCells));
@@ -79,8 +79,8 @@ class RegionBaker {
       last_[a] = first_[a] + (int64_t{1} << down) - 1;
     }
   }
-  // Returns false if the region now has more than `max_cells` cells; it then has at most
-  // kTriangleCells more. finish() must still be called in this case, but its result is incomplete.
+  // Returns false if the region now has more than `max_cells` cells, at most kTriangleCells more.
+  // finish() must still be called in this case, but its result is incomplete.
   bool add(std::span<const FixedSurface> triangles) {
     triangles_ = triangles;
     for (uint32_t i = 0; i < triangles.size() && cells_.count() <= max_cells_; ++i) add_triangle(i);
@@ -129,9 +129,9 @@ class RegionBaker {
     }
   }
 
-  // Returns false if the triangle cannot cover a column, as for most tiny triangles. A column has a
-  // fixed coordinate along two axes. So the triangle's box must contain such a coordinate along at
-  // least two axes.
+  // Returns false if the triangle cannot cover a column, as for most tiny triangles. A column is a
+  // line with fixed coordinates along two axes. So the triangle's box must contain a coordinate of
+  // columns along at least two axes.
   bool may_cover(const FixedTriangle& triangle) const {
     const int bits = grid_.cell_bits() - 2;
     const int64_t half = int64_t{1} << (bits - 1);

@@ -77,7 +77,7 @@ struct CellTriangle {
   // The edge function in a projection, >= 0 inside: a x + b y + base in lattice units.
   struct Edge {
     Int a, b, base;
-    // In cells: the maximum over the closed cell (p, q) is >= 0 iff a p + b q + touch >= 0.
+    // The maximum of the function over the closed cell (p, q) is >= 0 iff a p + b q + touch >= 0.
     Int touch;
   };
 

@@ -16,7 +16,7 @@ struct ColumnTotals {
   int64_t count, sum_i, sum_j;
 };
 
-// ColumnTotals of the 256 sets of columns in two rows (j is 0 or 1).
+// The ColumnTotals of the 256 sets of columns in two rows (j is 0 or 1), by member.
 struct ColumnTable {
   uint8_t count[256] = {}, sum_i[256] = {}, sum_j[256] = {};
   constexpr ColumnTable() {
@@ -61,7 +61,7 @@ VOXDAG_HD inline uint32_t negative_columns(Int first, Int a, Int b) {
     const __m128i two = _mm_set1_epi64x(wrapping_sum(a, a)), down = _mm_set1_epi64x(b);
     __m128i left = start, right = _mm_add_epi64(start, two), rows[4];
     for (int j = 0; j < 4; ++j) {
-      // Takes the high halves of the four sums, which have their signs.
+      // Takes the high halves of the four sums, which contain the signs.
       rows[j] = _mm_castps_si128(
           _mm_shuffle_ps(_mm_castsi128_ps(left), _mm_castsi128_ps(right), 0b11'01'11'01));
       left = _mm_add_epi64(left, down);

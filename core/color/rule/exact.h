@@ -8,7 +8,7 @@
 #include "core/base/host_device.h"
 #include "core/base/integers.h"
 
-// Code with SSE2 has an equivalent in plain code.
+// All code that uses SSE2 also exists as plain code with the same results.
 #ifdef VOXDAG_SSE2
 #include <emmintrin.h>
 #endif

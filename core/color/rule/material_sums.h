@@ -57,8 +57,8 @@ class MaterialSums {
   // one list for all cells.
   struct FirstMaterial {
     uint32_t material = 0;
-    uint32_t is_reset = 0;
-    uint64_t weight = 0;  // 0: nothing was added yet
+    uint32_t is_reset = 0;  // 1 after reset(cell)
+    uint64_t weight = 0;    // 0: nothing was added yet
   };
   struct FurtherMaterial {
     uint32_t cell = 0;
@@ -75,8 +75,8 @@ class MaterialSums {
     }
   };
 
-  // Sorts further_ and adds up the weights that belong together: same cell, same material, and both
-  // added before or both added after the call of reset() for the cell.
+  // Sorts further_ and adds up the weights that belong together: weights for the same cell and
+  // material that were all added before reset(cell), or all after it.
   void add_up() {
     std::sort(further_.begin(), further_.end());
     size_t count = 0;

@@ -39,7 +39,8 @@ VOXDAG_HD inline void set_area(const FixedTriangle& triangle, SurfaceFacing& fac
   facing.is_backward = n[dominant] < 0;
 }
 
-// `material` is the index of the triangle's material in the list of names.
+// Returns the contribution of a triangle. `material` is the index of its material in the list of
+// names.
 VOXDAG_HD inline SurfaceFacing facing_of(const FixedSurface& surface, uint32_t material) {
   SurfaceFacing facing;
   facing.material = material;

@@ -120,8 +120,8 @@ VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, 
 #endif
 }
 
-// The contribution of a triangle to the cells that it touches. The surface, the material and the
-// textures must outlive this object.
+// Adds the color of a triangle to the sums of the cells that it touches. The surface, the material
+// and the textures must outlive this object.
 template <class Textures>
 class SurfaceLook {
  public:
@@ -145,7 +145,7 @@ class SurfaceLook {
     for (const uint32_t t : tint_) no_tint_ = no_tint_ && t == kFullIntensity;
   }
 
-  // The position of a point in the textures.
+  // A point of the triangle, and the texels around the point.
   struct Spot {
     SurfacePoint point;
     TexelSquare texels;  // if there is an image

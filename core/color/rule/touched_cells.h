@@ -173,7 +173,7 @@ class TouchedCells {
 
   const CellTriangle<Int>& t_;
   const CellRange& range_;
-  Int margin_[3];    // an edge function's change over a cell
+  Int margin_[3];    // an edge function's maximum minus its minimum over a cell
   Int rise_, fall_;  // the plane's rise and fall over a cell, along axes 0 and 1
   // The first and the last cell that the plane touches in the current column of cells, the highest
   // value of the plane in the first cell, and the lowest value in the last cell.

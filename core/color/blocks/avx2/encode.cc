@@ -1,4 +1,4 @@
-// Compiled for AVX2: nothing in this file may run before the CPU was checked.
+// This file is compiled for AVX2, so its code for blocks must not run before the CPU was checked.
 #include "core/color/blocks/block_encoder.h"
 
 namespace voxdag {
