@@ -18,7 +18,7 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
                           uint32_t grid_levels, SegmentWriter& to);
 
 // Writes the artifact at `ref` of `from` as a cache entry at `path`, atomically: writes the file
-// `partial`, a name that only the caller uses, and renames it to `path`. The file is not synced. If
+// `partial`, a name that only the caller uses, and renames it to `path`. Does not sync the file. If
 // a power failure damages an entry, its checksums fail, and a lookup of the entry is a cache miss.
 // Returns the size of the file in bytes.
 uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,

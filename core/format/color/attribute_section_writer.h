@@ -1,12 +1,12 @@
 // Writes the section of an attribute after the levels of a global file. A tier is up to seven
 // consecutive levels; tier 0 has the finest. A region is a part of a tier with up to 64^3 cells of
-// the tier's finest level. docs/format.md, "The color section" and "The sections of alpha, normals
-// and materials", documents the byte layout.
+// the tier's finest level. docs/format.md documents the byte layout in "The color section" and "The
+// sections of alpha, normals and materials".
 //
 // The regions of tier 0 are written when they are added. The cells of the coarser tiers, and the
 // directories of all tiers, are in memory until finish(). This memory is charged to the budget. It
-// takes 32 bytes per region, plus the size of tier 1, which is a ten-thousandth of the size of tier
-// 0. Only one thread may use a writer.
+// is 32 bytes per region, plus the size of tier 1, which is about a ten-thousandth of the size of
+// tier 0. Only one thread may use a writer.
 #pragma once
 
 #include <cstdint>

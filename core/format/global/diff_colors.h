@@ -1,6 +1,6 @@
-// Compares the colors of two global files of the same grid. Compares the cells that are set in both
-// files, on the finest level that has colors in both files. The result does not depend on the
-// number of threads.
+// Compares the colors of two global files of the same grid, in the cells that are set in both
+// files. The cells are on the finest level that has colors in both files. The result does not
+// depend on the number of threads.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,8 @@ struct ColorDiff {
   double psnr() const;
 };
 
-// Throws Error{kInvalidInput} if a file has no colors or the grids differ, Error{kCorrupt} for a
-// damaged file. Needs a few MiB of memory.
+// Compares the colors on up to `threads` threads. Throws Error{kInvalidInput} if a file has no
+// colors or the grids differ, Error{kCorrupt} for a damaged file. Needs a few MiB of memory.
 ColorDiff diff_colors(const voxdag_reader::File& a, const voxdag_reader::File& b, unsigned threads,
                       const CancelToken& cancel);
 

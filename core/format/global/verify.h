@@ -26,8 +26,9 @@
 
 namespace voxdag {
 
-// Throws Error{kCorrupt}; the message names the problem, the place and the expectation. Works on up
-// to `threads` threads. A level must be wide if and only if it has more than `narrow_words` words.
+// Checks the file on up to `threads` threads. Throws Error{kCorrupt}; the message names the
+// problem, its place and the expected value. A level must be wide if and only if it has more than
+// `narrow_words` words.
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
                         Progress& progress, const CancelToken& cancel,
                         uint64_t narrow_words = global_layout::kNarrowLevelWords);

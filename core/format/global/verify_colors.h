@@ -2,7 +2,7 @@
 //
 //   1. The tiers, sizes and counts of a section agree; padding and reserved fields are 0.
 //   2. Each tier has exactly the regions where the DAG has set cells, in Morton order, and each
-//      region has exactly the counts and prefixes of the DAG's cells.
+//      region has the counts and the prefix tables (region.h) that follow from the DAG.
 //   3. Each block of colors has the canonical form of its mode: the larger of its two end colors is
 //      first, and the weights of missing cells (after the last one of the region) are 0.
 //   4. Values of other attributes are within their bounds. The value of a coarser cell equals the
@@ -15,8 +15,8 @@
 
 namespace voxdag {
 
-// Throws Error{kCorrupt}; the message names the problem, the place and the expectation. Works on up
-// to `threads` threads. A file without attributes is valid.
+// Checks the sections on up to `threads` threads. Throws Error{kCorrupt}; the message names the
+// problem, its place and the expected value. A file without attributes is valid.
 void verify_colors(const voxdag_reader::File& file, unsigned threads, Progress& progress,
                    const CancelToken& cancel);
 

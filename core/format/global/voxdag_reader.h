@@ -5,7 +5,7 @@
 //     bool set = dag.voxel(x, y, z);                       // 0 <= x, y, z < dag.resolution()
 //     dag.walk(visitor);                                   // depth first, the visitor may prune
 //     if (auto rgb = dag.color(x, y, z, level)) ...        // of a cell of edge R/2^level
-//     voxdag_reader::ColorCursor colors(dag);              // the same, fast for cells nearby
+//     voxdag_reader::ColorCursor colors(dag);              // the same, fast for nearby cells
 //     dag.alpha(x, y, z, level), dag.normal(...), dag.material(...), dag.material_names()
 //     const voxdag_reader::Level& level = dag.level(l);    // raw words, for an upload to the GPU
 //
@@ -309,7 +309,7 @@ class File {
     if (!empty()) walk_from(visitor, 0, 0, 0, 0, 0);
   }
 
-  // Compares all checksum blocks with their checksums. Returns the byte offset of the first one
+  // Compares all checksum blocks with their checksums. Returns the byte offset of the first block
   // that differs, or 0 if all are intact.
   uint64_t first_damaged_block() const {
     const unsigned char* const table = data() + table_offset_;

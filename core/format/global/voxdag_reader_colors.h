@@ -1,6 +1,6 @@
 // The part of voxdag_reader.h that reads colors and the other attributes of cells (alpha, normals,
-// materials). Copy both headers into your engine, and include voxdag_reader.h. docs/format.md, "The
-// color section" and "The sections of alpha, normals and materials", describes the bytes.
+// materials). Copy both headers into your engine, and include voxdag_reader.h. docs/format.md
+// describes the bytes in "The color section" and "The sections of alpha, normals and materials".
 //
 // A section has a color, or another value, for all set cells of the levels from 0 to the section's
 // finest level. The levels are divided into tiers of up to seven levels, and a tier into regions of
@@ -299,8 +299,8 @@ class ColorSection {
   std::vector<std::string> names_;
 };
 
-// Looks up colors, or another attribute. A lookup is fast if the cell is near the previous one. The
-// cursor refers to the File, which must outlive it. Each thread needs a separate cursor.
+// Looks up colors, or another attribute. A lookup is fast if the cell is near the cell of the
+// previous lookup. The File must outlive the cursor. Each thread needs a separate cursor.
 template <class Dag>
 class BasicColorCursor {
  public:
