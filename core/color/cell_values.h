@@ -1,4 +1,4 @@
-// Values of a baked cell that are not part of its ColorSum.
+// The values of a cell of the color grid that do not follow from its ColorSum.
 #pragma once
 
 #include <cstdint>

@@ -17,7 +17,7 @@
 
 namespace voxdag {
 
-// Byte 0 is the low 8 bits, byte 1 the high 8 bits.
+// The two bytes of a normal: byte 0 in the low 8 bits, byte 1 in the high 8 bits.
 using NormalCode = uint16_t;
 
 // The normal (0, 0, 1), for cells whose sums give no direction.
@@ -50,8 +50,8 @@ VOXDAG_HD inline NormalCode encode_normal(int64_t x, int64_t y, int64_t z) {
                                  (127 + color::in_127ths(along, length)) << 8);
 }
 
-// Returns the direction with a length of 2^14, each component rounded to nearest. Requires bytes of
-// at most 254.
+// Returns the direction of a code as a vector of length 2^14, each component rounded to nearest.
+// Requires bytes of at most 254.
 VOXDAG_HD inline std::array<int64_t, 3> decode_normal(NormalCode code) {
   const int across = (code & 255) - 127, along = (code >> 8) - 127;
   const int width = across < 0 ? -across : across, height = along < 0 ? -along : along;

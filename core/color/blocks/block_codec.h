@@ -3,9 +3,10 @@
 //
 // A block has two colors, its ends, and a weight for each cell. The weight places the cell's color
 // on the line between the ends. The ends follow from the colors' principal axis and one step of
-// least squares. They are computed for both modes of the format, and the mode with the smaller
-// squared error is used. All arithmetic is exact, so that the same colors produce the same bytes on
-// every machine. Blocks of one or two colors are lossless.
+// least squares. The format has two modes, which divide the bits differently between ends and
+// weights. The encoder uses the mode with the smaller squared error. All arithmetic is exact, so
+// that the same colors produce the same bytes on every machine. Blocks of one or two colors are
+// lossless.
 #pragma once
 
 #include <array>

@@ -61,8 +61,8 @@ class BlockEncoder {
     alignas(64) int32_t at[kBlockCells];
     int32_t range;
   };
-  // The stored bits of two ends, and a weight for each cell: 0 for the first end, kTop for the
-  // second end.
+  // The stored bits of the two ends, and a weight for each cell. Weight 0 is the color of the first
+  // end, kTop the color of the second end.
   struct Fit {
     uint32_t ends[2];
     alignas(64) uint8_t weights[kBlockCells];

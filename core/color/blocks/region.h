@@ -1,8 +1,8 @@
 // Encodes the colors of a region as the file stores them. The cells of the region's finest level
 // come first, in Morton order, then the cells of the next coarser level, and so on up to the one
 // cell that is the region. The cells are stored in blocks of 32; each region begins a new block.
-// The sum of a coarser cell is the sum of its children. Its color is made from this sum, not from
-// the stored colors of the children.
+// The sum of a coarser cell is the sum of its children. The color of a coarser cell is computed
+// from this sum, not from the stored colors of the children.
 #pragma once
 
 #include <array>

@@ -35,11 +35,11 @@ class AttributeSums {
   }
 
   bool is_needed() const { return is_needed_; }
-  // `columns` and `weight` are 1 for a triangle that covers no column of the cell.
+  // Adds a triangle to a cell. `columns` and `weight` are 1 if it covers no column of the cell.
   void add(uint32_t cell, const SurfaceFacing& facing, uint32_t columns, uint32_t weight) {
     for_each([&](auto& sums) { sums.add(cell, facing, columns, weight); });
   }
-  // Call it once for each cell, when a surface first covers a column of the cell.
+  // Drops the cell's sums. Called once per cell, when a surface first covers a column of the cell.
   void reset(uint32_t cell) {
     for_each([&](auto& sums) { sums.reset(cell); });
   }

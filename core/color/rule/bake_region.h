@@ -102,7 +102,8 @@ class RegionBaker {
     return has_all;
   }
   void finish(std::vector<ColoredCell>& cells) { finish(cells, values_); }
-  // `values` gets an element for each cell if normals or materials are wanted.
+  // Sets `cells` as bake() does. Sets `values` to an element for each cell if normals or materials
+  // are wanted.
   void finish(std::vector<ColoredCell>& cells, std::vector<CellValues>& values) {
     cells_.take(cells, values);
   }

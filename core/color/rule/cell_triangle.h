@@ -74,7 +74,7 @@ VOXDAG_HD inline double area_of(const FixedTriangle& triangle) {
 
 template <class Int>
 struct CellTriangle {
-  // The edge function in a projection, >= 0 inside: a x + b y + base in lattice units.
+  // The function of an edge in a projection: a x + b y + base, in lattice units; >= 0 inside.
   struct Edge {
     Int a, b, base;
     // The maximum of the function over the closed cell (p, q) is >= 0 iff a p + b q + touch >= 0.
@@ -92,8 +92,8 @@ struct CellTriangle {
   // grid's origin, divided by E and rounded down and up. column_floor and column_ceil are the value
   // at column (0, 0) and height 0, divided by E/4 and rounded down and up.
   Int plane_floor, plane_ceil, column_floor, column_ceil;
-  // edges[d][i] is the edge from vertex i to i + 1 in the projection along axis d. Its x and y are
-  // along the axes d + 1 and d + 2. (All sums are modulo 3.)
+  // edges[d][i] is the edge from vertex i to i + 1 in the projection along axis d. In its function,
+  // x and y are along the axes d + 1 and d + 2. (All sums are modulo 3.)
   Edge edges[3][3];
   // In the projection along axis 2, the function of edge i at column (P, Q) is
   // 2^(cell_bits - 2) (a P + b Q) + at_column[i]. It is >= 0 iff a P + b Q + column[i] >= 0.

@@ -11,12 +11,12 @@ namespace voxdag::color {
 
 inline constexpr uint32_t kAllColumns = 0xffff;
 
-// The number of columns, and the sums of their i and j.
+// The number of columns in a set, and the sums of their i and j.
 struct ColumnTotals {
   int64_t count, sum_i, sum_j;
 };
 
-// The ColumnTotals of the 256 sets of columns in two rows (j is 0 or 1), by member.
+// The members of ColumnTotals for each of the 256 sets of columns in two rows (j is 0 or 1).
 struct ColumnTable {
   uint8_t count[256] = {}, sum_i[256] = {}, sum_j[256] = {};
   constexpr ColumnTable() {

@@ -10,9 +10,9 @@
 
 namespace voxdag::color {
 
-// Weight of a covered column if the surface is perpendicular to it. Oblique surfaces have more area
-// and up to sqrt(3) times this weight. If no triangle covers a column of the cell, each triangle
-// has weight 1.
+// Weight of a surface in a cell's sum, per covered column, if the surface is perpendicular to the
+// columns. Oblique surfaces have more area and up to sqrt(3) times this weight. If no triangle
+// covers a column of the cell, each triangle has weight 1.
 inline constexpr double kColumnWeight = 64;
 
 struct Reciprocals {

@@ -1,5 +1,5 @@
-// The materials of the cells of a region. For each cell and material, the weights of the surfaces
-// are added up. Sums are integers, so the order of the surfaces does not matter.
+// The materials of a region's cells. A cell gets the material whose surfaces have the largest sum
+// of weights in it. Sums are integers, so the order of the surfaces does not matter.
 #pragma once
 
 #include <algorithm>

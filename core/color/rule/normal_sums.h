@@ -1,5 +1,5 @@
-// The normals of the cells of a region, as sums of area vectors. Sums are integers, so the order of
-// the triangles does not matter.
+// The normals of a region's cells, as sums of area vectors (SurfaceFacing::area). Sums are
+// integers, so the order of the triangles does not matter.
 #pragma once
 
 #include <cstdint>

@@ -1,9 +1,9 @@
 // The cells of a region that surfaces touch, and their sums, found by Morton code in the region.
 //
-// A cell is covered if a surface covers a column of it. In a covered cell, surfaces that cover no
-// column are ignored. Whether a cell is covered is known only at the end. So at first a cell's sum
-// contains the surfaces that cover no column. The first surface that covers a column restarts the
-// sum from zero. The final sums do not depend on the order of the surfaces.
+// A cell is covered if a surface covers one of its columns (cell_triangle.h). In a covered cell,
+// surfaces that cover no column are ignored. Whether a cell is covered is known only at the end. So
+// at first a cell's sum contains the surfaces that cover no column. The first surface that covers a
+// column restarts the sum from zero. The final sums do not depend on the order of the surfaces.
 #pragma once
 
 #include <cstdint>
@@ -61,8 +61,8 @@ class RegionCells {
 
   AttributeSums& attributes() { return attributes_; }
 
-  // Moves the cells into `cells`, in Morton order. Moves their values other than colors and alpha
-  // into `values`, which remains empty without such attributes.
+  // Moves the cells into `cells`, in Morton order. Moves their normals and materials into `values`,
+  // which remains empty if neither attribute is wanted.
   void take(std::vector<ColoredCell>& cells, std::vector<CellValues>& values) {
     cells.clear();
     cells.reserve(sums_.size());

@@ -10,7 +10,7 @@
 
 namespace voxdag::color {
 
-// The number that stands for the area of one covered column in the projection along the triangle's
+// The integer that stands for the area of one column, in the projection along the triangle's
 // dominant axis.
 inline constexpr double kColumnArea = 1 << 20;
 

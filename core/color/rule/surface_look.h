@@ -23,7 +23,8 @@ struct SurfacePoint {
   int64_t second, third;
 };
 
-// Returns the point with these weights, clamped so that none of the three weights is negative.
+// Returns the point with these weights, changed where necessary so that none of the three weights
+// is negative.
 VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
   constexpr double kOne = static_cast<double>(kPointOne);
   SurfacePoint point{0, 0};

@@ -6,15 +6,15 @@
 //   artifact:  [frames of the bricks] [frames of level L-3] ... [frames of its top level] [index]
 //
 // A row is a node or a brick. A frame has kFrameRows consecutive rows of one level; the last frame
-// of a level may have fewer. Columns of frames are compressed where that saves enough. The index
-// lists the roots, levels and frames of the artifact, with the checksum of each frame's stored
-// bytes. An ArtifactRef has the position and the checksum of the index, so a reader never scans a
-// segment. The artifact of one subvolume has one root; a merge pass writes artifacts with many
-// roots.
+// of a level may have fewer. Frames store rows by columns (all hashes, all masks, all children). A
+// column is compressed if that saves enough. The index lists the roots, levels and frames of the
+// artifact, with the checksum of each frame's stored bytes. An ArtifactRef has the position and the
+// checksum of the index, so a reader never scans a segment. The artifact of one subvolume has one
+// root; a merge pass writes artifacts with many roots.
 //
-// Writers check rows before they write them, and readers check them again: rows are in the total
-// order, masks are not 0, and children are rows of the level below. Readers also verify checksums
-// and counts.
+// Writers check rows before they write them, and readers check them again: rows are sorted by
+// (hash, mask, children), masks are not 0, and children are rows of the level below. Readers also
+// verify checksums and counts.
 #pragma once
 
 #include <cstddef>
@@ -45,7 +45,7 @@ struct SegmentRange {
   uint64_t bytes = 0;
 };
 
-// The root of one subvolume's DAG: row `index` of the artifact's level cube.level.
+// The root node of one subvolume's DAG: row `index` of level cube.level in the artifact.
 struct ArtifactRoot {
   Cube cube;
   uint32_t index = 0;
@@ -54,7 +54,7 @@ struct ArtifactRoot {
   uint64_t svo_nodes = 0;
 };
 
-// A frame: its position in its level and in the segment.
+// Describes a frame: its position in its level and in the segment, its size and its checksum.
 struct FrameInfo {
   uint64_t first_row = 0;
   uint64_t first_child = 0;  // number of children of all earlier rows of the level

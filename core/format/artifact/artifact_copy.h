@@ -13,7 +13,7 @@ namespace voxdag {
 
 // Appends the artifact at `ref` in `from` to `to`, as the artifact of `cube` on a grid of
 // 2^grid_levels voxels per edge. Verifies the checksums of the frames. Throws Error{kCorrupt} if
-// the artifact is damaged, has several subvolumes, or belongs to a cube of another size.
+// the artifact is damaged, contains several subvolumes, or belongs to a cube of another size.
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
                           uint32_t grid_levels, SegmentWriter& to);
 

@@ -1,5 +1,5 @@
-// Functions fields() (core/fields/field.h) of the structs that name a subvolume and its artifact.
-// The job store, the checkpoint of the merge and the records of cluster tasks use them.
+// The fields() functions (core/fields/field.h) of the structs that identify a subvolume and its
+// artifact. The job store, the checkpoint of the merge and the records of cluster tasks use them.
 #pragma once
 
 #include "core/dag/sub_dag.h"

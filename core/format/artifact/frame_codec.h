@@ -4,7 +4,7 @@
 //   bricks:   column(mask byte planes)
 //   nodes:    number of byte planes of the children (1 to 4), hashes, column(masks),
 //             column(children, byte plane 0), ...
-//   column:   [stored size, high bit: zstd] [bytes]
+//   column:   [stored size; its high bit is set if zstd was used] [bytes]
 //
 // Byte plane i of a column has byte i of each of its values; plane 0 is the lowest. Hashes and byte
 // plane 0 of the children are random, so they are stored uncompressed. The other columns are
@@ -49,10 +49,10 @@ class FrameEncoder {
 };
 
 // Decodes a frame of `rows` bricks, and computes their hashes, truncated to `hash_bits`. `bytes`
-// may be in `out.stored`. Returns an error message, or nullptr if there is no error.
+// may be the bytes of `out.stored`. Returns an error message, or nullptr if there is no error.
 const char* decode_brick_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t hash_bits,
                                Frame& out);
-// Decodes a frame of `rows` nodes with `children` children in total. `bytes` may be in
+// Decodes a frame of `rows` nodes with `children` children in total. `bytes` may be the bytes of
 // `out.stored`. Returns an error message, or nullptr if there is no error.
 const char* decode_node_frame(std::span<const std::byte> bytes, uint32_t rows, uint32_t children,
                               Frame& out);

@@ -9,7 +9,7 @@
 
 namespace voxdag {
 
-// The row that precedes the checked rows. `present` is false at the start of a level.
+// The row before the rows to check. `present` is false at the start of a level.
 struct LastRow {
   bool present = false;
   uint64_t hash = 0;
@@ -27,7 +27,7 @@ const char* check_brick_order(std::span<const uint64_t> hashes, std::span<const 
 //   - masks are not 0, and there are as many children as the masks have bits;
 //   - child indices are below `child_rows`, the number of rows of the next level;
 //   - hashes are truncated to `hash_bits`;
-//   - nodes strictly increase in the total order.
+//   - nodes strictly increase by (hash, mask, children).
 //
 // Returns an error message, or nullptr if there is no error. Sets `last` to the last row.
 const char* check_node_order(const NodeLevelView& rows, uint64_t child_rows, uint32_t hash_bits,

@@ -31,11 +31,11 @@ class CheckedBlocks {
     return sizeof(uint64_t) * (table_offset / kBlockBytes / 64 + 1);
   }
 
-  // `file` must outlive this object. The File has checked its header page and its checksum table
-  // when it was opened.
+  // `file` must outlive this object. The header page and the checksum table were checked when the
+  // File was opened, so they are not compared here.
   explicit CheckedBlocks(const voxdag_reader::File& file);
 
-  // Compares the blocks that contain these bytes; blocks known to be intact are skipped. Call it
+  // Compares the blocks that contain these bytes; skips blocks that are known to be intact. Call it
   // before the bytes are read. The bytes must be in the mapped file, after its header page and
   // before its checksum table. Throws DamagedBlock.
   void expect_intact(const void* begin, uint64_t bytes) const {

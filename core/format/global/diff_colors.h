@@ -17,7 +17,7 @@ struct ColorDiff {
   uint64_t different_cells = 0;   // cells whose colors differ
   uint32_t largest = 0;           // largest difference of a channel
   uint64_t sum = 0, squares = 0;  // sums of the channels' differences and their squares
-  // Compares one more cell.
+  // Adds a cell whose colors in the two files are `a` and `b`.
   void add(const voxdag_reader::Rgb& a, const voxdag_reader::Rgb& b);
   // Returns the mean difference of a channel; 0 if no cells were compared.
   double mean() const;

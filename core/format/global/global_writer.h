@@ -47,7 +47,7 @@ struct GlobalLevel {
   uint64_t words = 0;
 };
 
-// An attribute section. It has a value for every set cell of the levels 0 to `cell_levels`.
+// Describes an attribute section, with a value for every set cell of the levels 0 to `cell_levels`.
 struct GlobalAttribute {
   uint32_t kind = 0;
   uint32_t cell_levels = 0;

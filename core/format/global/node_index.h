@@ -46,7 +46,8 @@ class NodeIndex {
   }
 
   // To visit all nodes of the level, call visit_span() for the spans 0 to span_count() - 1, on any
-  // threads. It calls visit(index, offset) for the nodes that begin in the span, in order.
+  // threads. visit_span() calls visit(index, offset) for the nodes that begin in the span, in
+  // order.
   uint64_t span_count() const { return (level_.word_count + kSpanWords - 1) / kSpanWords; }
   template <class Visit>
   void visit_span(uint64_t span, Visit&& visit) const {
@@ -68,8 +69,8 @@ class NodeIndex {
   static constexpr uint64_t kSpanWords = uint64_t{1} << 16;  // a multiple of 64
 
   struct Span {
-    uint64_t begin = 0;  // where its first node begins
-    uint64_t end = 0;    // where its last node ends
+    uint64_t begin = 0;  // word offset of its first node
+    uint64_t end = 0;    // word offset of the end of its last node
     uint64_t nodes = 0;
     bool broken = false;  // no node can begin at `end`
   };

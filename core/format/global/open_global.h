@@ -96,9 +96,9 @@ void put_value(Attribute attribute, const voxdag_reader::ColorRegion& region, ui
   }
 }
 
-// map_global_file() maps the file's bytes, and open_global_bytes() opens the file in them. A caller
-// that watches the mapping for unreadable pages creates a WatchedMapping between the two calls,
-// because opening already reads pages.
+// map_global_file() maps the file's bytes, and open_global_bytes() opens a File that reads them. A
+// caller that watches the mapping for unreadable pages creates a WatchedMapping between the two
+// calls, because opening already reads pages.
 inline std::shared_ptr<const voxdag_reader::Bytes> map_global_file(const std::string& path) {
   system_files().open_read(path);  // refuses a folder or a pipe like every other input
   return with_reader_errors([&] {

@@ -8,7 +8,7 @@
 //      two of them are equal. The hashes are computed from the bricks up.
 //   4. There is one root, and every other node has a parent.
 //   5. The numbers of voxels and octree nodes in the header equal the DAG's.
-//   6. Colors and other attributes follow core/format/global/verify_colors.h.
+//   6. Colors and other attributes satisfy the rules in verify_colors.h.
 //
 // Needs 2 bits of memory per word of the file, and 9 bytes per node of two consecutive levels,
 // charged to the budget. All threads work on the same level. The result does not depend on the

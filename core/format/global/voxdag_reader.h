@@ -17,8 +17,8 @@
 // Child index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
 //
 // Opening a file checks the header, and that the levels and the checksum table are within the file.
-// Nodes and bricks are checked when they are read: a bad offset in a damaged file is an Error, and
-// no access leaves the mapping. verify_checksums() compares all data with its checksums.
+// Nodes and bricks are checked when they are read: a bad offset in a damaged file is an Error,
+// never a read outside the mapping. verify_checksums() compares all data with its checksums.
 //
 // The file is mapped, or read into memory if mmap fails or Access::kRead is requested. A mapped
 // file must not be truncated while it is open. A File is immutable; any thread may use it.
@@ -294,7 +294,8 @@ class File {
     return index;
   }
   const std::vector<std::string>& material_names() const { return materials().names(); }
-  // Throws an Error for values of an attribute that do not fit the DAG. `what` ends its message.
+  // Throws an Error for values of an attribute that do not fit the DAG. Its message ends with
+  // `what`.
   [[noreturn]] void broken_section(const ColorSection& section, const std::string& what) const {
     corrupt(section.name() + (": " + what));
   }

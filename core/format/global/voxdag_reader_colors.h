@@ -234,7 +234,7 @@ class ColorSection {
   // Returns the tier that has level `l`. The level is 0 to color_levels().
   const ColorTier& tier_of(uint32_t l) const { return tiers_[(color_levels_ - l) / 7]; }
 
-  // Sets `region` to the i-th region of a tier, all of whose bytes are then inside the tier.
+  // Sets `region` to the i-th region of a tier, and checks that its bytes are inside the tier.
   // Returns false if the directory entry is damaged.
   static bool region(const ColorTier& tier, uint64_t i, ColorRegion& region) {
     const unsigned char* const entry = tier.directory + 32 * i;
@@ -327,8 +327,8 @@ class BasicColorCursor {
     const ColorRegion* const region = find(x, y, z, level, i);
     return region ? std::optional(region->normal(i)) : std::nullopt;
   }
-  // Finds the value of a cell: returns the region that has it, and sets `i` to the number of the
-  // cell in the region. The region is valid until the next call. Returns null if the cell is not
+  // Finds the value of a cell: returns the region that has it, and sets `i` to the index of the
+  // value in the region. The region is valid until the next call. Returns null if the cell is not
   // set or has no value.
   const ColorRegion* find(int64_t x, int64_t y, int64_t z, uint32_t level, uint64_t& i) {
     if (section_->tier_count() == 0 || level > dag_->grid_levels()) return nullptr;
