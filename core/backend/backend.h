@@ -101,11 +101,11 @@ inline bool cuda_device_available() { return cuda_device_count() > 0; }
 // Returns the reason why no device is usable, as a message; "" if a device is usable.
 std::string cuda_device_problem();
 
-// Creates a backend that runs the parallel pipeline on a GPU. `device`: 0 to cuda_device_count()
-// - 1. Device memory is charged to the build's budget like host memory. Each backend has its own
-// stream. So if two backends share a device, transfers and host work of one backend overlap with
-// kernels of the other backend. Throws Error{kDevice} if the device does not exist or cannot be
-// opened.
+// Creates a backend that runs the parallel pipeline on the GPU with the number `device`, which must
+// be below cuda_device_count(). Device memory is charged to the build's budget like host memory.
+// Each backend has its own stream. So if two backends share a device, transfers and host work of
+// one backend overlap with kernels of the other backend. Throws Error{kDevice} if the device does
+// not exist or cannot be opened.
 std::unique_ptr<Backend> make_cuda_backend(Method method = Method::kFast, int device = 0);
 
 }  // namespace voxdag

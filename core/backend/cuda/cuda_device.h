@@ -26,7 +26,8 @@ class CudaDevice {
   // reason if the device does not exist or a call of the CUDA runtime fails.
   explicit CudaDevice(int device);
 
-  // Returns the space of one build, and makes this device the thread's current CUDA device.
+  // Returns the space (space.h) of one build, and makes this device the thread's current CUDA
+  // device.
   CudaSpace open(const SubvolumeTask& task, MemoryBudget& budget, const CancelToken& cancel);
 
   cudaStream_t stream() const { return stream_.get(); }

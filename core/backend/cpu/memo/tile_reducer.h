@@ -69,8 +69,8 @@ class TileReducer {
   void find_blocks(TileBricks& tile, int count);
   void find_new_blocks(TileBricks& tile, int count, bool insert);
   NodeRef reduce(int words, int count, int from_log2, int size_log2);
-  // `hashes` and `ids` contain the children's values before the call and the parents' values after
-  // it.
+  // Finds or adds the nodes of `parents`. `hashes` and `ids` contain the children's values before
+  // the call and the parents' values after it.
   static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
 
   static constexpr int kMaxBricks = kTileBlocks * kBlockBricks;

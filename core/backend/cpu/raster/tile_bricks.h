@@ -11,8 +11,8 @@ namespace voxdag::cpu {
 inline constexpr int kTileLog2 = 6;  // log2 of a full tile's edge in voxels
 inline constexpr int kTileBlocks = 1 << 3 * (kTileLog2 - kBlockLog2);
 
-// A brick's coordinate in the tile (0..15) with its bits moved to positions 0, 3, 6 and 9. Shifted
-// left by 2 - a, this is axis a's part of the brick's Morton index in the tile.
+// kSpread[k]: a brick's coordinate k in the tile, with its bits moved to positions 0, 3, 6 and 9.
+// Shifted left by 2 - a, this is axis a's part of the brick's Morton index in the tile.
 inline constexpr uint32_t kSpread[16] = {
     0x000, 0x001, 0x008, 0x009, 0x040, 0x041, 0x048, 0x049,
     0x200, 0x201, 0x208, 0x209, 0x240, 0x241, 0x248, 0x249,

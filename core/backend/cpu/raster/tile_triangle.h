@@ -51,7 +51,7 @@ struct TileTriangle {
   Int width;
   Edge edges[3][3];  // [projection][edge]
 
-  // Returns false if the triangle certainly touches no voxel of the tile.
+  // Prepares a triangle. Returns false if it certainly touches no voxel of the tile.
   bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const LatticeCube& tile);
 
  private:

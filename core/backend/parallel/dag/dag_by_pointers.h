@@ -87,7 +87,7 @@ struct TakeFirstOfEquals {
   }
 };
 
-// Sets index_of of each item to the position of the item's group among the survivors.
+// Sets index_of[item], for each item, to the position of the item's group among the survivors.
 struct RewireThroughGroups {
   const uint32_t* marked;
   const uint32_t* items;

@@ -1,6 +1,6 @@
 // Builds the octree of a subvolume from its sorted brick codes, from the bottom up, as in Sintorn,
-// "DAG Construction" (2018). For each level it marks the first child of each parent, computes a
-// prefix sum of the marks, and then the child masks and pointers.
+// "DAG Construction" (2018). For each level it marks the first child of each parent, selects the
+// positions of the marks, and computes the child masks.
 //
 // Because codes are sorted, the children of a node are consecutive in the level below. So a node is
 // stored as its child mask and the position of its first child.

@@ -32,8 +32,8 @@ VOXDAG_HD inline int select_bit(uint64_t mask, uint32_t rank) {
   return at;
 }
 
-// Positions of cubes in a subvolume. A cube has an edge of 2^shift lattice units. Its low corner is
-// the subvolume's origin plus its decoded Morton code times 2^shift.
+// Computes the low corners of cubes in a subvolume. A cube has an edge of 2^shift lattice units.
+// Its low corner is the subvolume's origin plus its decoded Morton code times 2^shift.
 struct CubePlace {
   int64_t origin[3];
 
