@@ -1,6 +1,6 @@
 // Converts a scene's images, materials and surfaces for the oracle (tests/oracle), a second
-// implementation of the color rule. Only the scene readers and the image decoders are voxdag's own
-// code.
+// implementation of the color rule. The oracle must not share code with voxdag's colors, so this
+// file uses only the scene readers and the image decoders.
 #pragma once
 
 #include <memory>

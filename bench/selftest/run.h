@@ -11,7 +11,7 @@
 
 namespace voxdag::selftest {
 
-// A backend to test, and its name in the tables.
+// A backend to test, and its name in the printed tables.
 struct Subject {
   std::string name;
   std::function<std::unique_ptr<Backend>()> open;

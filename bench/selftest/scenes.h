@@ -22,11 +22,12 @@ struct Scene {
 // the coordinates.
 std::vector<Scene> tricky_scenes(uint64_t seed, const Cube& cube, uint32_t grid_levels, int count);
 
-// A surface like a scanned one: about `triangles` small triangles on a bumpy ball that fills the
-// grid.
+// Returns a surface like a scanned one: about `triangles` small triangles on a bumpy ball that
+// fills the grid.
 Scene scan(uint64_t triangles, uint32_t grid_levels);
 
-// A building of large and small triangles: floors, walls, round columns and folded curtains.
+// Returns a building of large and small triangles: floors, walls, round columns and folded
+// curtains.
 Scene building(uint64_t triangles, uint32_t grid_levels);
 
 }  // namespace voxdag::selftest

@@ -72,7 +72,7 @@ struct BuildOptions {
   bool strict = false;       // throw Error{kInvalidInput} for a warning about the scene
   bool allow_empty = false;  // build a scene without triangles in the grid instead of refusing it
   std::string cache_folder;  // folder for subvolumes shared between builds; "": no cache
-  uint64_t cache_bytes = uint64_t{16} << 30;  // limit of the cache folder
+  uint64_t cache_bytes = uint64_t{16} << 30;  // maximum size of the cache folder
 
   // Resources. Resident memory, without `mesh`, exceeds memory_bytes by at most 64 MiB if the
   // allocator returns freed memory to the system (docs/library.md).

@@ -34,13 +34,13 @@ struct Region {
   friend bool operator==(const Region&, const Region&) = default;
 };
 
-// Returns all cells of a grid of 2^grid_levels cells per edge.
+// Returns the region of all cells of the grid of 2^grid_levels cells per edge.
 inline Region whole_grid(uint32_t grid_levels) {
   const int64_t edge = int64_t{1} << grid_levels;
   return {{0, 0, 0}, {edge, edge, edge}};
 }
 
-// Returns the part of the region in this grid, or an empty region.
+// Returns the part of the region inside the grid of 2^grid_levels cells per edge; may be empty.
 inline Region cut_to_grid(const Region& region, uint32_t grid_levels) {
   const int64_t edge = int64_t{1} << grid_levels;
   Region cut;

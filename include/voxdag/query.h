@@ -176,7 +176,7 @@ class DagFile {
   // if no node can be at `offset`.
   std::vector<uint32_t> tile(uint32_t tile_levels, uint32_t level, uint64_t offset) const;
 
-  // The file itself, for voxdag_reader.h. It lives as long as this object.
+  // Returns the open file, for use with voxdag_reader.h. It lives as long as this object.
   const voxdag_reader::File& file() const;
 
  private:
