@@ -38,7 +38,7 @@ class ThreadTimes {
   // above 255 share the entry of worker 255.
   static void add(size_t worker) { times_ns_[std::min(worker, kBackground - 1)] += now_ns(); }
   static void add_background() { times_ns_[kBackground] += now_ns(); }
-  // Returns the seconds of each entry so far. Worker 0's includes the calling thread's time.
+  // Returns the seconds of each entry so far. Entry 0 includes the time of the calling thread.
   static Seconds now() {
     Seconds seconds;
     for (size_t i = 0; i < kThreads; ++i) seconds[i] = 1e-9 * static_cast<double>(times_ns_[i]);

@@ -9,7 +9,7 @@
 
 namespace voxdag {
 
-// Returns the code with this name; nullopt if none exists.
+// Returns the code with this name; nullopt if no code has this name.
 std::optional<ErrorCode> error_code_named(std::string_view name);
 // Returns the exit status of the command line for a code; never 0.
 int exit_status(ErrorCode code);

@@ -47,7 +47,7 @@ class MemoryBudget {
   std::atomic<uint64_t> peak_{0};
 };
 
-// Charges bytes to a budget, and releases them when it is destroyed.
+// Charges bytes to a budget. The destructor releases the bytes.
 class MemoryCharge {
  public:
   MemoryCharge() = default;

@@ -1,9 +1,9 @@
 // All file access of voxdag uses this interface. So tests can replace the disk by a full disk, or
 // by a disk that loses unsynced data or flips bits. Paths are plain byte strings.
 //
-// Error codes are kNotFound, kNoSpace (for ENOSPC, EDQUOT and EFBIG) and kIo. The message names the
-// call, the path, the offset if there is one, and the system's reason. Implementations handle short
-// reads and writes, and EINTR.
+// If the system refuses a call, the error code is kNotFound, kNoSpace (for ENOSPC, EDQUOT and
+// EFBIG) or kIo. The message names the call, the path, the offset if there is one, and the system's
+// reason. Implementations handle short reads and writes, and EINTR.
 //
 // A FileSystem is thread-safe. A file is not thread-safe, with these exceptions: several threads
 // may call ReadableFile::read_at() or WritableFile::write_at() at the same time, and other threads

@@ -1,5 +1,5 @@
-// Decides which files may be overwritten. Inputs are never overwritten. Files that the program did
-// not create are overwritten only with --force.
+// Decides which files may be overwritten. Inputs are never overwritten. Files that are not empty
+// and that the program did not write are overwritten only with --force.
 #pragma once
 
 #include <functional>
