@@ -51,8 +51,8 @@ struct BuildOptions {
   // Half the edge, in the units of the scene, of the cube that replaces each point of a point file.
   // If it is not set, a point sets exactly one voxel.
   std::optional<double> point_radius;
-  // Names of the columns of text files with points, such as "x,y,z,_,r,g,b" (docs/scenes.md). If it
-  // is empty, the file's header line or first row decides.
+  // Names of the columns of text files with points, such as "x,y,z,_,r,g,b" (docs/scenes.md). If
+  // `columns` is empty, the header line or the first row of a file determines its columns.
   std::string columns;
   bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
   uint32_t hash_bits = 64;    // bits of the node hash, 4 to 64

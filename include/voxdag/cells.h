@@ -13,7 +13,7 @@ namespace voxdag::query {
 // x, y and z in cells of a grid. An array of positions is a table of three int64 columns.
 using Position = std::array<int64_t, 3>;
 
-// The half-open box low <= p < high of cells of a grid. It may extend beyond the grid.
+// The half-open box low <= p < high of cells of a grid. A region may extend beyond the grid.
 struct Region {
   Position low{};
   Position high{};

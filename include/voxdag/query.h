@@ -161,8 +161,8 @@ class DagFile {
                std::span<Nearest> cells, unsigned threads = 1) const;
 
   // Returns the cell that contains a point of the scene's space. The cell may be outside the grid,
-  // at most 2^62 cells away. A point within rounding error of a boundary between cells counts as on
-  // the boundary.
+  // at most 2^62 cells away. A point within rounding error of a cell boundary counts as on the
+  // boundary, so it is in the cell above the boundary.
   Position world_to_cell(const Coordinates& world, uint32_t grid_levels) const;
   // Returns the cells that the half-open box low <= p < high overlaps. `low` and `high` are in the
   // units of the scene. An infinite coordinate stands for the border of the grid.
@@ -176,7 +176,7 @@ class DagFile {
   // if no node can be at `offset`.
   std::vector<uint32_t> tile(uint32_t tile_levels, uint32_t level, uint64_t offset) const;
 
-  // Returns the open file, for use with voxdag_reader.h. It lives as long as this object.
+  // Returns the open file, for use with voxdag_reader.h. It is valid as long as this object exists.
   const voxdag_reader::File& file() const;
 
  private:
