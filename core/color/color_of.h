@@ -78,8 +78,8 @@ VOXDAG_HD inline uint64_t rounded_quotient(uint64_t numerator, uint64_t denomina
 
 // Returns the quotient rounded to the nearest integer (half up), computed in doubles. Requires a
 // numerator below 2^52, a denominator below 2^35 and a quotient below 2^16. The result is exact: a
-// quotient below k + 1/2, for an integer k, is below it by at least 2^-36. It remains below k + 1/2
-// after rounding to a double, because doubles below 2^16 are at most 2^-37 apart.
+// quotient below k + 1/2, for an integer k, is at least 2^-36 below k + 1/2. Rounding it to a
+// double keeps it below k + 1/2, because doubles below 2^16 are at most 2^-37 apart.
 VOXDAG_HD inline uint32_t rounded_quotient_in_doubles(uint64_t numerator, double denominator) {
   const double quotient = static_cast<double>(static_cast<int64_t>(numerator)) / denominator;
   return static_cast<uint32_t>(static_cast<int32_t>(quotient + 0.5));

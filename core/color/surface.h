@@ -32,7 +32,7 @@ struct SurfaceTriangle {
   std::array<SurfaceCorner, 3> corners;
   uint32_t material = 0;  // index into SceneMaterials::materials
   // True if the corners run clockwise when seen from the front: in mirrored instances, and in every
-  // second triangle of a strip. Only normals depend on it.
+  // second triangle of a strip. Only normals depend on this flag.
   bool is_flipped = false;
 };
 

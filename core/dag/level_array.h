@@ -1,5 +1,5 @@
-// Level arrays: the nodes of one level of a sub-DAG, or of several merged sub-DAGs. They are sorted
-// in the total order, by
+// Level arrays: the nodes of one level of a sub-DAG, or of several merged sub-DAGs. The nodes are
+// sorted in the total order, by
 //
 //     (hash, mask, child indices lexicographically)         or, for bricks, (hash, mask)
 //

@@ -1,6 +1,6 @@
 // Hashes of bricks and nodes. A hash depends on the subtree alone, not on level, position or index.
-// It only finds candidates; equality is always decided by masks and children. docs/format.md, "Node
-// hash", is the specification. A changed constant requires a new format version.
+// Hashes only find candidates for equal nodes; masks and children always decide. docs/format.md,
+// "Node hash", is the specification. A changed constant requires a new format version.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace voxdag {
 
-// Returns the hash of a brick. This is a bijection of 64-bit words (two rounds of xor-shift and odd
-// multiplication), so two bricks have the same full hash only if they are the same brick.
+// Returns the hash of a brick. The hash is a bijection of 64-bit words (two rounds of xor-shift and
+// odd multiplication), so two bricks have the same full hash only if they are the same brick.
 VOXDAG_HD inline uint64_t hash_brick(uint64_t mask) {
   uint64_t h = mask ^ 0x9e3779b97f4a7c15ull;
   h = (h ^ h >> 32) * 0xd6e8feb86659fd93ull;

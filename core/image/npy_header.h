@@ -5,9 +5,9 @@
 
 namespace voxdag {
 
-// Returns the header of an array in C order. It has at most 64 KiB and is padded so that the
-// numbers of the array begin at a multiple of 64 bytes. Examples: `type` is "<f4" (little-endian
-// floats of 4 bytes), `shape` is "(7, 3)".
+// Returns the header of an array in C order. The header has at most 64 KiB and is padded so that
+// the numbers of the array begin at a multiple of 64 bytes. Examples: `type` is "<f4"
+// (little-endian floats of 4 bytes), `shape` is "(7, 3)".
 inline std::string npy_header(const std::string& type, const std::string& shape) {
   std::string text = "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + shape + ", }";
   // The header has ten bytes before this text, and an end of line after it.

@@ -15,7 +15,7 @@ OutputLock::OutputLock(FileSystem& files, const std::string& output, std::unique
 
 OutputLock::~OutputLock() {
   try {
-    // A file with this name that is not empty was not created by voxdag. It is kept.
+    // If the file is not empty, voxdag did not create it, so it is kept.
     if (files_.open_read(path_)->size() == 0) files_.remove(path_);
   } catch (const Error&) {
     // The empty lock file remains. The next process that writes this output locks it.

@@ -121,7 +121,8 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   void* memory = nullptr;
   cudaError_t status = cudaMallocAsync(&memory, bytes, stream());
   if (status == cudaErrorMemoryAllocation) {
-    // The memory retained by the pool may be fragmented. Returns it to the device and tries again.
+    // The memory that the pool retains may be fragmented. Returns this memory to the device and
+    // tries again.
     cudaGetLastError();
     check_call(cudaStreamSynchronize(stream()), "cudaStreamSynchronize", where);
     check_call(cudaMemPoolTrimTo(pool_, 0), "cudaMemPoolTrimTo", where);

@@ -1,5 +1,5 @@
-// One GPU for one backend: a stream, and pinned host memory for small transfers. One thread uses it
-// for many subvolumes.
+// One GPU for one backend: a stream, and pinned host memory for small transfers. One thread uses a
+// CudaDevice for many subvolumes.
 #pragma once
 
 #include <cstdint>

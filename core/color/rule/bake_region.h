@@ -1,7 +1,7 @@
 // Computes the colors and other attributes of the cells in a region of the color grid, by the rule
 // of docs/color.md. The sum of a cell is a function of the triangles that touch the cell, of their
-// materials and of the images. It does not depend on the order of the triangles, or on the region
-// in which the cell is baked.
+// materials and of the images. The sum does not depend on the order of the triangles, or on the
+// region in which the cell is baked.
 //
 // `Textures` is a reader of images. An image is a pyramid of box-filtered levels, linear and with
 // 16 bits per channel. The first level is the image itself. The members of `Textures` are
@@ -59,8 +59,8 @@ class RegionBaker {
         spread_[a][k] = static_cast<uint32_t>(spread_bits3(k) << (2 - a));
   }
 
-  // `region`: a cube of at most 64^3 color cells. `triangles`: all triangles that may touch it, at
-  // most 2^32. Sets `cells` to the cells that the triangles touch, in Morton order.
+  // `region`: a cube of at most 64^3 color cells. `triangles`: all triangles that may touch
+  // `region`, at most 2^32. Sets `cells` to the cells that the triangles touch, in Morton order.
   void bake(const Cube& region, std::span<const FixedSurface> triangles,
             std::vector<ColoredCell>& cells) {
     begin(region);

@@ -96,7 +96,7 @@ struct CellTriangle {
   // x and y are along the axes d + 1 and d + 2. (All sums are modulo 3.)
   Edge edges[3][3];
   // In the projection along axis 2, the function of edge i at column (P, Q) is
-  // 2^(cell_bits - 2) (a P + b Q) + at_column[i]. It is >= 0 iff a P + b Q + column[i] >= 0.
+  // 2^(cell_bits - 2) (a P + b Q) + at_column[i], which is >= 0 iff a P + b Q + column[i] >= 0.
   Int at_column[3], column[3];
 
   VOXDAG_HD CellTriangle(const FixedTriangle& triangle, int bits) : cell_bits(bits) {

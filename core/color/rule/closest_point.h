@@ -53,8 +53,8 @@ VOXDAG_HD inline SurfacePoint closest_point(const FixedTriangle& triangle,
             static_cast<double>(triangle.v[i][2] - center[2])};
   const Vector normal = cross(v[1] - v[0], v[2] - v[0]);
   // opposite[i] is twice the area of the triangle between the center's projection and the edge
-  // opposite to vertex i, times the length of `normal`. It is negative if the projection is on the
-  // outer side of this edge.
+  // opposite to vertex i, times the length of `normal`. The value is negative if the projection is
+  // on the outer side of this edge.
   const double opposite[3] = {dot(normal, cross(v[1], v[2])), dot(normal, cross(v[2], v[0])),
                               dot(normal, cross(v[0], v[1]))};
   const double all = opposite[0] + opposite[1] + opposite[2];

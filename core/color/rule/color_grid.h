@@ -1,6 +1,6 @@
-// The color grid: it divides the cube of the voxel grid (R^3 voxels) into K^3 cells, with
-// K = 2^color_levels <= R. Its set cells are the octree's nodes of level color_levels. Colors are
-// baked by regions, which are octree-aligned cubes of at most 64^3 color cells.
+// The color grid divides the cube of the voxel grid (R^3 voxels) into K^3 cells, with K =
+// 2^color_levels <= R. Its set cells are the octree's nodes of level color_levels. Colors are baked
+// by regions, which are octree-aligned cubes of at most 64^3 color cells.
 #pragma once
 
 #include <cstdint>

@@ -8,8 +8,8 @@
 // the other two projections also decide.
 //
 // From one column of cells to the next, the plane rises or falls by at most one cell. So the
-// plane's height is updated by additions. In the first column of a row it is estimated in doubles,
-// and the estimate is corrected with exact values.
+// plane's height is updated by additions. In the first column of a row the height is estimated in
+// doubles, and the estimate is corrected with exact values.
 #pragma once
 
 #include <cstdint>
@@ -90,8 +90,8 @@ class TouchedCells {
   // Updates first_, last_, highest_ and lowest_ from the previous column of cells in the row.
   VOXDAG_HD void climb() {
     if (t_.degenerate) return;
-    // The plane rises or falls by at most one cell, so one step of correct() is enough. It is done
-    // without branches, which the CPU would often mispredict.
+    // The plane rises or falls by at most one cell, so one step of correct() is enough. This step
+    // is done without branches, which the CPU would often mispredict.
     const Int n = t_.normal[2];
     highest_ += t_.normal[1];
     lowest_ += t_.normal[1];

@@ -11,8 +11,8 @@
 //
 // Checksums are computed from the words and bytes that the caller passes in, not from the file.
 // (resume() reads the last incomplete checksum block back, but first compares it with its saved
-// checksum.) seal() reads the file back and compares it with these checksums. It throws
-// Error{kCorrupt} if the disk returns wrong bytes.
+// checksum.) seal() reads the file back and compares it with these checksums. seal()
+// throws Error{kCorrupt} if the disk returns wrong bytes.
 //
 // Only one thread may use a writer, except that other threads may call write_words() and sync().
 #pragma once

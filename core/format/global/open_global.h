@@ -49,7 +49,7 @@ auto naming_file(const std::string& path, const Use& use) {
   }
 }
 
-// Checks that the kinds and block sizes that the standalone reader repeats equal kAttributeTable's.
+// The standalone reader repeats the kinds and block sizes of kAttributeTable. They must be equal.
 static_assert(std::ranges::all_of(kAttributeTable, [](const AttributeTraits& row) {
   const auto kind = static_cast<uint32_t>(row.attribute);
   return kind < voxdag_reader::kEndOfKinds &&

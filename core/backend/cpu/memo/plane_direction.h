@@ -1,8 +1,8 @@
 // All nodes of 8^3 voxels that planes of one direction n can produce. A plane with offset f
 // (plane.h) passes above or below a voxel corner k, depending on whether f >= -n.k. A cube of 8^3
 // voxels has 729 corners, so the sorted values -n.k divide all offsets f into at most 730
-// intervals. All planes with offsets in one interval produce the same node. It is made once and
-// then looked up.
+// intervals. All planes with offsets in one interval produce the same node. This node is made once
+// and then looked up.
 #pragma once
 
 #include <cstdint>

@@ -3,8 +3,8 @@
 // Entry in triangle_set.h) and no other triangle touches. There are two kinds of planes:
 //
 //   small normals    Planes whose |n_a| sum to at most 64, such as walls, floors and slopes of 45
-//                    degrees. The nodes for every offset and size of cube are in a hash table. Its
-//                    keys contain all inputs, so a hit is exact.
+//                    degrees. The nodes for every offset and size of cube are in a hash table.
+//                    Keys of the table contain all inputs, so a hit is exact.
 //   other planes     The nodes of 8^3 voxels are stored by direction (plane_direction.h), for
 //                    triangles that have covered at least kWorthwhile tiles.
 //

@@ -19,8 +19,8 @@
 // edges, |a|, |b| <= 2^27 and |c| < 2^50.
 //
 // Bounds for wide triangles: half-edges are < 2^40, so |n_a| < 2^81, and n.v < 2^124 in 128 bits.
-// Edge constants c are below 2^82. They are clamped to +-2^60. This does not change the sign of
-// a k_p + b k_q + c, because |a k_p + b k_q| < 2^47.
+// Edge constants c are below 2^82. set_up() clamps them to +-2^60. Clamping does not change the
+// sign of a k_p + b k_q + c, because |a k_p + b k_q| < 2^47.
 #pragma once
 
 #include <cstdint>

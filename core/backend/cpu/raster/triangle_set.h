@@ -9,8 +9,9 @@
 
 namespace voxdag::cpu {
 
-// Lattice coordinates, [axis][vertex]. Axis 0 is x, as everywhere: axis a owns bit 2 - a of a child
-// index (child_coordinate()) and bits 2 - a and 5 - a of a brick's bit number (brick_coordinate()).
+// A triangle in lattice coordinates, v[axis][vertex]. Axis 0 is x. Bit 2 - a of a child index
+// belongs to axis a (child_coordinate()), as do bits 2 - a and 5 - a of a brick's bit number
+// (brick_coordinate()).
 template <class Int>
 struct Triangle {
   Int v[3][3];

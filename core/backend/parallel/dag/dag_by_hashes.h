@@ -4,13 +4,13 @@
 // removed nodes are never visited, so the cost of sorting is proportional to the largest level of
 // the DAG, not of the octree.
 //
-// A verification sweep makes the result exact. On every level it compares every octree node,
+// A verification sweep makes the result exact. On every level the sweep compares every octree node,
 // removed or not, with the remaining node of the same hash. It compares the masks of bricks, and
 // the child masks and lists of child hashes of the nodes above the bricks. If all compared nodes
 // agree, octree nodes with equal hashes have equal subtrees. This follows by induction from the
 // bricks: the children of two such nodes have equal hashes, so the children have equal subtrees.
 // Then the remaining nodes of a level have different hashes, and the order of the hashes is the
-// total order. After any mismatch, the DAG is made by pointers instead.
+// total order. After any mismatch, the DAG is made by pointers instead (dag_by_pointers.h).
 #pragma once
 
 #include <cstdint>

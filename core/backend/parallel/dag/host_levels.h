@@ -14,7 +14,8 @@
 
 namespace voxdag::parallel {
 
-// A space's array on the host. It is the array itself if the space is HostSpace, otherwise a copy.
+// An array of a space (space.h) on the host. For a HostSpace, this is the array itself, otherwise a
+// copy.
 template <class Space, class T>
 class HostArray {
  public:

@@ -111,7 +111,7 @@ struct FindSlice {
   }
 };
 
-// The destination of the pairs of the last level.
+// Arrays with space for `capacity` pairs, to which the pairs of the last level are written.
 struct PairSpan {
   uint64_t* codes;
   uint32_t* triangles;  // null if only codes are needed

@@ -10,8 +10,8 @@
 //     up = 0:  no voxel if t > 0, otherwise all. The code divides by 2^-60 instead of |up| = 0, so
 //              y is far above or far below all voxels.
 // The code computes y = slope k + start in doubles; only the division, products and sums are
-// rounded. y is at least 1 / (2 |up|) >= 2^-28 away from a whole number. Its floor is exact where
-// that matters:
+// rounded. y is at least 1 / (2 |up|) >= 2^-28 away from a whole number. The floor of y is exact
+// where that matters:
 //     |c| <= 2^36:  The error of y is below 2^-12 / |up| + 2^-45, including the error of adding the
 //                   constructor's below_more or over_more.
 //     |c| > 2^36:   |y| > 2^8 is outside the tile, so only the sign of y matters. The error is
