@@ -44,11 +44,11 @@ class PeekedSource {
   std::exception_ptr failure_;
 };
 
-// The bytes of a complete file, for decoders that need all bytes at once.
+// The bytes of a complete file, for decoders that need all bytes in one buffer.
 class WholeFile {
  public:
   // Reads the source to its end. Throws Error{kOutOfMemory} if the bytes do not fit in the budget,
-  // and the source's errors.
+  // and the errors of the source.
   WholeFile(PeekedSource& source, MemoryBudget& budget);
   std::span<const uint8_t> bytes() const { return {bytes_.data(), size_}; }
 

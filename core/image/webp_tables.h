@@ -8,8 +8,9 @@
 
 namespace voxdag {
 
-// Reads a lossless stream ("VP8L") up to the number of its sets of Huffman tables. `stream` begins
-// with the transforms. Returns nothing for a broken stream.
+// Returns the bound in bytes for a lossless stream ("VP8L"), or nullopt if the stream is broken.
+// Reads the stream up to the number of its sets of Huffman tables. `stream` begins with the
+// transforms.
 std::optional<uint64_t> webp_table_bytes(std::span<const uint8_t> stream, uint32_t width,
                                          uint32_t height);
 

@@ -12,7 +12,7 @@
 
 namespace voxdag {
 
-// A plane of numbers of 8 bits, or of 16 bits if YuvPlanes::bits is over 8.
+// A plane of 8-bit numbers, or of 16-bit numbers if YuvPlanes::bits is above 8.
 struct Plane {
   const uint8_t* bytes = nullptr;
   size_t row_bytes = 0;
@@ -33,7 +33,7 @@ class YuvRows {
  public:
   // The memory of the planes must outlive this object. Throws BrokenImage if the matrix is unknown.
   explicit YuvRows(const YuvPlanes& planes);
-  // Reads row `y`: red, green, blue and alpha of each pixel. A channel has 8 bits, or 16 bits if
+  // Converts row `y`: red, green, blue and alpha of each pixel. A channel has 8 bits, or 16 bits if
   // the planes have more than 8.
   void read(uint32_t y, std::span<std::byte> out);
 
