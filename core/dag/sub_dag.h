@@ -10,8 +10,8 @@
 
 namespace voxdag {
 
-// Properties that all sub-DAGs of one DAG share. Initialize a DagShape with names: `{.grid_levels =
-// 11, .hash_bits = 64}`.
+// Properties that all sub-DAGs of one DAG share. Initialize them by name:
+// `{.grid_levels = 11, .hash_bits = 64}`.
 struct DagShape {
   uint32_t grid_levels = 2;  // L; bricks are level L-2
   uint32_t hash_bits = 64;   // 4 to 64

@@ -1,4 +1,5 @@
-// Converts structs that have a `fields` function (field.h) to and from JSON. There are two kinds:
+// Converts structs that have a `fields` function (field.h) to and from JSON. There are two kinds of
+// JSON:
 //
 //   - The JSON of a record has all members, except optional members without a value and empty
 //     members with omit_empty(). A decoder ignores unknown members.

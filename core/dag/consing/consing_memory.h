@@ -1,6 +1,6 @@
-// Limits for memory that only makes hash-consing faster: finding equal nodes by their hashes while
-// a sub-DAG is built. If such memory would exceed its limit, the build uses less of it or none. The
-// DAG is the same.
+// Limits for memory that only makes hash-consing faster. Hash-consing finds equal nodes by their
+// hashes while a sub-DAG is built. If such memory would exceed its limit, the build uses less of it
+// or none. The DAG is the same.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@ struct ConsingMemory {
   static constexpr uint64_t page_bytes(uint64_t budget_bytes) {
     return std::clamp(budget_bytes / 8, kMinPageBytes, kMaxPageBytes);
   }
-  // Maximum total size of the brick and node tables that a build reserves in advance. The sizes
-  // that the tables had for the last sub-DAG are the estimate.
+  // Maximum total size of the brick and node tables that a build reserves in advance. Each table is
+  // reserved at the size that it had for the last sub-DAG.
   static constexpr uint64_t table_bytes(uint64_t free_bytes) { return free_bytes / 4; }
 };
 
