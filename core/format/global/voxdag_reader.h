@@ -294,8 +294,7 @@ class File {
     return index;
   }
   const std::vector<std::string>& material_names() const { return materials().names(); }
-  // Throws an Error for values of an attribute that do not fit the DAG. Ends its message with
-  // `what`.
+  // Throws an Error about values that do not fit the DAG. Its message ends with `what`.
   [[noreturn]] void broken_section(const ColorSection& section, const std::string& what) const {
     corrupt(section.name() + (": " + what));
   }
