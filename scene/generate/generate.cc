@@ -112,12 +112,6 @@ GenerateReport generate_scene(FileSystem& files, const std::string& path,
   return {layout.triangles(), layout.stored_triangles(), layout.instance_count(), bytes};
 }
 
-bool is_generated_scene(const ReadableFile& file) {
-  // The description of the largest scenes takes a few megabytes.
-  constexpr uint64_t kMaxDescriptionBytes = 16 << 20;
-  std::string start(std::min(file.size(), kMaxDescriptionBytes), '\0');
-  file.read_at(0, std::as_writable_bytes(std::span(start)));
-  return start.starts_with("glTF") && start.find(kGenerator) != std::string::npos;
-}
+bool is_generated_scene(const ReadableFile& file) { return is_glb_of(file, kGenerator); }
 
 }  // namespace voxdag

@@ -4,32 +4,15 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "scene/glb_arrays.h"
 
 namespace voxdag {
 namespace {
 
 using nlohmann::json;
 
-constexpr int kFloat = 5126, kUint16 = 5123, kUint8 = 5121;  // componentType
-constexpr int kVertexTarget = 34962, kIndexTarget = 34963;   // target of a bufferView
-
-// The bufferViews and accessors of all arrays, in the order of the file.
-struct Arrays {
-  json views = json::array(), accessors = json::array();
-  uint64_t offset = 0;
-
-  void add(uint64_t bytes, uint64_t padded_bytes, int target, json accessor) {
-    json view = {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", bytes}};
-    if (target) view["target"] = target;
-    accessor["bufferView"] = views.size();
-    views.push_back(std::move(view));
-    accessors.push_back(std::move(accessor));
-    offset += padded_bytes;
-  }
-};
-
 json vectors(uint64_t count) {
-  return {{"componentType", kFloat}, {"type", "VEC3"}, {"count", count}};
+  return {{"componentType", kGlbFloat}, {"type", "VEC3"}, {"count", count}};
 }
 
 // Returns a primitive whose arrays are consecutive, starting with array `positions`.
@@ -110,7 +93,7 @@ void GlbLayout::add_bytes(uint64_t bytes) {
 // instanced. There is one node for this mesh, and one for each block of instances.
 std::string GlbLayout::json_text(const std::string& generator,
                                  std::span<const SceneMaterial> materials) const {
-  Arrays arrays;
+  GlbArrays arrays;
   json meshes = json::array(), nodes = json::array(), primitives = json::array();
   for (const Block& b : blocks_) {
     const uint64_t array = arrays.views.size();
@@ -127,13 +110,15 @@ std::string GlbLayout::json_text(const std::string& generator,
     json positions = vectors(b.first);
     positions["min"] = b.low;
     positions["max"] = b.high;
-    arrays.add(bytes, bytes, kVertexTarget, std::move(positions));
+    arrays.add(bytes, bytes, kGlbVertices, std::move(positions));
     if (b.has_colors)
-      arrays.add(
-          sizeof(Rgba8) * uint64_t{b.first}, sizeof(Rgba8) * uint64_t{b.first}, kVertexTarget,
-          {{"componentType", kUint8}, {"normalized", true}, {"type", "VEC4"}, {"count", b.first}});
-    arrays.add(sizeof(uint16_t) * uint64_t{b.second}, padded_index_bytes(b.second), kIndexTarget,
-               {{"componentType", kUint16}, {"type", "SCALAR"}, {"count", b.second}});
+      arrays.add(sizeof(Rgba8) * uint64_t{b.first}, sizeof(Rgba8) * uint64_t{b.first}, kGlbVertices,
+                 {{"componentType", kGlbUint8},
+                  {"normalized", true},
+                  {"type", "VEC4"},
+                  {"count", b.first}});
+    arrays.add(sizeof(uint16_t) * uint64_t{b.second}, padded_index_bytes(b.second), kGlbIndices,
+               {{"componentType", kGlbUint16}, {"type", "SCALAR"}, {"count", b.second}});
   }
   if (!primitives.empty()) {
     nodes.push_back({{"mesh", meshes.size()}});
@@ -154,9 +139,7 @@ std::string GlbLayout::json_text(const std::string& generator,
     root["materials"].push_back(material_json(material));
   if (instance_count_ > 0)
     root["extensionsUsed"] = root["extensionsRequired"] = json::array({"EXT_mesh_gpu_instancing"});
-  std::string text = root.dump();
-  text.resize((text.size() + 3) / 4 * 4, ' ');
-  return text;
+  return root.dump();
 }
 
 }  // namespace voxdag

@@ -15,11 +15,10 @@
 
 #include "core/base/progress.h"
 #include "scene/generate/scene_builder.h"
+#include "scene/glb_file.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag {
-
-inline constexpr uint64_t kMaxGlbBytes = UINT32_MAX;
 
 class GlbLayout : public BlockSink {
  public:
@@ -30,8 +29,8 @@ class GlbLayout : public BlockSink {
   void instances(uint32_t part, std::span<const Float3> translations,
                  std::span<const Float3> scales) override;
 
-  // Returns the text of the JSON chunk, padded to a multiple of 4 with spaces. `generator` becomes
-  // the asset's generator. `materials` are the materials of meshes; empty without colors.
+  // Returns the text of the JSON chunk. `generator` becomes the asset's generator. `materials` are
+  // the materials of meshes; empty without colors.
   std::string json_text(const std::string& generator,
                         std::span<const SceneMaterial> materials) const;
   uint64_t bin_bytes() const { return bin_bytes_; }
