@@ -132,6 +132,7 @@ void add_info_command(CommandLine& line);
 void add_verify_command(CommandLine& line);
 void add_diff_command(CommandLine& line);
 void add_generate_command(CommandLine& line);
+void add_import_command(CommandLine& line);
 void add_render_command(CommandLine& line);
 void add_extract_command(CommandLine& line);
 void add_export_command(CommandLine& line);

@@ -66,6 +66,9 @@ int run(int argc, char** argv) {
 #ifdef VOXDAG_HAS_GENERATORS
            add_generate_command,
 #endif
+#ifdef VOXDAG_HAS_ASSIMP
+           add_import_command,
+#endif
            add_render_command,      add_extract_command,    add_export_command,
 #ifdef VOXDAG_HAS_VIEWER
            add_view_command,

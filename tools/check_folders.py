@@ -91,6 +91,7 @@ LAYERS = {
     ],
     "scene": [
         "scene/formats",
+        "scene/import",
         "scene/gltf",
         "scene/gltf/materials",
         "scene/gltf/mesh_data",
@@ -153,6 +154,7 @@ THIRD_PARTY = {
     "tiny_gltf.h": ["scene", "tests"],
     "draco/compression/mesh/mesh_edgebreaker_decoder.h": ["scene"],
     "meshoptimizer.h": ["scene", "tests"],
+    "assimp/scene.h": ["scene"],
     "sqlite3.h": ["core/db"],
     "httplib.h": ["client"],
     "png.h": ["core/image"],

@@ -15,6 +15,14 @@ constexpr size_t kFirstBytes = 512;
 
 constexpr const char* kUnpack = "unpack it first";
 constexpr const char* kConvert = "convert it first, for example with Blender";
+#ifdef VOXDAG_HAS_ASSIMP
+constexpr const char* kImport = "convert it first: voxdag import IN OUT.glb";
+constexpr const char* kUnpackOrImport =
+    "unpack it first, or convert a 3MF file: voxdag import IN OUT.glb";
+#else
+constexpr const char* kImport = kConvert;
+constexpr const char* kUnpackOrImport = kConvert;
+#endif
 
 // A format that voxdag does not read. Its files have `bytes` at `offset`.
 struct KnownFormat {
@@ -36,14 +44,14 @@ constexpr KnownFormat kKnown[] = {
     {0, "7z\xbc\xaf\x27\x1c", "a 7z archive", kUnpack},
     {0, "Rar!", "a RAR archive", kUnpack},
     {257, "ustar", "a tar archive", kUnpack},
-    {0, "PK\x03\x04", "a zip archive, as 3MF, USDZ and KMZ files are", kConvert},
-    {0, "Kaydara FBX Binary", "an FBX file", kConvert},
-    {0, "; FBX", "an FBX file", kConvert},
+    {0, "PK\x03\x04", "a zip archive, as 3MF, USDZ and KMZ files are", kUnpackOrImport},
+    {0, "Kaydara FBX Binary", "an FBX file", kImport},
+    {0, "; FBX", "an FBX file", kImport},
     {0, "BLENDER", "a Blender file", "export it as .glb"},
     {0, "PXR-USDC", "a USD file", kConvert},
     {0, "#usda", "a USD file", kConvert},
     {0, {"MM\0*", 4}, "a TIFF image"},
-    {0, "MM", "a 3DS file", kConvert},
+    {0, "MM", "a 3DS file", kImport},
     {0, "Ogawa", "an Alembic file", kConvert},
     {0, "\x89HDF\r\n\x1a\n", "an HDF5 file", kConvert},
     {0, "# vtk DataFile", "a VTK file", kConvert},
@@ -52,9 +60,18 @@ constexpr KnownFormat kKnown[] = {
     {0, ".PCD", "a PCD point cloud", "convert it to PLY"},
     {0, "ASTM-E57", "an E57 point cloud", "convert it to PLY or LAS"},
     {0, "#VRML", "a VRML file", kConvert},
-    {0, "OFF", "an OFF file", kConvert},
-    {0, "COFF", "an OFF file", kConvert},
-    {0, "NOFF", "an OFF file", kConvert},
+    {0, "OFF", "an OFF file", kImport},
+    {0, "COFF", "an OFF file", kImport},
+    {0, "NOFF", "an OFF file", kImport},
+    {0, "xof 0", "a DirectX file", kImport},
+    {0, "AC3D", "an AC3D file", kImport},
+    {0, "MS3D", "a MilkShape 3D file", kImport},
+    {0, "BB3D", "a Blitz3D file", kImport},
+    {0, "IDP2", "a Quake II model", kImport},
+    {0, "IDP3", "a Quake III model", kImport},
+    {0, "MD5Version", "a Doom 3 model", kImport},
+    {0, "INTERQUAKEMODEL", "an Inter-Quake model", kImport},
+    {8, "LWO", "a LightWave file", kImport},
     {0, "ISO-10303-21", "a STEP or IFC file", kConvert},
     {0, "AC10", "a DWG file", kConvert},
     {0, "VOX ", "a MagicaVoxel file"},
@@ -83,8 +100,8 @@ std::string lower(std::string_view text) {
 
 std::string contents_of_markup(std::string_view text) {
   const std::string small = lower(text);
-  if (small.find("<collada") != small.npos) return std::string("a COLLADA file: ") + kConvert;
-  if (small.find("<x3d") != small.npos) return std::string("an X3D file: ") + kConvert;
+  if (small.find("<collada") != small.npos) return std::string("a COLLADA file: ") + kImport;
+  if (small.find("<x3d") != small.npos) return std::string("an X3D file: ") + kImport;
   if (small.find("<html") != small.npos || small.starts_with("<!doctype html"))
     return "a web page, perhaps the error page of a failed download";
   return "an XML file";

@@ -9,7 +9,11 @@ using Help = CommandLine;
 
 constexpr const char* kCommands[] = {
     "build",  "plan", "status", "info",   "verify",  "diff",   "generate", "render", "extract",
-    "submit", "jobs", "watch",  "cancel", "suspend", "resume", "download", "view"};
+    "submit", "jobs", "watch",  "cancel", "suspend", "resume", "download", "view",
+#ifdef VOXDAG_HAS_ASSIMP
+    "import",
+#endif
+};
 
 TEST_F(Help, ListsAllCommands) {
   const Answer answer = run({"--help"});

@@ -1,0 +1,49 @@
+// A scene file as assimp reads it. Only scene/import includes assimp. Not thread-safe.
+#pragma once
+
+#include <assimp/scene.h>
+
+#include <array>
+#include <assimp/Importer.hpp>
+#include <string>
+
+#include "core/base/warning.h"
+
+namespace voxdag {
+
+class AssimpScene {
+ public:
+  // Throws Error{kInvalidInput} with assimp's message if it cannot read the file, std::bad_alloc.
+  explicit AssimpScene(const std::string& path);
+
+  const std::string& path() const { return path_; }
+  const aiScene& operator*() const { return *scene_; }
+  const aiScene* operator->() const { return scene_; }
+  // Returns the matrix, column by column, that converts the positions of the scene to the unit and
+  // the axes of glTF: meters, y upward, z to the front.
+  std::array<double, 16> to_gltf() const;
+  // Parts of the file that a .glb of import_scene() does not have.
+  const WarningList& losses() const { return losses_; }
+
+ private:
+  struct Axis {
+    unsigned number;  // 0: x
+    int sign;
+  };
+
+  void add_losses();
+  [[noreturn]] void refuse_file();
+  std::string extensions() const;
+  double meters_per_unit() const;
+  std::array<Axis, 3> axes() const;
+
+  const std::string path_;
+  Assimp::Importer importer_;
+  const aiScene* scene_ = nullptr;
+  WarningList losses_;
+};
+
+// Returns the name of a node, a mesh or a material.
+inline std::string text_of(const aiString& name) { return {name.data, name.length}; }
+
+}  // namespace voxdag

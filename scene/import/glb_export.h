@@ -1,0 +1,52 @@
+// Writes an assimp scene as a .glb.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/base/warning.h"
+#include "core/io/file_system.h"
+#include "scene/import/assimp_scene.h"
+#include "scene/import/import.h"
+#include "scene/import/material_export.h"
+#include "scene/import/mesh_export.h"
+
+namespace voxdag {
+
+class GlbExport {
+ public:
+  static constexpr const char* kGenerator = "voxdag import";
+
+  // Adds warnings about parts that are left out. Throws Error{kInvalidInput} for an invalid mesh or
+  // transform, or a scene without triangles. The arguments must outlive this object.
+  GlbExport(const AssimpScene& scene, FileSystem& files, WarningList& warnings);
+
+  // The number of bytes is known after write().
+  const ImportReport& report() const { return report_; }
+  // Writes "<path>.partial". Calls advance(triangles) after each mesh. Throws Error.
+  void write(const std::string& path, MemoryBudget& budget,
+             const std::function<void(uint64_t)>& advance);
+
+ private:
+  void add_meshes(GlbArrays& arrays);
+  nlohmann::json nodes();
+  nlohmann::json node_of(const aiNode& node);
+  std::optional<size_t> mesh_of(const aiNode& node);
+
+  const AssimpScene& scene_;
+  FileSystem& files_;
+  WarningList& warnings_;
+  MaterialExport materials_;
+  std::vector<MeshExport> meshes_;
+  std::vector<nlohmann::json> primitives_;  // of each mesh; null without triangles
+  // The meshes of the .glb, keyed by the assimp meshes that they consist of.
+  std::map<std::vector<unsigned>, size_t> mesh_numbers_;
+  nlohmann::json glb_meshes_ = nlohmann::json::array();
+  nlohmann::json root_;
+  uint64_t bin_bytes_ = 0;
+  ImportReport report_;
+};
+
+}  // namespace voxdag
