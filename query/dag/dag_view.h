@@ -1,7 +1,7 @@
 // Presents a finished DAG as cells of any size, from the complete grid down to a voxel. The view
-// reads the words of each level in place, in the layout of the global file. `depth` is a cell's
-// number of levels below the root, and L is the grid's number of levels. `content` is a number that
-// identifies the part of the DAG below a cell:
+// reads each level's words in place, in the layout of the global file. A cell's `depth` is its
+// number of levels below the root; L is the grid's number of levels. A cell's `content` is a number
+// that identifies the part of the DAG below the cell:
 //     cell                           depth        content
 //     a node                         0 to L - 3   the node's word offset in its level
 //     a brick (4x4x4 voxels)         L - 2        the brick's 64-bit mask
@@ -39,8 +39,8 @@ class DagView {
   uint32_t grid_levels() const { return grid_levels_; }
   // Returns the words of the level at `depth`, 0 to L - 2. The DAG must not be empty.
   const Level& level(uint32_t depth) const { return levels_[depth]; }
-  // Requests that the CPU loads the node or brick at this word offset of the level at `depth` into
-  // its cache. Does nothing if the level has no such word.
+  // Prefetches the node or brick at this word offset of the level at `depth` into the CPU's cache.
+  // Does nothing if the level has no such word.
   void prefetch(uint32_t depth, uint64_t offset) const {
     const std::span<const uint32_t> words = levels_[depth].words;
     if (offset < words.size()) __builtin_prefetch(words.data() + offset);
@@ -150,8 +150,8 @@ void DagView::visit_below(const Cell& cell, uint64_t content, uint32_t depth, co
   if (selected == 0) return;
   const Children c = children(cell.depth, content);
   const double half = cell.edge / 2;
-  // Visits opposite corners first. After them, a search for a bounding box can skip most of the
-  // other children.
+  // The order begins with two opposite corners. For a search for a bounding box, these two children
+  // give a large box, so the search can skip most of the other children.
   for (const int i : {0, 7, 3, 4, 5, 2, 1, 6}) {
     if (!(selected & c.mask & 1u << i)) continue;
     const Vec low = cell.low + Vec{{i & 4 ? half : 0, i & 2 ? half : 0, i & 1 ? half : 0}};

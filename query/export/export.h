@@ -50,14 +50,14 @@ struct ExportRequest {
   Selection selection;
   std::string output;
   uint64_t memory_bytes = 0;  // limit of allocations, not including the mapped file
-  bool gray = false;          // without colors
+  bool gray = false;          // no colors in the output
   bool replace = false;       // replace existing files
 };
 
 // Writes the selected voxels. The files get their final names when all of them are complete. After
-// an error no file remains, unless the first of two renames succeeded and the second failed. If the
-// process is killed, the next export to the same output removes its files. Throws Error{kLimit} if
-// the format cannot hold the voxels, Error{kOutOfMemory} if they do not fit in memory_bytes (the
+// an error no file remains, except if the first of two renames succeeded and the second failed. If
+// the process is killed, the next export to the same output removes its files. Throws Error{kLimit}
+// if the format cannot hold the voxels, Error{kOutOfMemory} if they do not fit in memory_bytes (the
 // message names a selection that fits), and the errors of LockedOutputs.
 ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,

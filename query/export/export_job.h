@@ -111,11 +111,11 @@ void require_space(const ExportJob& job, uint64_t bytes);
                               const std::function<bool(uint32_t grid_levels)>& fits,
                               ErrorCode code = ErrorCode::kLimit);
 
-// Returns the number of set cells of `selection`. If this number is over `limit`, the result is an
-// arbitrary number over `limit`.
+// Returns the number of set cells of `selection`. Stops counting above `limit`: the result is then
+// an arbitrary number over `limit`.
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);
 // Determines on which coarser grids the job's selection has at most `limit` set cells. Call fits()
-// for the coarsest grid first. Chooses the first possible way to count:
+// for the coarsest grid first. Counts in the first of these ways that is possible:
 // 1. If the complete grid is selected, LevelCells reads each level once for all calls together.
 //    It needs memory for the nodes of two levels.
 // 2. NodeCounts reads each node once per call. It needs memory for a count per node.
@@ -157,8 +157,8 @@ ExportReport write_voxel(const ExportJob& job);
 ExportReport write_vox(const ExportJob& job);
 ExportReport write_bt(const ExportJob& job);
 ExportReport write_glb(const ExportJob& job);
-// Like write_glb(), with a different size limit. Tests use a smaller one, because writing files of
-// 4 GiB takes too long.
+// Like write_glb(), with a different limit of the file's size in bytes. Tests use a small limit,
+// because writing files of 4 GiB takes too long.
 ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes);
 ExportReport write_vdb(const ExportJob& job);
 ExportReport write_nvdb(const ExportJob& job);

@@ -1,6 +1,7 @@
-// Counts the set cells in the grids of a file's levels, starting with the coarsest grid. Each node
-// passes the number of its occurrences in the octree on to its children. So each level above the
-// requested grid is read only once, and no level below that grid is read.
+// Counts the set cells in the grids of a file's levels, from the coarsest grid to finer grids. For
+// each node of one level, the class stores how often the node occurs in the octree, and computes
+// the numbers of the next level from them. So each level above the requested grid is read only
+// once.
 #pragma once
 
 #include <cstdint>
@@ -22,11 +23,11 @@ class LevelCells {
              const CancelToken& cancel)
       : file_(file), dag_(dag), budget_(budget), cancel_(cancel) {}
 
-  // Returns the number of set cells in the grid of 2^grid_levels cells per edge. If this number is
-  // over `limit`, the result is an arbitrary number over `limit`. `grid_levels` must be at least 2,
-  // less than the file's, and not less than in the previous call. Takes 8 bytes for each node that
-  // is two or three levels above the cells, and 2 bits for each word of these nodes. Throws
-  // Error{kOutOfMemory} if this is over the budget, and Error{kCorrupt}.
+  // Returns the number of set cells in the grid of 2^grid_levels cells per edge. Stops counting
+  // above `limit`: the result is then an arbitrary number over `limit`. `grid_levels` must be at
+  // least 2, less than the file's, and not less than in the previous call. Takes 8 bytes for each
+  // node that is two or three levels above the cells, and 2 bits for each word of these nodes.
+  // Throws Error{kOutOfMemory} if this is over the budget, and Error{kCorrupt}.
   uint64_t count(uint32_t grid_levels, uint64_t limit);
 
  private:

@@ -1,8 +1,8 @@
 // The selected cells as a DAG of the selection's grid, for formats that share equal subtrees. If
-// the complete file is selected and all its pointers have 32 bits, this DAG consists of the file's
-// levels in place. Otherwise, the DAG is built in memory that is charged to the budget. Equal
-// subtrees are shared again after clipping to the region. A node of the file that is completely
-// inside the region is visited only once.
+// the complete file is selected and all its pointers have 32 bits, this DAG is the file's levels in
+// place. Otherwise, the DAG is built in memory that is charged to the budget. Subtrees that become
+// equal because the region clips them are also shared. A node of the file that is completely inside
+// the region is visited only once.
 //
 // Levels have the layout of the global file. A node is its child mask and the word offsets of its
 // children in the next level, one word each. A brick is two words, low half first.
@@ -34,8 +34,8 @@ class SelectedDag {
   uint64_t word_count() const;
   DagView view() const;
 
-  // Upper bounds of the size that the DAG would have on a coarser grid. On such a grid, bricks are
-  // made from the nodes two levels above the grid's cells.
+  // Upper bounds of the DAG's size on a coarser grid. The bricks of such a grid are made from the
+  // nodes two levels above the grid's cells.
   struct Size {
     uint64_t words = 0, nodes = 0, bricks = 0;  // nodes without the bricks
   };
@@ -78,8 +78,8 @@ class SelectedDag {
 };
 
 // Holds one number per node or brick of a level, in memory charged to the job. The index of a
-// node's number is half the node's offset, which is unique because each node has at least two
-// words.
+// node's number is half the node's word offset. This index is unique, because each node has at
+// least two words.
 template <class Number>
 class NodeNumbers {
  public:

@@ -3,11 +3,11 @@
 // on the voxels.
 //
 // The grid is divided into octree-aligned cubes. For each cube, one of several threads reads the
-// necessary part of the DAG, builds the DAG of the selected cells in memory (part_builder.h), and
+// cube's part of the DAG, builds the DAG of the selected cells in memory (part_builder.h), and
 // writes it as an artifact. A cube that does not fit in the thread's share of the memory is divided
-// into its children. The merge then makes the file from the artifacts, as in a build. So the memory
-// depends on the budget, not on the size of the file. If the file has colors or other attributes,
-// they are written last (part_colors.h).
+// into its eight children. The merge then makes the file from the artifacts, as in a build. So the
+// memory depends on the budget, not on the size of the file. If the file has colors or other
+// attributes, they are written last (part_colors.h).
 #pragma once
 
 #include <cstdint>
@@ -56,10 +56,10 @@ struct ExtractReport {
 Cube crop_cube(const Selection& selection);
 
 // Writes the selected part of `file` to spec.output, which gets its final name when it is complete.
-// Temporary files are in a folder next to the output, which is removed at the end, also after an
-// error. If the process is killed, the next extract with the same output removes the folder. Throws
-// Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the errors of
-// LockedOutputs.
+// Temporary files are in a folder next to the output; extract() removes the folder at the end, also
+// after an error. If the process is killed, the next extract with the same output removes the
+// folder. Throws Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the
+// errors of LockedOutputs.
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel);
 

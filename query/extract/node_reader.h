@@ -1,6 +1,6 @@
-// Reads nodes of a global file with read calls of limited size, not through a mapping, so that
-// resident memory does not grow with the file. The checksum blocks that contain the nodes are
-// verified when they are read for the first time.
+// Reads nodes of a global file with read calls of limited size. A mapping would make the resident
+// memory grow with the file. The checksum blocks that contain the nodes are verified when they are
+// read for the first time.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ namespace voxdag::query {
 // Thread-safe.
 class CheckedReader {
  public:
-  // `header` is the opened file to read. Only its header is read through `header`; everything else
-  // is read with read calls.
+  // `header` is the opened file to read. The reader uses only its header, and reads everything else
+  // with read calls.
   CheckedReader(FileSystem& files, const voxdag_reader::File& header, MemoryBudget& budget);
 
   const voxdag_reader::File& header() const { return header_; }

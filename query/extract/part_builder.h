@@ -8,10 +8,10 @@
 //     selected grid   nodes   ...   bricks          cells
 //     file            nodes   ...   nodes at l-2    their children's masks, at l-1
 //
-// Then, from these bricks up, nodes that have become equal are merged (hash-consing), with the same
-// tables that are used to build subvolumes. Cells outside the region are left out on the way down.
-// The region cuts a node if only a part of the node's cube is in the region. Such a node is added
-// once per position; any other node is added only once.
+// Then the tree is built from these bricks up. Nodes that have become equal are merged
+// (hash-consing), with the same tables that are used to build subvolumes. Cells outside the region
+// are left out on the way down. The region cuts a node if only a part of the node's cube is in the
+// region. A level's list of nodes has a cut node once per position, and any other node only once.
 #pragma once
 
 #include <cstdint>
@@ -51,11 +51,11 @@ class PartBuilder {
     NodeRef ref;
     OctreeCounts counts;
   };
-  // The children of the nodes of one level. Each element of `all` is the number of a child in the
-  // level below. The children of node i begin at all[first[i]]; masks[i] is the node's child mask,
-  // without children outside the region.
+  // The children of the nodes of one level. `all` has the numbers of the children in the level
+  // below. The children of node i begin at all[first[i]]; masks[i] is the node's child mask without
+  // children outside the region.
   struct Children {
-    PooledArray<uint8_t> masks;   // by node number; children outside the region are left out
+    PooledArray<uint8_t> masks;   // by node number
     PooledArray<uint32_t> first;  // by node number
     PooledArray<uint32_t> all;
     uint64_t count = 0;

@@ -1,27 +1,27 @@
-// Writes the colors of a part of a global file, or another attribute of its cells, behind the
+// Writes the colors, or another attribute, of a part of a global file. The attribute follows the
 // levels of the new file.
 //
 // The color grid of the part has the cell size of the file's color grid, or of the selected grid if
-// that is coarser. If this would give fewer than 4 cells per edge, the color grid of the part has
-// smaller cells, 4 per edge. They have the colors of the file's cells that contain them. A cell of
-// the part has
+// that is coarser. If such a grid had fewer than 4 cells per edge, the part's color grid has 4
+// smaller cells per edge. Each of them has the color of the file's cell that contains it. The color
+// of a cell of the part is
 //
-//   1. the color stored in the file, on the finest level of the color grid and if the selection's
-//      region does not cut the cell;
-//   2. otherwise the mean of its finest cells that are inside that region, in linear light.
+//   1. the color stored in the file, if the cell is on the finest level of the color grid and the
+//      selection's region does not cut the cell;
+//   2. otherwise the mean, in linear light, of the cell's finest cells inside that region.
 //
 // Colors are stored in color regions of up to 64^3 cells; all color regions with the same levels
-// are a tier (docs/format.md). A color region of the file is copied byte for byte if it is
-// completely inside the selection, and if the part has a tier with the same finest level and the
-// same level of color regions. Other color regions are decoded and encoded again, so their colors
-// are close to the file's colors. The written bytes depend only on the file and the selection.
+// are a tier (docs/format.md). A color region is copied byte for byte if it is completely inside
+// the selection, and if the part has a tier with the same finest level and the same level of color
+// regions. Other color regions are decoded and encoded again, so their colors are only close to the
+// file's colors. The written bytes depend only on the file and the selection.
 //
-// For the other attributes, the finest cells have the file's values. The values of coarser cells
-// are computed by the attribute's rule, so cells that the selection's region does not cut have the
-// same values as in the file.
+// For the other attributes, the finest cells have the file's values. The attribute's rule computes
+// the values of coarser cells. So cells that the selection's region does not cut have the same
+// values as in the file.
 //
-// This code reads the file through a mapping. Every checksum block is verified before it is read,
-// and pages are released when the process exceeds the budget.
+// This code reads the file through a mapping. It verifies every checksum block before the first
+// use, and releases pages when the process exceeds the budget.
 #pragma once
 
 #include <cstdint>

@@ -3,11 +3,11 @@
 // node that the region cuts is added once per position. Nodes are numbered in the order in which
 // they are added.
 //
-//   slots     [tag | number + 1] ...    open addressing by the offset, for nodes that are not cut
+//   slots     [tag | number + 1] ...    open addressing by offset, for nodes that are not cut
 //
-// A slot is 64 bits, or 0 if it is free. The tag is the lower half of the product of the offset and
-// an odd number, so it determines the lower half of the offset. Two different offsets can have the
-// same tag only in a wide level. In such a level, the complete offsets are compared.
+// A slot has 64 bits; it is 0 if it is free. The tag is the lower half of the product of the offset
+// and an odd number, so it determines the lower half of the offset. In a level that is not wide,
+// the tag alone identifies the offset. In a wide level, the complete offsets are also compared.
 //
 // Not thread-safe. Throws OutOfBudget when a node does not fit in the budget, or when there would
 // be more than 2^32 - 1 nodes.

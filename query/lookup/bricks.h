@@ -1,7 +1,7 @@
 // Iterates over the bricks of a selection. The selection's grid is the file's grid or a coarser
 // grid; a brick of a coarser grid has 4x4x4 cells of that grid. Box queries, lists of positions and
-// exporters use this iteration. Its memory does not depend on the size of the selection; its time
-// grows with the number of bricks in the selection.
+// exporters use this iteration. Its memory is constant; its time grows with the number of bricks in
+// the selection.
 #pragma once
 
 #include <bit>
@@ -90,10 +90,10 @@ class BrickWalk {
 };
 
 // Calls visit(const Brick&) for every brick that has set cells in the region, in Morton order. If
-// visit() returns a bool, the iteration ends when it returns false. The brick's mask has only the
-// cells in the region; the region may extend beyond the grid. A node is read once for each place
-// where it occurs in the selection. Throws Error{kInvalidInput} if the selection's grid has more
-// levels than the file, and Error{kCorrupt} for a damaged DAG.
+// visit() returns a bool, false ends the iteration. The brick's mask has only the cells in the
+// region; the region may extend beyond the grid. A node is read once for each place where it occurs
+// in the selection. Throws Error{kInvalidInput} if the selection's grid has more levels than the
+// file, and Error{kCorrupt} for a damaged DAG.
 template <class Visit>
 void for_each_brick(const DagView& dag, const Selection& selection, Visit&& visit) {
   check_grid_levels(dag, selection.grid_levels);

@@ -1,5 +1,5 @@
-// Counts the set cells in regions. To make this fast, the number of set cells below each node is
-// computed once, from the bricks up, and stored: one 64-bit number per node.
+// Counts the set cells in regions. So that counting is fast, the constructor computes the number of
+// set cells below each node, from the bricks up, and stores it: one 64-bit number per node.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,9 @@ namespace voxdag::query {
 class NodeCounts {
  public:
   // Stores the counts. They take at most 8 bytes per node above the bricks, and 2 bits per word of
-  // these nodes. If the counts do not fit in the budget, stores none: count() then visits all nodes
-  // in its region. `dag` is the view of `file`; both must outlive this object. Throws
-  // Error{kCorrupt}, Error{kCanceled}.
+  // these nodes. If they do not fit in the budget, stores nothing; count() then visits all nodes in
+  // its region. `dag` is the view of `file`; both must outlive this object. Throws Error{kCorrupt},
+  // Error{kCanceled}.
   NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint32_t grid_levels,
              MemoryBudget& budget, const CancelToken& cancel = {});
 

@@ -1,7 +1,7 @@
 // Computes which children of a cell a ray crosses, from the planes that bound the children. The
-// planes are two vectors of four doubles. Each source file that includes this header is compiled
+// planes are two vectors of four doubles. Several source files include this header, each compiled
 // for a different instruction set. So all functions of this header have internal linkage: the
-// linker must not replace a function by a version for another instruction set.
+// linker must not replace a function by its version for another instruction set.
 #pragma once
 
 #include <cstdint>

@@ -4,15 +4,15 @@
 //
 // The walk visits large cells depth first, once for all rays that may cross them. Bounds of the
 // origins and directions of all rays exclude most children. If several children remain, each ray is
-// tested with each of them. If only few rays remain in a cell, each of them descends separately
-// through its cells in order, and so loads no cells behind its hit. The separate rays take turns,
-// one step each. While the other rays take their steps, memory loads the next cell of a ray.
+// tested with each of them. If only few rays remain in a cell, each ray descends separately through
+// its cells, nearest first, and so never loads a cell behind its hit. The separate rays take turns,
+// one step each: while other rays take their steps, memory loads the ray's next cell.
 //
-// A ray crosses a cell if its interval in the cell, a range of its parameter t, is not empty. In
-// two cases RayCaster's result depends on the path from the root to the cell: if the ray has an
-// interval of length 0 in an occupied cell, and if the ray enters the hit cell through two faces at
-// the same t. In these cases the walk gives the ray up: the ray is removed from the packet, and
-// RayPacket casts it with RayCaster.
+// A ray's interval in a cell is the range of the ray's parameter t in the cell; the ray crosses the
+// cell if this range is not empty. In two cases RayCaster's result depends on the path from the
+// root to the cell: if a ray's interval in an occupied cell has length 0, and if the ray enters the
+// hit cell through two faces at the same t. In these cases the walk gives the ray up: it removes
+// the ray from the packet, and RayPacket casts the ray with RayCaster.
 #pragma once
 
 #include <limits>
@@ -62,8 +62,8 @@ class PacketWalk {
   }
 
  private:
-  // In a cell with at most this number of rays, the rays continue separately. In bricks, any number
-  // of rays continue separately. The number was chosen by measurement.
+  // In a cell with at most this number of rays (chosen by measurement), the rays continue
+  // separately. In a brick, they always continue separately.
   static constexpr int kFewRays = 8;
 
   using Planes = FourPlanes<Four>;
@@ -180,8 +180,9 @@ class PacketWalk {
                  job_.t_min, job_.t_max);
   }
 
-  // Returns the children of a cell that at least one ray may cross or touch. Rounding is monotonic,
-  // so bounds of the origins and inverse directions give bounds of the parameters.
+  // Returns the children of a cell that at least one ray may cross or touch. Computes bounds of the
+  // ray parameters from the bounds of origins and inverse directions; rounding is monotonic, so it
+  // keeps them valid.
   VOXDAG_INLINE uint32_t cross_any(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);
@@ -191,8 +192,8 @@ class PacketWalk {
         cross(min(in * i0, in * i1), max(out * i0, out * i1), job_.t_min, job_.t_max);
     return crossed.inside | crossed.touching;
   }
-  // Returns children of a cell that all rays cross. Because the bounds are not tight, the mask may
-  // lack some of these children.
+  // Returns children of a cell that all rays cross. The bounds are not tight, so some of these
+  // children may be missing in the mask.
   VOXDAG_INLINE uint32_t cross_all(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);
@@ -201,7 +202,7 @@ class PacketWalk {
     return cross(max(in * i0, in * i1), min(out * i0, out * i1), job_.t_min, job_.t_max).inside;
   }
 
-  // Returns the rays that cross or touch a cell.
+  // Returns the subset of `rays` that cross or touch the cell with this low corner and edge.
   VOXDAG_INLINE uint64_t crossing(Int4 low, double edge, uint64_t rays) const {
     Four low_plane[3], high_plane[3];
     for (int axis = 0; axis < 3; ++axis) {
@@ -266,9 +267,9 @@ class PacketWalk {
     }
   }
 
-  // Adds a cell to the separate descent of each of `rays`. A ray without a descent begins one in
-  // this cell; for other rays, the cell waits. Cells must be pushed in the order in which a ray
-  // crosses them.
+  // Adds a cell to the separate descent of each of `rays`. A ray without a descent begins its
+  // descent in this cell; for a ray with a descent, the cell waits. The caller must push the cells
+  // in the order in which a ray crosses them.
   void push(uint32_t depth, Int4 low, uint64_t offset, uint64_t rays) {
     for (; rays != 0; rays &= rays - 1) {
       const int ray = first_of(rays);
@@ -297,8 +298,8 @@ class PacketWalk {
     descent.first_waiting = cell.next;
   }
 
-  // Advances all separate rays by one step each, in turn, until each ray has ended or has left the
-  // last of its waiting cells.
+  // Advances all separate rays in turn, one step each, until each ray has ended or has no more
+  // waiting cells.
   void finish_descents() {
     while (count_ > 0)
       for (int i = 0; i < count_;)
@@ -336,8 +337,8 @@ class PacketWalk {
     return enter_next(descent);
   }
 
-  // Enters a child of `n`, the path's node at `depth`. `in` is a mask of the children to visit: the
-  // ray enters the first of them, and the others remain in `descent.left`.
+  // Enters a child of `n`, the path's node at `depth`. `in` is the mask of the children to visit.
+  // The ray enters the first of them; descent.left stores the others for later.
   VOXDAG_INLINE void enter_first(RayDescent& descent, uint32_t depth, uint32_t in, const Node& n) {
     const int index = first_of(in);
     descent.low = corner(descent.low, index, int32_t{1} << (job_.grid_levels - depth - 1));

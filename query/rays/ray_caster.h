@@ -1,13 +1,13 @@
 // Casts rays through the DAG.
 //
 // A ray descends the octree from the root. At each node it descends into the children that it
-// crosses, nearest first. A ray's parameter t at a plane, its distance from the ray's origin along
-// the ray, is computed from the plane's integer coordinate, always by the same formula. So the
-// cells on both sides of a plane agree to the last bit, and there are no cracks at any resolution.
-// The ray is mirrored so that its direction is positive on every axis.
+// crosses, nearest first. A ray's parameter t at a plane is the distance along the ray from its
+// origin to the plane. It is computed from the plane's integer coordinate, always by the same
+// formula. So the cells on both sides of a plane get the same t to the last bit, and there are no
+// cracks at any resolution. The ray is mirrored so that its direction is positive on every axis.
 //
-// A ray widens into a cone: if an occupied cell is no larger than the width of the cone at the
-// cell, the cell counts as solid. So the descent ends where finer cells would be invisible.
+// A ray may widen into a cone. An occupied cell that is no larger than the width of the cone at the
+// cell counts as solid. So the descent ends where finer cells would be invisible.
 //
 // Immutable; any number of threads may cast rays.
 #pragma once

@@ -1,10 +1,10 @@
 // The descent of one ray through the DAG.
 //
-// The ray is mirrored so that its direction is positive on every axis. `out` has the ray's
-// parameters at the three planes at which it can leave a cell, by axis; a ray that enters the cell
-// at `t` leaves it at the smallest of them. The parameter at a plane is always computed from the
-// plane's integer coordinate by the same formula. So a descent can begin in any cell that the ray
-// enters, with the same result as from the root.
+// The ray is mirrored so that its direction is positive on every axis. `out` has, by axis, the
+// ray's parameters at the three planes at which the ray can leave a cell. A ray that enters the
+// cell at `t` leaves it at the smallest of the three. The parameter at a plane is always computed
+// from the plane's integer coordinate by the same formula. So a descent can begin in any cell that
+// the ray enters, with the same result as from the root.
 #pragma once
 
 #include <algorithm>
@@ -68,8 +68,8 @@ class RayWalk {
 
  private:
   // Visits the children of a cell that the ray crosses and for which has(index) is true, nearest
-  // first. Calls enter_child(index, low corner, out, t) for each. If enter_child() returns true,
-  // which means a hit, ends and returns true.
+  // first. Calls enter_child(index, low corner, out, t) for each, until enter_child() returns true,
+  // which means a hit. Returns true after a hit.
   template <class Has, class EnterChild>
   bool cross(const double (&low)[3], double half, const double (&out)[3], double t, const Has& has,
              const EnterChild& enter_child);

@@ -1,5 +1,5 @@
 // The share of light that a surface reflects, from the colors of a file. Without colors, surfaces
-// are gray plaster. The file must outlive an Albedo. Not thread-safe.
+// are gray plaster. The file must outlive the Albedo object. Not thread-safe.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ inline constexpr Vec kPlaster{{0.74, 0.70, 0.64}};
 
 class Albedo {
  public:
-  // `colors`: the file whose colors are shown; may be null. Without colors, the result is gray.
+  // `colors`: the file whose colors are shown. If it is null or has no colors, the result is gray.
   explicit Albedo(const voxdag_reader::File* colors) {
     if (colors && colors->has_colors()) cursor_.emplace(*colors);
   }

@@ -1,4 +1,4 @@
-// The light on a surface: a sun that casts shadows, and a sky that nearby surfaces hide in part.
+// The light on a surface: a sun that casts shadows, and a sky that nearby surfaces partly hide.
 // Both lights are computed by casting rays. Immutable; thread-safe.
 #pragma once
 
@@ -14,9 +14,10 @@ namespace voxdag::query {
 
 class Lighting {
  public:
-  // Places the sun for the visible surface. `seen` has samples of this surface, nearest first.
-  // `box` is the box of the occupied cells. If the camera is outside the box and above its lower
-  // side, there is also a floor below the scene, on which the scene casts its shadow.
+  // Places the sun. `seen` has samples of the visible surface, nearest first; if there is no floor,
+  // the sun is placed so that it lights about a third of them. `box` is the box of the occupied
+  // cells. If the camera is outside the box and above the box's lower side, a floor below the scene
+  // shows the scene's shadow.
   Lighting(const DagView& dag, const Box& box, const Camera& camera,
            const std::vector<SurfaceHit>& seen);
 

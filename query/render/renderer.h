@@ -12,7 +12,7 @@ namespace voxdag::query {
 
 struct RenderOptions {
   int width = 1280, height = 720;
-  int samples = 2;  // samples per pixel along each of its sides
+  int samples = 2;  // along each side of a pixel: samples^2 samples per pixel
   unsigned threads = 1;
   // The DAG's file, for its colors; null for gray.
   const voxdag_reader::File* colors = nullptr;

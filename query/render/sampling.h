@@ -10,9 +10,9 @@ namespace voxdag::query {
 inline constexpr double kPi = 3.14159265358979323846;
 
 // Points in [0, 1)^2 that cover the square evenly (the R2 sequence). A sample of a pixel needs
-// points for several purposes, called dimensions: its position in the pixel, its rays to the sky.
-// Each dimension shifts the sequence by a random amount. The sequences of neighboring pixels start
-// far apart, so the remaining noise is fine-grained.
+// points for several purposes, such as its position in the pixel and its rays to the sky. Each
+// purpose is a dimension; a dimension shifts the sequence by a random amount. The sequences of
+// neighboring pixels start far apart, so the remaining noise is fine-grained.
 class Sampler {
  public:
   struct Pair {

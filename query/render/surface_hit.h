@@ -13,7 +13,7 @@ namespace voxdag::query {
 // Maximum distance, in voxels, at which a surface is seen.
 inline constexpr double kFarthest = 1e30;
 // Returns the cone of a ray through a pixel that is `pixel_spread` wide at distance 1. A ray ends
-// at an occupied cell that is at most three quarters of a pixel wide; finer cells are not visited.
+// at an occupied cell that is at most three quarters of a pixel wide. It visits no finer cells.
 inline Cone visible_cone(double pixel_spread) { return {0, 0.75 * pixel_spread}; }
 
 struct SurfaceHit {
@@ -26,9 +26,9 @@ struct SurfaceHit {
 };
 
 // Finds the first surface on a ray through a pixel that is `pixel_spread` wide at distance 1.
-// Returns false if none exists. A voxel that covers many pixels is shown as a cube. Smaller voxels
-// are shown as the smooth surface from which they were sampled. Throws Error{kCorrupt} for a
-// damaged DAG.
+// Returns false if none exists. A voxel that covers many pixels looks like a cube. Smaller voxels
+// look like the smooth surface from which they were sampled. Throws Error{kCorrupt} for a damaged
+// DAG.
 bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, SurfaceHit& surface);
 
 }  // namespace voxdag::query

@@ -47,9 +47,9 @@ const std::vector<std::string>& view_names();
 // otherwise "iso". `aspect` is the picture's width divided by its height. Without `fov_degrees`,
 // the field of view is 62 degrees for "inside" and 32 degrees for the other views.
 //
-// "inside" and "auto" cast rays for up to half a second, or one to two seconds if the scene is
-// dust: separate small particles between which rays pass through thousands of cells. The rays may
-// read a limited number of nodes. At the limit, the result is the best view so far, or "iso".
+// "inside" and "auto" cast rays for up to half a second. If the scene is dust (small separate
+// particles, between which rays pass through thousands of cells), they take one to two seconds. The
+// rays read a limited number of nodes. At this limit, the result is the best view so far, or "iso".
 //
 // Throws Error{kInvalidInput} for an unknown name, and the error of `cancel`.
 Placement named_view(const std::string& name, const DagView& dag, double aspect,

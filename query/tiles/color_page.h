@@ -1,9 +1,9 @@
 // Color pages: a page has the colors of 8 x 8 x 8 cells of one level, for viewers that fetch only
-// visible data (docs/format.md, "Color pages"). Tiles (tile.h) are addressed by their nodes, but
-// pages by their position, because equal subtrees can have different colors.
+// visible data (docs/format.md, "Color pages"). A page is addressed by its position. It cannot be
+// addressed by its node, as tiles are, because equal subtrees can have different colors.
 //
-// An address may come from an unknown client, and the colors from a damaged file. So the work for a
-// page is bounded.
+// The address may come from an unknown client, and the colors may come from a damaged file. So the
+// work for a page is bounded.
 #pragma once
 
 #include <array>
@@ -42,7 +42,7 @@ class ColorPages {
   std::vector<uint32_t> encode(const ColorPageAddress& address);
 
  private:
-  // The file in the form that a cursor needs.
+  // The file, with checks before each read, in the form that the cursor needs.
   struct CheckedFile {
     const voxdag_reader::File& file;
     const DagView& dag;

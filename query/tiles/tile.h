@@ -1,11 +1,11 @@
 // Tiles: a tile is a node of a finished DAG with a few levels below it, for viewers that fetch only
 // visible data (docs/format.md, "Tiles"). A tile is addressed by its root node, so equal subtrees
-// are one tile, wherever they occur. If a tile ends above the bricks, it contains two things for
-// each node at which it ends: the offset of that node, which is the root of a further tile, and a
-// coarse brick to draw until the further tile arrives.
+// are one tile, wherever they occur. A tile that ends above the bricks has two things for each node
+// of its last level: the node's offset, which is the address of a further tile, and a coarse brick,
+// which the viewer draws until that tile arrives.
 //
 // Stateless; thread-safe. Offsets may come from unknown clients and damaged files. So each offset
-// is checked, and the work for a tile is bounded by its number of levels.
+// is checked, and the tile's number of levels bounds the work for the tile.
 #pragma once
 
 #include <cstdint>

@@ -17,9 +17,9 @@
 namespace voxdag::query {
 
 inline constexpr size_t kSampleRegions = 16;
-// Minimum PSNR, in dB, between a region's colors in the file and the colors baked from the scene.
-// In a file written by a build, the colors and all other attributes are equal to the baked ones.
-// Regions that `extract` had to encode again differ slightly.
+// Minimum PSNR, in dB, between a region's colors in the file and the colors baked from the scene. A
+// build's file has exactly the baked colors and attributes. In a file written by `extract`, the
+// colors of regions that it had to encode again differ slightly.
 inline constexpr double kMinSamplePsnr = 30;
 
 struct ColorSampleReport {

@@ -1,9 +1,9 @@
 // A random sample of the voxels near a scene's surface, to compare with a file. A seed determines
-// the sample. The voxels are computed from the scene's triangles without the code that builds DAGs.
-// The sample consists of boxes of voxels around random points of random triangles. Half of the
-// triangles are drawn uniformly, and half with a probability proportional to their area. So the
-// sample misses neither a floor that consists of two large triangles nor the million small
-// triangles of a tree's leaves. Takes two passes over the scene. Memory depends only on the size of
+// the sample. The voxels are computed from the scene's triangles, without the code that builds
+// DAGs. The sample consists of boxes of voxels around random points of random triangles. Half of
+// the triangles are drawn uniformly, and half with a probability proportional to their area. So the
+// sample covers both a floor of two large triangles and the leaves of a tree, a million small
+// triangles. Takes two passes over the scene. Memory depends only on the size of the sample.
 // the sample.
 #pragma once
 

@@ -2,12 +2,12 @@
 // the palette is made, and then each color gets an index.
 //
 // Up to 255 distinct colors are kept unchanged. Otherwise colors with the same six high bits per
-// channel are treated as one color, called a bin. The bins are divided into boxes in Oklab
-// (Ottosson 2020). One box after the other is cut in two until there are 255. The next box is
-// always the one with the largest sum of squared distances from its mean along an axis. The cut is
-// at the mean, because a cut at the median, as in Heckbert's method, makes the picture 0.3 to 0.6
-// dB worse. A color of the palette is the mean of a box. All arithmetic is in integers, or in IEEE
-// operations in a fixed order. So the palette depends only on how often each color occurs.
+// channel are treated as one color, called a bin. The bins, as points in Oklab (Ottosson 2020), are
+// divided into 255 boxes; the mean of a box is a color of the palette. Each step divides the box
+// with the largest sum of squared distances from its mean along an axis. It divides the box at the
+// mean, because a division at the median, as in Heckbert's method, makes the picture 0.3 to 0.6 dB
+// worse. All arithmetic is in integers, or in IEEE operations in a fixed order. So the palette
+// depends only on how often each color occurs.
 //
 // The used memory does not grow with the number of colors; it is charged to the budget. A palette
 // must be used by only one thread.
