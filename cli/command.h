@@ -1,7 +1,7 @@
-// The commands and their options. Each command has a file that defines a function
+// The commands and their options. Each command has a file with a function
 // `add_<name>_command(line)`, which adds the command to the command line. main.cc calls all these
 // functions, and turns an Error into a message and an exit status. Only command.cc includes CLI11,
-// which takes seconds to compile.
+// because CLI11 takes seconds to compile.
 #pragma once
 
 #include <array>
@@ -58,8 +58,8 @@ class Option {
   CLI::Option* option_;
 };
 
-// A handle of a command. The functions that add an option take a reference to a variable, which
-// must live until the command line is parsed and then gets the option's value.
+// A handle of a command. A function that adds an option takes a reference to a variable. Parsing
+// the command line sets the variable to the option's value, so the variable must exist until then.
 class Command {
  public:
   explicit Command(CLI::App* app) : app_(app) {}
@@ -123,7 +123,7 @@ State& add_command(CommandLine& line, const char* name, const char* description)
 }
 
 void add_build_command(CommandLine& line);
-// Adds the command that a cluster's engine starts.
+// Adds the hidden command that a cluster's engine starts to build a batch.
 void add_build_batch_command(CommandLine& line);
 void add_stop_tasks_command(CommandLine& line);
 void add_plan_command(CommandLine& line);

@@ -11,8 +11,8 @@ namespace voxdag::cli {
 
 class OptionDeclarer {
  public:
-  // A field's scope is the first command that has the field as an option. Fields of a later scope
-  // than `scope` are not declared.
+  // A field's scope is the first of the commands that have the field as an option. Fields with a
+  // later scope than `scope` are not declared.
   OptionDeclarer(Command& command, Scope scope) : command_(command), scope_(scope) {}
 
   template <class T>

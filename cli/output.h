@@ -22,8 +22,8 @@ nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section)
 // also has the names of the materials.
 void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json);
 
-// True if the file was written by voxdag and has the type of file that is to be written now, so
-// that it may be replaced without --force.
+// True if voxdag wrote the file and the file has the type that the command is about to write. Such
+// a file may be replaced without --force.
 using IsOwnFile = std::function<bool(const ReadableFile& file)>;
 
 // A file to write, and the option --force.
@@ -31,12 +31,12 @@ struct OutputFile {
   std::string path;
   bool force = false;
   void declare_force(Command& command);
-  // Throws Error{kInvalidInput} if writing would destroy `input`, or if --force is not given and
-  // writing would destroy a file for which `is_own` returns false. Makes the same check for path +
-  // ".partial", the temporary name of write_file_atomically(). Also throws if the output's folder
-  // does not exist.
+  // Throws Error{kInvalidInput} if writing would destroy `input`. Unless --force is given, also
+  // throws it if writing would destroy a file for which `is_own` returns false. Makes the same
+  // checks for path + ".partial", the temporary name of write_file_atomically(). Also throws Error
+  // if the output's folder does not exist.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
-  // Makes these checks for one name, such as path + ".partial".
+  // Makes the checks of existing files for one name, such as path + ".partial".
   void check(FileSystem& files, const std::string& name, const std::string& input,
              const IsOwnFile& is_own) const;
 };

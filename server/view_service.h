@@ -1,6 +1,6 @@
-// Shows one finished DAG in a browser on this machine, for `voxdag view`. It listens only on the
-// loopback, reads this file and writes nothing. If the file is replaced, the new one is shown.
-// Thread-safe.
+// Shows one finished DAG in a browser on this machine, for `voxdag view`. The service listens only
+// on the loopback, reads only this file and writes nothing. If the file is replaced, the service
+// shows the new file. Thread-safe.
 #pragma once
 
 #include <functional>

@@ -9,8 +9,8 @@
 
 namespace voxdag::cli {
 
-// Calls run(), which must last until stop() is called. Another thread calls stop() once `cancel` is
-// canceled, because a signal handler may only cancel the token. Throws the exceptions of run().
+// Calls run(), which must last until stop() is called. When `cancel` is canceled, another thread
+// calls stop(): a signal handler may only cancel the token. Throws the exceptions of run().
 template <class Run>
 void run_until_canceled(CancelToken& cancel, const Run& run, const std::function<void()>& stop) {
   std::thread watcher([&] {

@@ -1,6 +1,6 @@
-// Shows progress on standard error: on a terminal as a bar with the rate and the remaining time,
-// otherwise as a plain line every five seconds and at the end of each stage. The progress bar is
-// thread-safe.
+// Shows progress on standard error. On a terminal, this is a bar with the rate and the remaining
+// time; otherwise, it is a plain line every five seconds and at the end of each stage. The progress
+// bar is thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -28,9 +28,9 @@ std::string python_type(const Field& field) {
   }
 }
 
-// Collects the lines of _options.py: one line per keyword in `members` and in `documents`, and the
-// quoted names of keywords with path values in `paths`. Skips required options, because these are
-// parameters of the Python functions, not keywords.
+// Collects the lines of _options.py: one line per keyword in `members` and in `documents`, and in
+// `paths` the quoted names of the keywords whose values are paths. Skips required options, because
+// they are parameters of the Python functions, not keywords.
 class KeywordWriter {
  public:
   template <class T>

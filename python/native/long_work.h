@@ -1,7 +1,7 @@
-// Runs work that takes long and was called from Python. The work runs on a new thread without the
-// interpreter's lock. The calling thread waits for it, handles signals (Ctrl-C raises
-// KeyboardInterrupt) and forwards progress and warnings to Python. So Python code runs only on the
-// calling thread.
+// Runs long work for a Python caller. The work runs on a new thread without the interpreter's
+// lock. The calling thread waits for the work, handles signals (Ctrl-C raises
+// KeyboardInterrupt) and forwards progress and warnings to Python. So Python code runs only on
+// the calling thread.
 #pragma once
 
 #include <nanobind/nanobind.h>

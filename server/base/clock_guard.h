@@ -1,5 +1,5 @@
 // Detects a clock that is far ahead of the last time known to the service. While the clock may be
-// wrong, nothing is deleted because of its age. Used by one thread.
+// wrong, the service deletes nothing because of its age. Used by one thread.
 #pragma once
 
 #include "server/base/steps.h"
@@ -13,16 +13,16 @@ class ClockGuard {
   // `last_seen_s`: Unix time at which the previous service is known to have run; 0 if unknown.
   explicit ClockGuard(double last_seen_s) : last_clock_s_(last_seen_s) {}
 
-  // Returns true if the clock has advanced over an hour more than the time that has passed since
-  // the last call. The first call returns true if the clock is over a day ahead of `last_seen_s`.
-  // Call this function at least once per hour, with `clock_s` = unix_seconds() and `now_s` =
-  // wall_seconds().
+  // Returns true if, since the last call, the clock has advanced over an hour more than `now_s`.
+  // The first call returns true if the clock is over a day ahead of `last_seen_s`. `clock_s` is the
+  // Unix time (unix_seconds()), and `now_s` the time of a clock that nobody sets (wall_seconds()).
+  // Call this function at least once per hour.
   bool has_jumped(double clock_s, double now_s);
   // True if the clock jumped within the last day.
   bool is_uncertain(double now_s) const { return now_s < uncertain_until_s_; }
   // Returns the Unix time before which data is older than `days`; 0 while the clock is uncertain.
-  // Calls has_jumped(). If the clock becomes uncertain, logs that; `what` names the data in the log
-  // line.
+  // Calls has_jumped(). If the clock has jumped, logs that no old data is deleted for a day; `what`
+  // names the data in this log line.
   double oldest_s(double days, const char* what, const Log& log);
 
  private:

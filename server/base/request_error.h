@@ -1,7 +1,7 @@
 // The queue, scenes, jobs and tiles throw a RequestError if the client can correct the request, and
-// an Error otherwise. server/api converts both to answers. The message of a RequestError is written
-// for clients and contains no path of the server. The message of an Error may contain such a path,
-// so public_error() replaces the message.
+// an Error otherwise. server/api converts both to answers. The message of a RequestError is for
+// clients and contains no path of the server. The message of an Error may contain such a path, so
+// public_error() replaces it.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace voxdag::server {
 
 class RequestError : public std::exception {
  public:
-  // The tables in code() and in server/api have the same order.
+  // code() and server/api have tables in the order of these values.
   enum class Kind {
     kInvalid,    // the request breaks a rule
     kNotFound,   // the job or scene does not exist

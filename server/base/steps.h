@@ -1,5 +1,5 @@
-// Runs the steps of the service's threads. An exception ends only its step: it is logged, and the
-// thread continues with its next step. Thread-safe.
+// Runs the steps of the service's threads. An exception ends only one step: Steps logs the
+// exception, and the thread continues with its next step. Thread-safe.
 #pragma once
 
 #include <functional>

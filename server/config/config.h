@@ -16,7 +16,7 @@ struct JobLimits {
   unsigned max_concurrent = 1;
   uint64_t memory_bytes = 0;  // for all running jobs together; 0: half of the machine's memory
   unsigned threads = 0;       // default number per job; 0: all cores
-  uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // no job starts if less space is free
+  uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // a job starts only if this much space is free
   int nice = 5;                                      // nice value of the jobs' processes
   unsigned max_attempts = 5;
   double backoff_s = 15;  // pause before the second attempt; doubles with each further attempt
@@ -30,8 +30,8 @@ struct JobLimits {
 struct TransferLimits {
   uint64_t max_scene_bytes = uint64_t{64} << 30;
   uint64_t max_body_bytes = 64 << 10;  // JSON bodies
-  // Maximum numbers of concurrent transfers, in total and per client. The same limit applies
-  // separately to uploads, to downloads, and to requests for tiles.
+  // Maximum numbers of concurrent transfers, in total and per client. Uploads, downloads, and
+  // requests for tiles are counted separately, each with these limits.
   size_t max_concurrent = 64;
   size_t max_per_client = 16;
   size_t max_event_streams = 256;

@@ -1,6 +1,6 @@
 // Helpers for the files in the data folder. The service removes a scene or a job only after it has
-// marked its file or folder by renaming it. A file that a database does not list is kept, so no
-// file is lost if a database is lost or restored from a backup.
+// marked the file or folder by renaming it. It never removes an unmarked file that no database
+// lists. So no file is lost if a database is lost or restored from a backup.
 #pragma once
 
 #include <cstdint>

@@ -1,9 +1,9 @@
 // Manages the free space on the data folder's disk. Uploads leave a part of it free. An upload
-// reserves a few megabytes ahead of its writes: two uploads never use the same free bytes, and a
-// slow upload does not reserve the space of its complete scene. Thread-safe.
+// reserves space a few megabytes ahead of its writes. So two uploads never use the same free bytes,
+// and a slow upload does not reserve the space of its complete scene. Thread-safe.
 //
-// A ballast file protects against other programs that fill the disk completely: without it, the
-// databases could not even record a deletion.
+// A ballast file keeps some space for the service if other programs fill the disk. Without this
+// space, the databases could not even record a deletion.
 #pragma once
 
 #include <cstdint>
@@ -32,8 +32,8 @@ class DiskSpace {
     Reservation(DiskSpace& disk, uint64_t announced);
     ~Reservation();
     Reservation(const Reservation&) = delete;
-    // Call it before writing `bytes` bytes. If the reserved space is used up, reserves more. Throws
-    // Error{kNoSpace} if the disk no longer has that space.
+    // Call this function before writing `bytes` bytes. If the reserved space is used up, reserves
+    // more. Throws Error{kNoSpace} if the disk no longer has that space.
     void use(uint64_t bytes);
 
    private:

@@ -1,5 +1,5 @@
-// Reads the body of a request from its connection. Memory is bounded for any client: data is passed
-// on as it arrives, and the lines between chunks have a limit. Used by one thread.
+// Reads the body of a request from its connection. Memory is bounded for any client: the reader
+// passes data on as it arrives, and limits the lines between chunks. Used by one thread.
 #pragma once
 
 #include "server/http/connection/connection.h"

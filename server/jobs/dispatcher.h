@@ -1,15 +1,15 @@
-// Runs the queue's jobs, each in a separate process, within the limits of number, memory and disk.
-// Stops and resumes jobs, and cleans up after them. Thread-safe.
+// Runs the queue's jobs, each in a separate process, within limits of their number, memory and disk
+// space. Stops and resumes jobs, and cleans up after them. Thread-safe.
 //
-// Reasons for running each job in a separate process: a memory limit applies to a process; a scene
-// that crashes a build harms nothing else; and a build can be stopped, killed and reniced without
-// touching the threads that answer requests. A job's process dies with the service. A new process
-// with the same task resumes from the job's work folder. So the queue and the folders are enough to
-// continue after any crash.
+// Each job runs in a separate process for three reasons: a memory limit applies to a process; a
+// scene that crashes a build harms nothing else; and the service can stop, kill and renice a build
+// without touching the threads that answer requests. A job's process dies with the service. A new
+// process with the same task resumes from the job's work folder. So the queue and the folders are
+// enough to continue after any crash.
 //
-// A failure in a thread of the dispatcher ends neither the thread nor the service (Steps in
-// server/base/steps.h). If a step for a job throws, the job fails or the step is repeated. If a
-// step for a folder throws, the folder is kept. All other work continues.
+// A failure in a thread of the dispatcher ends neither the thread nor the service
+// (server/base/steps.h). If a step for a job throws, the job fails or the step is repeated. If a
+// step that removes a folder throws, the folder is kept. All other work continues.
 #pragma once
 
 #include <condition_variable>
@@ -75,9 +75,9 @@ class Dispatcher {
     // True if the worker will still record the job's outcome.
     bool is_running() const { return !recorded && !done; }
   };
-  // Reserves the files of an ended job for one thread that removes them. During the lifetime of
-  // this object, other removals of these files wait, and the job does not start even if it is
-  // retried.
+  // Reserves the files of an ended job for one thread that removes them. While this object
+  // exists, other removals of these files wait, and the job does not start even if a client
+  // retries it.
   class FilesLock {
    public:
     FilesLock(Dispatcher& dispatcher, const std::string& id);
@@ -90,13 +90,12 @@ class Dispatcher {
   };
 
   bool stopping();
-  // Repairs jobs that a crash, or an unwritable queue, left in a wrong state.
+  // Repairs the states of jobs after a crash or after the queue could not be written.
   void recover();
   void retire_old_jobs();
   // Finishes deletions that a crash or an error interrupted.
   void finish_deletions();
-  // Stops the tasks that a job has left on the cluster. The job has no process that could stop
-  // them.
+  // Stops the tasks that a job without a process has left on the cluster.
   void stop_tasks(const std::string& id);
   // Removes the job's work folder if the job has been canceled or has succeeded.
   void remove_work(const std::string& id);
@@ -116,7 +115,8 @@ class Dispatcher {
   void record_outcome(const Job& job, LiveJob& live, const ChildProcess::End& end);
   void draw_preview(const Job& job, LiveJob& live);
   // Runs a process to its end. If `live` gets a stop request, requests the process to stop, and
-  // kills it JobLimits::stop_timeout_s later. Also kills it after it has run for `max_s` seconds.
+  // kills the process JobLimits::stop_timeout_s later. Also kills it after it has run for `max_s`
+  // seconds.
   ChildProcess::End run_child(const ChildProcess::Start& start, LiveJob& live, double max_s);
 
   const ServerConfig& config_;
@@ -129,8 +129,8 @@ class Dispatcher {
   Steps steps_;
   ClockGuard clock_;  // used by the thread that starts jobs
 
-  // Guards the members below, up to live_mutex_. Held while a job's state and process change
-  // together, but not while files are removed.
+  // Guards the members below, up to live_mutex_. The thread that changes a job's state together
+  // with its process holds this mutex. It is not held while files are removed.
   mutable std::mutex mutex_;
   JobFolders folders_;
   // Keyed by job id. The worker with the key "preview" renders the preview of a finished job.

@@ -2,10 +2,10 @@
 // different jobs may run concurrently.
 //
 // A deletion first marks the job's folder by renaming it. Then it removes the folder's files, the
-// job's record and the renamed folder, in this order. The renamed folder remains until the end, so
-// a deletion that a crash interrupts can be finished. Deletions work even on a full disk. Only
-// folders marked by a deletion are removed. A folder without a record is kept, because the queue
-// may come from an old backup.
+// job's record and the renamed folder, in this order. Because the renamed folder remains until the
+// end, a deletion that a crash interrupts can be finished. Deletions work even on a full disk. Only
+// folders that a deletion has marked are removed. A folder without a record is kept, because the
+// queue may come from an old backup.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// A job while its process runs: its progress, collected from the process's messages, and a possible
-// stop request. Thread-safe.
+// A running job: its progress, collected from the messages of the job's process, and whether a stop
+// was requested. Thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -19,8 +19,8 @@ class TaskResolver {
 
   // Returns the task of a request. Throws RequestError: kNotFound for a scene that does not exist
   // or is outside the configured roots, kConflict for an incomplete upload, kLimit for more memory
-  // than a job may use. The message of kNotFound is the same in both cases, so that it does not
-  // reveal which files exist outside the roots.
+  // than a job may use. The message of kNotFound does not tell whether the scene exists, so it does
+  // not reveal which files exist outside the roots.
   JobTask make(const JobRequest& request, JobTask::Kind kind);
   // Returns the scenes of a request that are uploads.
   static std::vector<std::string> uploads_of(const JobRequest& request);

@@ -34,7 +34,7 @@ inline constexpr std::array<const char*, 7> kJobStateNames = {
 
 inline const char* state_name(JobState state) { return kJobStateNames[static_cast<size_t>(state)]; }
 std::optional<JobState> parse_state(std::string_view name);
-// True for canceled, failed and succeeded. Only a retry changes such a state.
+// True for canceled, failed and succeeded. Only a retry changes these states.
 inline bool has_ended(JobState state) { return state >= JobState::kCanceled; }
 
 struct JobError {
@@ -55,7 +55,7 @@ struct Job {
   std::vector<std::string> scenes;  // uploads that the job needs until it ends
   std::string posted_by;            // name of the token of the client that submitted the job
   int priority = 0;
-  bool front = false;  // queued before others of its priority, because it was already running
+  bool front = false;  // was running before: queued before other jobs of its priority
   unsigned attempts = 0;
   unsigned interruptions = 0;  // number of consecutive runs that ended because the service ended
   double created_s = 0, started_s = 0, finished_s = 0, not_before_s = 0;

@@ -2,8 +2,8 @@
 // returns, its changes are committed. A SIGKILL between any two instructions leaves every job in a
 // state that recover() repairs.
 //
-// Order of the queue: priority, then jobs that were running before, then the order of submission.
-// Thread-safe; readers never wait for a writer's sync.
+// Order of the queue: by priority; jobs of equal priority that were running before come first; then
+// by the order of submission. Thread-safe; readers never wait for a writer's sync.
 #pragma once
 
 #include <condition_variable>
@@ -73,15 +73,15 @@ class JobQueue {
   void remove(const std::string& id);
 
   // Returns the first queued job that may start at `now_s` and is not in `except`. A job that would
-  // have to wait longer than `max_wait_s` may start immediately: such a long wait shows that the
-  // clock was set back.
+  // have to wait longer than `max_wait_s` may start immediately, because such a long wait shows
+  // that the clock was set back.
   std::optional<Job> next(double now_s, double max_wait_s, const std::set<std::string>& except);
   // Returns a job that succeeded and has no preview yet.
   std::optional<Job> next_without_preview();
-  // Call it after a crash. `running` has the ids of the jobs whose processes are known to run;
-  // these jobs are not changed. All other jobs in the state running are queued again, at the front.
-  // All other jobs in the state canceling become canceled. A job that was interrupted often may
-  // itself be the cause of the interruptions. So such a job is not queued at the front, waits for
+  // Repairs states after a crash. `running` has the ids of the jobs whose processes are known to
+  // run; these jobs are not changed. All other jobs in the state running are queued again, at the
+  // front. All other jobs in the state canceling become canceled. A job that was interrupted often
+  // may itself cause the interruptions. Such a job is not queued at the front, waits for
   // pause_s(attempt) seconds before each further attempt (1, 2, ...), and finally fails. Returns
   // the jobs that have ended by this call.
   std::vector<Job> recover(const std::set<std::string>& running,
@@ -105,7 +105,7 @@ class JobQueue {
   uint64_t changes() const;
   // Waits until version() differs from `seen`, or for `max_s` seconds.
   void wait_for_change(uint64_t seen, double max_s) const;
-  // Wakes the threads in wait_for_change(), as a change does. Use it for events outside the
+  // Wakes the threads in wait_for_change(), as a change does. Call it after events outside the
   // database, such as progress.
   void announce();
 

@@ -2,8 +2,8 @@
 // each in scenes.db. Invariants:
 //
 //   1. A scene is complete only when all its bytes are synced and have the client's digest.
-//   2. The recorded offset of an upload counts synced bytes only: a power cut loses later bytes,
-//      and the client continues from that offset.
+//   2. The recorded offset of an upload counts only synced bytes. After a power cut, the client
+//      continues from this offset.
 //   3. Only one request writes to an upload.
 //   4. A deletion first marks the scene's file by renaming it, then removes only the marked file.
 //      So it does not remove a newer upload of the same name.

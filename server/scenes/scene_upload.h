@@ -1,6 +1,7 @@
-// Writes one request's part of an upload to the store as the bytes arrive. Received bytes are
-// recorded, unless the part's digest was wrong, so that the client can continue after them. If no
-// byte of an upload was received, its record and its file are removed. Used by one thread.
+// Writes one request's part of an upload to the store as the bytes arrive. If the request breaks
+// off, the received bytes are recorded, and the client can continue after them. Bytes whose digest
+// was wrong are not recorded. If no byte of an upload was received, its record and its file are
+// removed. Used by one thread.
 #pragma once
 
 #include <functional>
@@ -28,12 +29,12 @@ class SceneUpload {
   uint64_t offset() const { return offset_; }
 
   // Ends the part. Its SHA-256 must be `part_digest` ("": not checked). Returns true if it was the
-  // last part. The complete scene must then have the SHA-256 `whole_digest` ("": not checked), and
-  // waits for publish(). If a digest differs, discards the part or the complete scene, and throws
-  // RequestError{kInvalid}.
+  // last part of the scene. The complete scene must then have the SHA-256 `whole_digest` ("": not
+  // checked), and the caller must call publish(). If a digest differs, discards the part or the
+  // complete scene, and throws RequestError{kInvalid}.
   //
-  // Calls `check` often while it reads the scene. If `check` throws, or if publish() is not called
-  // afterwards, the upload keeps all its bytes, and the client can finish it later with an empty
+  // Calls `check` often while it reads the scene. If `check` throws, or if the caller does not call
+  // publish(), the upload keeps all its bytes, and the client can finish it later with an empty
   // part.
   bool finish(
       const std::string& part_digest, const std::string& whole_digest, bool is_last,

@@ -16,8 +16,8 @@ namespace voxdag::server {
 class FileTileSource : public TileSource {
  public:
   // Throws Error if the file is not a valid DAG. Reads only the file's header and checksum table.
-  // Pages that cannot be read while the file is being opened cause Error{kIo}; they never end the
-  // process. `manifests`, if not null, caches manifests.
+  // If one of their pages cannot be read, throws Error{kIo}; such a page never ends the process.
+  // `manifests`, if not null, caches manifests.
   FileTileSource(const std::string& path, const FileIdentity& identity,
                  std::shared_ptr<ManifestCache> manifests = nullptr);
   // Like the constructor above, for a file that is already mapped.
@@ -39,8 +39,8 @@ class FileTileSource : public TileSource {
   void expect_readable() const override;
   // True if expect_readable() throws. The file must then be opened again before it can be used.
   bool is_broken() const { return mapping_.is_damaged(); }
-  // True if the path now leads to a different file or to changed contents. False for a removed
-  // file, because its contents remain until this object closes it.
+  // True if the path now leads to a different file or to changed contents. False if the file was
+  // removed: its contents remain until this object closes the file.
   bool was_overwritten() const override;
   bool is_first_damage() const override { return !has_damage_.exchange(true); }
 

@@ -34,12 +34,15 @@ class TileSource {
   virtual const std::string& digest() const = 0;
   // Returns the data that a viewer needs to begin, as JSON (docs/api.md).
   virtual const std::string& manifest(const CancelToken& cancel) const = 0;
-  // Throws Error{kIo} if, at any time since the file was opened, a part of it could not be read,
-  // because the file was truncated or its disk failed. Results made after that are wrong.
+  // Throws Error{kIo} if, at any time since the file was opened, a part of it could not be read
+  // because the file was truncated or its disk failed. Results that were computed after such a
+  // failure are wrong.
   virtual void expect_readable() const {}
-  // True if the file was changed after it was opened, so that the read bytes may mix both versions.
+  // True if the file was changed after it was opened. The bytes read from it may then mix both
+  // versions.
   virtual bool was_overwritten() const { return false; }
-  // Call it when damage is found. Returns true for the first damage of this file, which is logged.
+  // Call this function when damage is found. Returns true for the file's first damage, which is
+  // logged.
   virtual bool is_first_damage() const { return true; }
 };
 

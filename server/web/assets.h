@@ -1,6 +1,6 @@
 // The files of the dashboard, which are compiled into the program (embed.cmake). In these files,
-// "{{scene_suffixes}}" stands for the file name endings of the scene formats,
-// "glb|gltf|ply|obj|stl".
+// the marker "{{scene_suffixes}}" is replaced by the file name endings of the scene formats, such
+// as "glb|gltf|ply".
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// Limits the number of concurrent operations of one kind, in total and per client, so that no
-// client can use up the total. Thread-safe.
+// Limits the number of concurrent operations of one kind, in total and per client. The limit per
+// client keeps one client from taking all permits. Thread-safe.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Rate limit per client: a token bucket with a capacity of two seconds of requests. Thread-safe.
+// Rate limit per client: a token bucket that holds the requests of two seconds. Thread-safe.
 #pragma once
 
 #include <map>

@@ -36,8 +36,8 @@ class Tokens {
   // the message then has the number of the line.
   static Tokens read(FileSystem& files, const std::string& path);
 
-  // Returns the caller with this token; nullopt for an unknown token. Takes the same time for known
-  // and unknown tokens, so that the time reveals nothing about the hashes.
+  // Returns the caller with this token; nullopt for an unknown token. Takes the same time for every
+  // token, so that the time reveals nothing about the hashes.
   std::optional<Caller> find(std::string_view token) const;
 
  private:

@@ -7,8 +7,8 @@
 
 namespace voxdag::server {
 
-// A Problem is returned unchanged, and a RequestError keeps its message. An Error keeps its code,
-// but its message is replaced by a fixed text, because it may contain paths of the server.
+// Returns a Problem unchanged. Keeps the message of a RequestError, and the code of an Error. The
+// message of an Error is replaced by a fixed text, because it may contain paths of the server.
 // std::bad_alloc becomes the problem `busy`; any other exception becomes the problem `internal`.
 Problem public_problem(const std::exception& error);
 

@@ -42,10 +42,10 @@ struct Context {
   PartialViews partial{files, 16};
   // Canceled when the service stops.
   CancelToken stopping = {};
-  // This mutex is held while a job is added or retried, from the check that its scenes exist to the
-  // change of the queue. It is also held while a scene is replaced or removed, from the check that
-  // no job uses the scene to the change of the store. So no scene disappears after a job has
-  // checked it, and no job starts to use a scene that is being removed.
+  // Protects the scenes of jobs. While a job is added or retried, the request holds this mutex from
+  // the check that the job's scenes exist to the change of the queue. While a scene is replaced or
+  // removed, the request holds it from the check that no job uses the scene to the change of the
+  // store. So no scene disappears between the check and the change of the queue.
   std::mutex scene_mutex = {};
   // Scenes that dry runs are reading, guarded by scene_mutex. These scenes must not be removed.
   // They may be replaced, because a reader keeps the old file open.

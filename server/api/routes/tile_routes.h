@@ -20,7 +20,7 @@ struct TileAccess {
 using OpenTiles = std::function<TileAccess(const Call&)>;
 
 // kGzip compresses tiles for clients that accept gzip. Compression halves the bytes of tiles and
-// runs at about 80 MB/s per core. So clients on a network get tiles faster, and clients on the
+// runs at about 80 MB/s per core. So clients on a network get tiles faster, but clients on the
 // loopback get them more slowly.
 enum class Packing { kNone, kGzip };
 
@@ -36,8 +36,8 @@ struct TileRoutes {
 };
 
 // Adds BASE/tiles, BASE/tiles/batch, BASE/tiles/{level}/{offset} and, if colors are served,
-// BASE/tiles/colors. When `stopping` is canceled, manifests that are being computed are abandoned.
-// `stopping` must outlive the router.
+// BASE/tiles/colors. When `stopping` is canceled, the routes abandon manifests that are being
+// computed. `stopping` must outlive the router.
 void add_tile_routes(Router& router, const TileRoutes& routes, const OpenTiles& open,
                      const CancelToken& stopping);
 

@@ -1,5 +1,5 @@
-// One client's connection: a plain or TLS socket. Each phase of the connection limits how long its
-// calls may block. Used by one thread.
+// One client's connection: a plain or TLS socket. A phase of the connection limits how long calls
+// may block. Used by one thread.
 //
 // Phases:
 //   - waiting: the next request must begin within idle_timeout_s
@@ -8,8 +8,8 @@
 //     faster; it may be up to grace_s behind this rate
 //
 // Only the time in which the connection waits for its client counts. If a client exceeds its time,
-// the connection enters an error state, in which reads fail. A connection that waits for its client
-// is recorded as waiting in the table, which may close it in favor of a new connection.
+// the connection enters an error state, in which reads fail. While a connection waits for its
+// client, the table may close it in favor of a new connection.
 #pragma once
 
 #include <cstdint>
@@ -60,7 +60,7 @@ class Connection {
   enum class Phase { kWaiting, kHeader, kExchange };
   // Time spent waiting for the client in this phase, minus the time that the transferred bytes take
   // at a given rate. `behind_minimum_s` uses the minimum rate. `behind_steady_s` uses a multiple of
-  // it; a client above that rate is not evicted.
+  // that rate. A client that is faster than this multiple is not evicted.
   struct Pace {
     double behind_minimum_s = 0;
     double behind_steady_s = 0;

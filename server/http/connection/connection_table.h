@@ -19,8 +19,8 @@ class ConnectionTable {
   struct Entry {
     int socket;
     std::string client;
-    bool waiting;           // the connection waits for its client
-    bool between_requests;  // the head of the next request is incomplete
+    bool waiting;           // waits for the client to send or receive
+    bool between_requests;  // waits for the rest of a request's head
     double waiting_since_s;
     bool evicted;
   };
@@ -31,8 +31,8 @@ class ConnectionTable {
   explicit ConnectionTable(const HttpLimits& limits) : limits_(limits) {}
 
   // Adds a connection. Returns false if the client has too many connections, or if the table is
-  // full and no connection is waiting. May take up to a second while many evicted connections are
-  // still ending. Must be called by one thread only.
+  // full and no connection may be closed. May take up to a second while many evicted connections
+  // are still ending. Must be called by one thread only.
   bool admit(int socket, const std::string& address, Place& place);
   // Records that the connection has waited for its client since `since_s` (wall_seconds()).
   void set_waiting(Place place, double since_s, bool between_requests);

@@ -1,4 +1,4 @@
-// Limits of the listener, per client and in total. The times limit each phase of a connection, so
+// Limits of the listener, per client and in total. Each phase of a connection has a time limit, so
 // that a client that sends very slowly cannot occupy a connection for long.
 #pragma once
 

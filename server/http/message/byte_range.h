@@ -26,8 +26,8 @@ struct RangeAnswer {
 };
 
 // Resolves a Range header for contents of `size` > 0 bytes. Ignores a header that is malformed, has
-// another unit, or requests more than 16 ranges or more than `size` bytes in total. Drops ranges
-// outside the contents; if no range remains, the result is kUnsatisfiable.
+// a unit other than bytes, or requests more than 16 ranges or more than `size` bytes in total.
+// Drops ranges outside the contents; if no range remains, the result is kUnsatisfiable.
 RangeAnswer parse_ranges(std::string_view header, uint64_t size);
 
 // Parses the Content-Range of an upload, "bytes FIRST-LAST/TOTAL". Returns false unless it is

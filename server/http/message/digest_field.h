@@ -9,8 +9,8 @@ namespace voxdag::server {
 
 using voxdag::digest_field;
 // Returns the SHA-256 of a Content-Digest or Repr-Digest header in hex. Throws
-// RequestError{kInvalid} for a header that is malformed or has only other algorithms, because a
-// check that the client requested must not be skipped.
+// RequestError{kInvalid} for a malformed header, and for a header with only other algorithms: the
+// client requested a check, so the service must not skip it.
 std::string parse_digest_field(const std::string& header);
 
 }  // namespace voxdag::server

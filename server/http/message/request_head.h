@@ -1,6 +1,7 @@
 // The head of an HTTP/1.1 request (RFC 9112): request line and header fields. The parser is strict.
-// Text that two parsers could interpret differently (a folded line, a blank before a colon, a lone
-// LF, two lengths) is an error, because a proxy in front may interpret it the other way.
+// It refuses text that two parsers could interpret differently (a folded line, a blank before a
+// colon, a lone LF, two lengths), because a proxy in front of the service may interpret the text
+// the other way.
 #pragma once
 
 #include <cstdint>

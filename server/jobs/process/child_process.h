@@ -19,9 +19,9 @@ class ChildProcess {
     std::string log_file;              // the child's standard error is appended to this file
     int nice = 0;
   };
-  // Must be called by a thread that lives until wait() has returned, because the child dies with
-  // this thread. Throws Error{kIo} if no process can be created. If the program cannot be run, the
-  // child ends with status 127.
+  // The calling thread must live until wait() has returned, because the child dies with this
+  // thread. Throws Error{kIo} if no process can be created. If the program cannot be run, the child
+  // ends with status 127.
   explicit ChildProcess(const Start& start);
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;

@@ -1,6 +1,6 @@
-// A file system that opens only the given files for reading. An uploaded scene may name any file as
-// its buffer: directly, with "..", or through a symbolic link. This class refuses to open such a
-// file. All calls other than open_read() are forwarded.
+// A file system that opens only the given files for reading. Without it, an uploaded scene could
+// read any file of the machine by naming it as a buffer: directly, with "..", or through a symbolic
+// link. All calls other than open_read() are forwarded.
 #pragma once
 
 #include <string>

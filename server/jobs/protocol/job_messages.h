@@ -46,7 +46,8 @@ struct Usage {
 };
 // "cluster_tasks": the tasks of a build on a cluster, with the members of ClusterTasks.
 using voxdag::ClusterTasks;
-// "warning": about the scene. A warning about the machine has the code "build" and no place.
+// "warning": a warning about the scene. A warning about the machine has the code "build" and no
+// place.
 struct WarningReported {
   Warning warning;
 };

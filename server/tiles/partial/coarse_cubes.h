@@ -24,14 +24,15 @@ struct CoarseCube {
 
 class CoarseCubes {
  public:
-  // Reads the job store again, and the artifacts of subvolumes built since the last call. Leaves
-  // out an unreadable artifact, because the merge may have freed its bytes. Reads at least one
-  // artifact; after `max_read_s` seconds it leaves the remaining artifacts to the next calls.
-  // Throws Error{kNotFound} if the folder has no job store, and the errors of JobStore.
+  // Reads the job store again, and the artifacts of the subvolumes that were built since the last
+  // call. Leaves out an unreadable artifact, because the merge may have freed its bytes. Reads at
+  // least one artifact; after `max_read_s` seconds it leaves the remaining artifacts to the next
+  // calls. Throws Error{kNotFound} if the folder has no job store, and the errors of JobStore.
   void refresh(FileSystem& files, const std::string& work_folder, double max_read_s = HUGE_VAL);
 
   uint64_t total() const { return total_; }
-  // Number of built subvolumes, including empty subvolumes and those whose artifacts were left out.
+  // Number of built subvolumes, including empty subvolumes and subvolumes with unreadable
+  // artifacts.
   uint64_t built() const { return built_; }
   // Returns the known subvolumes that have voxels.
   const std::map<SubvolumeId, CoarseCube>& cubes() const { return cubes_; }

@@ -1,6 +1,6 @@
-// The built subvolumes of a job as a DAG of the job's grid, for viewers. Each subvolume is
-// represented by the 4x4x4 cells of a coarse brick, and a cell that contains voxels is completely
-// solid. Equal subtrees are one node, so solid cells cost almost nothing at any resolution.
+// The built subvolumes of a job as a DAG of the job's grid, for viewers. A coarse brick of 4x4x4
+// cells represents each subvolume, and a cell that contains voxels is completely solid. Equal
+// subtrees are one node, so solid cells cost almost nothing at any resolution.
 //
 // The DAG only grows: add() adds new nodes and a new root. So the contents of an address never
 // change, and a viewer can keep all its tiles when the root changes. Used by one thread.
@@ -49,8 +49,8 @@ class PartialDag {
   const uint32_t brick_level_;
   std::vector<std::vector<uint32_t>> levels_;
   std::vector<std::map<std::vector<uint32_t>, uint64_t>> known_;  // offsets of nodes, by level
-  // Offsets of the nodes of coarse bricks and of solid cells, by level. With them, add() does not
-  // make the nodes below a known brick or solid cell again.
+  // Offsets of the nodes of coarse bricks and of solid cells, by level. If add() finds a coarse
+  // brick or solid cell here, it does not make the nodes below it again.
   std::vector<std::map<uint64_t, uint64_t>> coarse_;
   std::vector<std::optional<uint64_t>> solid_;
   uint64_t word_count_ = 0;

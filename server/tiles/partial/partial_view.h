@@ -1,7 +1,7 @@
 // A coarse view of the subvolumes that one job has built so far, as a list and as a DAG.
 //
-// 1. The job's folder is read at most once per second, by the thread of one request; other
-//    requests get the previous answer. Reading and converting take at most a twentieth of a core.
+// 1. At most once per second, the thread of one request reads the job's folder. Other requests
+//    get the previous answer. Reading and converting take at most a twentieth of a core.
 // 2. One reading handles a limited number of subvolumes, so a large job appears in several steps.
 // 3. Nodes never move while a digest is in use: a new digest replaces all nodes in one step.
 //
@@ -26,7 +26,8 @@ namespace voxdag::server {
 // Limits how often, and for how much CPU time, a job's folder is read. Used by one thread.
 class ReadLimiter {
  public:
-  // Charges the CPU time that this thread uses during the lifetime of this object to the limiter.
+  // Measures the CPU time that this thread uses while this object exists, and charges it to the
+  // limiter.
   class Charge {
    public:
     explicit Charge(ReadLimiter& limiter);
@@ -46,8 +47,8 @@ class ReadLimiter {
   double idle_until_s_ = 0;  // in wall_seconds(): end of the pause that limits the CPU share
 };
 
-// The DAG of the built subvolumes. It grows under one digest until too many of its nodes can no
-// longer be reached from any root. Then a new DAG is built, with a new digest. Used by one thread.
+// The DAG of the built subvolumes. It grows under one digest until it has too many words, because
+// nodes of earlier roots remain. Then a new DAG is built, with a new digest. Used by one thread.
 class GrowingDag {
  public:
   GrowingDag(std::string job, uint64_t max_words) : job_(std::move(job)), max_words_(max_words) {}
@@ -76,13 +77,13 @@ class PublishedAnswers {
  public:
   std::shared_ptr<const std::string> json() const;
   std::shared_ptr<const TileSource> tiles() const;
-  // Returns the tiles of the last set_tiles(), even after clear(), if they have this digest; else
+  // Returns the tiles of the last set_tiles() if they have this digest, even after clear(); else
   // null.
   std::shared_ptr<const TileSource> known(const std::string& digest) const;
 
   void set_json(std::string json);
   void set_tiles(std::shared_ptr<const TileSource> tiles);
-  // Returns true if tiles are still known.
+  // Removes the answers. Returns true if known() still has tiles.
   bool clear();
 
  private:
@@ -103,12 +104,13 @@ class PartialView {
   std::shared_ptr<const TileSource> known(const std::string& digest) const {
     return answers_.known(digest);
   }
-  // True if the job's folder was removed before any request for tiles. PartialViews then forgets
-  // this view, because it has nothing to serve.
+  // True if the last read found no job folder or no plan, and tiles() has never succeeded.
+  // PartialViews then forgets this view, because it has nothing to serve.
   bool is_worthless() const { return is_worthless_; }
 
  private:
-  // Returns an updated answer, or the previous one if another thread is reading the folder.
+  // Returns an updated answer. If another thread is reading the folder, returns the previous
+  // answer.
   template <class Answer, class Update>
   Answer read(const JobFolder& folder, Answer (PublishedAnswers::*answer)() const,
               const Update& update);
