@@ -71,8 +71,8 @@ export class Viewer {
     this.camera.set(this.firstCamera());
     this.followBookmark(location.hash);
     this.showMode();
-    // The viewer starts before the distance of the visible surface is known. Until then, the
-    // distance of the target is used.
+    // The viewer starts before the distance of the visible surface is known. Until it is known, the
+    // viewer uses the distance of the target.
     this.seen.distance = this.camera.distance;
     this.seen.time = performance.now() + kFirstSeenMs;
     this.applyCamera();

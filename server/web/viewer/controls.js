@@ -70,8 +70,8 @@ export class Controls {
     }
   }
 
-  // Makes the grabbed point follow the pointer. Until the depth of this point is known, the
-  // target's depth is used.
+  // Makes the grabbed point follow the pointer. Until the point's depth is known, uses the depth of
+  // the target.
   async findPanDepth(at) {
     const press = this.press;
     const point = await this.handlers.pick(...at);

@@ -1,6 +1,6 @@
 // Creates the graphics context and its programs while the other modules of the page are still
-// loading, because the compilation takes longest. The page of a job does not use this module,
-// because a job may have nothing to draw yet.
+// loading: compiling the programs takes longer than anything else. The page of a job does not use
+// this module, because a job may have nothing to draw yet.
 
 import {createContext} from "./gl/gl_objects.js";
 import {Passes} from "./gl/passes.js";
@@ -16,7 +16,7 @@ function begin(canvas) {
   const passes = gl.isContextLost() ? null : new Passes(gl),
         mine = {source, manifest, beginMs, gl, passes};
   begun = mine;
-  // If the context is lost before the renderer takes it, its programs are lost too. The renderer
+  // If the context is lost before the renderer takes it, its programs are also lost. The renderer
   // then compiles them again.
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
@@ -29,8 +29,8 @@ function begin(canvas) {
 
 if (!new URLSearchParams(location.search).has("job")) begin(document.getElementById("scene"));
 
-// Returns {source, manifest, beginMs, gl, passes} for the canvas of the page. Returns null if they
-// were already taken, or if no context is available. `passes` is null if the context was lost.
+// Returns {source, manifest, beginMs, gl, passes} for the canvas of the page. `passes` is null if
+// the context was lost. Returns null after the first call, or if no context is available.
 export function takeBegun() {
   const taken = begun;
   begun = null;

@@ -56,8 +56,8 @@ const kHelp = [
   ["H", "this help"],
 ];
 
-// Calls the actions by their names. `root` is the canvas, or the window. If it is the window, the
-// keys also work while nothing has the focus.
+// Calls the actions by their names. `root` is the canvas or the window. With the window, the keys
+// also work while nothing has the focus.
 export function listenToKeys(root, canvas, motion, actions, onChange, signal) {
   const held = new Map();  // by event.code: a character may change while its key is down
   root.addEventListener("keydown", (event) => {

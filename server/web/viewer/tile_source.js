@@ -41,8 +41,8 @@ export class TileError extends Error {
   get isMissing() {
     return this.status === 404 || this.status === 409;
   }
-  // True if the requested items may have caused the error, although the answer does not report
-  // that.
+  // True if the requested items may have caused the error, although the service does not report
+  // this.
   get isSuspicious() {
     return this.status === 200 || (this.status === 500 && this.isTransient);
   }

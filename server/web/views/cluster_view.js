@@ -21,7 +21,7 @@ export class ClusterView {
     const cluster = job.progress?.cluster;
     this.element.hidden = !cluster;
     if (!cluster) return;
-    // The counts are from the last attempt. Only while the job runs, they include running tasks.
+    // The counts are from the last attempt. They include running tasks only while the job runs.
     const runs = job.state === "running";
     const running = cluster.nodes.reduce((sum, node) => sum + node.running, 0);
     setText(

@@ -8,8 +8,8 @@ import {TilePool} from "../tiles/tile_pool.js";
 
 import {decodePage, kBlockWords, kMoreAt} from "./page_format.js";
 
-// Before a view has had kRoundsToKnow readings, pages that were used within this time are not
-// evicted, because the view may still use them.
+// Before a view has had kRoundsToKnow readings of the feedback, pages that were used within this
+// time are not evicted, because the view may still use them.
 const kRecentMs = 1500;
 const kFreeShare = 1 / 64;  // share of the pool that is freed when pages are evicted
 const kTableShare = 1 / 5;  // share of the budget for the hash table

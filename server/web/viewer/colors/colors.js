@@ -7,7 +7,7 @@ import {ColorStore, pageKey} from "./color_store.js";
 const kMebibyte = 1 << 20;
 const kBudgetShare = 1 / 4;   // share of colors in the budget of tiles and colors
 const kMinBytes = 96 * 1024;  // minimum for a pool and a hash table together
-const kBytesPerVoxel = 1024;  // worst case: one page per voxel, and as many on coarser levels
+const kBytesPerVoxel = 1024;  // in the worst case: a page per voxel, and as many on coarser levels
 const kBaseBelow = 2;  // levels from a wanted page to the coarser page that is requested first
 // Minimum value of the last word of a feedback texel whose page is missing: 1 + the number of
 // pixels that lack the page (gl/color_shader.js).
@@ -68,8 +68,9 @@ export class Colors {
     this.loader.demand(wanted, nowMs);
   }
 
-  // Pages that more pixels need come first. So coarse pages are requested before fine ones. If
-  // memory is short, every part of the picture still has colors.
+  // Adds a page to `wanted`. Its priority is the number of pixels that need it. So coarse pages,
+  // which more pixels need, come first. If memory is short, every part of the picture still has
+  // colors.
   want(wanted, level, position, pixels) {
     const key = pageKey(level, ...position), request = wanted.get(key);
     if (request) request.priority += pixels;

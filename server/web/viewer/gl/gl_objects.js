@@ -4,7 +4,7 @@ import {kQuad} from "./picture_shaders.js";
 
 export class WebGLUnavailable extends Error {}
 
-// Returns the WebGL2 context of a canvas; null if the browser provides none.
+// Returns the WebGL2 context of a canvas; null if the browser cannot create one.
 export function createContext(canvas) {
   return canvas.getContext("webgl2", {
     alpha: false,

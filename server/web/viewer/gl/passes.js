@@ -138,8 +138,8 @@ export class Passes {
     if (!isForCanvas) this.allocate(width, height, full, colored);
     else if (width > targets.hits.width || height > targets.hits.height)
       this.allocate(full.width, full.height, full, colored);
-    // A smaller picture should report as many missing tiles as a full one. So each of its feedback
-    // texels covers fewer pixels.
+    // A smaller picture should report as many missing tiles as a full-size picture. So each of its
+    // feedback texels covers fewer pixels.
     const share = Math.max(width / full.width, height / full.height);
     Object.assign(this.targets, {
       width,
@@ -292,10 +292,10 @@ export class Passes {
     return reading.take();
   }
 
-  // Returns {place, wanted}. `place` is one of the 48 positions of the sun: the one where the lit
-  // share of the surfaces in the last picture is nearest to `share`. `wanted` is a Map, as in
-  // readFeedback(), of the missing tiles that could change the choice; all priorities are 1. Call
-  // compileLater() first.
+  // Returns {place, wanted}. `place` is the one of 48 positions of the sun at which the lit share
+  // of the surfaces in the last picture is nearest to `share`. `wanted` is a Map, as in
+  // readFeedback(), of the missing tiles that could change this choice; all its priorities are 1.
+  // Call compileLater() first.
   chooseSun(values, share) {
     const {gl, targets} = this, wanted = new Map();
     const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]),

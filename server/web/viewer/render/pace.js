@@ -23,8 +23,8 @@ export class Pace {
     return kScales[this.scaleIndex];
   }
   // The scale while tiles arrive. A small picture quickly finds most of the tiles that a view
-  // needs, but its few rays find the last tiles only by chance. So if only few tiles are missing, a
-  // full-size picture searches for them.
+  // needs, but it has few rays and finds the last missing tiles only by chance. So if only few
+  // tiles are missing, a full-size picture searches for them.
   get seekingScale() {
     return this.lacksFew ? 1 : this.scale;
   }
@@ -42,8 +42,8 @@ export class Pace {
     if (interval > 4) this.intervalMs = Math.min(interval, 1.05 * this.intervalMs, kTargetMs);
   }
 
-  // Estimates the time on the GPU from an observed time: the GPU may have finished at any time
-  // since the previous frame.
+  // Estimates the time on the GPU from an observed time. The GPU may have finished at any time
+  // since the previous frame, so half of the frame interval is subtracted.
   gpuMs(seenMs) {
     return Math.max(1, seenMs - this.intervalMs / 2);
   }

@@ -14,8 +14,8 @@ export async function pickVoxel(renderer, cssX, cssY) {
   values.u_center = [width / 2 - x + 0.5, y - height / 2 + 0.5];
   const words = await passes.pickOne(values);
   if (!words || !renderer.isReady || (words[1] >>> 23 & 1) === 0) return null;
-  // The hit refers to tiles by their slots. If a tile was evicted after the pick began, a slot may
-  // now refer to another tile, so the pick is repeated.
+  // The hit refers to tiles by their slots. If a tile was evicted after the pick began, its slot
+  // may now belong to another tile, so the pick is repeated.
   if (store.evicted !== evicted) return pickVoxel(renderer, cssX, cssY);
   return hitOf(words, view.eye, view.direction(x, y, width, height), store, renderer.info);
 }

@@ -1,7 +1,7 @@
 // Moves the sun so that it lights about kLitShare of a view inside a scene. Runs once, after the
 // first complete view. A shadow test for a candidate position may need tiles that are missing.
-// These tiles are requested, and the search is repeated until no tile is missing or the search
-// makes no progress.
+// The search requests these tiles, and is repeated until no tile is missing or it makes no
+// progress.
 
 const kLitShare = 0.35;    // share of the visible surface that the sun should light
 const kMaxIdleTrials = 8;  // consecutive trials that do not reduce the number of missing tiles

@@ -5,7 +5,7 @@
 import {dot, subtract} from "../vector.js";
 
 const kMaxEdges = 24000;  // with more edges, only active subvolumes are drawn
-const kOpaque = 10;       // square root of the largest number of cubes of one kind drawn opaque
+const kOpaque = 10;       // up to kOpaque^2 cubes of one kind are drawn opaque
 const kNear = 1e-3;       // lines nearer to the eye than kNear/16 of the grid's edge are clipped
 
 // Later styles are drawn over earlier ones.

@@ -1,8 +1,8 @@
 // Finds the tiles of the first view while the shaders compile, by descending through the loaded
-// tiles. The feedback would find them only level by level. This search does not know which surfaces
-// are hidden, so it fetches some tiles that are not needed. Therefore it does not refine cells that
-// are already rather narrow, and ends after a maximum number of tiles, or if no tile arrives for
-// some time.
+// tiles. The feedback would find the tiles only level by level. The search does not know which
+// surfaces are hidden, so it fetches some tiles that are not needed. To limit their number, it does
+// not refine cells narrower than kPixels, and it ends after kMaxTiles tiles, or if no tile arrives
+// within kStallMs.
 
 const kPixels = 15;  // cells wider than this number of canvas pixels are refined
 const kMaxTiles = 1500;

@@ -16,11 +16,11 @@ const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
 });
 
 // The pool has texels of four words, addressed by 24 bits. A *pointer* is the address of a texel
-// times 256, plus the child mask of the node there, so a ray knows the mask of a node before it
-// reads the node. A node is one pointer per child, in one or two texels. A *cut-off node* is a node
-// at which a tile ends above the bricks; it is the root of another tile. It is one texel: the slot
-// of that tile (0: none), the two words of a coarse brick, 0. Two bricks share a texel; the lowest
-// bit of the pointer selects one.
+// times 256, plus the child mask of the node there, so a ray knows a node's mask before it reads
+// the node. A node is one pointer per child, in one or two texels. A *cut-off node* is a node at
+// which a tile ends above the bricks; it is the root of another tile. Its texel has the slot of
+// that tile (0: none), the two words of a coarse brick, and 0. Two bricks share a texel; the lowest
+// bit of the pointer selects one of them.
 //
 // `shape` is the tileShape() of the level. Returns {level, levels, words, pointers, root,
 // leafBegin, addresses, coarse}. `words` are the words of complete blocks for the pool. Their
