@@ -1,5 +1,5 @@
-// An option that is added to the description of a struct appears on the command line, in JSON, in
-// the schema and among the Python keywords without any other change.
+// If an option is added to the description of a struct, it appears on the command line, in JSON, in
+// the schema and among the Python keywords, without any other change.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -42,7 +42,7 @@ void run(const AddedOption& state, cli::CommandContext& context) {
   context.exit_status = static_cast<int>(state.options.smoothness);
 }
 
-// The exit status of a command with these arguments.
+// Runs a command with these arguments, and returns its exit status.
 int run_command(std::vector<std::string> arguments) {
   CancelToken cancel;
   cli::CommandContext context{system_files(), cancel};
@@ -101,8 +101,8 @@ TEST(AddedOption, IsAPythonKeyword) {
   EXPECT_THAT(writer.members, HasSubstr("    backend: Optional[Literal[\"auto\", \"cpu\""));
 }
 
-// Finds the options in the public C++ header, where the name of a member may have a unit at its
-// end.
+// Finds the options in the public C++ header, where a member's name may end with a unit, such as
+// cache_bytes.
 struct MemberFinder {
   template <class T>
   void operator()(const Field& field, T&) {

@@ -1,4 +1,4 @@
-// The public headers as a program uses them: builds from arrays, hooks, errors and queries.
+// Uses the public headers as a program does: builds from arrays, hooks, errors and queries.
 #include "voxdag/build.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ class LibraryBuild : public testing::Test {
     options.memory_bytes = uint64_t{256} << 20;
     return options;
   }
-  // The same mesh as a file.
+  // Writes the same mesh as a PLY file, and returns its path.
   std::string ply() const {
     const std::string path = folder_.file("mesh.ply");
     std::ofstream file(path);

@@ -1,4 +1,4 @@
-// What a merge refuses, and that it leaves nothing behind.
+// Tests that a merge refuses damaged and unsuitable artifacts, and leaves no files behind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +17,8 @@ class MergeErrors : public testing::Test {
     std::filesystem::create_directory(harness_.scratch_folder());
   }
 
-  // Merges. Checks that this throws an Error of this code and leaves the scratch folder empty.
+  // Merges. Checks that this throws an Error with this code, and leaves the scratch folder empty
+  // and no partial file.
   Error merge_fails(ErrorCode code, const MergeOptions& options = {}) {
     try {
       harness_.merge(options);
@@ -82,7 +83,7 @@ TEST_F(MergeErrors, CanceledMergesStop) {
   merge_fails(ErrorCode::kCanceled, {.cancel = &cancel});
 }
 
-// A level that its format cannot count is named.
+// The error for a level that exceeds a limit of the format names the level and the limit.
 TEST(LevelExtentTest, ALevelOverTheLimitIsALimitError) {
   for (const auto& [in_words, limit, text] : {std::tuple{true, uint64_t{1} << 40, "2^40 words"},
                                               {false, uint64_t{1} << 32, "2^32 nodes"}}) {

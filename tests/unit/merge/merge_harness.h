@@ -25,7 +25,7 @@ struct MergeOptions {
   CancelToken* cancel = nullptr;
   Checkpoint* checkpoint = nullptr;
   Progress* progress = nullptr;
-  double checkpoint_interval_s = 0;  // after every level, and the merge waits for it
+  double checkpoint_interval_s = 0;  // 0: after every level, and the merge waits for each save
 };
 
 struct Merged {
@@ -33,7 +33,7 @@ struct Merged {
   GlobalFileSummary file;
 };
 
-// Blobs that repeat, walls and dust; an edge of 4 and more.
+// Returns repeating blobs, walls and scattered voxels. `edge` is at least 4.
 inline oracle::Voxels mixed_voxels(uint64_t seed, int edge) {
   oracle::Random random(seed);
   oracle::Voxels voxels(edge);
@@ -56,7 +56,7 @@ inline oracle::Voxels mixed_voxels(uint64_t seed, int edge) {
   return voxels;
 }
 
-// Every voxel is set at random, so that almost no two bricks are equal.
+// Sets each voxel with a probability of 1/2, so that almost no two bricks are equal.
 inline oracle::Voxels noise_voxels(uint64_t seed, int edge) {
   std::mt19937_64 random(seed);
   oracle::Voxels voxels(edge);
@@ -78,7 +78,7 @@ inline oracle::Voxels part_of(const oracle::Voxels& whole, const oracle::Region&
   return part;
 }
 
-// Cubes of one level, which tile the grid.
+// Returns all cubes of a level.
 inline std::vector<Cube> equal_cubes(uint32_t level) {
   std::vector<Cube> cubes;
   const uint32_t count = 1u << level;
@@ -121,7 +121,7 @@ class MergeHarness {
   std::string scratch_folder() const { return folder_.file("scratch"); }
   std::vector<ArtifactRef>& artifacts() { return artifacts_; }
 
-  // Adds an artifact for each cube that holds voxels.
+  // Adds an artifact for each cube that contains voxels.
   void add(const oracle::Voxels& voxels, const std::vector<Cube>& cubes) {
     for (const Cube& cube : cubes) {
       const oracle::Region region = oracle::region_of(cube, grid_levels_);
@@ -162,12 +162,12 @@ class MergeHarness {
     return merged;
   }
 
-  // The file of a DAG as it should be.
+  // Writes the global file of a DAG directly, without a merge. The merge must write the same bytes.
   GlobalFileSummary expected(const oracle::Dag& dag) {
     GlobalFileWriter out(system_files(), folder_.file("expected.vdag"), grid_, hash_bits_,
                          narrow_words_);
     std::vector<uint32_t> below, offsets, words;
-    bool wide = false;  // children of the level
+    bool wide = false;  // pointers to the level below have 64 bits
     uint32_t level = grid_levels_ - 2;
     const auto end_level = [&](size_t nodes) {
       out.begin_level(level--);
@@ -199,7 +199,7 @@ class MergeHarness {
     return out.finish({dag.voxels, dag.svo_nodes});
   }
 
-  // The merged file and the counts equal the voxels' DAG.
+  // Checks that the merged file and the counts match the DAG of all voxels.
   void expect_dag_of(const oracle::Voxels& voxels, const Merged& merged) {
     const oracle::Dag dag = oracle::build_dag(voxels, static_cast<int>(hash_bits_));
     EXPECT_EQ(merged.report.voxels, dag.voxels);

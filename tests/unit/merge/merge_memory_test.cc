@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// Neither hash partitions nor spilled position maps affect the bytes.
+// Hash partitions and spilled position maps do not change the bytes of the file.
 TEST(MergeMemory, HashPartitionsGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(1, 256);
   for (const uint32_t hash_bits : {16u, 64u}) {
@@ -58,16 +58,16 @@ TEST(MergeMemory, PassesGiveTheSameBytes) {
 TEST(MergeMemory, WindowsOfAMapGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(3, 256);
   MergeHarness harness(8, 64);
-  // There is one run, whose brick map takes 1 MiB. Of the 4 MiB, 2/3 MiB are for the maps of a
-  // level, and a worker has 1 MiB minus a frame for its window.
+  // There is one run, whose brick map takes 1 MiB. In a budget of 4 MiB, the maps of a level get
+  // 2/3 MiB, and the worker's window gets 1 MiB minus a frame. So the map does not fit.
   harness.add(voxels, {Cube{}});
   const Merged merged = harness.merge({.budget_bytes = 4 * kMiB, .threads = 1});
   harness.expect_dag_of(voxels, merged);
   EXPECT_GE(merged.report.scratch_bytes, kMiB);
 }
 
-// The hashes of all bricks begin with the same four bits. If they are truncated to four bits, the
-// bricks are one group of equal hashes, which exceeds the merge's memory.
+// All bricks of the scene have hashes that begin with the same four bits. With 4 hash bits they are
+// one group of equal hashes, which exceeds the merge's memory. The merge streams this group.
 TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheBudget) {
   constexpr uint64_t kBudgetBytes = 9 * kMiB / 2;
   const uint32_t hash_bits = 4;
@@ -94,8 +94,8 @@ TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheBudget) {
   EXPECT_GT(merged.report.streamed_groups, 0u);
 }
 
-// There are few distinct hashes but enough memory. Buckets that are too large to be sorted are
-// merged row by row.
+// There are few distinct hashes, so some buckets are too large to be sorted. They are merged row by
+// row, although there is enough memory for the rest.
 TEST(MergeMemory, BucketsOfFewHashesGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(5, 128);
   MergeHarness harness(7, 4);

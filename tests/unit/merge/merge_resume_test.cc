@@ -24,8 +24,8 @@ void change_byte(const std::string& path, uint64_t at, char change) {
   file.put(byte);
 }
 
-// Stores the state in memory. Simulates a killed process at the save of a given number, just before
-// or just after the state is durable.
+// Stores the state in memory. Simulates that the process is killed at the save number `die_at`,
+// just before or just after the state is durable.
 class DyingCheckpoint : public Checkpoint {
  public:
   explicit DyingCheckpoint(std::string segment = "") : segment_(std::move(segment)) {}
@@ -73,8 +73,8 @@ class MergeResume : public testing::TestWithParam<Case> {
   }
 };
 
-// The merge is killed at every save in turn, also after it was resumed. It ends with the same bytes
-// and counts, although released bytes were overwritten.
+// The merge is killed at every save in turn, including saves after it was resumed. It ends with the
+// same bytes and counts, although the released bytes of its inputs were overwritten.
 TEST_P(MergeResume, ResumesAfterEverySave) {
   const oracle::Voxels voxels = noise_voxels(31, 256);
   MergeHarness harness(8, GetParam().hash_bits);
@@ -126,7 +126,7 @@ TEST_P(MergeResume, ResumesWithOtherMemory) {
   }
 }
 
-// As ResumesAfterEverySave, but states are saved in the background, as often as there is time.
+// Like ResumesAfterEverySave, but a thread saves states in the background, as often as it can.
 TEST_P(MergeResume, ResumesAfterBackgroundSaves) {
   const oracle::Voxels voxels = noise_voxels(35, 256);
   MergeHarness harness(8, GetParam().hash_bits);
@@ -151,14 +151,14 @@ TEST_P(MergeResume, ResumesAfterBackgroundSaves) {
   EXPECT_EQ(checkpoint.forgotten, 0u);
 }
 
-// The merge does not wait for a save. In this test, the first save waits until the next level is
-// merged, and this level waits until the save has begun.
+// The merge continues while a state is saved. In this test, the first save waits until the next
+// level is merged, and the merge of that level waits until the save has begun.
 TEST(MergeCheckpoint, TheMergeContinuesWhileAStateIsSaved) {
   MergeHarness harness(8, 64);
   harness.add(noise_voxels(36, 256), equal_cubes(1));
   const std::string expected = harness.merge().file.sha256;
   struct Meeting {
-    // Returns once both have arrived; false if the other one does not arrive.
+    // Marks one side as arrived. Returns true once both have arrived, or false after 20 s.
     bool meet(bool& here, const bool& there) {
       std::unique_lock lock(mutex);
       here = true;
@@ -181,7 +181,7 @@ TEST(MergeCheckpoint, TheMergeContinuesWhileAStateIsSaved) {
   struct MeetingProgress : NoProgress {
     MeetingProgress(Meeting& with, std::string folder)
         : meeting(with), scratch_folder(std::move(folder)) {}
-    // A file in the scratch folder: a state was made.
+    // A file in the scratch folder shows that the merge has made a state.
     void advance(uint64_t) override {
       if (!std::filesystem::is_empty(scratch_folder)) meeting.meet(meeting.merging, meeting.saving);
     }
@@ -202,9 +202,9 @@ INSTANTIATE_TEST_SUITE_P(Ways, MergeResume,
                                          Case{"ThreePasses", 8 * kMiB, 64, 3, 3}),
                          [](const auto& test) { return test.param.name; });
 
-// A bit is flipped in a state, a position map, an intermediate artifact or the partial file, or one
-// of them is missing. The merge never writes a wrong DAG. If the inputs are available, it starts
-// over.
+// In each case, a bit is flipped in a state, a position map, an intermediate artifact or the
+// partial file, or this file is missing. The merge never writes a wrong DAG. If its inputs are
+// still available, it starts over.
 TEST(MergeDamage, DamageStartsOver) {
   const oracle::Voxels voxels = noise_voxels(33, 256);
   struct Way {
@@ -242,8 +242,8 @@ TEST(MergeDamage, DamageStartsOver) {
           std::filesystem::remove(places[i]);
         else
           change_byte(places[i], 4096 + 100, 4);
-        // The damage is detected immediately, or when the bytes are read; then the next merge
-        // starts over.
+        // The merge detects the damage immediately and starts over, or it detects the damage when
+        // it reads the bytes and fails. In the second case the next merge starts over.
         try {
           EXPECT_EQ(harness.merge(options).file.sha256, expected);
           EXPECT_EQ(checkpoint.forgotten, 1u);
@@ -257,8 +257,8 @@ TEST(MergeDamage, DamageStartsOver) {
   }
 }
 
-// A state does not match a different set of inputs. It matches the same content at different
-// places.
+// A merge resumes with inputs of the same content at different places. With different inputs, it
+// starts over.
 TEST(MergeDamage, IdentifiesItsInputsByTheirContent) {
   const oracle::Voxels voxels = noise_voxels(34, 64);
   MergeHarness harness(6, 64);
@@ -268,7 +268,7 @@ TEST(MergeDamage, IdentifiesItsInputsByTheirContent) {
   checkpoint.die_at = 2;
   EXPECT_THROW(harness.merge({.checkpoint = &checkpoint}), Error);
   harness.artifacts().clear();
-  harness.add(voxels, equal_cubes(1));  // once more, behind the first ones
+  harness.add(voxels, equal_cubes(1));  // same content, behind the first artifacts
   EXPECT_EQ(harness.merge({.checkpoint = &checkpoint}).file.sha256, expected);
   EXPECT_EQ(checkpoint.forgotten, 0u);
 

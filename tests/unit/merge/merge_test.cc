@@ -10,8 +10,8 @@
 namespace voxdag {
 namespace {
 
-// Merging subvolumes of one size gives the bytes of the complete DAG, for any hash bits, sizes and
-// numbers of threads.
+// A merge of subvolumes of one size gives the bytes of the complete DAG, for any number of hash
+// bits, any size of the subvolumes, and any number of threads.
 TEST(Merge, EqualSubvolumesGiveTheDagOfTheWhole) {
   for (const uint32_t hash_bits : {4u, 16u, 64u})
     for (uint64_t seed = 0; seed < 3; ++seed) {
@@ -40,7 +40,7 @@ TEST(Merge, SubvolumesOfDifferentSizesGiveTheDagOfTheWhole) {
     }
 }
 
-// The order in which the artifacts are given does not affect the bytes.
+// The order of the artifacts does not affect the bytes.
 TEST(Merge, AnyOrderOfArtifactsGivesTheSameBytes) {
   const oracle::Voxels voxels = mixed_voxels(20, 64);
   MergeHarness harness(6, 64);
@@ -53,7 +53,7 @@ TEST(Merge, AnyOrderOfArtifactsGivesTheSameBytes) {
   }
 }
 
-// A grid of one brick: the root is a brick, and there is nothing above it.
+// In a grid of one brick, the root is a brick, and there is nothing above it.
 TEST(Merge, TheSmallestGridIsOneBrick) {
   const oracle::Voxels voxels = mixed_voxels(21, 4);
   MergeHarness harness(2, 64);
@@ -63,7 +63,7 @@ TEST(Merge, TheSmallestGridIsOneBrick) {
   EXPECT_EQ(merged.report.dag_nodes, 1u);
 }
 
-// No artifacts: a valid file without nodes.
+// Without artifacts, the merge writes a valid file without nodes.
 TEST(Merge, NoArtifactsGiveAFileWithoutNodes) {
   MergeHarness harness(6, 64);
   std::filesystem::create_directory(harness.scratch_folder());
@@ -72,9 +72,9 @@ TEST(Merge, NoArtifactsGiveAFileWithoutNodes) {
   EXPECT_EQ(merged.file.sha256, harness.expected({}).sha256);
 }
 
-// The merge that was published with the tutorial omitted the child mask from the hash. So two equal
-// sub-DAGs in different octants of different parents became one parent, and voxels moved. In this
-// test, two such pairs must keep their positions over two levels of the merge.
+// The published merge of the tutorial omitted the child mask from the hash. So two equal sub-DAGs
+// in different octants of different parents became one parent, and voxels moved. In this test, two
+// such pairs of sub-DAGs must keep their positions over two levels of the merge.
 TEST(Merge, EqualSubDagsInDifferentOctantsKeepTheirPlaces) {
   oracle::Voxels voxels(32);
   const auto blob = [&](int x, int y, int z) {

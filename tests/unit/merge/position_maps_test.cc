@@ -1,4 +1,4 @@
-// Positions of one word and of two words, in rows, in position maps and in the output.
+// Positions of one word and of two words: in rows, in position maps, and in the output.
 #include "merge/load/position_maps.h"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ namespace {
 
 using testing::ElementsAre;
 
-constexpr uint64_t kLast = (uint64_t{1} << 40) - 1;  // of a wide level's words
+constexpr uint64_t kLast = (uint64_t{1} << 40) - 1;  // the last word of a wide level
 constexpr std::array<uint64_t, 5> kPositions = {0, UINT32_MAX, uint64_t{1} << 32,
                                                 (uint64_t{3} << 32) + 7, kLast};
 
@@ -27,7 +27,7 @@ TEST(Positions, AreOneWordOrTwo) {
   EXPECT_EQ(get_position(words, false), UINT32_MAX);
 }
 
-// In memory, in a file, and in a file of an earlier merge.
+// Position maps of a wide level keep the high halves of positions, in memory and in a file.
 TEST(Positions, OfWideMapsKeepTheirHighHalf) {
   const TemporaryFolder folder;
   MemoryBudget budget(uint64_t{1} << 20);

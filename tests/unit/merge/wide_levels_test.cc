@@ -1,6 +1,6 @@
-// Levels with 64-bit pointers, on small scenes. With any memory and number of threads, the merge
-// writes the file of the oracle's DAG. The file passes `verify` and has the voxels of the narrow
-// file.
+// Tests levels with 64-bit pointers on small scenes. For any memory and number of threads, the
+// merge writes the file of the oracle's DAG. This file passes `verify`, and has the same voxels as
+// the file with 32-bit pointers.
 #include <gtest/gtest.h>
 
 #include "core/format/global/diff.h"
@@ -13,8 +13,8 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// The parameter is the number of words above which a level is wide. With one value all levels but
-// the highest are wide, with the other only the bricks.
+// The parameter is the number of words above which a level is wide. With the smaller value, all
+// levels except the highest ones are wide; with the larger value, only the bricks.
 class WideLevels : public testing::TestWithParam<uint64_t> {
  protected:
   // Checks that the merged file passes `verify`, has wide levels, and has the voxels of `narrow`.
@@ -35,7 +35,7 @@ class WideLevels : public testing::TestWithParam<uint64_t> {
     EXPECT_EQ(difference.only_a + difference.only_b, 0u);
   }
 
-  // Merges the voxels, divided into cubes, with each of these budgets, which are in units of 1/2
+  // Merges the voxels, divided into cubes, with each of these memory budgets in units of 1/2
   // MiB.
   void merge(const oracle::Voxels& voxels, const std::vector<Cube>& cubes, uint32_t hash_bits,
              const std::vector<uint64_t>& half_mib) {
@@ -65,7 +65,7 @@ TEST_P(WideLevels, SeveralPasses) { merge(noise_voxels(2, 256), equal_cubes(3), 
 // Many rows of equal hash go through the heap merge.
 TEST_P(WideLevels, EqualHashes) { merge(noise_voxels(3, 256), equal_cubes(3), 4, {24, 16}); }
 
-// One run whose map does not fit the memory of a worker.
+// There is one run, and its map does not fit in the memory of a worker.
 TEST_P(WideLevels, WindowsOfAMap) { merge(noise_voxels(4, 256), {Cube{}}, 64, {9}); }
 
 INSTANTIATE_TEST_SUITE_P(NarrowWords, WideLevels, testing::Values(64, 500'000),

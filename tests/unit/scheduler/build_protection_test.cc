@@ -1,4 +1,4 @@
-// Regression tests of defects that attacks on builds found.
+// Regression tests for defects that were found by attacks on builds.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -50,8 +50,8 @@ class BuildProtection : public testing::Test {
   CancelToken cancel_;
 };
 
-// A killed build holds its locks until the system has removed its process. The next build reports
-// for each lock that it waits.
+// A killed build holds its locks until the system has removed its process. The next build waits for
+// each lock, and reports that it waits.
 TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
   for (const std::string& path : {OutputLock::path_of(output()), output() + ".work/lock"}) {
     SCOPED_TRACE(path);
@@ -69,7 +69,7 @@ TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
   }
 }
 
-// A lock that is not released is a transient error, so the service tries the job again.
+// If a lock is not released in time, the error is transient, so the service retries the job.
 TEST_F(BuildProtection, ALockThatStaysIsATransientError) {
   BuildSpec impatient = spec();
   impatient.run.lock_wait_s = 0.1;
@@ -84,7 +84,7 @@ TEST_F(BuildProtection, ALockThatStaysIsATransientError) {
   EXPECT_NE(by_folder.message().find("is in use by process"), std::string::npos);
 }
 
-// Whoever waits for a lock can be stopped.
+// A build that waits for a lock can be canceled.
 TEST_F(BuildProtection, WaitingCanBeCanceled) {
   const OutputLock output_lock(files_, output());
   std::thread user([&] {
@@ -96,8 +96,8 @@ TEST_F(BuildProtection, WaitingCanBeCanceled) {
   EXPECT_EQ(error.code(), ErrorCode::kCanceled);
 }
 
-// A few bytes can describe billions of triangles. If neither memory nor disk can hold them, the
-// scene is refused before it is read. `plan` also refuses it.
+// A few bytes can describe billions of triangles. If neither memory nor disk can hold the
+// triangles, `build` and `plan` refuse the scene before they read it.
 TEST_F(BuildProtection, TrianglesThatFitNowhereAreRefusedBeforeTheyAreRead) {
   write_spheres(scene(), 700000);
   BuildSpec tight = spec();
@@ -124,13 +124,13 @@ TEST_F(BuildProtection, DisksAreToldApartByTheirDevice) {
   EXPECT_NE(refusal().find("the build's work folder is"), std::string::npos) << refusal();
 }
 
-// A build waits for the lock of an output. When it gets the lock, the lock's file has a name, even
-// if the preceding build has published its file. So a third build has to wait.
+// The second build waits for the lock of its output. Meanwhile the first build publishes its file.
+// The lock's file must still have its name, so that a third build also waits.
 TEST_F(BuildProtection, ALockOfTheOutputHasAName) {
   auto first = std::make_unique<OutputLock>(files_, output());
   std::unique_ptr<OutputLock> second;
   std::thread waiting([&] { second.reset(new OutputLock(lock_output(context(), output(), 30))); });
-  // A build does this at its end, and also earlier if its merge restarts.
+  // A build renames the partial file at its end, and removes it if its merge restarts.
   for (int file = 0; file < 2; ++file) {
     std::ofstream(output() + ".partial") << "levels";
     if (file) std::filesystem::rename(output() + ".partial", output());
@@ -144,10 +144,10 @@ TEST_F(BuildProtection, ALockOfTheOutputHasAName) {
   EXPECT_FALSE(std::filesystem::exists(OutputLock::path_of(output())));
 }
 
-// The same with complete builds: the second build waits for the first, the third waits for the
-// second, and the file is the third build's.
+// A build holds the lock of its output from its first stage until the output has its final
+// name.
 TEST_F(BuildProtection, ABuildHoldsItsOutputUntilItEnds) {
-  // Holds the lock while it looks, as the third build would.
+  // Checks at the begin and the end of each stage that another build cannot get the lock.
   class Looking : public NoProgress {
    public:
     explicit Looking(const std::string& output) : path_(OutputLock::path_of(output)) {}
@@ -163,20 +163,20 @@ TEST_F(BuildProtection, ABuildHoldsItsOutputUntilItEnds) {
     const std::string path_;
   } looking(output());
   const BuildReport report = run_build(spec(), {files_, looking, cancel_});
-  EXPECT_GT(looking.looks, 6);  // the last time after the output has got its name
+  EXPECT_GT(looking.looks, 6);  // includes the end of the stage that renames the output
   EXPECT_EQ(report.sha256.size(), 64u);
   EXPECT_FALSE(std::filesystem::exists(OutputLock::path_of(output())));
 }
 
-// A file of that name not created by voxdag is kept.
+// A file with the lock's name is kept if voxdag did not create it.
 TEST_F(BuildProtection, AForeignFileOfTheLocksNameStays) {
   std::ofstream(OutputLock::path_of(output())) << "mine";
   run_build(spec(), context());
   EXPECT_EQ(read_small_file(files_, OutputLock::path_of(output()), 10), "mine");
 }
 
-// A symbolic link or a pipe in a work folder does not make a build write to a file that it does not
-// own.
+// If a work folder contains a symbolic link or a pipe, a build does not write through it to a file
+// that it does not own.
 TEST_F(BuildProtection, LinksInTheWorkFolderAreNotFollowed) {
   const std::string victim = folder_.file("victim.txt"), work = output() + ".work";
   std::ofstream(victim) << "precious";
@@ -197,8 +197,8 @@ TEST_F(BuildProtection, LinksInTheWorkFolderAreNotFollowed) {
   EXPECT_EQ(error_of([&] { run_build(spec(), context()); }).code(), ErrorCode::kInvalidInput);
 }
 
-// A plan creates a new temporary folder that only its user can read, even if other names are
-// already in use.
+// A plan creates a new temporary folder that only its user can read. If someone else has already
+// created a folder with a similar name, the plan does not use it.
 TEST_F(BuildProtection, APlanTakesAFolderOfItsOwn) {
   const std::string temporary = folder_.file("tmp"), victim = folder_.file("victim.txt");
   const std::string foreseen = temporary + "/voxdag-plan-" + std::to_string(getpid());
@@ -234,8 +234,8 @@ TEST_F(BuildProtection, APlanTakesAFolderOfItsOwn) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temporary), {}), 1);
 }
 
-// If rows of the job store are lost, the build is an error. It does not write a file without their
-// voxels.
+// If rows of the job store are lost, the build fails. It must not write a file that lacks the
+// voxels of these rows.
 TEST_F(BuildProtection, ABuildNoticesMissingRows) {
   const std::string expected = run_build(spec(), context()).sha256;
   std::filesystem::remove(output());
@@ -248,7 +248,7 @@ TEST_F(BuildProtection, ABuildNoticesMissingRows) {
   EXPECT_EQ(run_build(again, context()).sha256, expected);
 }
 
-// A damaged row of the job does not prevent starting over.
+// If the row of the job is damaged, --restart works.
 TEST_F(BuildProtection, ADamagedJobStartsOver) {
   build_until(spec(), "build", 5);
   SqlDatabase(output() + ".work/job.db", SqlDatabase::Mode::kReadWrite)
@@ -259,7 +259,8 @@ TEST_F(BuildProtection, ADamagedJobStartsOver) {
   EXPECT_EQ(run_build(again, context()).subvolumes_reused, 0u);
 }
 
-// A scene whose files have the names of files of the build is refused, and its files are kept.
+// If files of the scene have the same names as files of the build, the build refuses the scene and
+// keeps its files.
 TEST_F(BuildProtection, ABuildDoesNotDestroyItsScene) {
   BuildSpec inside = spec();
   inside.run.work_folder = folder_.file("w");

@@ -1,4 +1,4 @@
-// Builds that are canceled, as by Ctrl-C, at a point that the test chooses.
+// Cancels builds, as Ctrl-C does, at a point that the test chooses.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 
 namespace voxdag {
 
-// Cancels once `stage` has done `after` units.
+// Cancels the build once the stage `stage` has done `after` units.
 class CancelingProgress : public NoProgress {
  public:
   CancelingProgress(CancelToken& cancel, std::string stage, uint64_t after)
@@ -34,7 +34,7 @@ class CancelingProgress : public NoProgress {
   uint64_t left_;
 };
 
-// Builds until `stage` has done `after` units.
+// Runs a build and cancels it once `stage` has done `after` units.
 inline void build_until(const BuildSpec& spec, const std::string& stage, uint64_t after,
                         FileSystem& files = system_files()) {
   CancelToken cancel;

@@ -1,6 +1,6 @@
-// The machine's files, with counters of reads and writes, and a disk that is full or fails on
-// request. Syncs are only counted, because no test cuts the power. Tests read the counters only
-// while no build runs.
+// The file system of the machine, with counters of reads and writes, and a simulated disk that is
+// full or fails on request. Syncs are only counted, because no test cuts the power. Tests read the
+// counters only while no build runs.
 #pragma once
 
 #include <algorithm>
@@ -23,8 +23,8 @@ class MeteredFiles : public ForwardingFiles {
   std::map<std::string, uint64_t> bytes_written;   // by path
   std::map<std::string, uint64_t> bytes_released;  // by path
   std::map<std::string, uint64_t> syncs;           // by path
-  std::map<std::string, uint64_t> failing_sync;    // by path, counted from 1: fails with kIo
-  std::string full_for;                            // no write to this file finds room
+  std::map<std::string, uint64_t> failing_sync;    // by path: the sync, from 1, that fails with kIo
+  std::string full_for;                            // writes to this file fail as on a full disk
   uint64_t free_bytes = UINT64_MAX;
   std::string other_disk;  // a folder on a separate disk
 

@@ -51,7 +51,7 @@ class ResumeTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// How far the stages were when they ended.
+// Records for each stage: the units done when it resumed, the units done so far, and the total.
 class StageRecord : public NoProgress {
  public:
   struct Stage {
@@ -103,8 +103,8 @@ TEST_F(ResumeTest, ProgressIsThatOfTheWholeBuild) {
   }
 }
 
-// A build that is interrupted in any stage is resumed by the same call. It reuses built subvolumes
-// and gives the same bytes. Afterwards only the result and its report exist.
+// A build that was canceled in any stage is resumed by the same call. It reuses the built
+// subvolumes and gives the same bytes. Afterwards, the work folder does not exist.
 TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   const std::string expected = build(spec()).sha256;
   std::filesystem::remove(output());
@@ -128,8 +128,8 @@ TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   }
 }
 
-// A build with a different scene, resolution or hash is refused with the difference, unless it is
-// to start over. Run options may change between the runs.
+// A build with a different scene, resolution or hash is refused, unless it is to start over. The
+// error names the difference. Run options may change between the runs.
 TEST_F(ResumeTest, RefusesAnotherJobInTheSameFolder) {
   build_until(spec(), "build", 5);
   BuildSpec other = spec();
@@ -211,8 +211,8 @@ TEST_F(ResumeTest, OwnsItsFolderAlone) {
   EXPECT_TRUE(std::filesystem::exists(work() + "/letter.txt"));
 }
 
-// A folder that has the name of a work folder but was not created by voxdag is refused and not
-// changed.
+// A folder that has the name of the work folder but was not created by voxdag is refused and kept
+// unchanged.
 TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
   std::filesystem::create_directories(work() + "/merge");
   std::ofstream(work() + "/merge/thesis.txt") << "not ours";
@@ -221,7 +221,7 @@ TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(work()), {}), 1);
 }
 
-// A process that briefly holds the lock to read the status does not prevent a build.
+// A process that holds the lock briefly to read the status does not prevent a build.
 TEST_F(ResumeTest, WaitsForThoseWhoLook) {
   std::filesystem::create_directories(work());
   auto looking = system_files().try_lock(work() + "/lock");
@@ -252,8 +252,8 @@ TEST_F(ResumeTest, OwnsItsOutputAlone) {
   EXPECT_GT(build(first).subvolumes_reused, 0u);
 }
 
-// After the merge has begun, the output of a build cannot be changed. The resumed merge writes to
-// the same file.
+// After the merge has begun, the output of a build cannot be changed: the resumed merge writes to
+// the file in which it has begun.
 TEST_F(ResumeTest, KeepsTheOutputOfAMergeThatBegan) {
   BuildSpec checkpointed = spec();
   checkpointed.run.work_folder = folder_.path() + "/work";
@@ -309,8 +309,8 @@ TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
   }
 }
 
-// If the job store of an earlier build is replaced by another file, --restart works in its folder.
-// In any other folder, such a file is not voxdag's, and is kept.
+// If a different file replaces the job store in a voxdag work folder, --restart works. If a folder
+// has only such a file, the file was not created by voxdag, and --restart keeps it.
 TEST_F(ResumeTest, StartsOverInAFolderOfItsOwnOnly) {
   build_until(spec(), "build", 5);
   const std::string store = work() + "/job.db";
@@ -326,7 +326,7 @@ TEST_F(ResumeTest, StartsOverInAFolderOfItsOwnOnly) {
   EXPECT_TRUE(std::filesystem::exists(store));
 }
 
-// A canceled build explains how to resume it.
+// The error of a canceled build explains how to resume the build.
 TEST_F(ResumeTest, SaysHowToResume) {
   CancelToken cancel;
   CancelingProgress progress(cancel, "build", 5);
@@ -338,7 +338,7 @@ TEST_F(ResumeTest, SaysHowToResume) {
   }
 }
 
-// The state of an interrupted build can be read by others.
+// Another process can read the state of an interrupted build.
 TEST_F(ResumeTest, ReportsItsStatus) {
   EXPECT_THROW(read_job_status(system_files(), work()), Error);
   build_until(spec(), "build", 5);

@@ -1,4 +1,4 @@
-// Warnings about the scene in reports, in resumed builds and in strict builds.
+// Warnings about the scene in reports, in resumed builds, and in strict builds.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ class SceneWarnings : public testing::Test {
     spec_.run.keep_work = true;
   }
 
-  // A PLY file with these faces over four vertices.
+  // Writes a PLY file with these faces over four vertices.
   void write_scene(const std::string& faces, int count) {
     spec_.geometry.scenes = {folder_.file("mesh.ply")};
     std::ofstream(spec_.geometry.scenes[0])

@@ -1,4 +1,4 @@
-// Cluster builds whose merge is a job of the cluster. The test simulates Slurm.
+// Cluster builds whose merge is a job of the cluster. The test simulates Slurm (played_slurm.h).
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -37,7 +37,7 @@ class ClusterMergeJob : public Cluster {
 };
 
 TEST_F(ClusterMergeJob, ItsReportIsThatOfTheCommand) {
-  slurm_.fates = {"", "FAILED"};  // which the job submits again
+  slurm_.fates = {"", "FAILED"};  // the merge job submits the failed task again
   const BuildReport report = build(merging_spec());
   EXPECT_EQ(report_json(report), report_json(of_job_));
   EXPECT_EQ(report.cluster->batches, 4u);
@@ -49,10 +49,10 @@ TEST_F(ClusterMergeJob, ItsReportIsThatOfTheCommand) {
   ASSERT_NE(submitted, slurm_.commands.end());
   for (const char* word : {"--mem=1G", "--chdir=/"})
     EXPECT_NE(std::ranges::find(*submitted, word), submitted->end()) << word;
-  // The same command finds the existing result. With another scene, or with --restart, it builds.
+  // The same command finds the existing result. With --restart or another scene, it builds again.
   slurm_.commands.clear();
   EXPECT_EQ(report_json(build(merging_spec())), report_json(report));
-  EXPECT_EQ(count("sbatch"), 2u);  // tests the options of the tasks, and of the job
+  EXPECT_EQ(count("sbatch"), 2u);  // tests of the options: of the tasks, and of the merge job
   BuildSpec restarted = merging_spec();
   restarted.run.restart = true;
   build(restarted);
@@ -65,7 +65,7 @@ TEST_F(ClusterMergeJob, ATaskThatSlurmHoldsForEverDoesNotHoldItUp) {
   slurm_.fates = {"", PlayedSlurm::kHeld};
   const auto merge = std::exchange(slurm_.merge_job, nullptr);
   slurm_.merge_job = [&] {
-    // It depends on the array.
+    // The merge job waits for the array of tasks until scancel is called.
     if (count("scancel") > 0)
       merge();
     else
@@ -132,8 +132,8 @@ TEST_F(ClusterMergeJob, WhoComesBackFollowsAndWhoStopsTheTasksStopsItFirst) {
   };
   const BuildReport report = run_build(merging_spec(), {system_files(), warnings_, never_});
   EXPECT_EQ(report.sha256, expected_);
-  EXPECT_EQ(count("sbatch"), 3u);  // both test the options only
-  // Neither did the job stop itself.
+  EXPECT_EQ(count("sbatch"), 3u);  // one merge job, and two tests of the options
+  // The merge job has not canceled itself.
   for (const auto& command : slurm_.commands)
     EXPECT_FALSE(command[0] == "scancel" && command[1].ends_with("-merge"));
 }

@@ -1,4 +1,4 @@
-// Cluster builds with a Slurm that is played by the test.
+// Builds on a cluster. The test simulates Slurm (played_slurm.h).
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -61,7 +61,7 @@ TEST_F(Cluster, ABatchThatIsOutOfTimeIsSplit) {
 
 TEST_F(Cluster, ABatchOfOneSubvolumeIsSplitInItsParts) {
   BuildSpec one = spec(1);
-  one.run.subvolume_edge = 4096;  // the whole grid
+  one.run.subvolume_edge = 4096;  // one subvolume: the complete grid
   slurm_.fates = {"TIMEOUT"};
   const BuildReport report = build(one);
   EXPECT_EQ(report.cluster->batches, 2u);
@@ -77,7 +77,7 @@ TEST_F(Cluster, TooManyFailuresEndTheBuildAndTheNextRunGoesOn) {
   EXPECT_NE(error.message().find("batch 1, task 2_1 on n7: FAILED; it has failed 2 times"),
             std::string::npos)
       << error.message();
-  // The other two are not built again.
+  // Only batch 1 is built again; the other two batches are reused.
   slurm_.commands.clear();
   const BuildReport report = build(hasty);
   EXPECT_EQ(report.cluster->batches, 3u);
@@ -91,7 +91,7 @@ TEST_F(Cluster, TooManyFailuresEndTheBuildAndTheNextRunGoesOn) {
 TEST_F(Cluster, ManyBatchesTakeSeveralArrays) {
   slurm_.max_array_size = 10;
   build(spec(25));
-  EXPECT_EQ(count("sbatch"), 1u + 3);  // one only tests the options
+  EXPECT_EQ(count("sbatch"), 1u + 3);  // a test of the options, and three arrays
 }
 
 TEST_F(Cluster, WaitsForASlurmThatDoesNotAnswer) {
@@ -167,8 +167,8 @@ TEST_F(Cluster, AnArrayThatIsTooLargeForSlurmIsHalved) {
   EXPECT_NE(warnings_.text.find("QOSMaxSubmitJobPerUserLimit"), std::string::npos);
 }
 
-// If the state of the cluster build is lost or has a different version, numbers of segments are not
-// used again, because rows of the job store name the existing segments.
+// If the state of the cluster build is lost or has a different version, built subvolumes are still
+// reused. New segments get new numbers, because rows of the job store name the existing segments.
 TEST_F(Cluster, ALostStateCostsNothingThatIsBuilt) {
   for (const bool is_lost : {true, false}) {
     SCOPED_TRACE(is_lost);
@@ -188,7 +188,7 @@ TEST_F(Cluster, ALostStateCostsNothingThatIsBuilt) {
   }
 }
 
-// Batches that were made for another plan of the same scene are not used for this plan.
+// A build does not use batches that were made for another plan of the same scene.
 TEST_F(Cluster, BatchesOfAnotherPlanAreNotTakenOver) {
   BuildSpec fine = spec(4);
   fine.run.cluster->max_retries = 0;
@@ -235,7 +235,7 @@ TEST_F(Cluster, ThisMachineTakesOverWhatTasksHaveBuilt) {
   EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
 }
 
-// A batch whose file is damaged is made again by the next run.
+// If the file of a batch is damaged, the next run makes the batch again.
 TEST_F(Cluster, ADamagedBatchIsCutAgain) {
   BuildSpec hasty = spec(2);
   hasty.run.cluster->max_retries = 1;
@@ -264,7 +264,7 @@ TEST_F(Cluster, ATimeoutIsNoticedByTheNextRun) {
   EXPECT_NE(warnings_.text.find("TIMEOUT; it is split"), std::string::npos) << warnings_.text;
 }
 
-// Splits are progress, not failures.
+// A split after a timeout does not count as a failure.
 TEST_F(Cluster, SplitsDoNotUseUpTheRetries) {
   BuildSpec strict = spec(1);
   strict.run.cluster->max_retries = 0;
@@ -282,8 +282,8 @@ TEST_F(Cluster, LeftoversThatCannotBeRemovedDoNotStopABuild) {
   EXPECT_EQ(report.sha256, expected_);
 }
 
-// A killed task leaves its temporary folder. The next task removes this folder, but not the folder
-// of a running task.
+// A killed task leaves its temporary folder. The next task removes this folder. It does not remove
+// the folder of a running task, or a folder that other users can write.
 TEST_F(Cluster, TemporaryFoldersOfKilledTasksAreRemoved) {
   const std::string killed = folder_.file("tmp/voxdag-batch-killed");
   const std::string running = folder_.file("tmp/voxdag-batch-running");
@@ -376,7 +376,7 @@ TEST_F(Cluster, AnotherAttemptFindsTheRecord) {
   slurm_.before_task = [&](uint32_t) {
     slurm_.before_task = nullptr;
     CancelToken never;
-    // Two attempts at batch 0, of which the second finds the record of the first.
+    // The second attempt at batch 0 finds the record of the first.
     const BatchRun run{.work_folder = output() + ".work",
                        .batch = 0,
                        .program = kVersion,

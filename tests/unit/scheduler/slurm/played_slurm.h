@@ -1,4 +1,4 @@
-// A simulated Slurm. Its tasks run in the process of the test and end as the test specifies. Also
+// A simulated Slurm, whose tasks run in the process of the test and end as the test specifies. Also
 // the fixture of the tests that build with it.
 #pragma once
 
@@ -27,26 +27,26 @@ namespace voxdag {
 
 inline constexpr const char* kVersion = "1.2.3";
 
-// Runs each task immediately. If the task has a fate, it does nothing and ends in that state; with
-// kHeld, it waits until it is canceled.
+// Runs each task immediately. A task with a fate does nothing and ends in that state; a task with
+// the fate kHeld waits until it is canceled.
 class PlayedSlurm : public CommandRunner {
  public:
   static constexpr const char* kHeld = "held";
-  std::deque<std::string> fates;  // of the next tasks; "" for a normal task
+  std::deque<std::string> fates;  // states of the next tasks; "" for a task that succeeds
   uint32_t max_array_size = 1001;
-  size_t max_tasks = SIZE_MAX;  // of an array
+  size_t max_tasks = SIZE_MAX;  // largest array that sbatch accepts
   int squeue_failures = 0;
-  std::string refusal;       // of sbatch
-  int refusals = INT_MAX;    // how often it refuses
-  std::string test_refusal;  // of sbatch --test-only
+  std::string refusal;       // error text of sbatch; "" for none
+  int refusals = INT_MAX;    // number of calls of sbatch that fail
+  std::string test_refusal;  // error text of sbatch --test-only
   int test_refusals = INT_MAX;
   std::vector<std::vector<std::string>> commands;
   std::string program = kVersion;
   std::string temporary_folder;
   std::function<void(uint32_t batch)> before_task;
-  std::function<void()> merge_job;           // its work
-  std::string waiting_merge_job;             // its id
-  std::string merge_state = "RUNNING|None";  // before its end
+  std::function<void()> merge_job;           // the work of the merge job
+  std::string waiting_merge_job;             // id of the merge job; "" unless it waits
+  std::string merge_state = "RUNNING|None";  // state of the merge job before its end
   std::string merge_end = "COMPLETED Reason=None ExitCode=0:0";
 
   CommandResult run(const std::vector<std::string>& command, const std::string& input, double,
@@ -80,7 +80,7 @@ class PlayedSlurm : public CommandRunner {
   }
 
  private:
-  // The merge job runs completely at the first query, and has ended afterwards.
+  // At a query, the merge job runs completely and ends, unless it makes itself wait again.
   CommandResult show_merge_job() {
     if (waiting_merge_job.empty()) return ok("");
     const std::string id = std::exchange(waiting_merge_job, "");
@@ -160,10 +160,10 @@ class PlayedSlurm : public CommandRunner {
 
   int jobs = 0;
   std::map<std::string, std::string> ends;
-  std::map<std::string, std::string> held;  // what squeue prints, by task
+  std::map<std::string, std::string> held;  // lines that squeue prints, by task
 };
 
-// Builds on a played cluster, and their bytes on this machine.
+// Collects the texts of warnings.
 class Warnings : public NoProgress {
  public:
   void warn(std::string_view message) override { text += std::string(message) + "\n"; }

@@ -12,8 +12,8 @@
 namespace voxdag {
 namespace {
 
-// The help text is a constant, but the file endings come from the table of formats. The text must
-// list all of them.
+// The help text is a constant, but the file endings come from the table of formats. So this test
+// checks that the text lists all endings.
 TEST(BuildFields, SceneHelpListsAllEndings) {
   EXPECT_THAT(std::string(kSceneField.help),
               testing::HasSubstr("(" + list_scene_endings(", ", ", ") + ")"));
@@ -27,7 +27,7 @@ struct OneOption {
 
   template <class T>
   void operator()(const Field& field, T& value) {
-    // The command line does not parse flags and scenes in this way.
+    // Flags and scenes have no text form on the command line.
     if constexpr (!IsVector<T>::value && !std::is_same_v<T, bool>)
       if (name == field.name) is_valid = parse_text(field, text, value);
   }

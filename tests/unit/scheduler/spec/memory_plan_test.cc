@@ -12,7 +12,7 @@ constexpr uint64_t kMiB = uint64_t{1} << 20, kGiB = uint64_t{1} << 30;
 constexpr uint64_t kBudgets[] = {64 * kMiB, 100'000'000, kGiB, 12 * kGiB};
 constexpr unsigned kThreads[] = {1, 2, 16, 1000};
 
-// The division of some budgets is fixed here, because a change shifts the balance between speed and
+// Fixes how some budgets are divided, because a change would shift the balance between speed and
 // memory.
 TEST(MemoryPlan, DividesTheBudgetBetweenStages) {
   struct Expected {
@@ -29,8 +29,8 @@ TEST(MemoryPlan, DividesTheBudgetBetweenStages) {
   }
 }
 
-// Workers get equal shares. If the shares would be too small for any subvolume, there are fewer
-// workers.
+// Workers get equal shares. If the shares would be too small for any subvolume, the number of
+// workers is reduced.
 TEST(MemoryPlan, DividesWhatIsFreeBetweenWorkers) {
   struct Expected {
     uint64_t free;
@@ -49,7 +49,7 @@ TEST(MemoryPlan, DividesWhatIsFreeBetweenWorkers) {
   }
 }
 
-// All parts fit in a worker's share, in addition to its retained pages.
+// A worker's share holds all parts and the worker's retained pages.
 TEST(MemoryPlan, DividesAWorkersShare) {
   EXPECT_EQ(WorkerMemory::key_bytes(64 * kMiB), 56 * kMiB);
   EXPECT_EQ(BackendMemory::page_bytes(10 * kMiB), 8 * kMiB);
@@ -75,7 +75,7 @@ TEST(MemoryPlan, DividesTheMergesBudget) {
   EXPECT_EQ(large.partition_bytes, 5 * kGiB - 5 * kGiB / 16);
 }
 
-// Parts that are in use at the same time never exceed the budget together.
+// The parts that are in use at the same time fit in the budget.
 TEST(MemoryPlan, PartsFitTheWhole) {
   for (const uint64_t budget : kBudgets) {
     const MemoryPlan plan = MemoryPlan::divide(budget);

@@ -1,5 +1,5 @@
-// Builds that share subvolumes through a cache: earlier results are copied, and the bytes are the
-// same.
+// Builds that share subvolumes through a cache. Cached results are copied, and the bytes of the
+// file are the same.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -70,8 +70,8 @@ class CacheTest : public testing::Test {
   Grid grid_;
 };
 
-// One node is moved. All subvolumes except the few that it left or entered come from the cache, and
-// the bytes equal a build without a cache.
+// One node of the scene is moved. The cache provides all subvolumes except the few that the node
+// has left or entered. A build without a cache gives the same bytes.
 TEST_F(CacheTest, AMovedNodeCostsItsOwnSubvolumes) {
   const std::string cache = folder_.file("cache");
   write_chair(0);
@@ -87,8 +87,8 @@ TEST_F(CacheTest, AMovedNodeCostsItsOwnSubvolumes) {
   EXPECT_LT(second.subvolumes_reused, second.subvolumes);
 }
 
-// A damaged entry is a miss; the cache never exceeds its limit; files of a killed build are
-// removed.
+// A damaged entry is built again. The cache never exceeds its limit. Files that a killed build has
+// left in the cache are removed.
 TEST_F(CacheTest, DamageLimitAndLeftovers) {
   const std::string cache = folder_.file("cache");
   write_chair(0);

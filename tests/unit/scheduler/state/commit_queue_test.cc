@@ -1,5 +1,5 @@
-// Groups of artifacts become durable in the background. A row is never recorded before its bytes
-// are durable.
+// The queue makes groups of artifacts durable in the background. It never records a row before the
+// row's bytes are durable.
 #include "scheduler/state/commit_queue.h"
 
 #include <gtest/gtest.h>
@@ -160,7 +160,7 @@ TEST_F(CommitQueueTest, TheWorkerContinuesWhileTheDiskWrites) {
   EXPECT_EQ(recorded(), begun_with + 2);
 }
 
-// If the disk is too slow, the worker waits, so that a group does not grow without limit.
+// If the disk is too slow, the worker waits, so that the current group does not grow without limit.
 TEST_F(CommitQueueTest, WaitsForADiskThatFallsBehind) {
   disk_.block_syncs();
   build_a_group();
@@ -177,7 +177,7 @@ TEST_F(CommitQueueTest, WaitsForADiskThatFallsBehind) {
   EXPECT_EQ(recorded(), next_);
 }
 
-// A failed sync is not repeated, because the second sync would succeed without the lost bytes.
+// A failed sync is not repeated: the second sync would succeed although bytes are lost.
 TEST_F(CommitQueueTest, WhatAFailedSyncLostIsNotRecorded) {
   disk_.fail_next_sync();
   bool reported = false;
@@ -196,7 +196,7 @@ TEST_F(CommitQueueTest, WhatAFailedSyncLostIsNotRecorded) {
   EXPECT_EQ(recorded(), 0u);
 }
 
-// The last group can be merged immediately, and waits for the disk only on request.
+// The merge can read the last group immediately. It waits for the disk only on request.
 TEST_F(CommitQueueTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
   disk_.block_syncs();
   for (int i = 0; i < 3; ++i) build_one();
@@ -244,8 +244,8 @@ TEST_F(CommitQueueTest, WhatTheJobStoreCannotStoreIsRecordedLater) {
   EXPECT_EQ(recorded(), 3u);
 }
 
-// Triangles that a later run could read are released only once their subvolumes are recorded, and
-// the last group waits for that.
+// Triangles that a later run could read are released only after their subvolumes are recorded. So
+// finish() waits until the last group is recorded.
 TEST_F(CommitQueueTest, DurableTrianglesStayUntilTheirSubvolumesAreRecorded) {
   DurableStore durable(system_files(), folder_.file("triangles"), {}, folder_.file("spill"), false,
                        budget_);
@@ -268,7 +268,7 @@ TEST_F(CommitQueueTest, DurableTrianglesStayUntilTheirSubvolumesAreRecorded) {
   EXPECT_EQ(announced(), 0u);
 }
 
-// What a full disk could store is recorded, and readable.
+// Artifacts that were written before the disk became full are recorded and readable.
 TEST_F(CommitQueueTest, WhatAFullDiskStoredIsRecorded) {
   build_a_group();
   queue_.commit();

@@ -1,4 +1,4 @@
-// What others see of a build that is not finished.
+// The state of an unfinished build, as other processes see it.
 #include "scheduler/state/job_progress.h"
 
 #include <gtest/gtest.h>
@@ -52,8 +52,8 @@ class BlockingProgress : public NoProgress {
   int ended_ = 0;
 };
 
-// A thread that waited for its turn writes the present state, not the state at the beginning of its
-// wait. Otherwise an old row could remain at the end of a stage.
+// A thread that waited for its turn to write a snapshot writes the state at the end of its wait,
+// not at the beginning. Otherwise the store could keep an old row at the end of a stage.
 TEST(JobProgressTest, WritesTheNewestSnapshot) {
   const TemporaryFolder folder;
   CancelToken cancel;

@@ -34,8 +34,7 @@ class JobStoreTest : public testing::Test {
   const JobIdentity job_{"abc", "{\"resolution\":4}", 1};
 };
 
-// Rows that were recorded exist when the store is opened again, and all of their numbers are
-// unchanged.
+// When the store is opened again, all recorded rows exist with unchanged numbers.
 TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   {
     JobStore store(path(), JobStore::Access::kBuild);
@@ -60,7 +59,8 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   EXPECT_EQ(store.stage_times()[0].largest_thread_share, 0.25);
 }
 
-// A subvolume marked as built without a record is planned again when it is dropped; records remain.
+// A subvolume that is built only in memory is planned again when it is forgotten. A recorded
+// subvolume remains built.
 TEST_F(JobStoreTest, ForgetsWhatIsBuiltInMemoryOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(2));
@@ -94,7 +94,8 @@ TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   EXPECT_TRUE(leaves[2].summary.empty());
 }
 
-// A built but unrecorded subvolume is in no row; a lost one is planned again.
+// Other processes see a subvolume that is built only in memory as planned. A subvolume marked for
+// rebuild is planned again for all.
 TEST_F(JobStoreTest, BuiltInMemoryIsKnownToTheWriterOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(3));
@@ -133,7 +134,7 @@ TEST_F(JobStoreTest, StartingOverForgets) {
   EXPECT_EQ(store.leaves().size(), 2u);
 }
 
-// Files of another kind or version are refused, and the error names it.
+// A file of another kind or version is refused, and the error names the kind or version.
 TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
   std::ofstream(path()) << "this is no database at all, whatever its name may say";
   try {
@@ -162,7 +163,7 @@ TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
   }
 }
 
-// A store of an earlier version is refused, for building and for reading, and is left as it is.
+// A store of an earlier version is refused, for building and for reading, and is not changed.
 TEST_F(JobStoreTest, RefusesAnEarlierVersion) {
   {
     JobStore store(path(), JobStore::Access::kBuild);
@@ -183,7 +184,8 @@ TEST_F(JobStoreTest, RefusesAnEarlierVersion) {
   EXPECT_EQ(JobStore(path(), JobStore::Access::kRead).leaves().size(), 3u);
 }
 
-// An unfinished merge and its result are remembered, replaced and forgotten; a new job has neither.
+// The store keeps, replaces and forgets the state of an unfinished merge and the merge's result. A
+// new job has neither.
 TEST_F(JobStoreTest, RemembersTheMerge) {
   const std::vector<std::byte> state = {std::byte{0}, std::byte{7}, std::byte{255}};
   JobResult result{"out", "sha", 1ull << 40, {}, "colors"};
@@ -211,7 +213,7 @@ TEST_F(JobStoreTest, RemembersTheMerge) {
   EXPECT_FALSE(store.merge().has_value());
 }
 
-// SQLite would return a row that was damaged on the disk; the row's own checksum detects it.
+// SQLite returns a row that was damaged on the disk. The checksum in the row detects the damage.
 TEST_F(JobStoreTest, NoticesARowThatChanged) {
   for (const char* change : {"x = x + 1", "state = 1", "voxels = 12", "checksum = checksum + 1"}) {
     SCOPED_TRACE(change);
@@ -229,7 +231,7 @@ TEST_F(JobStoreTest, NoticesARowThatChanged) {
   }
 }
 
-// So are the rows of the job, of the merge and of its result.
+// The checksums of the rows of the job, the merge and the result detect changes.
 TEST_F(JobStoreTest, NoticesAChangeInAnyRowThatDecides) {
   struct Change {
     const char* sql;
@@ -253,8 +255,8 @@ TEST_F(JobStoreTest, NoticesAChangeInAnyRowThatDecides) {
   }
 }
 
-// Rows that are missing, first, middle, last or all of them, would make a file without their
-// voxels.
+// Missing rows are detected, whether the first, a middle, the last or all of them are missing.
+// Otherwise the file would lack their voxels.
 TEST_F(JobStoreTest, NoticesMissingRows) {
   for (const char* missing : {"id = 1", "id % 2 = 0", "id = 6", "id = 7", "id > 0"}) {
     SCOPED_TRACE(missing);
@@ -271,7 +273,7 @@ TEST_F(JobStoreTest, NoticesMissingRows) {
   }
 }
 
-// Another connection reads while the builder's is open, and cannot write.
+// Another connection can read while the builder's connection is open, but cannot write.
 TEST_F(JobStoreTest, CanBeReadDuringABuild) {
   JobStore builder(path(), JobStore::Access::kBuild);
   builder.start(job_, plan(2));
@@ -286,8 +288,8 @@ TEST_F(JobStoreTest, CanBeReadDuringABuild) {
   EXPECT_THROW(looker.set_progress(progress), Error);
 }
 
-// The progress of ingest outlives the start of a job and is dropped on request, and when an
-// artifact is lost whose triangles were freed; a damaged row is detected.
+// The progress of ingest remains when a job starts. It is dropped on request, and when an artifact
+// is lost whose triangles were released. A damaged row is detected.
 TEST_F(JobStoreTest, RemembersTheProgressOfIngest) {
   const std::vector<std::byte> record = {std::byte{3}, std::byte{0}, std::byte{200}};
   JobStore store(path(), JobStore::Access::kBuild);

@@ -1,4 +1,4 @@
-// Stored surfaces come back as they were, but for what their colors do not depend on.
+// A stored surface is read back unchanged, except for members that do not affect its colors.
 #include "scheduler/triangles/surface_record.h"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,7 @@ TEST(SurfaceRecord, ComesBackAsItWas) {
           sizes.push_back(bytes.size() - before);
           expected.push_back(without_look(surface, has_image, has_color));
         }
-  EXPECT_EQ(sizes.front(), 41u);  // a header and nine coordinates: no look
+  EXPECT_EQ(sizes.front(), 41u);  // a header and nine coordinates; no color or texture
   EXPECT_EQ(*std::max_element(sizes.begin(), sizes.end()), 149u);
   EXPECT_LE(149u, kMaxSurfaceRecordBytes);
   SurfaceRecords records(bytes);
@@ -82,7 +82,7 @@ TEST(SurfaceRecord, RefusesWhatIsNoRecord) {
   EXPECT_THROW(SurfaceRecords(bytes).next(), DamagedTriangles);
 }
 
-// What was in memory comes from the file afterwards, and the memory is free.
+// After a store has moved to its file, its records are read from the file, and its memory is free.
 TEST(RecordStore, MovesToItsFile) {
   const TemporaryFolder folder;
   MemoryBudget budget(1 << 20);

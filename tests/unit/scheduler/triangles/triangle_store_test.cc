@@ -1,4 +1,4 @@
-// The guarantees of both triangle stores, and of the durable one.
+// Tests the guarantees of both triangle stores, and additional guarantees of the durable store.
 #include "scheduler/triangles/triangle_store.h"
 
 #include <gtest/gtest.h>
@@ -59,8 +59,8 @@ bool equal(const std::vector<FixedTriangle>& a, const std::vector<FixedTriangle>
                     });
 }
 
-// A bin returns its triangles in order, whether they were in memory or spilled, with
-// narrow and with wide records, read in batches of any size and again after a rewind.
+// A bin returns its triangles in order: from memory or spilled, with narrow and with wide records,
+// in batches of any size, and again after a rewind.
 TEST_P(TriangleStoreTest, ReturnsWhatWasStored) {
   for (const bool wide : {false, true})
     for (const uint64_t share_bytes : {uint64_t{0}, uint64_t{20000}, uint64_t{1} << 30}) {
@@ -99,8 +99,8 @@ TEST_P(TriangleStoreTest, ReturnsWhatWasStored) {
     }
 }
 
-// drop() frees triangles that no other run can read; the last release() frees the rest. The release
-// of a part counts for the bin that the part was copied from.
+// drop() frees a bin of a MemoryStore. A DurableStore keeps the bin until the last release(). A
+// part that was copied from a durable bin retains this bin until the part is released.
 TEST_P(TriangleStoreTest, FreesABinWithItsLastReference) {
   MemoryBudget share(1 << 20);
   const auto store = open_store(false, share);
@@ -128,7 +128,7 @@ TEST_P(TriangleStoreTest, FreesABinWithItsLastReference) {
   EXPECT_EQ(share.used(), 0u);
 }
 
-// A stream may begin at any triangle, within a chunk or between two.
+// A stream may begin at any triangle, inside a chunk or between two chunks.
 TEST_P(TriangleStoreTest, StreamsBeginAnywhere) {
   MemoryBudget share(40000);
   const auto store = open_store(false, share);
@@ -160,8 +160,8 @@ std::string name_of(const testing::TestParamInfo<Kind>& info) {
 INSTANTIATE_TEST_SUITE_P(Stores, TriangleStoreTest, testing::Values(Kind::kMemory, Kind::kDurable),
                          name_of);
 
-// Another process finds the bins again from the state of a checkpoint alone, whatever was written
-// after that.
+// Another process finds the bins with only the state of a checkpoint. It ignores triangles that
+// were written after the checkpoint.
 TEST(DurableStoreTest, OpensAtItsLastCheckpoint) {
   TemporaryFolder folder;
   MemoryBudget share(1 << 20);
@@ -194,7 +194,7 @@ TEST(DurableStoreTest, OpensAtItsLastCheckpoint) {
       state = store->checkpoint();
     }
     store->file()->sync();
-    // No checkpoint names these: they are as good as never written.
+    // No checkpoint names these triangles, so the next run does not see them.
     for (int i = 0; i < 500; ++i) writer.append(0, random_triangle(random, 1000));
     writer.flush();
     EXPECT_FALSE(std::filesystem::exists(folder.file("spill")));

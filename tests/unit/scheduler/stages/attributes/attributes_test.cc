@@ -1,5 +1,5 @@
-// Builds with alpha, normals and materials: tests the cells' values, and that every way to build
-// gives the same bytes.
+// Builds with alpha, normals and materials. Tests the values of the cells, and that all ways to
+// build give the same bytes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -46,7 +46,7 @@ class Attributes : public testing::Test {
         *file, Grid::given({origin[0], origin[1], origin[2]}, file->edge(), file->grid_levels()),
         system_files(), *scene, 1, folder_.file("images"), 1, budget, progress, cancel);
   }
-  // The bytes of a section.
+  // Returns the bytes of the section of this kind; "" if the file has none.
   static std::string section_of_kind(const std::string& path, uint32_t kind) {
     std::ifstream in(path, std::ios::binary);
     const std::string bytes(std::istreambuf_iterator<char>(in), {});
@@ -84,7 +84,7 @@ TEST_F(Attributes, AreThoseOfTheScene) {
         ++cells;
         sheet += *material == 0;
         plain += *material == 1;
-        // The corners' order puts all fronts below; the sheet's fronts have all angles.
+        // All front faces point down. Those of the bumpy sheet do so at many angles.
         EXPECT_LT(normal->y, *material == 1 ? -0.999 : -0.1);
       }
   EXPECT_EQ(cells, report.colors->cells);
@@ -96,8 +96,8 @@ TEST_F(Attributes, AreThoseOfTheScene) {
   EXPECT_GT(sample.cells, 1000u);
 }
 
-// No section depends on the other attributes that are built with it, and the levels depend on no
-// attribute.
+// The bytes of a section do not depend on the other attributes of the build. The levels depend on
+// no attribute.
 TEST_F(Attributes, AreIndependent) {
   build(spec(64, 64, kAll));
   std::string sections[5];
@@ -150,7 +150,7 @@ TEST_F(Attributes, AreTheSameBytesFromEveryRoute) {
   stop("material", 1);
 }
 
-// A cube counts as baked only if all its attributes are stored.
+// A cube is baked again unless all its attributes are stored.
 TEST_F(Attributes, AHalfStoredCubeIsBakedAgain) {
   const std::string expected = build(spec(256, 256, kAll)).sha256;
   std::filesystem::remove(output());
@@ -162,8 +162,8 @@ TEST_F(Attributes, AHalfStoredCubeIsBakedAgain) {
   EXPECT_EQ(report.colors->cubes_reused + 1, report.colors->cubes);
 }
 
-// The names of materials are in the file. So the file of a finished build is not reused if the
-// names have changed.
+// The file contains the names of materials. So a finished file is not reused if a name has
+// changed.
 TEST_F(Attributes, FollowTheNamesOfMaterials) {
   BuildSpec s = spec(32, 32, {Attribute::kMaterial});
   s.run.keep_work = true;
@@ -177,7 +177,7 @@ TEST_F(Attributes, FollowTheNamesOfMaterials) {
   EXPECT_EQ(open_global_file(output())->material_names()[1], "other");
 }
 
-// The work folder belongs to other options.
+// A build refuses the work folder of a build with other attributes, and the error names them.
 TEST_F(Attributes, BelongToTheJob) {
   build_until(spec(128, 128, {Attribute::kColor}), "write", 0);
   const Error error = error_of([&] { build(spec(128, 128, kAll)); });

@@ -1,4 +1,4 @@
-// Colors that outlive a run: reused and repeated cubes.
+// Color cubes that a later run reuses or bakes again.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 namespace voxdag {
 namespace {
 
-// A painted scene in 64 cubes, of which about a third has surfaces.
+// A painted scene whose color grid has 64 cubes. About a third of them have surfaces.
 class ColorArtifacts : public testing::Test {
  protected:
   void SetUp() override {
@@ -32,7 +32,7 @@ class ColorArtifacts : public testing::Test {
     CancelToken cancel;
     return run_build(spec, {system_files(), warnings_, cancel});
   }
-  // Stops a build that has baked all its colors.
+  // Runs a build until all its colors are baked.
   void bake() { build_until(spec(), "write", 0); }
   BuildReport resume() {
     const BuildReport report = build(spec());
@@ -75,7 +75,7 @@ TEST_F(ColorArtifacts, WithoutAnythingToBakeNoImageIsDecoded) {
   EXPECT_EQ(report.colors->image_bytes, 0u);
 }
 
-// The image is in a separate file: the scene's files are unchanged.
+// The image is a separate file, so the glTF file and its buffer do not change.
 TEST_F(ColorArtifacts, AChangedImageRepeatsTheCubesThatShowIt) {
   PaintedScene::write(folder_.path(), 128);
   const std::string changed = build(spec()).sha256;
@@ -86,12 +86,12 @@ TEST_F(ColorArtifacts, AChangedImageRepeatsTheCubesThatShowIt) {
   PaintedScene::write(folder_.path(), 128);
   expected_ = changed;
   const ColorReport colors = *resume().colors;
-  // The cubes of the triangle, which is far from the sheet, are reused.
+  // The cubes that show only the triangle, which is far from the sheet, are reused.
   EXPECT_GE(colors.cubes_reused, 4u);
   EXPECT_LE(colors.cubes_reused + 16, colors.cubes);
 }
 
-// Nor does a finished build answer for another image.
+// A finished build is also not reused after its image has changed.
 TEST_F(ColorArtifacts, AFinishedBuildIsOfItsImage) {
   BuildSpec s = spec();
   s.run.keep_work = true;
@@ -119,21 +119,21 @@ TEST_F(ColorArtifacts, WhatIsDamagedIsBakedAgain) {
   EXPECT_EQ(colors.cubes_reused + 1, colors.cubes);
   EXPECT_NE(warnings_.text.find("damaged colors are baked again; number of cubes: 1"),
             std::string::npos);
-  // Cut off, as by a stop: silent.
+  // A cut-off end, as after a killed process, gives no warning.
   warnings_.text.clear();
   bake();
   std::filesystem::resize_file(artifacts(), std::filesystem::file_size(artifacts()) - 1);
   colors = *resume().colors;
   EXPECT_EQ(colors.cubes_reused + 1, colors.cubes);
-  // The part after a damaged header is unreadable.
+  // After a damaged header, the rest of the file cannot be read.
   bake();
   damage(20);
   EXPECT_EQ(resume().colors->cubes_reused, 0u);
   EXPECT_EQ(warnings_.text, "");
 }
 
-// Stored cubes of an earlier scene are dropped when there are more of them than of this scene's
-// cubes.
+// Stored cubes of earlier scenes are dropped when they outnumber the cubes of this
+// scene.
 TEST_F(ColorArtifacts, DoNotGrowWithoutEnd) {
   BuildSpec s = spec();
   s.run.keep_work = true;
@@ -177,7 +177,7 @@ TEST(ColorKeys, NameAllThatColorsDependOn) {
   named.name = "name";
   named.number = 9;
   EXPECT_EQ(look(named), look(plain));
-  // That of a material counts where cells have it.
+  // The name and number of a material count only if cells store materials.
   const AttributeSet with_materials{Attribute::kMaterial};
   EXPECT_NE(look_digests(std::span(&named, 1), images, with_materials)[0],
             look_digests(std::span(&plain, 1), images, with_materials)[0]);
@@ -226,7 +226,7 @@ TEST(RegionRecords, ComeBackAsTheyWere) {
   EXPECT_THROW(cut.next(), Error);
 }
 
-// The merge, and so the colors, of a cluster build.
+// Builds on a cluster, whose merge also bakes the colors.
 class ColorsOnCluster : public Cluster {
  protected:
   void SetUp() override {

@@ -46,7 +46,7 @@ struct Counts {
   uint64_t red = 0, blue = 0, green = 0, other = 0;
 };
 
-// The colors of all set cells of a level.
+// Counts the set cells of a level by color.
 Counts count_colors(const voxdag_reader::File& file, uint32_t level) {
   Counts counts;
   voxdag_reader::ColorCursor cursor(file);
@@ -83,8 +83,8 @@ TEST_F(ColorStage, AreThoseOfTheMaterials) {
   EXPECT_GT(counts.red, 4000u);
   EXPECT_GT(counts.blue, 4000u);
   EXPECT_GT(counts.green, 500u);
-  // Other colors occur where the two halves of the image, or the sheet and the triangle, share a
-  // color block.
+  // Other colors occur only where a color block has both halves of the image, or both the sheet and
+  // the triangle.
   EXPECT_LT(counts.other, file->voxels() / 10);
   NoProgress progress;
   MemoryBudget budget(uint64_t{64} << 20);
@@ -120,7 +120,7 @@ TEST_F(ColorStage, AreTheSameAfterAnInterruption) {
   }
 }
 
-// PLY and npz have the colors of the cells in their order.
+// PLY and npz files have the colors in the order of the cells.
 TEST_F(ColorStage, AreExported) {
   build(spec(64));
   const auto file = open_global_file(output());
@@ -163,7 +163,7 @@ TEST_F(ColorStage, FollowTheImage) {
   PaintedScene::write(folder_.path(), 128);
   EXPECT_NE(build(spec(64)).sha256, red);
   const auto file = open_global_file(output());
-  // Without colors the image does not matter.
+  // Without colors, a change of the image does not change the file.
   BuildSpec plain = spec(64);
   plain.geometry.attributes = {};
   const std::string gray = build(plain).sha256;

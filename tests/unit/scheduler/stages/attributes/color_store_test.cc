@@ -41,7 +41,7 @@ class ColorStoreTest : public testing::Test {
     return all;
   }
   uint64_t file_bytes() const { return std::filesystem::file_size(path_); }
-  // Overwrites a byte of the file.
+  // Overwrites four bytes of the file.
   void damage(uint64_t offset) const {
     std::fstream(path_, std::ios::in | std::ios::out | std::ios::binary)
             .seekp(static_cast<std::streamoff>(offset))
@@ -75,7 +75,7 @@ TEST_F(ColorStoreTest, HasWhatWasAdded) {
     EXPECT_EQ(read(store, c_), bytes_of(std::string(300000, 'c')));
     EXPECT_EQ(store.file_bytes(), whole);
   }
-  // What was not written to its end is written over.
+  // An artifact that was not written to its end is overwritten.
   std::filesystem::resize_file(path_, whole - 1);
   {
     ColorStore store = open();
@@ -85,7 +85,7 @@ TEST_F(ColorStoreTest, HasWhatWasAdded) {
   const ColorStore store = open();
   EXPECT_EQ(read(store, c_), bytes_of("short"));
   EXPECT_EQ(warnings_.text, "");
-  // Damage since then.
+  // Damage that occurs after open() is detected by a read.
   damage(56);
   EXPECT_THROW(read(store, a_), Error);
 }
@@ -105,7 +105,7 @@ TEST_F(ColorStoreTest, HasArtifactsInParts) {
     ColorStore store = open();
     EXPECT_FALSE(store.has(a_));
     EXPECT_EQ(read(store, b_), bytes_of("two parts"));
-    // What an earlier run has begun does not count.
+    // Parts of an artifact that an earlier run has not completed do not count.
     for (uint64_t i = 0; i < 3; ++i) store.add(a_, i, i == 2, bytes_of("abc"));
   }
   EXPECT_EQ(read(open(), a_), bytes_of("abcabcabc"));
@@ -126,7 +126,7 @@ TEST_F(ColorStoreTest, DropsWhatIsMostOfItAndNotWanted) {
   }
   const uint64_t whole = file_bytes();
   {
-    // Too little garbage.
+    // The store has too little garbage to remove it.
     ColorStore store = open();
     store.keep_only(std::array{a_}, cancel_);
     EXPECT_EQ(store.file_bytes(), whole);
@@ -151,7 +151,7 @@ TEST_F(ColorStoreTest, DropsWhatIsMostOfItAndNotWanted) {
   EXPECT_EQ(warnings_.text, "");
 }
 
-// A disk that takes its time.
+// A disk on which each sync takes a millisecond.
 class SlowWriter : public ForwardingWriter {
  public:
   SlowWriter(std::unique_ptr<WritableFile> file, std::atomic<int>& syncs)

@@ -1,4 +1,4 @@
-// Cubes of the color grid have the same colors for any amount of memory.
+// The colors of a color grid's cubes do not depend on the memory for baking.
 #include "scheduler/stages/attributes/cube_baker.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 struct Baked {
   CubeBaker::Records records;
-  size_t parts = 0;  // that were taken before the last
+  size_t parts = 0;  // number of calls that took records before the end
 };
 
 class CubeBaking : public testing::Test {
@@ -31,7 +31,7 @@ class CubeBaking : public testing::Test {
     for (SurfaceCorner& c : surface.corners)
       c.color = {static_cast<uint16_t>(random(65536)), 9, 40000, kFullIntensity};
   }
-  // The whole grid.
+  // Bakes the complete grid.
   Baked bake(uint64_t region_bytes, uint64_t surface_bytes) {
     MemoryBudget budget(uint64_t{1} << 30);
     NoProgress progress;
@@ -68,7 +68,7 @@ class CubeBaking : public testing::Test {
       EXPECT_EQ(&records, &last);
       const size_t most = append();
       EXPECT_GE(most, CubeBaker::kManyRecordBytes);
-      // A region has 600 KiB of normals at most.
+      // A region has at most 600 KiB of normals.
       EXPECT_LE(most, CubeBaker::kManyRecordBytes + (610 << 10));
       ++baked.parts;
     });
@@ -101,7 +101,7 @@ TEST_F(CubeBaking, DividesSurfaces) {
   for (RegionRecords records(whole.records[0]); records.next();) ++regions;
   EXPECT_GT(regions, 100u);
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 60 << 10).records, whole.records);
-  // Not even the surfaces of one region fit in memory, so they are processed in parts.
+  // 1 KiB does not even hold the surfaces of one region, so they are processed in parts.
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 1 << 10).records, whole.records);
 }
 
@@ -110,8 +110,8 @@ class SolidCubes : public CubeBaking {
   SolidCubes() : CubeBaking(7) {}
 };
 
-// All cells of the regions are set, so a region fits in memory only if it is baked as its eight
-// children.
+// All cells of the regions are set. So with the smaller memory, a region fits only if its eight
+// children are baked one by one.
 TEST_F(SolidCubes, AreBakedByChildren) {
   constexpr int64_t kEnd = int64_t{1} << (7 + kUnitBits);
   for (int64_t z = kUnitsPerVoxel / 2 | 1; z < kEnd; z += kUnitsPerVoxel)
@@ -126,7 +126,7 @@ TEST_F(SolidCubes, AreBakedByChildren) {
   for (RegionRecords records(whole.records[0]); const auto region = records.next();)
     cells += region->counts[0];
   EXPECT_EQ(cells, uint64_t{1} << 21);
-  // At most a few of their regions are in memory.
+  // The records are taken several times, so only a few regions are in memory.
   EXPECT_GE(whole.parts, 4u);
   for (const uint64_t surface_bytes : {1 << 20, 2 << 10}) {
     const Baked by_children = bake(ColorMemory::kRegionBytes, surface_bytes);

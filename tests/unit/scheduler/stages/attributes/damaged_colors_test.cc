@@ -37,7 +37,7 @@ query::Picture render(const std::string& path) {
                         cancel);
 }
 
-// No picture is made from damaged colors, and the error names the damage.
+// A render of a file with damaged colors fails, and the error names the damage.
 TEST(DamagedColors, EndARender) {
   const TemporaryFolder folder;
   BuildSpec spec;
@@ -52,7 +52,7 @@ TEST(DamagedColors, EndARender) {
     std::ifstream in(spec.run.output, std::ios::binary);
     bytes.assign(std::istreambuf_iterator<char>(in), {});
   }
-  // The only region is to have no cells of the finest level.
+  // Removes all cells of the finest level from the only color region.
   const uint64_t section = number_at(bytes, 1152 + 8), size = number_at(bytes, 1152 + 16);
   const uint64_t directory = section + 16 * number_at(bytes, section + size - 32 + 8);
   std::memset(bytes.data() + directory + 16, 0, sizeof(uint32_t));

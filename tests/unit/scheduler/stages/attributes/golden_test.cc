@@ -1,6 +1,6 @@
-// Digests of files with colors. Every version of voxdag, compiler and distribution must make these
-// bytes of the same scene; this includes the decoders of images. If a digest changes, the format
-// needs a new version.
+// Digests of files with colors. Every version, compiler and distribution must make these bytes
+// from the same scene, including its images. If a digest changes, the format needs a new
+// version.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -37,7 +37,7 @@ TEST(GoldenColors, Png) {
   EXPECT_EQ(digest_of("", 16), "c5edeb1ed8c25e73db763d62cb6908aa5559b2169b549c9ed96fc52b5a032f6f");
 }
 
-// The same samples, stored in two ways.
+// Both JPEG files have the same samples, one as a baseline and one as a progressive image.
 TEST(GoldenColors, Jpeg) {
   const char* const expected = "37b0b86705169ef42183e369c19154ed5af1e19cf4a098456979f4e274d81030";
   EXPECT_EQ(digest_of("waves.jpg", 128), expected);

@@ -1,5 +1,5 @@
-// A glTF scene with everything that determines colors: a bumpy sheet with an image whose halves are
-// red and blue, and a triangle with green vertices in front of it.
+// A glTF scene that uses every source of color: a bumpy sheet with an image whose halves are red
+// and blue, and a triangle with green vertices above it.
 #pragma once
 
 #include <cmath>
@@ -102,7 +102,7 @@ class PaintedScene {
          {"material", 0}});
   }
 
-  // At y = 1/2, over the middle of the sheet.
+  // Adds a triangle at y = 1/2, above the middle of the sheet.
   void add_triangle() {
     const int position =
         accessor(std::vector<float>{0.25F, 0.5F, 0.25F, 0.75F, 0.5F, 0.25F, 0.5F, 0.5F, 0.75F},
@@ -122,7 +122,7 @@ inline BuildReport build_now(const BuildSpec& spec) {
   return run_build(spec, {system_files(), progress, cancel});
 }
 
-// A build of the scene that replaces the files of an earlier one.
+// Returns a build of the scene that replaces the output of an earlier build.
 inline BuildSpec painted_spec(const std::string& scene, const std::string& output,
                               uint64_t resolution) {
   BuildSpec spec;

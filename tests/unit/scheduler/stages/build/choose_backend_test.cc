@@ -44,7 +44,7 @@ class Forgetful : public Backend {
 
 std::unique_ptr<Backend> right_gpu(int) { return make_parallel_host_backend(Method::kFast); }
 
-// The check accepts every right backend, and detects a single wrong voxel.
+// The check accepts every correct backend, and detects a backend that omits a single voxel.
 TEST(BackendCheck, FindsOneVoxel) {
   for (const Method method : {Method::kFast, Method::kPointers, Method::kHashes})
     EXPECT_EQ(difference_from_cpu(*make_parallel_host_backend(method)), "");
@@ -52,8 +52,8 @@ TEST(BackendCheck, FindsOneVoxel) {
   EXPECT_NE(difference_from_cpu(forgetful), "");
 }
 
-// Without a GPU there is no warning. GPUs that pass the check are chosen, and workers use them in
-// turn.
+// Without a GPU, the CPU is chosen without a warning. GPUs that pass the check are chosen, and
+// workers use them in turn.
 TEST(ChooseBackend, AutoChoosesGpusThatAreRight) {
   Warnings warnings;
   EXPECT_EQ(choose_automatically({}, kPlenty, warnings).name, "cpu");
@@ -94,7 +94,7 @@ TEST(ChooseBackend, AutoFallsBackToTheCpu) {
   expect_cpu({1, broken}, kPlenty, "cudaStreamCreate failed");
 }
 
-// A method that the backend does not have is refused, and so are unknown names.
+// Unknown names are refused, and also methods that the chosen backend does not have.
 TEST(ChooseBackend, RefusesWhatDoesNotGoTogether) {
   const auto refused = [](const std::string& backend, const std::string& method) {
     RunOptions options;

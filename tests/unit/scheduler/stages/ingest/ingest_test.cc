@@ -1,4 +1,4 @@
-// Ingest on any number of threads gives the same result, and reports the first error.
+// Ingest gives the same result on any number of threads, and reports the first error.
 #include "scheduler/stages/ingest/ingest.h"
 
 #include <gtest/gtest.h>

@@ -25,7 +25,7 @@ FixedTriangle triangle_near(std::mt19937_64& random, int64_t size_units) {
   return t;
 }
 
-// Walks the leaves one by one with the plain overlap test.
+// Tests each leaf with the exact overlap test.
 std::vector<size_t> touched_by_brute_force(const FixedTriangle& t,
                                            const std::vector<SubvolumePlan>& leaves) {
   std::vector<size_t> touched;
@@ -51,7 +51,7 @@ void add(TopTree& top, const FixedTriangle& t) {
   top.add(tally);
 }
 
-// Counting neighboring triangles together gives the sum of their separate counts.
+// Counting many triangles in one tally gives the sum of separate counts.
 TEST(TopTree, OneTallyOrMany) {
   MemoryBudget budget(uint64_t{1} << 30);
   TopTree one(kLevels, budget, 5), many(kLevels, budget, 5);
@@ -81,8 +81,8 @@ TEST(TopTree, OneTallyOrMany) {
   }
 }
 
-// Every triangle goes to all subvolumes that it touches, for any division into subvolumes. The plan
-// has a subvolume at every place that a triangle touches.
+// For any division into subvolumes, each triangle is assigned to all subvolumes that it touches.
+// The plan has a subvolume wherever a triangle touches the grid.
 TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
   MemoryBudget budget(uint64_t{1} << 30);
   for (const int64_t size : {int64_t{600}, int64_t{40000}, int64_t{900000}}) {
@@ -103,11 +103,11 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
         std::vector<size_t> got;
         tree.for_each_touched(t, hint, [&](size_t leaf) { got.push_back(leaf); });
         std::sort(got.begin(), got.end());
-        // The tree may give a leaf that the triangle does not touch, because a box inside one cube
-        // is not tested. It must not omit a leaf.
+        // The tree may assign a triangle to a leaf that it does not touch: if the triangle's box is
+        // inside one cube, the overlap is not tested. It must not omit a leaf.
         const auto touched = touched_by_brute_force(t, leaves);
         EXPECT_TRUE(std::includes(got.begin(), got.end(), touched.begin(), touched.end()));
-        // Voxels of the triangle inside the grid are in some leaf.
+        // If the triangle touches the grid, it touches at least one leaf.
         const int64_t origin[3] = {0, 0, 0};
         if (triangle_touches_cube(t, origin, int64_t{kUnitsPerVoxel} << kLevels)) {
           EXPECT_FALSE(touched.empty());
@@ -117,7 +117,7 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
   }
 }
 
-// The same for the parts of a cube that is split, with triangles that extend beyond the cube.
+// Tests the same for the parts of a split cube, with triangles that extend beyond the cube.
 TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
   const Cube whole{2, {1, 2, 1}};
   std::vector<SubvolumePlan> parts;
@@ -151,7 +151,7 @@ TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
   EXPECT_GT(beyond, 20);
 }
 
-// A triangle's weight is counted in exactly the cells that the triangle touches, whatever its size.
+// Whatever the size of a triangle, its weight is counted in exactly the cells that it touches.
 TEST(TopTree, CountsTheCellsThatTrianglesTouch) {
   constexpr uint32_t kDepth = 4;
   std::mt19937_64 random(11);
@@ -169,15 +169,16 @@ TEST(TopTree, CountsTheCellsThatTrianglesTouch) {
             const int64_t corner[3] = {x * units, y * units, z * units};
             touched += triangle_touches_cube(t, corner, units);
           }
-      // Beyond the grid's face a box inside one cell is not tested.
+      // A box inside one cell is not tested, so a triangle that touches no cell may still be
+      // counted.
       if (touched > 0) {
         EXPECT_EQ(top.occupied_cells(), touched) << "size " << size << ", " << i;
       }
     }
 }
 
-// Cubes of a plan are disjoint, in Morton order, and no heavier than requested unless they are
-// single cells.
+// The cubes of a plan are disjoint and in Morton order. Only a single cell may be heavier than
+// requested.
 TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(3);
@@ -237,7 +238,7 @@ TEST(TopTree, TalliesAddUp) {
   }
 }
 
-// A top tree that is filled with the cells of another top tree gives the same plans as that one.
+// A top tree that takes over the cells of another top tree gives the same plans.
 TEST(TopTree, ContinuesFromTheCellsOfAnother) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(4);

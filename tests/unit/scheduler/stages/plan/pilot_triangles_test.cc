@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint32_t kShift = 6;
 
-// Stores small triangles in the order of a grid. Many of them are equal on a coarser grid.
+// Stores small triangles in the order of a grid. Many of them are equal on the pilot's grid.
 void fill(MemoryStore& store, int rows) {
   std::mt19937 random(7);
   BinWriter writer(store, {kSceneBin}, 1 << 20);
@@ -60,7 +60,7 @@ class PilotTrianglesTest : public testing::Test {
   MemoryStore store_{system_files(), folder_.file("spill"), false, budget_};
 };
 
-// What is left are the same triangles, few of them twice.
+// Keeps every distinct triangle. Few of the kept triangles are duplicates.
 TEST_F(PilotTrianglesTest, EqualOnesNearEachOtherAreThereOnce) {
   const auto all = read_all(*store_.open(kSceneBin), kShift);
   const std::set<Key> distinct(all.begin(), all.end());

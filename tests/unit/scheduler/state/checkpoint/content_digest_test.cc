@@ -7,8 +7,8 @@
 namespace voxdag {
 namespace {
 
-// A different grid, different pieces, or a different order of the pieces give a different digest. A
-// copy of a digest can be continued.
+// The digest depends on the grid, the pieces and their order. A copy of a digest can be continued
+// independently.
 TEST(ContentDigest, TellsContentsApart) {
   const Checksum128 a{1, 2}, b{3, 4};
   std::set<std::string> all;

@@ -1,4 +1,4 @@
-// Scan, ingest and partition of a large scene survive an interruption. Finished work is not
+// Scan, ingest and partition of a large scene resume after an interruption. Finished work is not
 // repeated, and is never used for another scene.
 #include "scheduler/state/checkpoint/ingest_checkpoint.h"
 
@@ -41,14 +41,14 @@ class IngestCheckpointTest : public testing::Test {
   std::string work() const { return output() + ".work"; }
   std::string durable() const { return work() + "/triangles.vddurable"; }
 
-  // Has checkpoints at the ends of scan, ingest and partition.
+  // Returns a build that writes checkpoints only at the ends of scan, ingest and partition.
   BuildSpec spec() const {
     BuildSpec spec = spheres_build(scene(), output());
     spec.run.checkpoint_interval_s = 1e9;
     spec.run.durable_min_triangles = 1;
     return spec;
   }
-  // Also writes a checkpoint after every piece of the scene.
+  // Returns a build that also writes a checkpoint after every piece of the scene.
   BuildSpec often() const {
     BuildSpec often = spec();
     often.run.checkpoint_interval_s = 0;
@@ -60,7 +60,7 @@ class IngestCheckpointTest : public testing::Test {
     CancelToken cancel;
     return run_build(spec, {files_, last_warning_, cancel});
   }
-  // Builds to the right bytes, without a warning.
+  // Builds. Expects the correct bytes, no warning, and no work folder afterwards.
   BuildReport expect_to_resume(const BuildSpec& spec) {
     const BuildReport report = build(spec);
     EXPECT_EQ(report.sha256, expected_);
@@ -83,8 +83,8 @@ class IngestCheckpointTest : public testing::Test {
   uint64_t whole_ = 0;
 };
 
-// A build that is interrupted at any point resumes there: it reads only the remaining part of the
-// scene, and nothing after the scene was ingested.
+// A build that is interrupted at any point resumes there: it reads only the rest of the scene, or
+// nothing if the scene was already ingested.
 TEST_F(IngestCheckpointTest, ResumesWhereItWas) {
   struct Moment {
     const char* stage;
@@ -120,8 +120,8 @@ TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   }
 }
 
-// Run options may change between the runs. Subvolumes that are split later find their triangles, as
-// do subvolumes that were built before.
+// Run options may change between the runs. The triangles of a subvolume that is split later are
+// found, whether or not the subvolume was built before.
 TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
   for (const char* stage : {"ingest", "build"}) {
     SCOPED_TRACE(stage);
@@ -138,7 +138,7 @@ TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
   }
 }
 
-// Disk space is freed as subvolumes are recorded.
+// The triangles of recorded subvolumes are removed from the disk.
 TEST_F(IngestCheckpointTest, FreesWhatIsBuilt) {
   build_until(spec(), "build", 0);
   const uint64_t all = std::filesystem::file_size(durable());
@@ -150,8 +150,8 @@ TEST_F(IngestCheckpointTest, FreesWhatIsBuilt) {
   expect_to_resume(spec());
 }
 
-// Another scene under the same name is refused. The job is not changed, and resumes when the first
-// scene is back, even if the times of its files are different.
+// A build with another scene of the same name is refused, and the job is not changed. The job
+// resumes when the first scene is back, even if its files have new times.
 TEST_F(IngestCheckpointTest, KnowsItsSceneByContent) {
   build_until(spec(), "build", 20);
   std::filesystem::rename(scene(), folder_.file("first.glb"));
@@ -213,7 +213,7 @@ TEST_F(IngestCheckpointTest, NoticesAChangeOfABuffer) {
   EXPECT_GT(files_.bytes_read[buffer], std::filesystem::file_size(buffer));
 }
 
-// A warning names the damage, and the scene is read again.
+// If stored triangles are damaged, a warning names the damage, and the scene is read again.
 TEST_F(IngestCheckpointTest, DamageIsHealed) {
   // Flips one bit in every `distance` bytes, except for the last few bytes.
   const auto flip = [&](uint64_t distance) {
@@ -247,7 +247,7 @@ TEST_F(IngestCheckpointTest, DamageIsHealed) {
     }
 }
 
-// If an artifact turns out to be damaged after its triangles were removed, the scene is read again.
+// If an artifact is found damaged after its triangles were removed, the scene is read again.
 TEST_F(IngestCheckpointTest, ReadsTheSceneForADamagedArtifact) {
   build_until(spec(), "merge", 0);
   std::filesystem::resize_file(work() + "/segment-0.vdseg", 1000);
@@ -255,8 +255,8 @@ TEST_F(IngestCheckpointTest, ReadsTheSceneForADamagedArtifact) {
   EXPECT_GE(part_read(), 1);
 }
 
-// If the disk has no space for triangles that memory can hold, there are no checkpoints. If the
-// disk becomes full later, the triangles are read again into memory.
+// If the disk has no space for the triangles but memory has, there are no checkpoints. If the disk
+// becomes full later, the scene is read again, into memory.
 TEST_F(IngestCheckpointTest, DoesWithoutDiskSpace) {
   files_.free_bytes = 3'000'000;
   expect_to_resume(spec());
@@ -267,7 +267,7 @@ TEST_F(IngestCheckpointTest, DoesWithoutDiskSpace) {
   EXPECT_NE(last_warning_.text.find("memory"), std::string::npos) << last_warning_.text;
 }
 
-// Starting over drops ingested triangles; a small scene has no checkpoints.
+// A restart drops the ingested triangles. A small scene has no checkpoints.
 TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
   build_until(spec(), "build", 0);
   BuildSpec again = spec();
@@ -280,7 +280,7 @@ TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
   EXPECT_FALSE(files_.bytes_written.contains(durable()));
 }
 
-// The times of a file are trusted once the file system's clock has advanced beyond them.
+// The times of a file count only once the clock of the file system has advanced beyond them.
 TEST(TrustedFiles, AreOlderThanATickOfTheirClock) {
   constexpr int64_t kSecond = 1'000'000'000;
   const auto file = [](int64_t modified_ns, int64_t changed_ns) {
