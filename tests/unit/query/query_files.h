@@ -1,4 +1,4 @@
-// Files of a few thousand voxels with shared nodes, and their voxels, for tests of query/lookup.
+// Small files with shared nodes, and their voxels, for tests of query/.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include "tests/unit/core/format/test_files.h"
 #include "voxdag/query.h"
 
-// A file, and the cells of each of its grids by brute force.
+// A file, and the cells of each of its grids, found by brute force.
 class QueryFile {
  public:
   using Cells = std::set<voxdag::query::Position>;  // in lexicographic order
@@ -29,7 +29,7 @@ class QueryFile {
 
   std::string path() const { return folder_.file("scene.vdag"); }
   uint32_t grid_levels() const { return levels_; }
-  // The set cells of the grid of 2^grid_levels.
+  // Returns the set cells of the grid of 2^grid_levels cells per edge.
   Cells cells(uint32_t grid_levels) const {
     Cells cells;
     const uint32_t shift = levels_ - grid_levels;

@@ -10,7 +10,7 @@
 #include "query/dag/dag_view.h"
 #include "query/render/camera.h"
 
-// An octree, without shared nodes, of a set of voxels.
+// The octree of a set of voxels, without shared nodes.
 class VoxelScene {
  public:
   using Voxel = std::array<int64_t, 3>;
@@ -20,8 +20,8 @@ class VoxelScene {
     if (!voxels.empty()) add(0, {voxels.begin(), voxels.end()});
   }
 
-  // Returns all voxels with x == `plane`. There is one node per level, which four children of its
-  // parent share.
+  // Returns the DAG of all voxels with x == `plane`. It has one node per level, which is shared by
+  // four children of its parent.
   static VoxelScene wall(uint32_t grid_levels, int64_t plane) {
     VoxelScene scene(grid_levels, {});
     for (uint32_t level = 0; level + 2 < grid_levels; ++level) {
@@ -36,7 +36,7 @@ class VoxelScene {
     return scene;
   }
 
-  // The voxels from 6 to 9 along each axis of a grid of 16.
+  // Returns the voxels from 6 to 9 along each axis of a grid of 16^3 voxels.
   static VoxelScene block() {
     std::set<Voxel> voxels;
     for (int64_t x = 6; x < 10; ++x)
@@ -54,7 +54,7 @@ class VoxelScene {
   }
 
  private:
-  // Returns the word offset of the new node or brick. `voxels` are the voxels in its cube.
+  // Adds a node or brick for `voxels`, the voxels in its cube, and returns its word offset.
   uint32_t add(uint32_t level, const std::vector<Voxel>& voxels) {
     if (level + 2 == grid_levels_) return add_brick(voxels);
     const uint32_t shift = grid_levels_ - 1 - level;
@@ -88,5 +88,5 @@ class VoxelScene {
   std::vector<std::vector<uint32_t>> words_;
 };
 
-// Looks at VoxelScene::block().
+// A camera that looks at VoxelScene::block().
 inline const voxdag::query::Placement kFromTheFront{{{8, 9, 24}}, {{8, 8, 8}}, 40};

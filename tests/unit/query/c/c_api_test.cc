@@ -41,7 +41,7 @@ TEST_F(CApiTest, Facts) {
   EXPECT_EQ(facts.origin[1], dag_.origin()[1]);
 }
 
-// Programs may be older or newer than the library.
+// A program may be compiled with a header that is older or newer than the library.
 TEST_F(CApiTest, StructsOfOtherSizes) {
   EXPECT_STREQ(voxdag_version(), VOXDAG_VERSION);
   voxdag_facts facts{};
@@ -50,7 +50,7 @@ TEST_F(CApiTest, StructsOfOtherSizes) {
     voxdag_facts known{};
     uint64_t unknown = 7, behind = 7;
   } later;
-  facts.struct_size = SIZE_MAX;  // uninitialized memory
+  facts.struct_size = SIZE_MAX;  // as in a struct that was not initialized
   EXPECT_EQ(voxdag_get_facts(file_, &facts), VOXDAG_INVALID_INPUT);
   later.known.struct_size = sizeof(voxdag_facts) + 8;
   ASSERT_EQ(voxdag_get_facts(file_, &later.known), VOXDAG_OK);

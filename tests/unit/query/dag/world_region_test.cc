@@ -1,4 +1,4 @@
-// Boxes and points of world space, in cells.
+// Converts boxes and points from world space to cells.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -22,7 +22,7 @@ class WorldRegion : public testing::Test {
                   Grid::given({-1920.9469616, -126.4427185, -1861.3}, 3720.9632874, kLevels));
     file_ = open_global_file(folder_.file("a.vdag"));
   }
-  // As to_world() of Python and its users compute it.
+  // Computes a world coordinate like to_world() of the Python package.
   double world(size_t axis, double cells) const {
     return file_->origin()[axis] + cells * (file_->edge() / static_cast<double>(kEdge));
   }
@@ -32,7 +32,7 @@ class WorldRegion : public testing::Test {
   std::unique_ptr<voxdag_reader::File> file_;
 };
 
-// The corner of a cell, computed in doubles, is in that cell, and a box that ends at the corner
+// The low corner of a cell, computed in doubles, is in that cell. A box that ends at this corner
 // does not contain the cell.
 TEST_F(WorldRegion, CornersOfCellsAreExact) {
   std::mt19937 random(5);

@@ -1,5 +1,5 @@
-// Decoders that return the voxels and colors of exported files. They were written only from
-// descriptions of the formats.
+// Decoders that return the voxels and colors of exported files. They were written from descriptions
+// of the formats, without the code of the exports.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace voxdag::query {
 using Cell3 = std::array<int64_t, 3>;
 using Color3 = std::array<int, 3>;
 
-// Numbers of a file, one after the other.
+// Reads the numbers of a file one after the other.
 class FileNumbers {
  public:
   explicit FileNumbers(const std::string& bytes, size_t at = 0) : bytes_(bytes), at_(at) {}
@@ -183,8 +183,8 @@ inline std::map<std::pair<Cell3, int>, Color3> decode_glb(const std::string& byt
   return faces;
 }
 
-// Reads the files of HashDAG. As HashDAG's viewer does, it finds a voxel's color by counting the
-// voxels before it while it descends the DAG.
+// Reads the files of HashDAG. It finds a voxel's color as HashDAG's viewer does: it descends the
+// DAG and counts the voxels before this voxel.
 class HashDagColors {
  public:
   HashDagColors(const std::string& dag, const std::string& colors) {

@@ -1,5 +1,5 @@
-// Palettes: few colors are unchanged, and many colors become the nearest of 255 colors. The order
-// of the colors does not matter.
+// Tests palettes. Few colors are kept unchanged; many colors are replaced by the nearest of 255
+// colors. The order of the colors does not matter.
 #include "query/export/color/color_palette.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ std::vector<Rgb> some_colors(size_t count) {
   std::mt19937 random(11);
   std::vector<Rgb> colors;
   for (size_t i = 0; i < count; ++i) {
-    // Colors are browns near each other, grays, and a few saturated colors.
+    // Most colors are similar browns; some are grays, and a few are saturated.
     const auto part = [&](unsigned low, unsigned range) {
       return static_cast<uint8_t>(low + random() % range);
     };
@@ -62,7 +62,7 @@ TEST(ColorPalette, IsNearManyColors) {
   for (const Rgb color : colors)
     squares += squared_distance(color, palette.colors()[palette.index_of(color)]);
   EXPECT_LT(squares / 3 / static_cast<double>(colors.size()), 16);
-  // Rare colors that are far from all others are not lost.
+  // Rare colors that are far from all others keep a color near them.
   const Rgb rare{255, 0, 220};
   EXPECT_LT(squared_distance(rare, palette.colors()[palette.index_of(rare)]), 300);
 }
@@ -73,7 +73,7 @@ TEST(ColorPalette, DependsOnTheColorsOnly) {
   const ColorPalette palette = palette_of(colors, budget);
   std::shuffle(colors.begin(), colors.end(), std::mt19937(1));
   EXPECT_EQ(palette_of(colors, budget).colors(), palette.colors());
-  // The same on every machine and with every compiler.
+  // This checksum is the same on every machine and with every compiler.
   uint32_t sum = 0;
   for (const Rgb color : palette.colors()) {
     sum = sum * 31 + color.r;

@@ -1,5 +1,5 @@
-// The colors of exported voxels equal the colors that the reader returns, in each format that
-// stores colors: for complete files, regions and coarser levels.
+// In each format that stores colors, the colors of exported voxels equal the colors that the reader
+// returns: for complete files, regions and coarser levels.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@
 namespace voxdag::query {
 namespace {
 
-// Few colors, in large patches: less than a palette has.
+// Returns few colors in large patches, fewer colors than a palette has.
 SumOf patches(uint32_t color_levels) {
   return [=](uint64_t code) {
     const uint64_t patch = code >> 3 * (color_levels - 1);
@@ -42,7 +42,7 @@ class ExportColors : public testing::Test {
     file_ = open_global_file(path);
   }
 
-  // The bytes of the files of an export.
+  // Exports, and returns the bytes of the written files.
   std::vector<std::string> bytes_of(const std::string& format, const Selection& selection,
                                     bool gray = false) {
     const ExportFormat& to = export_format(format);
@@ -56,7 +56,7 @@ class ExportColors : public testing::Test {
     return bytes;
   }
 
-  // Returns the colors of the selected cells as the reader finds them.
+  // Returns the colors of the selected cells according to the reader.
   std::map<Cell3, Color3> expected(const Selection& selection) const {
     std::map<Cell3, Color3> cells;
     const auto& [low, high] = selection.region;
@@ -69,8 +69,8 @@ class ExportColors : public testing::Test {
     return cells;
   }
 
-  // Calls check() with selections of two files, one whose colors are as fine as its voxels and one
-  // with coarser colors: all of the file, a region, and a coarser level.
+  // Calls check() with selections of two files: the complete file, a region, and a coarser level.
+  // The first file has colors as fine as its voxels, the second has coarser colors.
   template <class Check>
   void for_each_case(const Check& check) {
     open(6, 6, smooth_colors(6, 20), 1);
@@ -98,7 +98,8 @@ TEST_F(ExportColors, VoxKeepsFewColorsExactly) {
   }
 }
 
-// If there are more than 255 colors, each voxel has a color of the palette near its own color.
+// If there are more than 255 colors, each voxel has a color of the palette that is near its own
+// color.
 TEST_F(ExportColors, VoxHasAPaletteOfManyColors) {
   for_each_case([&](const Selection& selection) {
     const auto cells = expected(selection);
@@ -115,8 +116,8 @@ TEST_F(ExportColors, VoxHasAPaletteOfManyColors) {
   });
 }
 
-// HashDAG numbers colored voxels with 32 bits. Here the complete grid is exported, and its colors
-// are coarser than its voxels.
+// HashDAG numbers colored voxels with 32 bits. In this test the selection is the complete grid, and
+// its colors are coarser than its voxels.
 TEST_F(ExportColors, HashDagNamesTheLevelThatFits) {
   constexpr uint32_t kLevels = 12;
   ColoredScene colors{2, 2, Codes(64), patches(2)};
@@ -139,7 +140,7 @@ TEST_F(ExportColors, HashDagNamesTheLevelThatFits) {
   EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
 }
 
-// The colors are part of the work that is reported.
+// The work for colors is part of the reported progress.
 TEST_F(ExportColors, ProgressIsReported) {
   open(6, 6, patches(6), 1);
   for (const ExportFormat& format : export_formats()) {
@@ -153,7 +154,7 @@ TEST_F(ExportColors, ProgressIsReported) {
   }
 }
 
-// A grid of over 256 voxels per edge has several models, one for each place.
+// In a grid of over 256 voxels per edge, the .vox file has one model per cube of 256 voxels.
 TEST_F(ExportColors, VoxHasAModelForEachPlace) {
   open(9, 9, patches(9), 4);
   const auto decoded = decode_vox(bytes_of("vox", {9, whole_grid(9)})[0], 512);
@@ -183,7 +184,7 @@ TEST_F(ExportColors, GlbHasLinearColorsOfFaces) {
   });
 }
 
-// Faces of one color are merged as in a gray file.
+// Faces of one color are merged into rectangles, as in a gray file.
 TEST_F(ExportColors, GlbMergesFacesOfOneColor) {
   std::vector<uint64_t> sheet;
   for (uint32_t x = 0; x < 64; ++x)
@@ -194,7 +195,7 @@ TEST_F(ExportColors, GlbMergesFacesOfOneColor) {
   file_ = open_global_file(path);
   size_t rectangles = 0;
   decode_glb(bytes_of("glb", {6, whole_grid(6)})[0], {0, 0, 0}, rectangles);
-  // Four patches above and below, and two along each edge.
+  // Four patches on each of the two large sides, and two along each of the four edges.
   EXPECT_EQ(rectangles, 16u);
 }
 
@@ -209,7 +210,7 @@ TEST_F(ExportColors, HashDagHasThemInTheOrderOfItsVoxels) {
   });
 }
 
-// A full cube of 2^33 voxels is refused, because HashDAG has 32 bits for the number of a color.
+// An export of a full cube of 2^33 voxels is refused, because HashDAG numbers colors with 32 bits.
 TEST_F(ExportColors, HashDagRefusesMoreThanItCanNumber) {
   const uint32_t levels = 11;
   const std::string path = folder_.file("full.vdag");
@@ -265,7 +266,7 @@ TEST_F(ExportColors, DamageIsAnErrorOrHarmless) {
   EXPECT_GT(refused, 5);
 }
 
-// With --gray a file is exported like a file without colors.
+// With --gray, a file with colors is exported like the same file without colors.
 TEST_F(ExportColors, AreLeftOutOnRequest) {
   const ColoredScene scene{6, 6, random_codes(5, 6, 3000), smooth_colors(6, 20)};
   const Selection all{6, whole_grid(6)};

@@ -19,7 +19,7 @@ constexpr uint64_t kMemory = 64 << 20;
 
 class ExportDamage : public testing::TestWithParam<const char*> {
  protected:
-  // The damage that was noticed.
+  // Exports the file. Returns true if the export reports damage.
   bool is_refused(const std::string& path) {
     const auto file = open_global_file(path);
     const std::string format = GetParam();
@@ -56,7 +56,7 @@ TEST_P(ExportDamage, IsAnErrorOrHarmless) {
   int refused = 0;
   for (int round = 0; round < 60; ++round) {
     std::string damaged = intact;
-    // The levels are small, so their words are at the beginning of their pages.
+    // The levels are small, so only the first words of each page are used.
     const size_t pages = (intact.size() - kPage) / kPage;
     const size_t at = kPage * (1 + random() % std::max<size_t>(pages, 1)) + 4 * (random() % 8);
     if (at + 4 > damaged.size()) continue;

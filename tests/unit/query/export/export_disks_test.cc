@@ -1,5 +1,5 @@
-// Exports that are killed, and full disks. No partial file has a final name, and leftovers do not
-// prevent the next export.
+// Exports that are killed, and exports to full disks. A file with a final name is never partial,
+// and leftovers do not prevent the next export.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -38,7 +38,7 @@ class ExportDisks : public testing::TestWithParam<std::string> {
   std::vector<std::string> paths(const std::string& name) const {
     return export_paths(format(), output(name));
   }
-  // The bytes of all files of an export, which are removed.
+  // Returns the bytes of all files of an export, and removes the files.
   std::vector<std::string> take(const std::string& name) {
     std::vector<std::string> bytes;
     for (const std::string& path : paths(name)) {
@@ -56,7 +56,7 @@ class ExportDisks : public testing::TestWithParam<std::string> {
 using ExportKilled = ExportDisks;
 using ExportTruncated = ExportDisks;
 
-// The same command succeeds after a kill, unless the killed command had completed a file.
+// After a kill, the same command succeeds, unless the killed command had already completed a file.
 TEST_P(ExportKilled, IsRepeatedByTheSameCommand) {
   run(system_files(), "clean");
   const std::vector<std::string> clean = take("clean");
@@ -91,8 +91,8 @@ TEST_P(ExportKilled, IsNotConfusedWithARunningOne) {
   EXPECT_EQ(system_files().list(folder_.path()).size(), 2u);
 }
 
-// Without a lock, a file with the partial name was not made by voxdag and is kept. A lock file that
-// has contents was not made by voxdag either.
+// voxdag leaves a partial file only together with an empty lock file. So a partial file without a
+// lock file, or with a lock file that has contents, was not made by voxdag and is kept.
 TEST_P(ExportKilled, ButTheFilesOfOthersStay) {
   const std::string partial = output("out") + ".partial", lock = output("out") + ".lock";
   for (const bool has_lock : {false, true}) {
@@ -108,8 +108,8 @@ TEST_P(ExportKilled, ButTheFilesOfOthersStay) {
   }
 }
 
-// The disk is full from some write on. The export reports this, even if a format's library reports
-// another error.
+// The disk is full from the n-th write on. The export reports this, even if the format's library
+// reports a different error.
 TEST_P(ExportDisks, Full) {
   uint64_t failed = 0;
   for (;; ++failed) {
@@ -127,7 +127,7 @@ TEST_P(ExportDisks, Full) {
   take("out");
 }
 
-// A disk without space is noticed before a file is made.
+// A disk without free space. An export must notice this before it creates a file.
 class NoSpace : public ForwardingFiles {
  public:
   NoSpace() : ForwardingFiles(system_files()) {}
@@ -154,7 +154,7 @@ std::vector<std::string> all_formats() {
 }
 INSTANTIATE_TEST_SUITE_P(Formats, ExportDisks, testing::ValuesIn(all_formats()), name_of);
 
-// Truncates the input when the output is made.
+// Truncates the input file when the export creates its output.
 class Truncating : public ForwardingFiles {
  public:
   explicit Truncating(const std::string& input) : ForwardingFiles(system_files()), input_(input) {}
@@ -167,7 +167,7 @@ class Truncating : public ForwardingFiles {
   const std::string input_;
 };
 
-// If the input is truncated during the export, this is an error. It does not end the process.
+// If the input is truncated during an export, the export fails, but the process does not end.
 TEST_P(ExportTruncated, IsAnError) {
   Truncating files(folder_.file("a.vdag"));
   const Error error = error_of([&] { run(files, "out"); });
@@ -177,7 +177,7 @@ TEST_P(ExportTruncated, IsAnError) {
   expect_only_the_input();
 }
 
-// Those that read the input while they write.
+// The formats whose exports read the input while they write.
 INSTANTIATE_TEST_SUITE_P(Formats, ExportTruncated,
                          testing::Values("hashdag", "svdag", "voxel", "vox", "bt", "ply", "npz"),
                          name_of);

@@ -1,7 +1,7 @@
-// Limits that only files of many gigabytes reach. The input has a header with such counts and a
-// hole in place of the levels' words; some tests lower a limit instead. An export at the limit is
-// accepted. An export at one more than the limit is refused with a level that fits, and leaves no
-// files.
+// Limits that only files of many gigabytes reach. The header of the input has the large counts, and
+// its levels are a hole in the file; some tests lower a limit instead. An export at the limit is
+// accepted. An export of one more than the limit is refused; the message names a level that fits,
+// and no files remain.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -19,8 +19,8 @@ namespace {
 
 using namespace global_layout;
 
-// Writes a file with these levels, the root's level first. Their words are zeros in a hole of the
-// file, which takes no disk space.
+// Writes a file with these levels, beginning with the root's level. The words of the levels are
+// zeros in a hole of the file, which takes no disk space.
 void write_hole(const std::string& path, const std::vector<GlobalLevel>& levels) {
   ByteString page(kPageBytes, '\0');
   const auto put = [&](size_t at, auto value) { std::memcpy(&page[at], &value, sizeof(value)); };
@@ -80,15 +80,15 @@ class ExportHuge : public testing::Test {
         << refused.message();
     EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
   }
-  // What is missing is the words, the disk or the memory.
+  // The export passes the limit, and fails only because words, disk space or memory are missing.
   void expect_not_refused(const std::vector<GlobalLevel>& levels, const std::string& format) {
     const Error error = this->error(levels, export_format(format));
     EXPECT_NE(error.code(), ErrorCode::kLimit) << error.message();
     EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
   }
 
-  // Returns levels with one node each, which has one child, for a grid of 2^grid_levels voxels per
-  // edge.
+  // Returns levels for a grid of 2^grid_levels voxels per edge. Each level has one node with one
+  // child.
   static std::vector<GlobalLevel> chain(uint32_t grid_levels) {
     return std::vector<GlobalLevel>(grid_levels - 1, {1, 2});
   }
@@ -99,7 +99,7 @@ class ExportHuge : public testing::Test {
 
 constexpr uint64_t k24Bits = uint64_t{1} << 24, k32Bits = uint64_t{1} << 32;
 
-// A word for the root and one for each child pointer.
+// A PlayCanvas file has a word for the root and one word for each child pointer.
 TEST_F(ExportHuge, PlayCanvasVoxelsCountWordsWith24Bits) {
   std::vector<GlobalLevel> levels = chain(8);
   const uint64_t others = 1 + 5;  // the root's word, and the pointers of the other levels
@@ -123,7 +123,7 @@ TEST_F(ExportHuge, PlayCanvasVoxelsCountLeavesWith24Bits) {
                  "7 (128");
 }
 
-// Divides `words` among three levels, so that no level exceeds the format's limit.
+// Divides `words` among three levels, so that no single level exceeds the limit of the format.
 std::vector<GlobalLevel> many_words(std::vector<GlobalLevel> levels, uint64_t words) {
   for (const size_t level : {4, 5, 6}) levels[level] = {k32Bits / 64, words / 3};
   levels[4].words += words - words / 3 * 3;
@@ -139,8 +139,8 @@ TEST_F(ExportHuge, HashDagCountsWordsWith32Bits) {
                  "9 (512");
 }
 
-// HashDAG stores counts with 24 bits below its top levels. Nodes of the top levels have an index in
-// that place.
+// Below its top levels, HashDAG stores counts of voxels with 24 bits. In the top levels, a node has
+// an index of 24 bits in this place.
 TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
   std::vector<GlobalLevel> levels = chain(17);
   const uint64_t others = 9;
@@ -152,7 +152,8 @@ TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
                  "16 (65536");
 }
 
-// A brick has one word, and one more word for each octant with voxels. Here all octants are empty.
+// A brick takes one word, and one more word for each octant with voxels. Here all octants are
+// empty.
 TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
   const uint64_t others = 2 * 5 + 1 + 255;
   expect_not_refused(many_words(chain(10), k32Bits - 1 - others), "svdag");
@@ -176,7 +177,7 @@ TEST_F(ExportHuge, GlbCountsBytesWith32Bits) {
   constexpr uint64_t kVoxels = uint64_t{1} << (3 * kLevels - 1), kQuadBytes = 72;
   writer.finish({kVoxels, svo_nodes});
 
-  // Tests the largest limit that the faces exceed, and the smallest limit that they do not exceed.
+  // The file needs exactly one byte more than the first limit, and exactly the second limit.
   ExportFormat format = export_format("glb");
   format.write = [](const ExportJob& job) {
     return write_glb_within(job, 4096 + 6 * kVoxels * kQuadBytes - 1);

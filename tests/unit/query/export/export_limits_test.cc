@@ -1,6 +1,6 @@
-// If the format or the memory cannot hold the selection, the export is refused. The message names
-// the size and a selection that fits, and no files remain. The scenes are full cubes, whose files
-// are small in any grid.
+// An export is refused if the format or the memory cannot hold the selection. The message names the
+// size and a selection that fits, and no files remain. The scenes are full cubes, whose files are
+// small for any grid.
 #include <gtest/gtest.h>
 
 #include "core/base/clock.h"
@@ -18,7 +18,7 @@ namespace {
 
 class ExportLimits : public ::testing::Test {
  protected:
-  // A grid in which every voxel is set.
+  // Writes and opens a file of a grid in which every voxel is set.
   std::unique_ptr<voxdag_reader::File> full_grid(uint32_t levels) {
     const std::string path = folder_.file("full.vdag");
     GlobalFileWriter writer(system_files(), path, Grid::given({0, 0, 0}, 1, levels), 64);
@@ -64,8 +64,8 @@ class ExportLimits : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-// The message gives the region's cells in the grid that fits, where they have different
-// coordinates.
+// The message gives the region in cells of the coarser grid that fits, because the cells have other
+// coordinates in that grid.
 TEST_F(ExportLimits, TheRegionThatFitsIsNamed) {
   const Selection part{11, {{3, 4, 5}, {2047, 1025, 2000}}};
   const std::string message =
@@ -75,7 +75,7 @@ TEST_F(ExportLimits, TheRegionThatFitsIsNamed) {
       << message;
 }
 
-// However little memory there is for the search.
+// The export names the level that fits, however little memory the search for it has.
 TEST_F(ExportLimits, PlyNamesTheLevelThatFits) {
   const auto file = full_grid(11);
   for (const uint64_t memory_bytes : {kMemory, uint64_t{8}}) {
@@ -121,8 +121,8 @@ TEST_F(ExportLimits, OctoMapHas16Levels) {
   EXPECT_NE(message.find("--level 16 fits"), std::string::npos) << message;
 }
 
-// HashDAG counts voxels with 24 bits below its top levels. At 2^18 voxels per edge, a full cube of
-// 2^8 has too many.
+// HashDAG counts voxels with 24 bits below its top levels. In a grid of 2^18 voxels per edge, a
+// full cube of 2^8 voxels per edge has too many voxels.
 TEST_F(ExportLimits, HashDagCountsVoxelsWith24Bits) {
   const std::string message =
       refusal(*full_grid(18), "hashdag", "a.basic_dag.dag.bin", ErrorCode::kLimit, kMemory);
@@ -130,7 +130,7 @@ TEST_F(ExportLimits, HashDagCountsVoxelsWith24Bits) {
   EXPECT_NE(message.find("--level 17 (131072 voxels per edge) fits"), std::string::npos) << message;
 }
 
-// The formats that are built completely in memory.
+// vdb and nvdb files are built completely in memory.
 TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
   const auto file = full_grid(9);
   for (const ExportFormat& format : export_formats()) {
@@ -146,7 +146,7 @@ TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
   EXPECT_NE(message.find("a smaller --region or a coarser --level"), std::string::npos) << message;
 }
 
-// A chunk of MagicaVoxel has 2 GiB at most.
+// A chunk of a MagicaVoxel file has at most 2 GiB.
 TEST_F(ExportLimits, VoxNamesTheLevelThatFits) {
   const auto file = full_grid(17);
   const std::string message = refusal(*file, "vox", "a.vox", ErrorCode::kLimit, kMemory);
@@ -171,7 +171,7 @@ TEST_F(ExportLimits, FilesOfTwoNamesNeedTheSuffixThatViewersLookFor) {
   EXPECT_THROW(export_format("stl"), Error);
 }
 
-// Cancellation ends an export, and removes its files.
+// An export that is canceled leaves no files.
 TEST_F(ExportLimits, NothingIsLeftAfterACancellation) {
   const auto file = full_grid(9);
   CancelToken cancel;

@@ -1,5 +1,5 @@
-// Sharing of equal subtrees in each format, and the notes for the user. The scene consists of 64
-// equal cubes of 256^3 voxels.
+// Tests how each format shares equal subtrees, and the usage notes. The scene consists of 64 equal
+// cubes of 256^3 voxels.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -20,7 +20,7 @@ class ExportSharing : public testing::Test {
     write_tiles(folder_.file("a.vdag"), kLevels, kTileLevels);
     file_ = open_global_file(folder_.file("a.vdag"));
   }
-  // The report of an export, whose first file is read.
+  // Exports, reads the first written file, and returns the report.
   ExportReport run(const char* name, uint32_t levels = kLevels) {
     const ExportFormat& format = export_format(name);
     NoProgress progress;
@@ -53,7 +53,7 @@ TEST_F(ExportSharing, VoxHasOneModelAndItsPlaces) {
             std::vector<std::string>{"z is up: a voxel (x, y, z) is at (x, -z, y); 64 instances"});
 }
 
-// A word for the root and one for each child pointer of the DAG.
+// The file has a word for the root and one word for each child pointer of the DAG.
 TEST_F(ExportSharing, PlayCanvasVoxelsHaveOneWordForEachPointer) {
   EXPECT_EQ(run("voxel").notes, std::vector<std::string>{});
   const auto json = nlohmann::json::parse(bytes_);
@@ -64,7 +64,7 @@ TEST_F(ExportSharing, PlayCanvasVoxelsHaveOneWordForEachPointer) {
   EXPECT_EQ(json["leafDataCount"], 2);
 }
 
-// The words of the DAG's levels, whose nodes are the file's.
+// Both files have the words of the DAG's levels, with the same nodes as the file.
 TEST_F(ExportSharing, HashDagAndSvdagHaveTheNodesOfTheFile) {
   const uint64_t words = 9 * kTileLevels + 2 * (kLevels - 2 - kTileLevels);
   run("hashdag");

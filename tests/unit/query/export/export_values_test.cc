@@ -1,5 +1,5 @@
-// PLY and npz files have the alpha, the normals and the materials of the cells, in the order of the
-// cells.
+// PLY and npz files contain the alpha, the normal and the material of each cell, in the order of
+// the cells.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -31,7 +31,7 @@ class ExportValues : public testing::Test {
                progress, CancelToken{});
     return read_bytes(output);
   }
-  // The reader's values for a cell, in the order of the export.
+  // The values that the reader returns for a cell, in the order of the export.
   struct Cell {
     uint8_t alpha;
     voxdag_reader::Normal normal;

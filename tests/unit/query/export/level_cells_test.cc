@@ -1,4 +1,4 @@
-// The counts of cells by which exports find a level that fits.
+// Tests the counts of cells that exports use to find a level that fits.
 #include "query/export/level_cells.h"
 
 #include "core/format/global/open_global.h"

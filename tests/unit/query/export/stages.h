@@ -1,4 +1,4 @@
-// The stages of an export as its progress reports them.
+// Records the stages of an export from its progress reports.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -21,8 +21,9 @@ class Stages : public NoProgress {
   }
   void advance(uint64_t count) override { stage_->done += count; }
 
-  // Checks that every stage reports progress. All stages know their total at the start, except for
-  // stages that compute a total. The bytes that the libraries of formats write are an estimate.
+  // Checks that every stage reports progress. All stages know their total at the start, except
+  // stages that count something. If a library writes the file, the total number of bytes is an
+  // estimate.
   void expect_complete() const {
     for (const auto& [name, stage] : stages) {
       EXPECT_GT(stage.done, 0u) << name;

@@ -11,7 +11,7 @@ namespace {
 
 using Color3 = SectionDecoder::Color3;
 
-// IEC 61966-2-1, from and to 0..255.
+// Convert between sRGB and linear light (IEC 61966-2-1), from 0 to 255.
 double linear_of(int stored) {
   const double s = stored / 255.0;
   return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
@@ -20,9 +20,9 @@ double stored_of(double linear) {
   return 255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055);
 }
 
-// Each cell has one of two colors at random, so that a cell with another cell's color is noticed.
-// All mixtures of the two colors are on a line, which color blocks encode well.
-constexpr int kTolerance = 40;  // the two differ by 130
+// Each cell has one of two colors, chosen at random, so a cell with another cell's color is
+// noticed. All mixtures of the two colors are on a line, which color blocks encode well.
+constexpr int kTolerance = 40;  // the two colors differ by 130
 SumOf two_colors() {
   return [](uint64_t code) {
     return oracle::Random(code).between(0, 1) ? sum_of_color(220, 180, 30, 1)
@@ -60,7 +60,7 @@ class ExtractColors : public Extract {
     return morton_encode(cube.position[0], cube.position[1], cube.position[2]);
   }
 
-  // Extracts, and compares all colors of all levels.
+  // Extracts, and compares the colors of all cells on all levels.
   void check(const Selection& selection, bool crop) {
     const Cube cube = crop ? crop_cube(selection) : Cube{};
     const ColoredScene part = part_of_scene(selection, cube);
@@ -77,7 +77,7 @@ class ExtractColors : public Extract {
     };
     const uint32_t finest = part.color_levels + cube.level;
     for (uint32_t level = cube.level; level <= finest; ++level) {
-      // Mean colors, in linear light, of the finest cells that remain in each cell.
+      // The mean color, in linear light, of the finest cells that remain in each cell.
       std::map<uint64_t, std::array<double, 4>> means;
       for (const uint64_t code : part.cells(part.color_levels)) {
         const uint64_t whole_code = code_of(cube) << 3 * part.color_levels | code;
@@ -141,7 +141,7 @@ TEST_F(ExtractColors, OfLevels) {
   EXPECT_EQ(cut_, 0u);
 }
 
-// Boxes that cut cells and color regions, with the complete grid and cropped.
+// Extracts boxes that cut cells and color regions, with the complete grid and cropped.
 TEST_F(ExtractColors, OfRegions) {
   for (const auto& [levels, color_levels] : {std::pair{8u, 8u}, {9u, 7u}, {8u, 3u}}) {
     write(levels, color_levels);
@@ -163,8 +163,8 @@ TEST_F(ExtractColors, OfRegions) {
   EXPECT_GT(cut_, 100u);
 }
 
-// The octants of the grid have separate color regions, and the color grid ends with a tier. So the
-// extract of an octant has the bytes of a file that contains only this octant.
+// The octants of the grid have separate color regions, and the color grid ends at the finest level
+// of a tier. So the extract of an octant has the bytes of a file that contains only this octant.
 TEST_F(ExtractColors, OfAnAlignedCubeAreThoseOfItsScene) {
   for (const auto& [levels, color_levels] : {std::pair{9u, 7u}, {7u, 7u}}) {
     write(levels, color_levels, smooth_colors(color_levels, 20));
@@ -215,7 +215,7 @@ TEST_F(ExtractColors, OfNothing) {
   EXPECT_EQ(open_global_file(path("out.vdag"))->version(), 1u);
 }
 
-// Damage in a copied color, in a re-encoded color, and in the directory.
+// Damages a copied color, a color that is encoded again, and the directory of color regions.
 TEST_F(ExtractColors, DamageIsFound) {
   write(8, 8);
   const std::string intact = bytes("in.vdag");

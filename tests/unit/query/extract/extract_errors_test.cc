@@ -15,7 +15,7 @@ namespace {
 class ExtractErrors : public Extract {
  protected:
   ExtractErrors() { write_global(path("in.vdag"), random_voxels(7, 64)); }
-  // The error of an extraction of the complete grid; nullopt without an error.
+  // Extracts the complete grid. Returns the code of the error; nullopt without an error.
   std::optional<ErrorCode> error_with(FileSystem& files, Progress& progress,
                                       const CancelToken& cancel) {
     try {
@@ -50,7 +50,7 @@ TEST_F(ExtractErrors, DamagedInput) {
   expect_files({"in.vdag"});
 }
 
-// Offsets that do not point to a node are refused, although every checksum is right.
+// Offsets that do not lead to a node are refused, even if every checksum is correct.
 TEST_F(ExtractErrors, OffsetsThatLeadNowhere) {
   oracle::Voxels voxels(16);
   voxels.set(1, 2, 3);
@@ -78,7 +78,7 @@ TEST_F(ExtractErrors, OffsetsThatLeadNowhere) {
   }
 }
 
-// A disk that is full from any write on.
+// The disk is full from the n-th write on.
 TEST_F(ExtractErrors, FullDisk) {
   uint64_t failed = 0;
   for (uint64_t at = 1;; ++at) {
@@ -93,7 +93,7 @@ TEST_F(ExtractErrors, FullDisk) {
   EXPECT_GT(failed, 5u);
 }
 
-// Reads that fail, of the input or of temporary files.
+// The n-th read fails, of the input or of a temporary file.
 TEST_F(ExtractErrors, FailingReads) {
   uint64_t failed = 0;
   for (uint64_t at = 1;; at += 1 + at / 8) {
@@ -108,9 +108,9 @@ TEST_F(ExtractErrors, FailingReads) {
   EXPECT_GT(failed, 5u);
 }
 
-// The process is killed at any operation. The same extract succeeds afterwards, unless the killed
-// one had finished its output, and removes the temporary files and folders of the killed process.
-// Files with other names are kept.
+// The process is killed at any operation. Afterwards the same extract succeeds, unless the killed
+// process had finished its output. The extract removes the temporary files and folders of the
+// killed process, and keeps files with other names.
 TEST_F(ExtractErrors, Killed) {
   std::filesystem::create_directory(path("out.vdag.work-"));
   std::filesystem::create_directory(path("out.vdag.work-1234567"));
@@ -136,8 +136,8 @@ TEST_F(ExtractErrors, Killed) {
   EXPECT_GT(repeated, 5u);
 }
 
-// A region around the middle of the grid cannot be cropped, and the command reports that. A region
-// on one side of the middle can be cropped.
+// Cropping to a region around the middle of the grid gives the complete grid, and the extract warns
+// about this. A region on one side of the middle gives a smaller grid, without a warning.
 TEST_F(ExtractErrors, CropOfNothingIsSaid) {
   const auto is_said = [&](const Region& region, bool crop) {
     warnings_.texts.clear();
@@ -152,7 +152,7 @@ TEST_F(ExtractErrors, CropOfNothingIsSaid) {
   EXPECT_FALSE(is_said({{31, 0, 0}, {33, 64, 64}}, false));
 }
 
-// An existing file is replaced only with --force, even if voxdag made it.
+// An existing file is replaced only with --force, even if voxdag created it.
 TEST_F(ExtractErrors, ExistingOutput) {
   ExtractSpec part = spec("out.vdag", {5, whole_grid(5)});
   const auto file = open_global_file(path("in.vdag"));

@@ -1,5 +1,5 @@
-// Extracts parts of small files, and makes the files that they must equal voxel by voxel from the
-// oracle's DAGs.
+// Extracts parts of small files. Also makes the expected files from the oracle's DAGs of the same
+// voxels.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,14 +18,14 @@
 
 namespace voxdag::query {
 
-// Remembers the warnings.
+// Collects the texts of warnings.
 class Warnings : public NoProgress {
  public:
   void warn(std::string_view message) override { texts.emplace_back(message); }
   std::vector<std::string> texts;
 };
 
-// The cells of the grid of 2^levels that have a voxel.
+// Returns the cells of the grid of 2^levels cells per edge that contain a voxel.
 inline oracle::Voxels coarser(const oracle::Voxels& voxels, uint32_t levels) {
   oracle::Voxels cells(1 << levels);
   const int size = voxels.edge() >> levels;
@@ -36,7 +36,7 @@ inline oracle::Voxels coarser(const oracle::Voxels& voxels, uint32_t levels) {
   return cells;
 }
 
-// Those of a region, in the cube with that low corner and edge.
+// Returns the voxels of a region, relative to the cube with this low corner and edge.
 inline oracle::Voxels part_of(const oracle::Voxels& voxels, const Region& region,
                               const std::array<int64_t, 3>& low, int edge) {
   oracle::Voxels part(edge);
@@ -64,7 +64,7 @@ class Extract : public testing::Test {
     return spec;
   }
 
-  // Extracts from one file of the folder to another, which must verify.
+  // Extracts from a file of the folder, and verifies the written file.
   ExtractReport extract_file(const std::string& input, const ExtractSpec& spec) {
     const auto file = open_global_file(path(input));
     const ExtractReport report = extract(*file, spec, system_files(), warnings_, never_);
@@ -79,7 +79,7 @@ class Extract : public testing::Test {
   }
   std::string bytes(const std::string& name) const { return read_bytes(path(name)); }
 
-  // The only files of the folder are these.
+  // Checks that the folder contains exactly these files.
   void expect_files(std::vector<std::string> names) const {
     std::vector<std::string> found;
     for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))

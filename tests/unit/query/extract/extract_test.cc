@@ -1,4 +1,4 @@
-// The extract has the bytes of the file that the oracle makes of the same voxels.
+// An extract has the bytes of the file that the oracle makes from the same voxels.
 #include <array>
 
 #include "tests/unit/query/extract/extract_fixture.h"
@@ -6,7 +6,7 @@
 namespace voxdag::query {
 namespace {
 
-// Every voxel is set at random, so that almost no two bricks are equal.
+// Sets each voxel with a probability of 1/2, so that almost no two bricks are equal.
 oracle::Voxels noise(uint64_t seed, int edge) {
   std::mt19937_64 random(seed);
   oracle::Voxels voxels(edge);
@@ -51,7 +51,7 @@ TEST_F(Extract, Levels) {
   EXPECT_EQ(warnings_.texts, std::vector<std::string>());
 }
 
-// Boxes anywhere, in their place and cropped.
+// Extracts boxes at any position, with the complete grid and cropped.
 TEST_F(Extract, Regions) {
   const oracle::Voxels voxels = random_voxels(2, 64);
   write_global(path("in.vdag"), voxels);
@@ -84,7 +84,8 @@ TEST_F(Extract, Regions) {
   }
 }
 
-// The smallest aligned cube, not smaller than a brick.
+// The crop cube is the smallest aligned cube around the region, and has at least the size of a
+// brick.
 TEST_F(Extract, CropCube) {
   EXPECT_EQ(crop_cube({6, whole_grid(6)}), Cube{});
   EXPECT_EQ(crop_cube({6, {{31, 0, 0}, {33, 1, 1}}}), Cube{});
@@ -93,7 +94,7 @@ TEST_F(Extract, CropCube) {
   EXPECT_EQ(crop_cube({2, {{1, 1, 1}, {2, 2, 2}}}), Cube{});
 }
 
-// One way and another to the same voxels: the same bytes.
+// Different sequences of extracts that lead to the same voxels give the same bytes.
 TEST_F(Extract, InSteps) {
   write_global(path("in.vdag"), random_voxels(4, 128));
   extract_file("in.vdag", spec("half.vdag", {6, whole_grid(6)}));
@@ -115,8 +116,8 @@ TEST_F(Extract, InSteps) {
   EXPECT_TRUE(bytes("box_in_box.vdag") == bytes("inner.vdag"));
 }
 
-// The bytes are the same with many cubes, threads and merge passes, and if cubes do not fit their
-// share of the memory.
+// The bytes are the same for any number of threads, and if cubes that do not fit in their share of
+// the memory are divided.
 TEST_F(Extract, MemoryAndThreads) {
   const oracle::Voxels voxels = noise(5, 128);
   write_global(path("in.vdag"), voxels);
@@ -139,7 +140,7 @@ TEST_F(Extract, MemoryAndThreads) {
   EXPECT_TRUE(bytes("whole.vdag") == bytes("in.vdag"));
 }
 
-// Wide levels are read, and written where they are needed.
+// Wide levels can be read, and are written where the limit requires them.
 TEST_F(Extract, WideLevels) {
   const oracle::Voxels voxels = random_voxels(6, 64);
   const oracle::Dag dag = oracle::build_dag(voxels, 64);
@@ -162,7 +163,7 @@ TEST_F(Extract, WideLevels) {
   EXPECT_EQ(open_global_file(path("narrow.vdag"))->version(), 1u);
 }
 
-// An extract of a selection without voxels is a valid file without nodes. The command warns.
+// An extract without voxels is a valid file without nodes, and the extract warns.
 TEST_F(Extract, Nothing) {
   oracle::Voxels voxels(32);
   voxels.set(1, 1, 1);

@@ -1,5 +1,5 @@
-// Compares alpha, normals and materials of an extract with the input's. Both are decoded by code
-// written from docs/format.md.
+// Compares the alpha, normals and materials of an extract with the input's values. Code written
+// from docs/format.md decodes both.
 #include "tests/unit/core/format/color/valued_files.h"
 #include "tests/unit/query/extract/extract_fixture.h"
 
@@ -22,8 +22,8 @@ class ExtractValues : public Extract {
     return selection.region.contains({x * edge, y * edge, z * edge}, edge);
   }
 
-  // Extracts, verifies that coarser cells follow from finer ones, and compares the finest cells and
-  // all cells that the region does not cut.
+  // Extracts. Checks that the values of coarser cells follow from the finer cells, and compares the
+  // finest cells and all cells that the region does not cut.
   void check(const Selection& selection, bool crop) {
     const Cube cube = crop ? crop_cube(selection) : Cube{};
     ColoredScene part;

@@ -1,5 +1,5 @@
-// Compares colors of batches of cells, from C++ and from C, with a decoder written from
-// docs/format.md.
+// Compares the colors of batches of cells, from C++ and from C, with a decoder that was written
+// from docs/format.md.
 #include <gtest/gtest.h>
 
 #include "core/format/global/voxdag_reader.h"
@@ -10,14 +10,14 @@
 namespace voxdag::query {
 namespace {
 
-// The cells of the color grid are 4 voxels wide, and in two tiers.
+// The cells of the color grid are 4 voxels wide. The color grid has two tiers.
 class Colors : public testing::Test {
  protected:
   void SetUp() override {
     scene_ = {9, 7, random_codes(11, 9, 3000), smooth_colors(7, 20)};
     write_colored(path_, scene_);
   }
-  // The set cells of a level, in Morton order.
+  // Returns the set cells of a level, in Morton order.
   std::vector<Position> cells(uint32_t level) const {
     std::vector<Position> cells;
     for (const uint64_t code : scene_.cells(level)) {
@@ -103,7 +103,7 @@ TEST_F(Colors, FromC) {
   voxdag_close(file);
 }
 
-// Alpha, normals and materials of the color grid's cells and of a cell that is not set.
+// Compares alpha, normals and materials of cells of the color grid and of a cell that is not set.
 TEST_F(Colors, OtherAttributes) {
   const std::string path = folder_.file("valued.vdag");
   write_valued(path, scene_, {Attribute::kAlpha, Attribute::kNormal, Attribute::kMaterial}, 5);

@@ -26,7 +26,7 @@ bool is_within(const Region& region, const Position& p) {
   return true;
 }
 
-// Returns regions of a grid: the complete grid, boxes within it, across its boundary and outside
+// Returns regions of a grid: the complete grid, boxes in the grid, across its boundary and outside
 // it, and empty boxes.
 std::vector<Region> regions_of(uint32_t grid_levels, uint64_t seed) {
   const int64_t edge = int64_t{1} << grid_levels;
@@ -47,8 +47,8 @@ std::vector<Region> regions_of(uint32_t grid_levels, uint64_t seed) {
   return regions;
 }
 
-// Compares all functions with brute force, in every grid of files of three sizes, with narrow and
-// with wide levels.
+// Compares all functions with brute force, in every grid of three files of different sizes, with
+// narrow and with wide levels.
 class DagFileTest : public testing::TestWithParam<std::tuple<int, uint64_t>> {
  protected:
   DagFileTest()
@@ -109,7 +109,7 @@ TEST_P(DagFileTest, CountsAndListsAndFillsRegions) {
   }
 }
 
-// Without memory for counts the same numbers are found.
+// The counts are the same if there is no memory for stored counts.
 TEST_P(DagFileTest, CountsWithoutStoredCounts) {
   const DagFile poor(file_.path(), 0);
   for (uint32_t levels = 0; levels <= dag_.grid_levels(); ++levels)
@@ -117,7 +117,7 @@ TEST_P(DagFileTest, CountsWithoutStoredCounts) {
       ASSERT_EQ(poor.count({levels, region}), dag_.count({levels, region}));
 }
 
-// If the caller's list is too short, it is filled, and the returned number counts all cells.
+// If the caller's list is too short, positions() fills it and returns the number of all cells.
 TEST_P(DagFileTest, ListsAsManyAsFit) {
   const Selection all{dag_.grid_levels(), whole_grid(dag_.grid_levels())};
   std::vector<Position> some(3), every(dag_.count(all));
@@ -138,7 +138,7 @@ TEST_P(DagFileTest, VisitsBricksInMortonOrder) {
   }
 }
 
-// The nearest by trying every cell.
+// Finds the nearest cell by trying every cell.
 Nearest try_every_cell(const QueryFile::Cells& cells, const Position& from, double max_distance) {
   Nearest best;
   for (const Position& p : cells) {
@@ -178,8 +178,8 @@ TEST_P(DagFileTest, FindsTheNearestCell) {
   }
 }
 
-// If several cells have equal distances, the cell with the lowest Morton code wins, in any order of
-// the search.
+// If several cells are at equal distances, the result is the cell with the lowest Morton code, for
+// any order of the search.
 TEST(Dag, BreaksTiesByMortonCode) {
   oracle::Voxels voxels(16);
   for (const int x : {6, 10})
@@ -235,8 +235,8 @@ TEST(Dag, RefusesWrongArguments) {
   EXPECT_EQ(code_of([&] { DagFile nothing(file.path() + ".not"); }), ErrorCode::kNotFound);
 }
 
-// Queries of a file with flipped bytes give an error that names the file, or some result. They read
-// nothing outside the file (the address sanitizer checks this).
+// A query of a file with flipped bits gives some result, or an error that names the file. It reads
+// nothing outside the file, which the address sanitizer checks.
 TEST(Dag, SurvivesDamage) {
   for (const uint64_t narrow_words : {global_layout::kNarrowLevelWords, uint64_t{2}}) {
     const QueryFile file(random_voxels(11, 32), narrow_words);

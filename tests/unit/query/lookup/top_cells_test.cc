@@ -1,4 +1,4 @@
-// Lookups of so many points that the descents begin in a table of the cells of a coarse grid.
+// Lookups of so many points that they begin in TopCells, the table of a coarse grid.
 #include "query/lookup/top_cells.h"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,7 @@ TEST(TopCells, HaveTheNodesOfTheirGrid) {
       }
 }
 
-// The results of points whose descents do not visit damaged nodes are unchanged.
+// Damage to nodes changes only the results of points whose descents visit these nodes.
 TEST(TopCells, LeaveDamageToThosePointsThatMeetIt) {
   const QueryFile file(random_voxels(6, 256));
   std::vector<Position> points;

@@ -37,8 +37,8 @@ TEST(RayCaster, HitsAVoxelOfABrick) {
   EXPECT_FALSE(caster.cast({{{-5, 1.5, 3.5}}, {{1, 0, 0}}}, {}, 0, kFar, hit));
 }
 
-// A ray that begins within a voxel hits it immediately. A ray that begins behind the voxel, or
-// whose t_max is too small, misses it.
+// A ray that begins in a voxel hits it immediately. A ray that begins behind the voxel, or whose
+// t_max is too small, misses it.
 TEST(RayCaster, KeepsToItsInterval) {
   const VoxelScene scene(3, {{4, 4, 4}});
   const DagView dag = scene.view();
@@ -60,7 +60,7 @@ TEST(RayCaster, FindsNothingInAnEmptyScene) {
   EXPECT_FALSE(RayCaster(dag).cast({{{-1, 1, 1}}, {{1, 0, 0}}}, {}, 0, kFar, hit));
 }
 
-// When a ray enters a voxel's cube, kFar if it misses it.
+// Returns the parameter at which a ray enters the cube of a voxel; kFar if the ray misses it.
 double entry(const Ray& ray, const VoxelScene::Voxel& voxel) {
   double in = 0, out = kFar;
   for (int axis = 0; axis < 3; ++axis) {
@@ -73,7 +73,8 @@ double entry(const Ray& ray, const VoxelScene::Voxel& voxel) {
   return in <= out ? in : kFar;
 }
 
-// Compares with an intersection of every voxel, for rays from inside and outside in all directions.
+// Compares the caster with an intersection of every voxel, for rays from inside and outside the
+// grid, in all directions.
 TEST(RayCaster, AgreesWithTryingEveryVoxel) {
   constexpr uint64_t kSeed = 20240601;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
@@ -102,8 +103,8 @@ TEST(RayCaster, AgreesWithTryingEveryVoxel) {
   EXPECT_GT(hits, 300);
 }
 
-// A wall one voxel thick in a grid of 131072^3 has no cracks: rays at all angles, through edges and
-// corners of cells of all sizes, hit the wall.
+// A wall that is one voxel thick in a grid of 131072^3 has no cracks: rays at all angles hit it,
+// also through edges and corners of cells of all sizes.
 TEST(RayCaster, SeesNoCracksAtHighResolution) {
   constexpr uint64_t kSeed = 7;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
@@ -136,7 +137,7 @@ TEST(RayCaster, SeesNoCracksAtHighResolution) {
   }
 }
 
-// A cell no wider than the ray's cone counts as solid. The cone's width grows with the distance.
+// A cell that is no wider than the ray's cone counts as solid. The cone widens with the distance.
 TEST(RayCaster, EndsAtTheConesWidth) {
   const VoxelScene scene(6, {{63, 63, 63}});
   const DagView dag = scene.view();
@@ -152,7 +153,7 @@ TEST(RayCaster, EndsAtTheConesWidth) {
   EXPECT_EQ(hit.depth, 1u);
 }
 
-// A damaged file is an error; no word outside a level is read.
+// A damaged file gives an error, and no word outside a level is read.
 TEST(RayCaster, RefusesOffsetsOutsideALevel) {
   const Ray ray{{{-1, 0.5, 0.5}}, {{1, 0, 0}}};
   const auto code_of = [&](uint32_t level, size_t word, uint32_t value) {

@@ -16,7 +16,7 @@ namespace {
 constexpr double kFar = 1e30;
 
 // Returns rays in and around a grid of this edge: from one camera, in random directions, along axes
-// and diagonals, and through edges and corners of the lattice.
+// and diagonals, and through edges and corners of cells.
 std::vector<Ray> many_rays(int edge, uint64_t seed) {
   oracle::Random random(seed);
   const auto anywhere = [&](int64_t low, int64_t high) {
@@ -67,8 +67,8 @@ void expect_equal(WalkPacket walk, const DagView& dag, const std::vector<Ray>& r
   }
 }
 
-// Checks that results equal the single-ray caster's results to the last bit, in files of different
-// shapes.
+// Checks that all results are bit-identical to the single-ray caster's results, in files of
+// different shapes.
 void expect_single_rays(WalkPacket walk) {
   uint64_t hits = 0;
   for (const int edge : {4, 8, 64})
@@ -163,7 +163,7 @@ TEST_F(DagRays, RefusesWhatIsNoRay) {
   EXPECT_EQ(code_of({0, 0, 0}, {0, 0, 1}, {1, -1}), ErrorCode::kInvalidInput);
 }
 
-// More rays than one thread takes per batch.
+// Casts more rays than a thread takes per batch.
 TEST_F(DagRays, ThreadsDoNotChangeTheHits) {
   std::vector<Coordinates> origins, directions;
   for (const Ray& ray : many_rays(16, 9))

@@ -18,8 +18,8 @@ void expect_near(const Vec& a, const Vec& b) {
   for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(a[axis], b[axis], 1e-12);
 }
 
-// Computes the position of a point in the picture, in pixels. This is the inverse of ray(), written
-// from the camera's definition.
+// Computes the position of a point in the picture, in pixels. It is the inverse of ray(), and is
+// written from the definition of the camera.
 void project(const Placement& p, const Vec& point, int width, int height, double& x, double& y) {
   const Vec forward = normalized(p.target - p.eye);
   const Vec right = normalized(cross(forward, {{0, 1, 0}})), up = cross(right, forward);
@@ -39,7 +39,7 @@ TEST(Camera, RaysFollowTheFieldOfView) {
   EXPECT_NEAR(camera.pixel_spread(), 0.02, 1e-12);
 }
 
-// Looking straight down, up is -z by definition.
+// If the camera looks straight down, the picture's up direction is -z by definition.
 TEST(Camera, LooksStraightDown) {
   const Camera camera({{{0, 10, 0}}, {{0, 0, 0}}, 90}, 100, 100);
   expect_near(camera.ray(50, 50).direction, {{0, -1, 0}});
@@ -53,7 +53,7 @@ TEST(Camera, RefusesInvalidPlacements) {
   EXPECT_THROW(Camera({{{1, 2, 3}}, {{0, 0, 0}}, 0}, 10, 10), Error);
 }
 
-// All points are in the picture and centered, and they fill it in one direction.
+// All points are in the picture. They are centered, and fill the picture in one direction.
 TEST(Camera, FitsThePointsIntoThePicture) {
   std::vector<Vec> points;
   for (int i = 0; i < 8; ++i)

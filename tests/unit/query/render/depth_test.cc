@@ -19,14 +19,14 @@ DepthMap depth_of(const VoxelScene& scene, unsigned threads) {
   return render_depth(dag, kFromTheFront, kWidth, kHeight, threads, CancelToken());
 }
 
-// Returns the distance at which the ray through the center of a pixel enters the cube from 6 to 10.
-// It intersects the cube's six planes.
+// Returns the distance at which the ray through the center of a pixel enters the cube from 6 to 10,
+// by intersecting the ray with the cube's six planes.
 double distance_to_block(int x, int y) {
   const double eye[3] = {8, 9, 24}, length = std::sqrt(1 + 16.0 * 16);
   const double tangent = std::tan(20 * std::acos(-1) / 180);
   const double right = (2 * (x + 0.5) / kWidth - 1) * tangent * kWidth / kHeight;
   const double up = (1 - 2 * (y + 0.5) / kHeight) * tangent;
-  // The camera looks along (0, -1, -16); its axes are (1, 0, 0) and (0, 16, -1).
+  // The camera looks along (0, -1, -16). The axes of its picture are (1, 0, 0) and (0, 16, -1).
   double d[3] = {right, (-1 + 16 * up) / length, (-16 - up) / length};
   const double norm = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
   double enter = 0, leave = 1e9;
@@ -59,7 +59,7 @@ TEST(Depth, OfAnEmptySceneIsInfinite) {
   for (const float depth : depth_of(VoxelScene(4, {}), 1).depths) ASSERT_EQ(depth, INFINITY);
 }
 
-// The array's format, version 1.0: a magic, the length of a text, the text, the numbers.
+// The format of NumPy, version 1.0: a magic, the length of the header text, this text, the numbers.
 TEST(Depth, IsAnArrayForNumpy) {
   const DepthMap map{3, 2, {1, 2, 3, 4, 5, INFINITY}};
   const std::string bytes = encode_npy(map);

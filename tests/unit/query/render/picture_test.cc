@@ -33,7 +33,8 @@ Picture render(const VoxelScene& scene, const Placement& placement, unsigned thr
   return render_picture(dag, placement, options, progress, cancel);
 }
 
-// A PNG file is its signature, an IHDR chunk with the size and format (8 bits, RGB), and IEND last.
+// A PNG file has its signature, an IHDR chunk with the size and format (8 bits, RGB), and IEND at
+// its end.
 TEST(Picture, IsAPngOfItsSize) {
   Picture picture(123, 45);
   picture.pixel(7, 9)[1] = 200;
@@ -62,13 +63,13 @@ TEST(Picture, IsWrittenWhole) {
   std::filesystem::remove_all(folder);
 }
 
-// The same pixels for any number of threads.
+// The pixels are the same for any number of threads.
 TEST(Renderer, ThreadsDoNotChangeThePicture) {
   EXPECT_EQ(render(VoxelScene::block(), kFromTheFront, 1).rgb,
             render(VoxelScene::block(), kFromTheFront, 3).rgb);
 }
 
-// The block is seen in the center of the picture, lit, in front of the background.
+// The block is in the center of the picture, in front of the background, and lit.
 TEST(Renderer, ShowsTheBlockInTheMiddle) {
   const VoxelScene nothing(4, {});
   Picture with = render(VoxelScene::block(), kFromTheFront, 2),
@@ -87,7 +88,7 @@ TEST(Renderer, ShowsTheBlockInTheMiddle) {
   // A cube of edge 4 at distance 14 is about 19 pixels wide.
   EXPECT_GT(pixels, 150);
   EXPECT_LT(pixels, 700);
-  // Neither black nor overexposed.
+  // The block is neither black nor overexposed.
   EXPECT_GT(with.pixel(32, 24)[0], 60);
   EXPECT_LT(with.pixel(32, 24)[0], 250);
 }
@@ -101,7 +102,7 @@ TEST(Renderer, StopsWhenCanceled) {
   EXPECT_THROW(render_picture(dag, kFromTheFront, {}, progress, cancel), Error);
 }
 
-// An error on any thread stops the others and is rethrown to the caller.
+// An error on any thread stops the other threads, and is thrown to the caller.
 TEST(Renderer, ReportsDamage) {
   VoxelScene scene = VoxelScene::block();
   scene.level_words(1).at(1) = 0x7fffffff;

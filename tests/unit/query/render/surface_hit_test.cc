@@ -16,7 +16,7 @@ double degrees_between(const Vec& a, const Vec& b) {
   return std::acos(std::min(1.0, dot(normalized(a), normalized(b)))) * 180 / 3.14159265358979;
 }
 
-// The six sides of a box, one voxel thick.
+// Returns the voxels on the six sides of a box.
 std::set<VoxelScene::Voxel> shell(const VoxelScene::Voxel& low, const VoxelScene::Voxel& high) {
   std::set<VoxelScene::Voxel> voxels;
   for (int64_t x = low[0]; x <= high[0]; ++x)
@@ -37,13 +37,13 @@ TEST(SurfaceHit, NormalOfAWall) {
     const Ray ray{{{30.5 + 25 * side, 20, 20}}, normalized({{-side, 0.3, 0.4}})};
     ASSERT_TRUE(find_surface(dag, ray, 0.1, s));
     EXPECT_LT(degrees_between(s.normal, {{side, 0, 0}}), 0.1);
-    // Light is gathered on the near side.
+    // Rays to the light start on the visible side.
     EXPECT_GT((s.start[0] - 30.5) * side, 0.5);
   }
 }
 
-// Stairs of single voxels are shown as a slope of 45 degrees if a voxel is as small as a pixel, and
-// as stairs if it is many pixels large.
+// Stairs of single voxels look like a slope of 45 degrees if a voxel is as small as a pixel. They
+// look like stairs if a voxel is many pixels wide.
 TEST(SurfaceHit, StairsAreASlopeFromAfar) {
   std::set<VoxelScene::Voxel> voxels;
   for (int64_t x = 0; x < 32; ++x)
@@ -68,7 +68,7 @@ TEST(SurfaceHit, ALoneVoxelShowsItsFace) {
   EXPECT_LT(degrees_between(s.normal, {{0, 1, 0}}), 0.1);
 }
 
-// In such a small grid the box is exact, because its cells are voxels.
+// In this small grid the box is exact, because the cells that determine it are voxels.
 TEST(Bounds, AreTheOccupiedVoxels) {
   const VoxelScene scene(5, {{3, 9, 30}, {20, 10, 1}, {4, 4, 4}});
   const Box box = occupied_box(scene.view());
@@ -81,8 +81,8 @@ TEST(Bounds, AreTheOccupiedVoxels) {
   EXPECT_EQ(occupied_cells(scene.view()).centers.size(), 3u);
 }
 
-// If a scene is small relative to its grid, a view has the complete scene in the picture, and
-// little else.
+// If a scene is small in its grid, a view shows the complete scene, and the scene fills most of the
+// picture.
 TEST(Views, OfASmallSceneShowIt) {
   for (const uint32_t grid_levels : {3u, 10u})
     for (const int edge : {1, 4}) {
@@ -107,8 +107,8 @@ TEST(Views, OfASmallSceneShowIt) {
     }
 }
 
-// The automatic view of an object is from outside; the view of a furnished room with outer walls is
-// from within.
+// The view "auto" of an object is from outside. The view "auto" of a furnished room with outer
+// walls is from within.
 TEST(Views, RoomsAreSeenFromWithin) {
   const VoxelScene object(5, shell({8, 8, 8}, {23, 23, 23}));
   auto voxels = shell({0, 0, 0}, {63, 63, 63});

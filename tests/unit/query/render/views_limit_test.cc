@@ -16,8 +16,9 @@ using namespace voxdag::query;
 
 namespace {
 
-// A grid of 2^16 with one cluster of voxels in each cell of 1/256 of its edge: nodes with all
-// children, then nodes with one. Rays pass through hundreds of cells and rarely hit anything.
+// A grid of 2^16 voxels per edge with one small cluster of voxels in each of 256^3 cells: nodes
+// with all children, then nodes with one child. Rays pass through hundreds of cells and rarely hit
+// one.
 VoxelScene dust() {
   VoxelScene scene = VoxelScene::wall(16, 0);
   for (uint32_t level = 0; level < 14; ++level) {
@@ -51,7 +52,7 @@ TEST(RayCaster, StopsAfterItsSteps) {
   EXPECT_FALSE(caster.cast(ray, {}, 0, 4 * edge, limited_hit, left));
 }
 
-// Without a limit, these views would take minutes. The result is the same every time.
+// Without a limit, these views would take minutes. With it, the result is the same every time.
 TEST(Views, OfDustTakeAFewSeconds) {
   const VoxelScene scene = dust();
   const DagView dag = scene.view();
@@ -74,12 +75,12 @@ TEST(Views, CanBeStopped) {
   });
   EXPECT_EQ(error_of([&] { named_view("inside", dag, 1.5, {}, cancel); }).code(),
             ErrorCode::kCanceled);
-  // A box of a million cells.
+  // Computing this box requires visiting a million cells.
   EXPECT_EQ(error_of([&] { occupied_box(VoxelScene::wall(12, 2047).view(), cancel); }).code(),
             ErrorCode::kCanceled);
 }
 
-// Several views of one scene are those that each is alone.
+// Several views of one scene, computed together, equal the views that are computed separately.
 TEST(Views, AreTheSameTogether) {
   const VoxelScene scene(6, {{4, 4, 4}, {9, 58, 7}, {44, 12, 50}, {60, 1, 3}});
   const DagView dag = scene.view();

@@ -19,7 +19,7 @@ using query::ColorPages;
 using Color3 = SectionDecoder::Color3;
 using Words = std::vector<uint32_t>;
 
-// A color of a block of 16 bytes, as docs/format.md has it.
+// Decodes a color of a block of 16 bytes, as docs/format.md describes it.
 Color3 color_in_block(const uint32_t* block, uint32_t i) {
   const auto byte = [&](uint32_t at) { return block[at / 4] >> 8 * (at % 4) & 255; };
   Color3 color;

@@ -1,4 +1,5 @@
-// Tiles and color pages of a file with flipped bits have the original contents, or are an error.
+// In a file with flipped bits, each tile and color page has its original contents or gives an
+// error.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -17,7 +18,7 @@ using Words = std::vector<uint32_t>;
 
 constexpr uint32_t kLevels = 9, kColorLevels = 9, kDepth = 3;
 
-// A file of some blocks of 64 KiB, its tiles of two levels, and some of its color pages.
+// A file with several blocks of 64 KiB, its tiles of two levels, and some of its color pages.
 class DamagedBlocks : public testing::Test {
  protected:
   void SetUp() override {
@@ -91,7 +92,7 @@ TEST_F(DamagedBlocks, AreFoundBeforeTheyAreUsed) {
   EXPECT_GT(made, 1000u);
 }
 
-// A damaged block is compared again at its next use, so a repaired file works without a restart.
+// A damaged block is verified again at its next use, so a repaired file works without a restart.
 TEST_F(DamagedBlocks, AreComparedUntilTheyAreIntact) {
   const auto file = open_global_file(path_);
   const CheckedBlocks blocks(*file);

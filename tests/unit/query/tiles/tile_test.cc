@@ -47,7 +47,7 @@ struct Tile {
   size_t leaf_words, leaves, leaf_count;
 };
 
-// The child with this index, by the standard's own means.
+// Returns the word offset of a child, using the reader of the file instead of the tile encoder.
 uint64_t child_offset(const File& file, uint32_t level, uint64_t offset, int index) {
   return File::child(file.node(level, offset), index);
 }
@@ -84,7 +84,8 @@ class Comparison {
   void run(uint64_t root) {
     compare(0, tile_.level, root);
     EXPECT_EQ(leaves_.size(), tile_.leaf_count);
-    // Nodes are in level order without gaps, and equal nodes occur once.
+    // The nodes of a tile are in the order of their levels, without gaps, and equal nodes occur
+    // once.
     size_t end = 0;
     uint32_t level = tile_.level;
     for (const auto& [at, node] : nodes_) {
@@ -173,7 +174,7 @@ void check_tiles(const QueryFile& scene, uint64_t seed) {
     }
 }
 
-// The example of a tile in docs/format.md is the root tile of the example file in that document.
+// The example of a tile in docs/format.md is the root tile of the example file in docs/format.md.
 TEST(Tile, IsTheExampleOfTheDocuments) {
   const std::string source = VOXDAG_SOURCE_DIR;
   std::ifstream document(source + "/docs/format.md");
@@ -189,7 +190,7 @@ TEST(Tile, IsTheExampleOfTheDocuments) {
   EXPECT_EQ(encode_tile(DagView(file), 3, {0, 0}), expected);
 }
 
-// Each tile, decoded by independent code, equals the part of the file below its root.
+// Each tile equals the part of the file below its root. Independent code decodes the tile.
 TEST(Tile, EqualsTheFile) {
   for (const int edge : {8, 16, 64, 128})
     for (const uint64_t seed : {1, 2})
@@ -230,8 +231,8 @@ bool has_tile(const DagView& dag, uint32_t depth, const TileAddress& root) {
   }
 }
 
-// A request may name any word of a level. The answer is a tile or an error; for the offset of a
-// node, it is always the node's tile.
+// A request may name any word of a level. The answer is a tile or an error. For the offset of a
+// node, it is always the tile of this node.
 TEST(Tile, AnyOffsetIsAnsweredOrRefused) {
   const QueryFile scene(voxdag::random_voxels(5, 64));
   const File file(scene.path());
@@ -250,7 +251,7 @@ TEST(Tile, AnyOffsetIsAnsweredOrRefused) {
   EXPECT_GT(refused, 50u);
 }
 
-// Words of a file may be anything.
+// For a damaged file, which may contain any words, encode_tile() gives a tile or an error.
 TEST(Tile, ADamagedFileIsAnError) {
   std::set<VoxelScene::Voxel> voxels;
   oracle::Random random(7);

@@ -7,7 +7,8 @@ namespace {
 
 constexpr double kDayS = 86400, kYearS = 365 * kDayS;
 
-// A clock that is far ahead is in doubt for a day, whether it was set while the service ran or not.
+// A clock that is far ahead is uncertain for a day, whether it jumped while the service ran or
+// before.
 TEST(ClockGuard, DoubtsAClockThatJumps) {
   ClockGuard running(1e9);
   EXPECT_FALSE(running.has_jumped(1e9 + 100, 50));

@@ -19,7 +19,8 @@ class SmallDisk : public ForwardingFiles {
   uint64_t free = 100 * kMiB;
 };
 
-// Writes until the disk is full; written bytes are no longer free.
+// Writes up to `bytes` bytes, until the disk is full, and returns the number of written bytes.
+// Written bytes are no longer free.
 uint64_t fill(SmallDisk& disk, DiskSpace::Reservation& space, uint64_t bytes) {
   constexpr uint64_t kPiece = kMiB / 4;
   uint64_t written = 0;
@@ -44,8 +45,8 @@ bool fits(DiskSpace& space, uint64_t announced) {
   }
 }
 
-// An upload that cannot fit is refused when it begins. An upload of unknown size is refused when
-// only the reserve of the disk is free.
+// An upload that cannot fit is refused when it begins. An upload of unknown size is refused if only
+// the space that uploads must leave free is left.
 TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -67,8 +68,8 @@ TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   EXPECT_FALSE(space.is_low());
 }
 
-// Clients that announce the complete disk and send few bytes do not exclude others. Space for their
-// next bytes is reserved.
+// Clients that announce uploads as large as the disk but send few bytes do not exclude others. Only
+// the space for their next bytes is reserved.
 TEST(DiskReservations, UploadsThatSendSlowlyKeepNobodyOut) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -83,7 +84,7 @@ TEST(DiskReservations, UploadsThatSendSlowlyKeepNobodyOut) {
   EXPECT_EQ(disk.free, 30 * kMiB);
 }
 
-// The same number of bytes is reserved at the end as at the beginning.
+// At the end of an upload, all its reserved space is released.
 TEST(DiskReservations, UploadsGiveBackWhatTheyReserved) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -96,7 +97,7 @@ TEST(DiskReservations, UploadsGiveBackWhatTheyReserved) {
   EXPECT_TRUE(fits(space, 70 * kMiB));
 }
 
-// Other programs also write to the disk.
+// If other programs fill the disk, an upload stops.
 TEST(DiskReservations, AnUploadStopsIfTheDiskFillsUp) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -123,8 +124,8 @@ TEST(DiskReservations, ABallastGivesRoomForDeletions) {
   EXPECT_FALSE(disk.exists(folder.file("ballast"))) << "the databases need room to open";
 }
 
-// If the ballast file cannot be written completely, it is removed, because a part of it would be
-// too small.
+// If the ballast file cannot be written completely, it is removed, because an incomplete ballast
+// would be too small.
 TEST(DiskReservations, ABallastIsWholeOrAbsent) {
   class FailingDisk : public SmallDisk {
    public:

@@ -67,7 +67,7 @@ TEST(Target, IsParsed) {
   EXPECT_EQ(parse_target("http://host:80/x").segments, (std::vector<std::string>{"x"}));
 }
 
-// Dots and encoded slashes are parts of names; segments are never joined.
+// Dots and encoded slashes are parts of segment names; they neither join nor split segments.
 TEST(Target, DoesNotResolveDots) {
   EXPECT_EQ(parse_target("/a/../b").segments, (std::vector<std::string>{"a", "..", "b"}));
   EXPECT_EQ(parse_target("/a/..%2f..%2fetc").segments,
@@ -90,7 +90,8 @@ TEST(Headers, CompareCaseInsensitively) {
   EXPECT_EQ(trimmed(" "), "");
 }
 
-// A full table closes the longest waiting connection for a new one, never one with a request.
+// If the table is full, a new connection replaces the connection that has waited longest.
+// Connections with a request are kept.
 TEST(ConnectionTable, EvictsTheLongestWaiting) {
   HttpLimits limits;
   limits.max_connections = 4;
@@ -114,8 +115,8 @@ TEST(ConnectionTable, EvictsTheLongestWaiting) {
   EXPECT_EQ(table.size(), 2u);
 }
 
-// Connections that wait for their client within a body or an answer are also closed, but only if
-// they have waited for some time.
+// Connections that wait for their client within a body or an answer are also closed for a new
+// connection, but only if they have waited for some time.
 TEST(SlowConnections, SlowTransfersAreEvicted) {
   HttpLimits limits;
   limits.max_connections = 4;
@@ -135,7 +136,7 @@ TEST(SlowConnections, SlowTransfersAreEvicted) {
   EXPECT_FALSE(table.admit(-1, "10.0.0.3", slow)) << "only the fast one waits";
 }
 
-// The number of evicted connections whose threads have not ended is limited.
+// The number of evicted connections whose threads still run is limited.
 TEST(SlowConnections, EvictedConnectionsAreBounded) {
   HttpLimits limits;
   limits.max_connections = 8;
@@ -146,7 +147,7 @@ TEST(SlowConnections, EvictedConnectionsAreBounded) {
   EXPECT_EQ(admitted, 11u);
 }
 
-// The addresses of one /64 are one client, and so are the two spellings of an IPv4 address.
+// The addresses of a /64 network are one client. So are the two spellings of an IPv4 address.
 TEST(SlowConnections, AnIpv6NetworkIsOneClient) {
   EXPECT_EQ(client_of("10.0.0.1"), "10.0.0.1");
   EXPECT_EQ(client_of("::ffff:10.0.0.1"), "10.0.0.1");

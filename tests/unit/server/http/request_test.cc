@@ -80,7 +80,7 @@ TEST(RequestHead, RejectsMalformedFields) {
   EXPECT_EQ(status_of_fields(std::string("a: \0b\r\n", 7)), 400);
 }
 
-// Two readers must not disagree about where a body ends.
+// Framing that two readers could interpret differently is rejected.
 TEST(RequestHead, RejectsAmbiguousFraming) {
   for (const std::string fields :
        {"Content-Length: 1\r\nContent-Length: 1\r\n", "Content-Length: 1, 1\r\n",
@@ -113,7 +113,8 @@ TEST(HostileRequests, FieldsAreBounded) {
   EXPECT_EQ(status_of_fields(fields + "x: y\r\n"), 431);
 }
 
-// A connection to a client that has sent `bytes` and, unless it `waits`, has closed its side.
+// A connection to a client that has sent `bytes`. Unless `waits` is true, the client has closed its
+// sending side.
 class Client {
  public:
   explicit Client(const std::string& bytes, bool waits = false) {
@@ -131,7 +132,8 @@ class Client {
   }
 
   Connection& connection() { return *connection_; }
-  // Reads the head of the next request. Returns the status of its error, or 0.
+  // Reads the head of the next request. Returns the status of the request's error; 0 if the
+  // connection has ended.
   int next_request() {
     body_.clear();
     if (!connection_->wait_for_request()) return 0;
@@ -152,7 +154,7 @@ class Client {
   }
   const std::string& body() const { return body_; }
   bool answer(Response response) { return exchange_->answer(std::move(response), false); }
-  // What the client can read now.
+  // Returns the bytes that the client can read now.
   std::string received() {
     std::string text(1 << 16, '\0');
     const ssize_t got = recv(ends_[1], text.data(), text.size(), 0);
@@ -176,7 +178,7 @@ std::string put(const std::string& fields, const std::string& body) {
 }
 std::string chunked(const std::string& body) { return put("Transfer-Encoding: chunked\r\n", body); }
 
-// A connection has several requests, whatever way their bodies end.
+// A connection serves several requests, however their bodies are framed.
 TEST(Exchange, ReadsOneRequestAfterTheOther) {
   Client client("\r\n\r\n" + put("Content-Length: 3\r\n", "abc") +
                 chunked("3;x=y\r\nabc\r\n0A \r\n0123456789\r\n0\r\nTrailer: x\r\n\r\n") +
@@ -222,7 +224,7 @@ TEST(Exchange, RejectsMalformedChunks) {
   }
 }
 
-// Lines between chunks and after them are not stored beyond a limit.
+// The lines between and after chunks have a total limit.
 TEST(HostileRequests, LinesOfChunksAreBounded) {
   const std::string endless(32768, '0');
   std::string extensions, trailers;
@@ -266,7 +268,7 @@ TEST(Exchange, TimesOut) {
   EXPECT_EQ(idle.next_request(), 0);
 }
 
-// A client that was fast before may not be silent for longer than other clients.
+// A client that was fast at first may not be silent for longer than other clients.
 TEST(HostileRequests, PastBytesDoNotExcuseSilence) {
   Client client(put("Content-Length: 1000000\r\n", std::string(100000, 'x')), true);
   ASSERT_EQ(client.next_request(), 200);
@@ -276,8 +278,8 @@ TEST(HostileRequests, PastBytesDoNotExcuseSilence) {
   EXPECT_LT(wall_seconds() - start, 20);
 }
 
-// An answer without content has no length. The answer to HEAD has the length of the content that it
-// omits.
+// An answer without content has no Content-Length. The answer to HEAD has the length of the content
+// that it omits.
 TEST(Exchange, WritesAnswers) {
   const auto answer_to = [](const std::string& request, Response response) {
     Client client(request);

@@ -207,7 +207,7 @@ TEST(Messages, AreLinesOfNamedMembers) {
       R"({"message":"warning","warning":{"code":"a","count":1,"message":"two\nlines","place":"b"}})");
 }
 
-// The service checks the lines of a job's process, because it trusts them no more than a file.
+// The service ignores broken and unknown lines, because it does not trust a job's process.
 TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
   for (const char* line :
        {"", "hello", "[]", "null", "{", "{\"a\":1}", "[0,1,2,3,4,5,6,7,8,9,10]", R"({"message":1})",
@@ -225,7 +225,7 @@ TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
   }
 }
 
-// Nothing walks down a value of which no message knows.
+// Members that no message knows are skipped without recursion, so deep nesting does no harm.
 TEST(Messages, MayHaveADeepMember) {
   constexpr size_t kDepth = 1'000'000;
   const std::string deep = std::string(kDepth, '[') + std::string(kDepth, ']');
@@ -276,7 +276,8 @@ TEST(Progress, GoesOnWhereAnEarlierAttemptEnded) {
   EXPECT_DOUBLE_EQ(advanced["rate"].get<double>() * wall_s, 1);
 }
 
-// Built subvolumes of an earlier run count from the start; a split replaces one by its parts.
+// Subvolumes that an earlier run has built count from the start. A split replaces a subvolume by
+// its parts.
 TEST(Subvolumes, AreCountedAndListed) {
   SubvolumeMap map;
   const SubvolumeStatus built{1, {0, 0, 0}, 512, true, 10, 5, 100};
@@ -312,7 +313,7 @@ TEST(Subvolumes, AreCountedAndListed) {
   EXPECT_EQ(map.totals().bytes, 0u);
 }
 
-// Though nothing happens after it.
+// The file lists a begun subvolume even if no other event follows.
 TEST(Subvolumes, AreListedWhileOneIsBuilt) {
   const TemporaryFolder folder;
   const std::string path = folder.file("subvolumes.json");
@@ -350,7 +351,7 @@ TEST(ConfinedFilesTest, OpensNothingOutside) {
   EXPECT_THROW(one.open_read(folder.file("in/side/b")), Error);
 }
 
-// An answer does not reveal whether a file outside exists, and contains no path of the machine.
+// The error does not reveal whether a file outside exists, and contains no path of the machine.
 TEST(ConfinedFilesTest, DoesNotTellWhatIsOutside) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder.file("in"));
@@ -432,7 +433,7 @@ TEST_F(JobOutcome, ACrashIsReported) {
   EXPECT_EQ(job_.error->code, "out_of_memory");
 }
 
-// The signal to stop arrives before the process can handle it, or a second signal arrives.
+// The stop signal may end the process before the process handles signals, or a second signal may.
 TEST_F(JobOutcome, AProcessThatWasStoppedAtOnceRunsAgain) {
   live_.stop();
   for (const ChildProcess::End& end :
@@ -460,8 +461,8 @@ TEST_F(JobOutcome, AStoppedRunGetsTheStateThatWasAskedFor) {
   EXPECT_EQ(job_.state, JobState::kSuspended);
 }
 
-// A run that ended by itself, with any outcome, shows that the job does not cause the end of the
-// service.
+// A run that ended by itself, with any outcome, shows that the job does not end the service. So its
+// interruptions are forgotten.
 TEST_F(JobOutcome, ForgetsInterruptions) {
   job_.interruptions = 4;
   fail("no_space");

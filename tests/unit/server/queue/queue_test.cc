@@ -43,7 +43,7 @@ class Queue : public testing::Test {
   std::unique_ptr<JobQueue> queue_ = std::make_unique<JobQueue>(folder_.file("queue.db"));
 };
 
-// A job survives the end of the process completely.
+// After a restart, every member of a job is unchanged.
 TEST_F(Queue, StoresEveryMemberOfAJob) {
   const std::string id = post(7).id;
   queue_->change(id, [](Job& j) {
@@ -93,7 +93,7 @@ TEST_F(Queue, WaitsUntilAJobMayBeRetried) {
   EXPECT_TRUE(queue_->next(1000, 900, {}));
 }
 
-// After a crash of the service: running jobs are first in the queue, canceling ones are canceled.
+// After a crash of the service, running jobs are queued first, and canceling jobs become canceled.
 TEST_F(Queue, RecoversWhatWasRunning) {
   const std::string waiting = post().id, running = post().id, stopping = post().id;
   set_state(running, JobState::kRunning);
@@ -150,7 +150,7 @@ TEST_F(Queue, RecordsEveryChangeOfState) {
   EXPECT_EQ(queue_->events_after(other, 0).size(), 1u);
 }
 
-// An edit that throws leaves nothing behind.
+// If an edit throws, the job is unchanged.
 TEST_F(Queue, RollsBackAChangeThatFails) {
   const std::string id = post().id;
   EXPECT_EQ(refusal([&] {
@@ -205,7 +205,7 @@ TEST_F(Queue, LetsEndedJobsExpire) {
   EXPECT_EQ(queue_->expired(1e12, 100).size(), 2u);
 }
 
-// A client that may post jobs must not be able to remove other clients' results by posting many.
+// A client that submits many jobs cannot make the results of other clients expire.
 TEST_F(Queue, JobsExpireForThoseOfTheSamePosterOnly) {
   const auto end = [&](const std::string& poster, JobState state, double finished_s) {
     const std::string id = post().id;
@@ -223,7 +223,7 @@ TEST_F(Queue, JobsExpireForThoseOfTheSamePosterOnly) {
   EXPECT_EQ(std::count(expired.begin(), expired.end(), result), 0);
 }
 
-// A long job was posted before many short jobs and ends after them, so it is kept longest.
+// The job that ended last is kept longest. Here, this is the job that was submitted first.
 TEST_F(Queue, TheJobThatEndedLastStays) {
   const std::string lengthy = post().id, quick = post().id;
   const auto succeed = [&](const std::string& id, double finished_s) {
@@ -237,7 +237,7 @@ TEST_F(Queue, TheJobThatEndedLastStays) {
   EXPECT_EQ(queue_->expired(0, 1), (std::vector<std::string>{quick}));
 }
 
-// If the clock was set back, a job does not wait for the difference.
+// If the clock was set back, a job does not wait until the old time.
 TEST_F(Queue, DoesNotWaitForAClockThatWasSetBack) {
   const std::string id = post().id;
   queue_->change(id, [](Job& j) { j.not_before_s = 1e6 + 900; });
@@ -245,8 +245,8 @@ TEST_F(Queue, DoesNotWaitForAClockThatWasSetBack) {
   EXPECT_TRUE(queue_->next(1e6 - 1, 900, {}));
 }
 
-// A job that ends the service with every run is not run without limit. After some runs it is no
-// longer the first to run.
+// If the service ends during every run of a job, the job fails in the end. After five such runs the
+// job is no longer queued at the front.
 TEST_F(Queue, InterruptedRunsCountInTheEnd) {
   const std::string id = post().id, other = post().id;
   int runs = 0;
@@ -276,7 +276,7 @@ TEST_F(Queue, RecoversNothingThatRuns) {
   EXPECT_EQ(queue_->find(id)->state, JobState::kRunning);
 }
 
-// A damaged row can be read, listed and deleted, and does not hide other rows.
+// A damaged row can be read, listed and deleted, and other rows are not affected.
 TEST_F(Queue, ReadsADamagedRow) {
   const std::string id = post().id, other = post().id;
   const auto damage = [&](const std::string& set) {
@@ -301,8 +301,8 @@ TEST_F(Queue, ReadsADamagedRow) {
   EXPECT_FALSE(queue_->find(id));
 }
 
-// If the queue's file is removed or replaced while the service runs, this is detected before a job
-// is lost.
+// If the queue's file is removed or replaced while the service runs, the queue detects this before
+// it accepts another job.
 TEST_F(Queue, NoticesThatItsFileIsGone) {
   post();
   queue_->check_file();
@@ -313,7 +313,7 @@ TEST_F(Queue, NoticesThatItsFileIsGone) {
   EXPECT_THROW(queue_->check_file(), Error) << "another file";
 }
 
-// A queue of version 3, whose warnings are texts, is upgraded.
+// A queue of version 3, in which warnings are texts, is upgraded.
 TEST_F(Queue, ReadsThePreviousVersion) {
   const std::string id = post().id;
   queue_.reset();

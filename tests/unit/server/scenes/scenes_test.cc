@@ -14,7 +14,7 @@
 namespace voxdag::server {
 namespace {
 
-// Calls a function of the test before a file is removed.
+// Calls `before_removal` once, before the next removal of a file.
 class RemovalHook : public ForwardingFiles {
  public:
   RemovalHook() : ForwardingFiles(system_files()) {}
@@ -165,7 +165,7 @@ TEST_F(Scenes, AreListedByNameAndRemoved) {
   EXPECT_FALSE(store_->find("a.glb"));
 }
 
-// While an upload arrives, neither its bytes nor its record can be removed.
+// While an upload arrives, the scene cannot be removed.
 TEST_F(Scenes, AreNotRemovedWhileTheyArrive) {
   SceneUpload upload(*store_, "a.glb", 0, 5);
   upload.write("hel");
@@ -194,7 +194,8 @@ TEST_F(Scenes, AreNotCompleteWithoutTheirBytes) {
     EXPECT_THROW(upload.publish(), Error);
   }
   EXPECT_FALSE(store_->find("a.glb"));
-  // A crash after the digest was recorded.
+  // The service crashed after it had recorded the digest, and the file is missing, correct or
+  // wrong.
   for (const char* left : {"", "hello", "hallo"}) {
     SCOPED_TRACE(left);
     { SceneUpload(*store_, "a.glb", 0, 5).write("hello"); }
@@ -231,7 +232,8 @@ TEST_F(Scenes, StartOverIfTheirBytesAreLost) {
   EXPECT_EQ(contents("a.glb"), "ok");
 }
 
-// After the database is lost, all scenes remain. Files not created by an upload are not changed.
+// After the database is lost, all scenes can be adopted. Files that no upload created are not
+// changed.
 TEST_F(Scenes, StayWithoutTheirDatabase) {
   put("a.glb", "hello");
   store_.reset();
@@ -249,7 +251,7 @@ TEST_F(Scenes, StayWithoutTheirDatabase) {
   EXPECT_EQ(store_->list("", 10).size(), 2u);
   EXPECT_NE(log_.find("a.glb adopted"), std::string::npos) << log_;
   EXPECT_NE(log_.find("b.glb: adopted"), std::string::npos) << log_;
-  // A part of which nobody knows how much was synced: it can be sent again, or removed.
+  // It is unknown how many bytes of this part were synced, so the upload starts over or is removed.
   const auto part = store_->upload("b.glb");
   ASSERT_TRUE(part);
   EXPECT_EQ(part->offset, 0u);
@@ -292,7 +294,7 @@ TEST_F(Scenes, AreNotRemovedByAnEarlierDeletion) {
   }
 }
 
-// Nor does it take the upload in progress.
+// An interrupted deletion of a scene does not remove a later unfinished upload.
 TEST_F(Scenes, KeepAnUploadFromAnEarlierDeletion) {
   put("a.glb", "old");
   { SceneUpload(*store_, "a.glb", 0, 10).write("01234"); }
@@ -303,7 +305,7 @@ TEST_F(Scenes, KeepAnUploadFromAnEarlierDeletion) {
   EXPECT_NE(log_.find("scene a.glb: finished a deletion"), std::string::npos) << log_;
 }
 
-// What a start drops, or cannot finish, is in the log.
+// The log reports uploads that the store drops, or cannot finish, when it starts.
 TEST_F(Scenes, AreNotDroppedSilently) {
   { SceneUpload(*store_, "a.glb", 0, 5).write("hello"); }
   system_files().remove(folder_.file("parts/a.glb"));
@@ -314,7 +316,8 @@ TEST_F(Scenes, AreNotDroppedSilently) {
   EXPECT_NE(log_.find("scene a.glb: failed to finish its upload"), std::string::npos) << log_;
 }
 
-// All bytes have arrived, but the service stopped, or a job began to use the scene.
+// All bytes of a scene have arrived, but the service stopped before publish(), or publish() was not
+// called. An empty part completes the upload.
 TEST_F(Scenes, AreFinishedByAnEmptyPart) {
   for (const std::optional<uint64_t> total : {std::optional<uint64_t>(5), {}}) {
     for (const bool stopped : {false, true}) {
@@ -345,7 +348,7 @@ TEST_F(Scenes, AreFinishedByAnEmptyPart) {
   }
 }
 
-// A record in a database whose file was removed is not acknowledged.
+// If the file of the database was removed, every call that would record something fails.
 TEST_F(Scenes, AreNotRecordedInADatabaseThatIsGone) {
   put("b.glb", "old");
   { SceneUpload(*store_, "old.glb", 0, 5).write("x"); }
@@ -362,14 +365,14 @@ TEST_F(Scenes, AreNotRecordedInADatabaseThatIsGone) {
   EXPECT_EQ(contents("b.glb"), "old");
 }
 
-// An upload of which nothing arrived leaves nothing.
+// An upload that received no bytes leaves neither a record nor a file.
 TEST_F(Scenes, LeaveNothingWithoutABeginning) {
   { SceneUpload(*store_, "a.glb", 0, 5); }
   EXPECT_FALSE(store_->find("a.glb"));
   EXPECT_FALSE(system_files().exists(folder_.file("parts/a.glb")));
 }
 
-// A part that arrives while old uploads are removed.
+// An upload that continues while old uploads are removed is not removed.
 TEST_F(Scenes, AreNotStaleOnceTheyGoOn) {
   for (const char* name : {"a.glb", "b.glb"}) SceneUpload(*store_, name, 0, 5).write("he");
   SqlDatabase(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite)

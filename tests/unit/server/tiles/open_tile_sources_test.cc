@@ -1,4 +1,4 @@
-// Files that several viewers open, and changes of these files in the meantime.
+// Files that several viewers open, and changes of these files while they are open.
 #include "server/tiles/open_tile_sources.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ class ViewedFilesTest : public testing::Test {
     token.cancel();
     return token;
   }
-  // True if the cameras are not yet known, because their search fails with a canceled token.
+  // True if the cameras are not computed yet: with a canceled token, computing them fails.
   static bool needs_work(const FileTileSource& file) {
     try {
       file.manifest(canceled());
@@ -47,8 +47,8 @@ class ViewedFilesTest : public testing::Test {
   const std::string path_ = folder_.file("m.vdag");
 };
 
-// If several viewers open a file concurrently, they get the same object, so its manifest is made
-// once.
+// If several viewers open a file concurrently, they get the same object, so its manifest is
+// computed only once.
 TEST_F(ViewedFilesTest, AreOneForAllThatComeAtOnce) {
   for (int round = 0; round < 20; ++round) {
     OpenTileSources files(system_files(), 4);
@@ -81,7 +81,7 @@ TEST_F(ViewedFilesTest, HaveManifestsThatOutliveThem) {
   EXPECT_EQ(again->manifest({}), manifest);
 }
 
-// A read that failed once says nothing about the next one.
+// A file with a failed read is opened again, because the next read may succeed.
 TEST_F(ViewedFilesTest, AreOpenedAgainIfTheyCouldNotBeRead) {
   class SameIdentity : public ForwardingFiles {
     struct Reader : ForwardingReader {

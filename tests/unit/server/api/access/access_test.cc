@@ -71,7 +71,8 @@ class AccessControlTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// Pages of other sites, also under a host name that resolves to this machine, are rejected.
+// Requests from pages of other sites are rejected, even if the site's host name resolves to this
+// machine.
 TEST_F(AccessControlTest, RejectsOtherSitesWithoutTokens) {
   AccessControl access(config_, system_files());
   EXPECT_EQ(status(access, request("GET", {{"Host", "localhost:8080"}}), Role::kAdmin), 0);

@@ -9,7 +9,7 @@
 namespace voxdag::server {
 namespace {
 
-// A handler of SIGTERM, as `voxdag serve` has one.
+// Installs a handler of SIGTERM, as `voxdag serve` does.
 class HandlesTerm {
  public:
   HandlesTerm() {
@@ -21,8 +21,8 @@ class HandlesTerm {
   void (*before_)(int);
 };
 
-// A signal sent between fork and exec would call this program's handler, and the new program would
-// never receive it.
+// A stop that is requested before the child has started its program still ends the child. (Between
+// fork and exec, the signal would otherwise run this program's handler and be lost.)
 TEST(ChildProcesses, AreStoppedBeforeTheirProgramBegins) {
   const TemporaryFolder folder;
   const HandlesTerm handler;
@@ -35,7 +35,7 @@ TEST(ChildProcesses, AreStoppedBeforeTheirProgramBegins) {
   }
 }
 
-// The thread that starts a child process still receives its own signals.
+// Starting a child process does not change the signal mask of the calling thread.
 TEST(ChildProcesses, LeaveTheSignalsOfTheirParentAsTheyWere) {
   const TemporaryFolder folder;
   sigset_t before, after;
@@ -48,7 +48,7 @@ TEST(ChildProcesses, LeaveTheSignalsOfTheirParentAsTheyWere) {
   EXPECT_EQ(child.wait().exit_status, 0);
 }
 
-// A child started with SIGHUP ignored still ignores it: `nohup voxdag serve`.
+// If the parent ignores SIGHUP, as in `nohup voxdag serve`, the child also ignores it.
 TEST(ChildProcesses, IgnoreWhatTheirParentIgnores) {
   const TemporaryFolder folder;
   const auto before = std::signal(SIGHUP, SIG_IGN);

@@ -1,5 +1,5 @@
-// The process of a job on a failing machine. Whatever fails, its reports and logs name no folder of
-// the machine, and the failure of a scene names the scene.
+// The process of a job on a machine with failures. Whatever fails, its reports and logs contain no
+// folder of the machine, and a failure that is caused by a scene names the scene.
 #include "server/jobs/process/job_process.h"
 
 #include <gtest/gtest.h>
@@ -50,7 +50,7 @@ class JobProcess : public testing::Test {
   void put_scene(const std::string& text) {
     write_file_atomically(system_files(), scene_path(), text);
   }
-  // An empty folder with the task, as the service makes it.
+  // Makes a new job folder with the task, as the service does.
   void start_over(JobTask::Kind kind = JobTask::Kind::kBuild) {
     remove_tree(system_files(), job_.path);
     std::filesystem::create_directories(job_.path);
@@ -67,8 +67,8 @@ class JobProcess : public testing::Test {
   struct Run {
     int exit_status = -1;
     std::string output, log;
-    // Returns the message of the last reported failure, without its code; "" if there was no
-    // failure.
+    // Returns the last reported failure as "CODE: MESSAGE"; "" if no failure was
+    // reported.
     std::string failure() const {
       std::string found, line;
       for (std::istringstream lines(output); std::getline(lines, line);)
@@ -116,14 +116,14 @@ TEST_F(JobProcess, BuildsAndReportsItsResult) {
   EXPECT_NE(contents(job_.subvolumes()).find("\"built\":1,\"total\":1"), std::string::npos)
       << contents(job_.subvolumes());
   EXPECT_FALSE(std::filesystem::exists(job_.work()));
-  // Killed after the build, before the service heard of it.
+  // As if the service was killed before it received the result, runs the finished job again.
   const Run again = run();
   EXPECT_EQ(again.exit_status, 0) << again.log;
   EXPECT_EQ(again.output.substr(again.output.rfind("{\"json\"")),
             first.output.substr(first.output.rfind("{\"json\"")));
 }
 
-// The list of subvolumes of an earlier run is kept as long as its work.
+// The list of subvolumes of an earlier run is kept as long as that run's work folder.
 TEST_F(JobProcess, ListsNothingOfAnEarlierRunBeforeItsOwnPlan) {
   put_scene("no scene at all");
   write_file_atomically(system_files(), job_.subvolumes(), "the list");
@@ -148,7 +148,7 @@ TEST_F(JobProcess, NamesTheSceneAsTheClientDid) {
   expect_failure("scene.gltf", run());
 }
 
-// Neither the service's files nor the job's files are readable as geometry.
+// A scene cannot use files of the service or of the job as its buffer.
 TEST_F(JobProcess, ReadsNoFileOfTheServiceAsABuffer) {
   write_file_atomically(system_files(), folder_.file("secret.bin"), std::string(36, 'x'));
   for (const char* uri : {"../secret.bin", "task.json", "log"}) {
@@ -181,7 +181,7 @@ TEST_F(JobProcess, NamesNoFolderOfABrokenJob) {
   expect_failure("the job's folder", run());
 }
 
-// The disk is full, or fails, from its n-th operation on.
+// The disk is full, or fails, from the n-th operation on.
 TEST_F(JobProcess, NamesNoFolderOfABrokenDisk) {
   for (const Fault fault : {Fault::kNoSpace, Fault::kIoError, Fault::kReadError}) {
     for (const JobTask::Kind kind : {JobTask::Kind::kBuild, JobTask::Kind::kPlan}) {

@@ -13,7 +13,7 @@
 namespace voxdag {
 namespace {
 
-// The occupied cells of the finished file. A cell's edge is a quarter of the cube's edge.
+// The occupied cells of a cube in the finished file. A cell's edge is a quarter of the cube's edge.
 class Cells {
  public:
   Cells(const voxdag_reader::File& file, const Cube& cube)
@@ -65,7 +65,7 @@ TEST_F(CoarseCubesTest, HaveTheCellsOfTheResult) {
   const voxdag_reader::File file(output_);
   for (const auto& [id, cube] : cubes.cubes())
     ASSERT_EQ(cube.brick, Cells(file, cube.cube).mask) << "subvolume " << id;
-  // Known cubes remain known after the artifacts were removed; a new reader sees none.
+  // After the artifacts are removed, the cubes that were read remain, and a new reader finds none.
   for (const auto& entry : std::filesystem::directory_iterator(work_))
     if (entry.path().extension() == ".vdseg") std::filesystem::remove(entry.path());
   const size_t before = cubes.cubes().size();
@@ -77,7 +77,7 @@ TEST_F(CoarseCubesTest, HaveTheCellsOfTheResult) {
   EXPECT_EQ(late.built(), cubes.built());
 }
 
-// Cancels when some subvolumes are built.
+// Cancels the build after ten subvolumes are built.
 class Canceler : public NoProgress {
  public:
   explicit Canceler(CancelToken& cancel) : cancel_(cancel) {}

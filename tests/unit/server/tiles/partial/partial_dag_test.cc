@@ -41,7 +41,7 @@ bool has(const std::vector<PartialDag::Part>& parts, uint32_t levels, uint32_t x
   return false;
 }
 
-// Cubes of all sizes down to a brick, and some not built.
+// Adds cubes of all sizes down to a brick; leaves some cubes out, as if they were not built.
 void add_random_parts(const Cube& cube, uint32_t levels, std::mt19937& random,
                       std::vector<PartialDag::Part>& parts) {
   if (cube.level + 2 < levels && random() % 3 != 0) {
@@ -63,7 +63,7 @@ TEST(PartialDag, HasTheCellsOfItsParts) {
     }
     PartialDag dag(levels);
     std::shuffle(parts.begin(), parts.end(), random);
-    // Earlier roots are unchanged.
+    // Adding parts does not change what earlier roots contain.
     std::vector<PartialDag::Part> first(parts.begin(), parts.begin() + 9);
     const auto old_root = dag.add(first), root = dag.add(parts);
     ASSERT_TRUE(old_root && root);

@@ -29,7 +29,7 @@ namespace {
 using Cells = std::set<std::array<uint32_t, 3>>;
 
 constexpr uint64_t kResolution = 1024;
-constexpr uint32_t kCellDepth = 6;  // a quarter of a subvolume of 64 voxels
+constexpr uint32_t kCellDepth = 6;  // level of cells with a quarter of a subvolume's edge (64)
 
 void add_cells(const query::DagView& dag, uint64_t node, uint32_t depth,
                const std::array<uint32_t, 3>& at, Cells& cells) {
@@ -50,8 +50,8 @@ Cells cells_of(const query::DagView& dag, uint64_t root) {
   return cells;
 }
 
-// Lists a build's subvolumes as its job's process would, and cancels it after some built
-// subvolumes.
+// Lists the subvolumes of a build, as the job's process does, and cancels the build after some
+// built subvolumes.
 class ListedBuild : public NoProgress {
  public:
   explicit ListedBuild(int most) : most_(most) {}
@@ -76,7 +76,7 @@ class ListedBuild : public NoProgress {
 
 class PartialViewsTest : public testing::Test {
  protected:
-  // Returns the list of the subvolumes.
+  // Builds, and returns the list of the subvolumes.
   std::string build(int most) {
     BuildSpec spec = spheres_build(scene_, job_.result());
     spec.run.work_folder = job_.work();
@@ -94,7 +94,7 @@ class PartialViewsTest : public testing::Test {
     std::ofstream(path, std::ios::binary) << text;
   }
   auto look(PartialViews& views) { return views.tiles("job", job_, kResolution); }
-  // Looks until the condition holds, for at most ten seconds.
+  // Requests the tiles until the condition holds, for at most ten seconds.
   template <class Condition>
   std::shared_ptr<const TileSource> look_until(PartialViews& views, const Condition& condition) {
     auto dag = look(views);
@@ -178,7 +178,8 @@ TEST_F(PartialViewsTest, BeginAgainWithAnotherScene) {
   const auto first = look(views);
   const auto before = nlohmann::json::parse(first->manifest({}));
   std::filesystem::remove_all(job_.work());
-  // While it is read, and then until there is a plan of the next run.
+  // Until the folder is read again, the old tiles are returned. Then, until there is a new plan,
+  // the error is kNotFound.
   ErrorCode code = ErrorCode::kInvalidInput;
   for (int i = 0; i < 1000 && code != ErrorCode::kNotFound; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -240,7 +241,7 @@ TEST_F(PartialViewsTest, AreForgottenWhenNobodyAsksForThem) {
   EXPECT_NO_THROW(views.json("other", job_, kResolution));
 }
 
-// The folder exists when it is checked, and is missing when it is read.
+// The folder exists when it is checked, but is missing when it is read.
 class VanishingFiles : public ForwardingFiles {
  public:
   VanishingFiles() : ForwardingFiles(system_files()) {}
@@ -256,7 +257,7 @@ TEST_F(PartialViewsTest, OfAFolderThatVanishesAreNotFound) {
   EXPECT_EQ(error_of([&] { look(views); }).code(), ErrorCode::kNotFound);
 }
 
-// Files whose disk hangs from a moment on.
+// A disk that hangs from some moment on.
 class HangingFiles : public ForwardingFiles {
  public:
   HangingFiles() : ForwardingFiles(system_files()) {}
