@@ -27,9 +27,10 @@ class CommandLine : public testing::Test {
   // Starts `voxdag ARGS...` without waiting; wait_for() returns its output.
   pid_t start(const std::vector<std::string>& args);
   Answer wait_for(pid_t pid);
-  // Runs, expects success, and parses standard output, which must be JSON without messages.
+  // Runs `voxdag`, expects success, and parses standard output, which must be JSON and nothing
+  // else.
   Json run_json(std::vector<std::string> args);
-  // Runs, expects this exit status and one message that contains `part`.
+  // Runs `voxdag`, expects this exit status and a single message that contains `part`.
   void expect_error(int status, const std::string& part, const std::vector<std::string>& args);
 
   // Writes a Menger sponge of 2112 triangles to m.glb.

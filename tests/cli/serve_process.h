@@ -8,7 +8,7 @@
 
 namespace command_line {
 
-// The server accepts connections when the constructor returns, and is stopped by the destructor.
+// The server accepts connections when the constructor returns. The destructor stops it.
 class ServeProcess {
  public:
   // Stores its data and its log in `folder`.

@@ -1,5 +1,5 @@
-// Tables may store only the upper 32 bits of a hash. Different nodes with equal upper 32 bits must
-// remain different nodes.
+// A hash table may store only the upper 32 bits of a hash. Different nodes whose hashes have equal
+// upper 32 bits must remain different nodes.
 #include <unordered_map>
 
 #include "tests/conformance/harness.h"
@@ -10,14 +10,14 @@ namespace {
 using Collisions = Conformance;
 VOXDAG_FOR_ALL_BACKENDS(Collisions);
 
-// A node with one brick.
+// A node with one child, a brick.
 struct SmallNode {
   int child;
   uint64_t brick;
 };
 
-// Returns pairs of nodes, one pair after the other. The hashes of a pair have equal upper halves.
-// The pairs are found by trial.
+// Returns pairs of nodes, one pair after the other. The two hashes of a pair have equal upper
+// halves. The function finds the pairs by trial.
 std::vector<SmallNode> colliding_nodes() {
   std::unordered_map<uint32_t, SmallNode> by_half_hash;
   std::vector<SmallNode> found;
@@ -41,7 +41,7 @@ void place(const SmallNode& node, int index, oracle::Triangles& scene) {
     if (!(node.brick >> bit & 1)) continue;
     oracle::Point p;
     for (int a = 0; a < 3; ++a) {
-      const int shift = 2 - a;  // x is the highest bit of each three
+      const int shift = 2 - a;  // x has the highest bit of each group of three
       const int voxel = 2 * (bit >> (3 + shift) & 1) + (bit >> shift & 1);
       const int cell = index / (a == 0 ? 16 : a == 1 ? 4 : 1) % 4;
       p[a] = 256 * (8 * cell + 4 * (node.child >> shift & 1) + voxel) + 101;

@@ -1,4 +1,4 @@
-// Subvolumes of every level, anywhere in grids of up to 2^20 voxels per edge.
+// Builds subvolumes of every level, at any position in grids of up to 2^20 voxels per edge.
 #include "tests/conformance/harness.h"
 #include "tests/oracle/check_sub_dag.h"
 
@@ -15,7 +15,7 @@ Cube random_cube(oracle::Random& random, uint32_t level) {
   return {level, {position(), position(), position()}};
 }
 
-// Returns the region of `edge` voxels that contains the cube, moved inside the grid.
+// Returns a region of `edge` voxels per edge that is inside the grid and contains the cube.
 oracle::Region region_around(const Cube& cube, uint32_t grid_levels, int edge) {
   oracle::Region region = oracle::region_of(cube, grid_levels);
   for (int64_t& low : region.low)
@@ -24,8 +24,8 @@ oracle::Region region_around(const Cube& cube, uint32_t grid_levels, int edge) {
   return region;
 }
 
-// Builds all cubes of all levels of one grid, down to single bricks. Each gets all of the scene's
-// triangles, because triangles that miss the cube have no effect.
+// Builds all cubes of all levels of a small grid, down to single bricks. Each build gets all
+// triangles of the scene, because triangles that miss the cube must have no effect.
 TEST_P(Cubes, EveryCubeOfASmallGrid) {
   constexpr uint32_t kLevels = 5;
   const auto backend = open();
@@ -44,8 +44,8 @@ TEST_P(Cubes, EveryCubeOfASmallGrid) {
   }
 }
 
-// Small cubes at random positions in grids of up to 2^20 voxels per edge. Triangles are inside,
-// around and through the cubes.
+// Builds small cubes at random positions in grids of up to 2^20 voxels per edge. Triangles are in
+// the cubes, around them and through them.
 TEST_P(Cubes, SmallCubesOfLargeGrids) {
   const auto backend = open();
   oracle::Random random(21);
@@ -68,8 +68,8 @@ TEST_P(Cubes, SmallCubesOfLargeGrids) {
     }
 }
 
-// Large cubes of large grids are too large for the oracle. So some of their regions, near triangles
-// and elsewhere, are compared voxel by voxel.
+// Large cubes of large grids are too large for the oracle. So the test compares only some of their
+// regions voxel by voxel, near triangles and elsewhere.
 TEST_P(Cubes, RegionsOfLargeCubes) {
   const auto backend = open();
   oracle::Random random(22);
@@ -98,8 +98,8 @@ TEST_P(Cubes, RegionsOfLargeCubes) {
   }
 }
 
-// A large cube is built in one piece, and as its eight children. The large cube has as many voxels
-// as its children together, and one octree node more.
+// Builds a large cube in one piece, and its eight children. The cube has as many voxels as its
+// children together, and one octree node more than they have.
 TEST_P(Cubes, CountsAddUp) {
   const auto backend = open();
   for (const oracle::SceneKind kind : oracle::kAllKinds) {
@@ -119,10 +119,10 @@ TEST_P(Cubes, CountsAddUp) {
   }
 }
 
-// Triangles that miss the cube, even by very little, leave it empty.
+// A cube is empty if all triangles miss it, even by one unit.
 TEST_P(Cubes, MissedCubesAreEmpty) {
   const auto backend = open();
-  const Cube cube{4, {5, 6, 7}};  // of 64 voxels at R 1024
+  const Cube cube{4, {5, 6, 7}};  // 64 voxels per edge in a grid of 1024
   oracle::Random random(23);
   oracle::Triangles scene;
   for (int i = 0; i < 300; ++i) {

@@ -1,5 +1,5 @@
-// The CUDA backend is tested if there is a device. Without a device, the error must state why it
-// cannot be opened.
+// If the machine has a CUDA device, the CUDA backend is tested. If it has none, the error must
+// state why no device can be opened.
 #include "core/base/error.h"
 #include "tests/conformance/harness.h"
 

@@ -36,8 +36,8 @@ size_t first_child(const SubDag::Nodes& nodes, size_t index) {
   return at;
 }
 
-// Sets the voxels of one node in `out`. levels_above is the number of levels between the node and
-// the bricks.
+// Sets the voxels of one node in `out`. `levels_above` is the number of levels from the bricks to
+// the node.
 struct Decoder {
   const SubDag& dag;
   const oracle::Region& region;

@@ -20,7 +20,7 @@ namespace voxdag {
 struct BackendUnderTest {
   std::string name;
   std::function<std::unique_ptr<Backend>()> open;
-  Simd simd = Simd::kNone;  // that it needs
+  Simd simd = Simd::kNone;  // instruction set that the backend needs
   friend std::ostream& operator<<(std::ostream& out, const BackendUnderTest& b) {
     return out << b.name;
   }
@@ -49,8 +49,8 @@ struct Built {
   bool sink_called = false;
 };
 
-// Builds a subvolume, and checks a backend's guarantees for every outcome: it calls the sink in
-// order and only if the subvolume is built, and releases all memory.
+// Builds a subvolume, and checks the guarantees of a backend for every outcome: it calls the sink
+// in order, only if the subvolume is built, and releases all memory.
 Built build(Backend& backend, const SubvolumeTask& task, TriangleStream& stream,
             uint64_t budget_bytes = kAmpleBudget);
 Built build(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles,

@@ -1,6 +1,6 @@
-// The grid is too large for the oracle, so implementations that share no inner loop are compared.
-// In such a grid a build uses all memos (planes and their directions), grown tables, and subvolumes
-// of many tiles.
+// The grid is too large for the oracle, so the tests compare implementations that share no inner
+// loop. In such a grid a build uses all caches (of planes and their directions), tables that grow,
+// and subvolumes of many tiles.
 #include "tests/conformance/harness.h"
 
 namespace voxdag {
@@ -28,8 +28,8 @@ oracle::Triangles mixed_scene(const Cube& cube, uint64_t seed) {
   return scene;
 }
 
-// The CPU backend with each instruction set of this machine, and the parallel pipeline, give the
-// same arrays of the complete grid and of a subvolume.
+// All CPU backends that this machine can run, and the parallel pipeline, give the same arrays for
+// the complete grid and for a subvolume.
 TEST(LargeGrid, TheSameArraysFromAllThatRunHere) {
   const auto parallel = make_parallel_host_backend(Method::kFast);
   for (const Cube& cube : {Cube{}, Cube{1, {1, 0, 1}}}) {

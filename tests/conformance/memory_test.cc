@@ -1,5 +1,5 @@
-// The memory guarantee of a backend: a cube that does not fit in the budget needs a split, and the
-// smallest cube always fits.
+// The memory guarantees of a backend. A cube that does not fit in the budget gives the outcome that
+// it must be split. The smallest cube always fits.
 #include <malloc.h>
 
 #include <atomic>
@@ -11,7 +11,7 @@
 namespace {
 
 // Bytes currently allocated by `new`, and their maximum. A backend may allocate only little memory
-// without charging it.
+// (kUncharged) without charging it to the budget.
 std::atomic<int64_t> g_heap{0}, g_heap_peak{0};
 
 void* counted(void* block) {
@@ -59,7 +59,7 @@ class EndlessStream : public TriangleStream {
   size_t read(std::span<FixedTriangle> out) override {
     size_t n = 0;
     for (; n < out.size() && next_ < count_; ++n, ++next_) {
-      // Every repetition begins with another vertex, so that equal triangles have different bytes.
+      // Each repetition begins with another vertex, so that equal triangles have different bytes.
       const FixedTriangle& t = unique_[next_ * 7919 % unique_.size()];
       for (size_t i = 0; i < 3; ++i)
         std::copy_n(t.v[(i + next_ / unique_.size()) % 3], 3, out[n].v[i]);
@@ -72,11 +72,11 @@ class EndlessStream : public TriangleStream {
   uint64_t count_, next_ = 0;
 };
 
-// The smallest cube fits the smallest budget, however many triangles there are, and uncharged
-// memory is small.
+// The smallest cube fits in the smallest budget, however many triangles there are, and the
+// uncharged memory is small.
 TEST_P(Memory, SmallestCubeFitsWithAnyTriangles) {
   const auto backend = open();
-  const SubvolumeTask task{14, {8, {200, 3, 117}}, 64};  // 64 voxels
+  const SubvolumeTask task{14, {8, {200, 3, 117}}, 64};  // a cube of 64 voxels per edge
   const oracle::Region region = oracle::region_of(task.cube, task.grid_levels);
   for (const oracle::SceneKind kind : oracle::kAllKinds) {
     SCOPED_TRACE(oracle::kind_name(kind));
@@ -102,7 +102,7 @@ TEST_P(Memory, SmallestCubeFitsWithAllBricksDifferent) {
   expect_equals(build(*open(), task, scene, kSmallestBudget), truth, task);
 }
 
-// Builds a cube, splitting it until the parts fit the smallest budget.
+// Builds a cube. Splits it until the parts fit in the smallest budget.
 class Splitter {
  public:
   Splitter(Backend& backend, uint32_t grid_levels, const oracle::Triangles& scene)
@@ -127,10 +127,10 @@ class Splitter {
   const oracle::Triangles& scene_;
 };
 
-// If a cube had to be split, its parts together have the same voxels as the cube.
+// If a cube must be split, its parts together have the same voxels as the cube.
 TEST_P(Memory, CubesThatNeedASplitCanBeSplit) {
   const auto backend = open();
-  const Cube cube{1, {1, 1, 0}};  // 512 voxels
+  const Cube cube{1, {1, 1, 0}};  // a cube of 512 voxels per edge
   const auto scene =
       oracle::make_scene(oracle::SceneKind::kSpanning, 11, oracle::region_of(cube, 10), 100);
   const Built whole = build(*backend, {10, cube, 64}, scene);
@@ -141,7 +141,7 @@ TEST_P(Memory, CubesThatNeedASplitCanBeSplit) {
   EXPECT_EQ(splitter.voxels, whole.summary.voxels);
 }
 
-// With any budget, from far too small to ample, the cube needs a split or the result is right. The
+// For any budget, from far too small to ample, the outcome is a split or the correct result. The
 // memory from `new` is within the budget.
 TEST_P(Memory, AnyBudgetNeedsASplitOrGivesTheResult) {
   const auto backend = open();

@@ -1,4 +1,5 @@
-// A backend builds many subvolumes and caches data between them; results must not depend on that.
+// A backend builds many subvolumes and caches data between them. The cached data must not affect
+// results.
 #include "tests/conformance/harness.h"
 
 namespace voxdag {
@@ -39,8 +40,8 @@ std::vector<Work> make_work() {
   return all;
 }
 
-// One backend builds many tasks in random order, some of which do not fit the budget. Every result
-// equals the result of a new backend, and of the oracle.
+// One backend builds many tasks in random order. Some tasks do not fit in the budget. Every result
+// equals the result of a new backend and of the oracle.
 TEST_P(Reuse, ResultsDoNotDependOnWhatWasBuiltBefore) {
   const auto all = make_work();
   const auto reused = open();

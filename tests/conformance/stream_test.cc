@@ -1,5 +1,5 @@
-// The order, number and packing of the triangles never affect the result; errors of the stream
-// are passed on, and the backend remains usable.
+// The order, number and packing of the triangles do not affect the result. Errors of the stream are
+// passed on, and the backend remains usable after them.
 #include <algorithm>
 
 #include "core/base/error.h"
@@ -11,7 +11,7 @@ namespace {
 using Streams = Conformance;
 VOXDAG_FOR_ALL_BACKENDS(Streams);
 
-constexpr SubvolumeTask kTask{8, {1, {1, 0, 1}}, 16};  // 128 voxels
+constexpr SubvolumeTask kTask{8, {1, {1, 0, 1}}, 16};  // 128 voxels per edge
 
 oracle::Triangles mixed_scene(uint64_t seed) {
   oracle::Triangles scene;
@@ -29,7 +29,7 @@ void expect_same(const Built& a, const Built& b) {
   EXPECT_EQ(a.summary.root_hash, b.summary.root_hash);
 }
 
-// The triangles are shuffled and duplicated, their vertices are rotated, and they are read one by
+// The triangles are shuffled and duplicated, and their vertices are rotated. They are read one by
 // one or in one batch.
 TEST_P(Streams, OrderAndRepetitionDoNotShow) {
   const auto backend = open();
@@ -50,7 +50,7 @@ TEST_P(Streams, OrderAndRepetitionDoNotShow) {
   }
 }
 
-// A stream that starts in the middle is rewound first.
+// If a stream starts in the middle, the backend first rewinds it.
 TEST_P(Streams, StartsAtTheFirstTriangle) {
   const auto backend = open();
   const oracle::Triangles scene = mixed_scene(2);
@@ -74,8 +74,8 @@ class FailingStream : public oracle::VectorStream {
   int good_reads_;
 };
 
-// An error of the stream is rethrown unchanged, and the sink is not called. The next build gives
-// the right result.
+// The backend throws an error of the stream unchanged, without calling the sink. Its next build
+// gives the correct result.
 TEST_P(Streams, ErrorsOfTheStreamComeThrough) {
   const auto backend = open();
   const oracle::Triangles scene = mixed_scene(3);
@@ -98,7 +98,7 @@ TEST_P(Streams, ErrorsOfTheStreamComeThrough) {
   }
 }
 
-// The same for a sink whose disk is full.
+// A sink whose disk becomes full after some calls.
 class FullSink : public SubDagSink {
  public:
   explicit FullSink(int good_calls) : good_calls_(good_calls) {}
@@ -133,7 +133,7 @@ TEST_P(Streams, ErrorsOfTheSinkComeThrough) {
   }
 }
 
-// A very long stream. It cancels the build after `reads` reads, and counts the further reads.
+// A very long stream. It cancels the build after `reads` reads, and counts the reads after that.
 class CancelingStream : public TriangleStream {
  public:
   CancelingStream(const oracle::Triangles& triangles, CancelToken& token, int reads)
@@ -158,8 +158,8 @@ class CancelingStream : public TriangleStream {
   uint64_t done_ = 0;
 };
 
-// A build that is canceled before or while it reads the stream soon throws kCanceled and sends
-// nothing, and the backend remains usable.
+// A build that is canceled before or while it reads the stream soon throws kCanceled, and sends
+// nothing to the sink. The backend remains usable.
 TEST_P(Streams, CanBeCanceled) {
   const auto backend = open();
   const SubvolumeTask smallest{12, {6, {9, 8, 7}}, 64};

@@ -1,4 +1,4 @@
-// Small grids built as one subvolume equal the oracle's DAG, array for array.
+// Builds small grids as one subvolume. All arrays equal the arrays of the oracle's DAG.
 #include "tests/conformance/harness.h"
 
 namespace voxdag {
@@ -9,7 +9,8 @@ VOXDAG_FOR_ALL_BACKENDS(WholeGrid);
 
 constexpr uint32_t kHashBits[] = {4, 16, 64};
 
-// Scenes of every kind, with R from 4 to 64, few and many triangles, and truncated and full hashes.
+// Scenes of every kind, in grids of 4 to 64, with few and many triangles, truncated and full
+// hashes.
 TEST_P(WholeGrid, EqualsTheOracle) {
   const auto backend = open();
   for (const oracle::SceneKind kind : oracle::kAllKinds)
@@ -26,7 +27,7 @@ TEST_P(WholeGrid, EqualsTheOracle) {
       }
 }
 
-// The same at 128, all kinds of triangles in one scene.
+// The same in a grid of 128, with all kinds of triangles in one scene.
 TEST_P(WholeGrid, EqualsTheOracleOnMixedScenes) {
   const auto backend = open();
   for (const uint32_t hash_bits : {4u, 5u, 33u, 64u}) {
@@ -41,7 +42,7 @@ TEST_P(WholeGrid, EqualsTheOracleOnMixedScenes) {
   }
 }
 
-// All 2^18 voxels are set: there is one node per level, which occurs many times.
+// All 2^18 voxels are set, so each level has only one node, which occurs many times.
 TEST_P(WholeGrid, FullGridIsOneNodeALevel) {
   oracle::Triangles scene;
   for (int64_t x = 128 + 1; x < 64 * 256; x += 256) {

@@ -1,5 +1,5 @@
 // A build with colors and all other attributes is killed, loses power, or its disk becomes full or
-// fails, at any disk operation. When the build runs again, it gives the same bytes.
+// fails, at any disk operation. The next build gives the same bytes.
 #include <array>
 #include <set>
 
@@ -33,7 +33,7 @@ TEST_P(ColorCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
 TEST_P(ColorCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
-// Either all unwanted artifacts are removed, or none.
+// After a fault during keep_only(), all unwanted artifacts are removed, or none.
 TEST(ColorStoreCrash, KeepsWhatIsWanted) {
   const voxdag::TemporaryFolder folder;
   const std::string path = folder.file("colors.vddurable");
@@ -55,7 +55,7 @@ TEST(ColorStoreCrash, KeepsWhatIsWanted) {
     waitpid(child, &status, 0);
     return WIFSIGNALED(status);
   };
-  std::set<bool> outcomes;  // whether garbage is left
+  std::set<bool> outcomes;  // true if the garbage remains
   for (const Fault fault :
        {Fault::kKillBefore, Fault::kKillAfter, Fault::kPowerCut, Fault::kNoSpace})
     for (uint64_t at = 1;; ++at) {

@@ -1,5 +1,5 @@
-// Builds a small scene, simulates every fault of the disk and of the process, and checks the
-// results.
+// Builds a small scene, simulates every fault of the disk and of the process, and checks that the
+// build resumes with the expected bytes.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ namespace crash {
 using voxdag::BuildReport;
 using voxdag::BuildSpec;
 
-// Remembers the last warning. A resumed build must not warn, because nothing that it stored is
+// Stores the last warning. A resumed build must not warn, because none of its stored data is
 // damaged.
 class Warnings : public voxdag::NoProgress {
  public:
@@ -44,7 +44,7 @@ inline uint64_t rounds() {
   return text ? std::strtoull(text, nullptr, 10) : 6;
 }
 
-// The place of the scene's triangles between ingest and the build stage.
+// Where the triangles of the scene are stored between ingest and the build stage.
 enum class Ingested { kInMemory, kDurable };
 
 class CrashTest : public testing::TestWithParam<Ingested> {
@@ -52,7 +52,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
   void SetUp() override {
     voxdag::GenerateOptions options;
     options.kind = voxdag::SceneKind::kCity;
-    // Ingest with checkpoints needs several batches of triangles.
+    // Checkpoints during ingest occur only with several batches of triangles.
     options.triangles = is_durable() ? 20000 : 3000;
     voxdag::NoProgress progress;
     voxdag::CancelToken cancel;
@@ -64,8 +64,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
   static bool is_durable() { return GetParam() == Ingested::kDurable; }
   std::string output() const { return folder_.file("out.vdag"); }
 
-  // A small budget and several threads, so that the build spills triangles, splits subvolumes and
-  // needs several merge passes.
+  // The budget is small and there are several threads, so that the build spills triangles, splits
+  // subvolumes and needs several merge passes.
   virtual BuildSpec spec() const {
     BuildSpec spec;
     spec.geometry.scenes = {folder_.file("scene.glb")};
@@ -89,12 +89,12 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     voxdag::CancelToken cancel;
     const BuildReport report = voxdag::run_build(spec(), {files, warnings, cancel});
     // If an artifact had been recorded before it was durable, the resumed build would find it
-    // damaged, warn, and build it again.
+    // damaged, would warn, and would build it again.
     EXPECT_EQ(warnings.last, "");
     return report;
   }
 
-  // Builds in a separate process; true if it was killed before its end.
+  // Builds in a separate process. Returns true if the process was killed before its end.
   bool killed(FaultPlan plan, std::chrono::microseconds after = {}) const {
     const pid_t child = fork();
     if (child == 0) {
@@ -117,8 +117,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     return WIFSIGNALED(status);
   }
 
-  // Runs the build again after any fault. Checks that it ends with the expected file and leaves no
-  // other files.
+  // Runs the build again after a fault. Checks that it ends with the expected file and that no
+  // other files remain.
   void expect_to_resume() {
     if (std::filesystem::exists(output())) {
       // A file of this name must always be complete.
@@ -150,8 +150,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     return counting.operations();
   }
 
-  // The process is killed, or the power fails, before or after every write, sync, rename and
-  // removal.
+  // The process is killed before or after each write, sync, rename and removal, or the power fails
+  // there.
   void kill_at_any_operation() {
     const uint64_t operations = operations_of_a_build();
     ASSERT_GT(operations, 20u);
@@ -167,8 +167,8 @@ class CrashTest : public testing::TestWithParam<Ingested> {
     }
   }
 
-  // The disk becomes full, or fails, at any operation. The build reports the error, and it resumes
-  // without loss when the disk works again.
+  // The disk becomes full, or fails, at any operation. The build reports the error. When the disk
+  // works again, the build resumes without loss.
   void break_disk_at_any_operation() {
     const uint64_t operations = operations_of_a_build();
     struct Case {
@@ -183,7 +183,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
         FaultyFiles files({c.fault, at});
         try {
           run(files);
-          // Only the removal of leftover files may fail silently.
+          // A build succeeds only if the fault affected nothing but the removal of leftover files.
           EXPECT_TRUE(std::filesystem::exists(output()));
           std::filesystem::remove_all(output() + ".work");
         } catch (const voxdag::Error& error) {

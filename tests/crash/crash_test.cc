@@ -1,8 +1,9 @@
-// A build is killed, loses power, or its disk becomes full or fails, at any disk operation. When
-// the build runs again, it resumes and gives the same bytes.
+// A build is killed, loses power, or its disk becomes full or fails, at any disk operation. The
+// next build resumes and gives the same bytes.
 //
-// By default the tests choose a few operations at random. VOXDAG_CRASH_ROUNDS=N sets the number of
-// moments per fault. If N is large, the tests use every operation, and N random points in time.
+// By default, the tests choose a few operations at random. VOXDAG_CRASH_ROUNDS=N sets the number of
+// moments that are tested per fault. For a large N, the tests use every operation and N random
+// times.
 #include "core/base/clock.h"
 #include "tests/crash/crash_fixture.h"
 
@@ -12,20 +13,20 @@ namespace {
 TEST_P(CrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
 // The same scene at a higher resolution and with larger subvolumes. The build takes about as long
-// as CrashTest's, but spends more of its time on computations.
+// as the build of CrashTest, but spends more of this time on computations.
 class FineCrashTest : public CrashTest {
  protected:
   BuildSpec spec() const override {
     BuildSpec spec = CrashTest::spec();
     spec.geometry.resolution = 2048;
     spec.run.subvolume_edge = 512;
-    // Checkpoints during the passes over the triangles.
+    // Durable triangles: writes checkpoints during the passes over the triangles.
     if (is_durable()) spec.run.checkpoint_interval_s = 1e-4;
     return spec;
   }
 };
 
-// SIGKILL at random moments, for example inside SQLite or during computations.
+// Kills the build with SIGKILL at random times, for example in SQLite or during computations.
 TEST_P(FineCrashTest, KilledAtRandomMoments) {
   const double start = voxdag::wall_seconds();
   run(voxdag::system_files());
@@ -61,8 +62,8 @@ TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   const BuildReport whole = build(one, counting);
   ASSERT_GT(whole.artifact_bytes, uint64_t{4} << 20) << "fewer than four writes of a segment";
   std::filesystem::remove(output());
-  // The segment's first MiB is written by the fourth operation. So operation 7, which fails, is the
-  // write of its fourth MiB.
+  // The fourth operation writes the first MiB of the segment. So operation 7, which fails, writes
+  // its fourth MiB.
   FaultyFiles files({Fault::kNoSpace, 7});
   EXPECT_THROW(build(one, files), voxdag::Error);
   const BuildReport report = build(one, voxdag::system_files());
@@ -70,7 +71,7 @@ TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   EXPECT_EQ(report.sha256, whole.sha256);
 }
 
-// If a read fails, the error does not report an artifact as damaged, so no artifact is discarded.
+// If a read fails, the build does not treat the artifact as damaged, so it discards no artifact.
 TEST_P(CrashTest, ReadsThatFail) {
   FaultyFiles counting({});
   run(counting);
@@ -80,8 +81,8 @@ TEST_P(CrashTest, ReadsThatFail) {
     FaultyFiles files({Fault::kReadError, at});
     try {
       run(files);
-      // Threads share the blocks that they read, so the number of reads differs slightly from run
-      // to run, and this run may end before the planned read.
+      // The number of reads differs slightly between runs, because threads share the blocks that
+      // they read. So this run may end before the planned read.
       EXPECT_LT(files.reads(), at) << "the build went through";
     } catch (const voxdag::Error& error) {
       EXPECT_EQ(error.code(), voxdag::ErrorCode::kIo) << error.what();

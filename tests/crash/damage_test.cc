@@ -1,5 +1,5 @@
-// The disk returns wrong bytes. The build detects them, and repairs or refuses the data. It never
-// writes a wrong DAG.
+// The disk returns wrong bytes. The build detects them, and repairs the data or refuses it. It
+// never writes a wrong DAG.
 #include <fstream>
 
 #include "core/base/error.h"
@@ -16,7 +16,7 @@ using voxdag::ErrorCode;
 class DamageTest : public CrashTest {
  protected:
   // Builds until the process is killed at this disk operation. Returns false if the build ended
-  // before.
+  // before the operation.
   bool killed_at(uint64_t operation) const { return killed({Fault::kKillBefore, operation}); }
 
   // Flips one bit of the file, which must not be empty.
@@ -26,8 +26,8 @@ class DamageTest : public CrashTest {
     voxdag::flip_bits(path, bit / 8, 1 << bit % 8);
   }
 
-  // Runs the build on the present state of the disk. It must give the right bytes, or refuse the
-  // state and give the right bytes with --restart. Returns true if it did not refuse.
+  // Runs the build with the files that are on the disk. The build must give the correct bytes, or
+  // refuse the files and give the correct bytes with --restart. Returns true if it did not refuse.
   bool expect_healed_or_refused(voxdag::FileSystem& files = voxdag::system_files()) {
     bool healed = true;
     try {
@@ -47,7 +47,7 @@ class DamageTest : public CrashTest {
   }
 };
 
-// A bit flips when any file is written.
+// During a build, one bit of a write to any file is flipped.
 TEST_P(DamageTest, BitsFlippedInAnyWrite) {
   const uint64_t operations = operations_of_a_build();
   for (const uint64_t at : moments(operations)) {
@@ -57,8 +57,8 @@ TEST_P(DamageTest, BitsFlippedInAnyWrite) {
   }
 }
 
-// While the build is stopped, one bit flips in any of its files: segments, the job store and its
-// log, position maps, artifacts of merge passes, or the partial global file.
+// While the build is stopped, one bit flips in one of its files: a segment, the job store or its
+// log, a position map, an artifact of a merge pass, or the partial global file.
 TEST_P(DamageTest, BitsFlippedBetweenTwoRuns) {
   const uint64_t operations = operations_of_a_build();
   std::mt19937_64 random(2);
@@ -86,8 +86,8 @@ TEST_P(DamageTest, BitsFlippedBetweenTwoRuns) {
   EXPECT_GT(flips, 0u);
 }
 
-// The first page of the partial file identifies it as a file of voxdag. If the page is damaged, the
-// file is accepted because its job is stored next to it.
+// The first page of the partial file shows that voxdag created the file. If this page is damaged,
+// the file is still accepted, because its job is stored next to it.
 TEST_P(DamageTest, FirstPageOfThePartialFile) {
   const std::string partial = output() + ".partial";
   uint64_t at = operations_of_a_build();
@@ -99,8 +99,8 @@ TEST_P(DamageTest, FirstPageOfThePartialFile) {
   EXPECT_TRUE(expect_healed_or_refused());
 }
 
-// As BitsFlippedBetweenTwoRuns, but only in the job store, many times, because SQLite has no
-// checksums of its pages.
+// Like BitsFlippedBetweenTwoRuns, but only for the job store, and many times, because SQLite does
+// not store checksums of its pages.
 TEST_P(DamageTest, BitsFlippedInTheJobStore) {
   const uint64_t operations = operations_of_a_build();
   std::mt19937_64 random(3);
@@ -108,7 +108,7 @@ TEST_P(DamageTest, BitsFlippedInTheJobStore) {
     if (!killed_at(operations / 4 + random() % (operations / 2))) continue;
     const std::string store = output() + ".work/job.db";
     {
-      // Opening and closing the store moves the contents of its log into it.
+      // Opening and closing the store moves the contents of the log into the store.
       voxdag::JobStore closed(store, voxdag::JobStore::Access::kBuild);
     }
     SCOPED_TRACE(round);
@@ -117,8 +117,8 @@ TEST_P(DamageTest, BitsFlippedInTheJobStore) {
   }
 }
 
-// Triangles are spilled because memory cannot hold them. Some of their bytes change before they are
-// read back, so the build reads the scene again.
+// Triangles that do not fit in memory are spilled. Some of their bytes change before the build
+// reads them back, so the build reads the scene again.
 TEST_P(DamageTest, BitsFlippedInSpilledTriangles) {
   voxdag::GenerateOptions options;
   options.kind = voxdag::SceneKind::kSoup;

@@ -1,5 +1,5 @@
-// A build with a small budget runs in a process whose address space is limited to slightly more
-// than the budget. It gives the same bytes as a build with enough memory.
+// Runs a build with a small budget in a process whose address space is limited to slightly more
+// than the budget. The build gives the same bytes as a build with enough memory.
 #include <sys/resource.h>
 
 #include <fstream>
@@ -13,7 +13,7 @@ namespace {
 // reserves, and SQLite.
 constexpr uint64_t kBesides = uint64_t{1} << 30;
 
-// Sanitizers reserve more shadow memory than any useful limit of the address space.
+// Sanitizers reserve more address space than any useful limit allows.
 bool under_a_sanitizer() {
   uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;

@@ -1,5 +1,5 @@
 // The triangles of a glTF scene are stored in another format. The build gives the same bytes, even
-// if it is killed during ingest and then run again.
+// if it is killed during ingest and then resumed.
 #include <cstring>
 #include <iomanip>
 #include <sstream>
@@ -21,7 +21,7 @@ void append(std::string& bytes, T value) {
   bytes.append(own, sizeof(T));
 }
 
-// `expected_` is the digest of a build of scene.glb. The tests build another file with the same
+// `expected_` is the digest of a build of scene.glb. The tests build other files with the same
 // triangles.
 class FormatTest : public CrashTest {
  protected:
@@ -122,8 +122,8 @@ TEST_P(FormatTest, StlText) {
 
 #ifdef VOXDAG_HAS_MESHOPT
 
-// The positions are compressed with meshopt. Each run decodes them into a temporary file of the
-// work folder.
+// The positions are compressed with meshopt. Each run decodes them to a temporary file in the work
+// folder.
 TEST_P(FormatTest, Meshopt) {
   const std::vector<double> all = corners();
   std::vector<float> positions(all.begin(), all.end());

@@ -1,8 +1,8 @@
-// list_voxels FILE SHIFT [colors]: writes x, y, z of the voxels of a .vdag file, shifted right by
-// SHIFT bits, to the standard output as 32-bit integers. With `colors` it also writes, as
-// red * 65536 + green * 256 + blue, the color of the cell that has these coordinates. Tests compare
-// exports with this output. This program reads the file with the standalone reader, and shares no
-// code with the exports.
+// list_voxels FILE SHIFT [colors]: writes the x, y, z of the voxels of a .vdag file, shifted
+// right by SHIFT bits, to standard output as 32-bit integers. With `colors`, it also writes the
+// color of the cell with these coordinates as red * 65536 + green * 256 + blue. Tests compare
+// exports with this output. The program uses the standalone reader and shares no code with the
+// exports.
 #include <cstdio>
 #include <cstdlib>
 

@@ -1,6 +1,6 @@
-// nanovdb_voxels FILE.nvdb [GRID]: writes the world coordinates of all voxels that are on in the
-// file's first grid as doubles, as NanoVDB's own reader finds them; or of the named grid, followed
-// by the three numbers that a voxel has there.
+// nanovdb_voxels FILE.nvdb [GRID]: writes, as doubles, the world coordinates of all voxels that are
+// on in the file's first grid. With GRID, writes the voxels of the grid of this name, each followed
+// by its three values. The program reads the file with NanoVDB's own reader.
 #include <nanovdb/util/IO.h>
 
 #include <cstdio>
@@ -21,7 +21,7 @@ bool list(const nanovdb::NanoGrid<Value>* grid, const Write& write) {
       write(leaf.getValue(voxel.getCoord()));
     }
   }
-  // Tiles would stand for more voxels than the leaves have.
+  // The count differs if the tree has tiles, which stand for more voxels than the leaves have.
   return count == grid->activeVoxelCount();
 }
 

@@ -1,5 +1,5 @@
-// octomap_leaves FILE.bt: writes x, y, z of the low corner, edge and whether it is occupied, of
-// each leaf that OctoMap's own library finds, as 32-bit integers; coordinates are keys.
+// octomap_leaves FILE.bt: writes, for each leaf that OctoMap's own library finds, the x, y, z of
+// its low corner (as keys), its edge, and whether it is occupied, as 32-bit integers.
 #include <octomap/OcTree.h>
 
 #include <cstdint>

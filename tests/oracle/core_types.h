@@ -1,5 +1,5 @@
-// Converts the oracle's plain types to voxdag's own types and back, for tests that compare the two.
-// The oracle itself never includes this.
+// Converts the oracle's plain types to voxdag's types and back, for tests that compare the two. The
+// oracle itself never includes this header.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ inline std::vector<voxdag::FixedTriangle> fixed(const Triangles& triangles) {
   return out;
 }
 
-// The voxels of a cube on a grid of 2^grid_levels.
+// Returns the voxels of a cube in a grid of 2^grid_levels voxels per edge.
 inline Region region_of(const voxdag::Cube& cube, uint32_t grid_levels) {
   const int64_t edge = cube.edge_voxels(grid_levels);
   return {{cube.position[0] * edge, cube.position[1] * edge, cube.position[2] * edge},
@@ -50,7 +50,7 @@ inline voxdag::SubDag as_sub_dag(const Dag& dag, uint32_t grid_levels) {
   return out;
 }
 
-// Hands a sub-DAG to a sink as a backend does.
+// Passes a sub-DAG to a sink, in the order in which a backend does.
 inline void send(const voxdag::SubDag& dag, voxdag::SubDagSink& sink) {
   if (dag.brick_masks.empty()) return;
   sink.bricks({dag.brick_masks});

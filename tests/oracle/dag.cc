@@ -8,7 +8,8 @@ namespace {
 
 constexpr uint32_t kNothing = 0xffffffff;
 
-// Multiplies 64 x 64 bits to 128 bits, as on paper, and returns the XOR of the two halves.
+// Multiplies 64 x 64 bits to 128 bits by long multiplication, and returns the XOR of the two
+// halves.
 uint64_t fold(uint64_t a, uint64_t b) {
   const uint64_t a0 = a & 0xffffffff, a1 = a >> 32, b0 = b & 0xffffffff, b1 = b >> 32;
   const uint64_t middle = a1 * b0 + (a0 * b0 >> 32);
@@ -17,7 +18,7 @@ uint64_t fold(uint64_t a, uint64_t b) {
   return (a * b) ^ high;
 }
 
-// One level of the octree: the index in the level array of the node at (x, y, z).
+// The nodes of one octree level: for the cell (x, y, z), the node's index in the level array.
 struct Places {
   explicit Places(int edge_) : edge(edge_), node(static_cast<size_t>(edge_) * edge_ * edge_) {}
   uint32_t& at(int x, int y, int z) { return node[(static_cast<size_t>(x) * edge + y) * edge + z]; }
@@ -52,8 +53,8 @@ Node node_above(Places& below, const std::vector<uint64_t>& hashes, int x, int y
   return node;
 }
 
-// Sorts the keys of `wanted`. Sets all places of a key to the key's index in this order, and
-// returns the sorted keys.
+// Sorts the keys of `wanted`, and returns them. Sets each place of a key to the key's index in this
+// order.
 template <class Key>
 std::vector<Key> number(const std::map<Key, std::vector<size_t>>& wanted, Places& places) {
   std::vector<Key> sorted;

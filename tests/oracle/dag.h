@@ -1,6 +1,6 @@
-// The DAG of a cube of voxels, made only from the definitions: bricks of 4x4x4 voxels, and above
-// them nodes of up to eight children. Equal nodes are merged level by level with ordinary maps.
-// Every level is in the order (hash, mask, child indices).
+// The DAG of a cube of voxels, made directly from the definitions: bricks of 4x4x4 voxels, and
+// above them nodes of up to eight children. Ordinary maps merge equal nodes level by level. Every
+// level is in the order (hash, mask, child indices).
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace oracle {
 
-// The node hash as defined in docs/format.md, implemented a second time.
+// A second implementation of the node hash that docs/format.md defines.
 uint64_t brick_hash(uint64_t mask);
 uint64_t node_hash(uint32_t mask, const std::vector<uint64_t>& child_hashes);
 // Returns the top `bits` of a hash; the other bits are 0.

@@ -1,4 +1,4 @@
-// Maps world space to the lattice as the documentation defines it, implemented a second time.
+// A second implementation of the documented map from world space to the lattice.
 #pragma once
 
 #include <array>

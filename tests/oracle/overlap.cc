@@ -5,8 +5,8 @@
 namespace oracle {
 namespace {
 
-// Nothing overflows: components of a normal are below 2^83, a dot product with a point is below
-// 2^125.
+// 128 bits are enough: the components of a normal are below 2^83, and a dot product with a point is
+// below 2^125.
 __extension__ typedef __int128 Wide;
 using Axis = std::array<Wide, 3>;
 
@@ -37,8 +37,8 @@ bool touches(const Triangle& triangle, const Point& low, int64_t edge) {
                   low[2] + (i & 4 ? edge : 0)};
 
   // The axes are the normals of the cube's faces, the normal of the triangle, and all cross
-  // products of an edge of the cube with an edge of the triangle. These are the normals of all
-  // faces that the Minkowski difference of the two bodies can have.
+  // products of an edge of the cube with an edge of the triangle. The Minkowski difference of the
+  // two bodies has no faces with other normals.
   const Axis unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   const Axis edges[3] = {minus(triangle[1], triangle[0]), minus(triangle[2], triangle[1]),
                          minus(triangle[0], triangle[2])};

@@ -1,5 +1,5 @@
-// Decides whether a closed triangle touches a closed cube, by the plain separating-axis theorem:
-// two convex bodies are apart iff their projections onto one of a few axes are apart.
+// Decides whether a closed triangle touches a closed cube, by the separating-axis theorem: two
+// convex bodies do not touch if and only if their projections onto one of a few axes do not touch.
 #pragma once
 
 #include "tests/oracle/triangle.h"

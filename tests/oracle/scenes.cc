@@ -56,8 +56,8 @@ class Maker {
   Triangle near(const Point& p, int64_t reach) {
     return {around(p, reach), around(p, reach), around(p, reach)};
   }
-  // Returns a size from a fraction of a voxel to the whole region. Small sizes are as likely as
-  // large ones.
+  // Returns a size from half a voxel to the complete region: halves the region's edge repeatedly,
+  // with a probability of 2/3 for each further step.
   int64_t some_size() {
     int64_t size = size_;
     while (size > 128 && random_.between(0, 2) != 0) size /= 2;
@@ -91,7 +91,7 @@ class Maker {
     return {p, q, r};
   }
 
-  // A rectangle at a fixed x, y or z, as two triangles.
+  // Adds a rectangle at a fixed x, y or z, as two triangles.
   void wall(Triangles& out) {
     const int64_t axis = random_.between(0, 2), other = (axis + random_.between(1, 2)) % 3;
     const Point p = point();
@@ -104,8 +104,8 @@ class Maker {
     out.push_back({r, s, p});
   }
 
-  // A triangle in a plane a + b = 256 k or a - b = 256 k for two axes a and b. The plane contains
-  // edges of voxels, and touches the voxels next to it without entering them.
+  // Returns a triangle in a plane a + b = 256 k or a - b = 256 k, for two axes a and b. The plane
+  // contains edges of voxels. It touches the voxels next to it without entering them.
   Triangle diagonal() {
     const int64_t a = random_.between(0, 2), b = (a + random_.between(1, 2)) % 3;
     const int64_t sign = random_.coin() ? 1 : -1;
@@ -118,7 +118,7 @@ class Maker {
     return t;
   }
 
-  // Returns a point on the hull of the region.
+  // Returns a point on the surface of the region.
   Point side() {
     Point p = point();
     const int64_t axis = random_.between(0, 2);
@@ -133,7 +133,7 @@ class Maker {
     out.push_back({t[2], t[1], t[0]});
   }
 
-  // A triangle whose first edge has a voxel's corner as its middle.
+  // Returns a triangle whose first edge has a voxel's corner as its midpoint.
   Triangle through_corner() {
     const Point corner = near_corner(point());
     const int64_t reach = std::max<int64_t>(some_size() / 2, 3);
@@ -157,8 +157,8 @@ class Maker {
     return t;
   }
 
-  // A triangle with two far vertices on opposite sides of a point of the region. The third vertex
-  // is anywhere.
+  // Returns a triangle with two far vertices on opposite sides of a point of the region. The third
+  // vertex is anywhere.
   Triangle wide() {
     const Point middle = point();
     Point p, q, r;

@@ -1,4 +1,4 @@
-// Triangle scenes from a seed, placed in and around a region of the grid. There is a kind for every
+// Triangle scenes from a seed, placed in and around a region of the grid. Each kind of scene is an
 // arrangement of triangles that has revealed a defect. The same seed gives the same triangles on
 // every machine.
 #pragma once
@@ -12,7 +12,7 @@ namespace oracle {
 
 enum class SceneKind {
   kSoup,            // random triangles of mixed sizes
-  kDegenerate,      // points, segments, doubled vertices, collinear ones
+  kDegenerate,      // points, segments, doubled vertices, collinear vertices
   kSliver,          // long and a few units thin
   kSubVoxel,        // triangles smaller than a voxel, within one voxel or across several
   kWalls,           // axis-aligned rectangles
@@ -29,10 +29,10 @@ constexpr SceneKind kAllKinds[] = {
     SceneKind::kSpanning, SceneKind::kCoincident, SceneKind::kThroughCorners,
     SceneKind::kCrossing, SceneKind::kWide};
 
-// "soup", "degenerate", ...
+// Returns the name of a kind: "soup", "degenerate", ...
 std::string kind_name(SceneKind kind);
 
-// Random numbers that are the same on every machine. The standard distributions differ by machine.
+// Random numbers that are the same on every machine, which standard distributions do not guarantee.
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}
@@ -48,7 +48,7 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// About `count` triangles of one kind.
+// Returns about `count` triangles of one kind.
 Triangles make_scene(SceneKind kind, uint64_t seed, const Region& region, int count);
 
 }  // namespace oracle

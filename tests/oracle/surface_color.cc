@@ -6,7 +6,7 @@
 namespace oracle {
 namespace {
 
-// A point of a triangle: its position relative to the cube's low corner, and its barycentric
+// A point of a triangle: its position relative to the low corner of the cube, and its barycentric
 // coordinates.
 struct SurfacePoint {
   std::array<double, 3> at{}, shares{};
@@ -66,7 +66,7 @@ int bordered(int texel, int size, Border border) {
 
 Rgba texture_at(const SurfaceMaterial& material, double u, double v) {
   const ColorImage& image = *material.image;
-  // Removes whole periods, which would only lose precision.
+  // Removes complete periods, because large coordinates lose precision.
   const double x = std::remainder(u, 2.0) * image.width - 0.5;
   const double y = std::remainder(v, 2.0) * image.height - 0.5;
   const bool far_x = material.borders[0] == Border::kClamp,
@@ -87,7 +87,7 @@ Rgba texture_at(const SurfaceMaterial& material, double u, double v) {
   return out;
 }
 
-// Color and opacity.
+// Returns the color and the opacity of a point of the surface.
 Rgba look_at(const Surface& surface, const std::array<double, 3>& shares) {
   const SurfaceMaterial& material = *surface.material;
   Rgba out = material.factor;
@@ -106,8 +106,9 @@ Rgba look_at(const Surface& surface, const std::array<double, 3>& shares) {
   return out;
 }
 
-// Returns the k-th of a sequence of points that are spread evenly over a triangle, in barycentric
-// coordinates: a lattice with the steps of the plastic number, folded.
+// Returns point k of a sequence that covers a triangle evenly, in barycentric coordinates. The
+// sequence is a lattice with the steps of the plastic number; points outside the triangle are
+// folded into it.
 std::array<double, 3> spread_point(int k) {
   const double steps[] = {0.7548776662466927, 0.5698402909980532};
   double s = std::fmod(0.5 + k * steps[0], 1.0), t = std::fmod(0.5 + k * steps[1], 1.0);
@@ -151,7 +152,7 @@ double linear_to_srgb(double linear) {
 std::optional<std::array<uint8_t, 3>> mean_color(std::span<const Surface* const> surfaces,
                                                  const Point& low, int64_t edge, int points) {
   const std::vector<Piece> pieces = pieces_in(surfaces, low, edge);
-  // Smaller areas are rounding errors of surfaces that touch the cube from outside.
+  // Smaller areas are rounding errors of surfaces that only touch the cube.
   const double least = 1e-9 * static_cast<double>(edge) * static_cast<double>(edge);
   if (pieces.empty() || pieces.back().area_up_to <= least) return std::nullopt;
   std::array<double, 3> seen{}, plain{};

@@ -1,6 +1,6 @@
-// The reference color of a cube of the grid: the mean color of the surfaces in the closed cube, in
-// linear light, over many points spread evenly over their area. Triangles are clipped to the cube.
-// Images are sampled bilinearly in their finest texels. All computations are in doubles.
+// The reference color of a cube of the grid: the mean color, in linear light, of the surfaces in
+// the closed cube, over many points that cover the surfaces evenly. Triangles are clipped to the
+// cube. Images are sampled bilinearly at their finest level. All computations are in doubles.
 #pragma once
 
 #include <array>
@@ -46,9 +46,9 @@ struct Surface {
 double srgb_to_linear(double encoded);
 double linear_to_srgb(double linear);
 
-// Returns the mean color in 8 bits, or nothing if the surfaces touch the cube only in points or
-// lines and so have no area in it. Surfaces count by area and by alpha, or only by area if all
-// points are transparent. `points` is the number of samples.
+// Returns the mean color in 8 bits, or nothing if the surfaces have no area in the cube, because
+// they touch it only in points or lines. Surfaces are weighted by area and alpha, or only by area
+// if all points are transparent. `points` is the number of samples.
 std::optional<std::array<uint8_t, 3>> mean_color(std::span<const Surface* const> surfaces,
                                                  const Point& low, int64_t edge, int points = 128);
 

@@ -7,7 +7,7 @@
 namespace oracle {
 namespace {
 
-// Marks the voxels that `triangle` sets in the part of the region that starts at (x, y, z).
+// Marks the voxels that `triangle` sets in the cube of `edge` voxels at (x, y, z) of the region.
 void mark(const Triangle& triangle, const Region& region, int x, int y, int z, int edge,
           Voxels& out) {
   const Point low = {(region.low[0] + x) * kUnits, (region.low[1] + y) * kUnits,

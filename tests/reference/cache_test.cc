@@ -1,5 +1,5 @@
-// Builds that share subvolumes through a cache. Unchanged subvolumes are copied from the cache, and
-// the cache does not affect the bytes of the file.
+// Builds that share subvolumes through a cache. Unchanged subvolumes are copied from the cache,
+// which does not change the bytes of the file.
 #include <filesystem>
 #include <fstream>
 
@@ -10,7 +10,7 @@ namespace {
 
 using CacheTest = Reference;
 
-// Returns a room with many small objects, and a chair whose low x is chair_x_voxels.
+// Returns a room with many small objects, and a chair whose lowest x is chair_x_voxels.
 Triangles room_with_chair(int resolution, int64_t chair_x_voxels) {
   Triangles scene =
       oracle::make_scene(oracle::SceneKind::kSubVoxel, 3, {{0, 0, 0}, resolution}, 4000);
@@ -20,8 +20,8 @@ Triangles room_with_chair(int resolution, int64_t chair_x_voxels) {
   return scene;
 }
 
-// Only the chair is moved between two builds. At least 95 % of the subvolumes come from the cache,
-// and the file equals a build without a cache.
+// Only the chair is moved between two builds. The cache provides at least 95 % of the subvolumes. A
+// build without a cache gives the same file.
 TEST_F(CacheTest, OneChairMoved) {
   constexpr int kResolution = 1024;
   auto before = spec_for(room_with_chair(kResolution, 100), kResolution);
@@ -43,8 +43,8 @@ TEST_F(CacheTest, OneChairMoved) {
   EXPECT_EQ(run(before).subvolumes_cached, first.subvolumes);
 }
 
-// Triangles that are moved to another place of the grid, whose vertices or order differ, or that
-// occur twice, have the same entry in the cache.
+// A subvolume has the same cache entry if its triangles are moved together with it, are stored in
+// another order or with rotated vertices, or occur twice.
 TEST_F(CacheTest, ContentIsRelativeAndCanonical) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSoup, 5, {{0, 0, 0}, 64}, 40);
   Triangles moved = scene;
@@ -65,8 +65,8 @@ TEST_F(CacheTest, ContentIsRelativeAndCanonical) {
   EXPECT_GT(report.subvolumes_cached, 0u);
 }
 
-// The cache is missed if the hash bits differ, if an entry is damaged, or if a small limit has
-// evicted the entry.
+// A subvolume is not found in the cache if the hash bits differ, if its entry is damaged, or if a
+// small limit has evicted the entry.
 TEST_F(CacheTest, MissesWhatItMust) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSoup, 6, {{0, 0, 0}, 256}, 60);
   auto spec = spec_for(scene, 256);

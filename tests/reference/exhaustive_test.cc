@@ -1,4 +1,4 @@
-// Small worlds tried out completely.
+// Tests all cases of small grids.
 #include "tests/reference/reference_build.h"
 
 namespace reference {
@@ -6,13 +6,13 @@ namespace {
 
 using Exhaustive = Reference;
 
-// A triangle within one voxel.
+// Returns a triangle inside one voxel.
 oracle::Triangle dot(int64_t x, int64_t y, int64_t z) {
   const oracle::Point p = {256 * x + 101, 256 * y + 101, 256 * z + 101};
   return {p, {p[0] + 20, p[1], p[2]}, {p[0], p[1] + 20, p[2] + 20}};
 }
 
-// R = 4, so the root is a brick: each single voxel, and each voxel together with the first voxel.
+// In a grid of 4^3 voxels, the root is a brick. Sets each voxel, alone or with the first voxel.
 TEST_F(Exhaustive, EveryVoxelOfABrick) {
   for (int v = 0; v < 64; ++v) {
     SCOPED_TRACE(v);
@@ -23,9 +23,9 @@ TEST_F(Exhaustive, EveryVoxelOfABrick) {
   }
 }
 
-// Sets of octants, all of which have the same voxels, in a build of eight subvolumes. So the root,
-// a node of the top tree, gets different masks over equal children. A merge that ignores masks
-// would move voxels to other octants.
+// Sets the same voxels in each octant of a mask, for many masks, in a build of eight subvolumes. So
+// the root, a node of the top tree, has different masks over equal children. A merge that ignored
+// masks would move voxels to other octants.
 TEST_F(Exhaustive, EveryMaskOfTheTopTree) {
   for (int mask = 1; mask < 256; mask += mask < 32 ? 1 : 7) {
     SCOPED_TRACE(mask);
@@ -41,8 +41,8 @@ TEST_F(Exhaustive, EveryMaskOfTheTopTree) {
   }
 }
 
-// Two equal sub-DAGs are in different octants of different parents. They remain at their positions
-// when two levels above them are merged.
+// Two equal sub-DAGs are in different octants of different parents. They must keep their positions
+// when the two levels above them are merged.
 TEST_F(Exhaustive, EqualSubDagsOfDifferentParents) {
   for (int i = 0; i < 8; ++i)
     for (int j = i % 2; j < 8; j += 2) {

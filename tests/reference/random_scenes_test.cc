@@ -1,4 +1,4 @@
-// Seeded scenes of every kind through the whole pipeline.
+// Builds seeded scenes of every kind with the complete pipeline.
 #include <cmath>
 
 #include "tests/reference/reference_build.h"
@@ -8,7 +8,7 @@ namespace {
 
 using RandomScenes = Reference;
 
-// Kinds whose coordinates floats hold exactly.
+// Returns the kinds whose coordinates can be stored as floats exactly.
 std::vector<oracle::SceneKind> exact_kinds() {
   std::vector<oracle::SceneKind> kinds(std::begin(oracle::kAllKinds), std::end(oracle::kAllKinds));
   std::erase(kinds, oracle::SceneKind::kWide);
@@ -36,8 +36,8 @@ TEST_F(RandomScenes, EqualTheOracle) {
     }
 }
 
-// The grid is a cube inside the scene: triangles cross its boundary or miss it, and vertices are
-// far outside.
+// The grid is a cube inside the scene. Triangles cross its boundary or miss it, and some vertices
+// are far outside.
 TEST_F(RandomScenes, GivenCubeInsideTheScene) {
   const Triangles scene =
       oracle::make_scene(oracle::SceneKind::kSoup, 5, {{-200, -100, -300}, 512}, 150);
@@ -53,8 +53,8 @@ TEST_F(RandomScenes, GivenCubeInsideTheScene) {
   EXPECT_EQ(report.dropped_outside + report.triangles, all.size());
 }
 
-// Vertices are arbitrary floats, and the build computes the default cube. The oracle has separate
-// code for the cube and for snapping.
+// Vertices are arbitrary floats, and the build computes the default cube. The oracle computes the
+// cube and snaps the vertices with its own code.
 TEST_F(RandomScenes, DefaultCube) {
   oracle::Random random(6);
   for (int round = 0; round < 12; ++round) {
@@ -86,7 +86,7 @@ TEST_F(RandomScenes, DefaultCube) {
   }
 }
 
-// Several files are one scene, in any division.
+// Several files give the same scene as one file, however the triangles are divided.
 TEST_F(RandomScenes, SeveralFilesAreOneScene) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSoup, 7, {{0, 0, 0}, 64}, 30);
   const auto whole = expect_right(scene, 64, spec_for(scene, 64));

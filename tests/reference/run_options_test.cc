@@ -1,5 +1,5 @@
-// Run options, the number of copies of each triangle and the order of work do not affect the bytes
-// of the file. The reports show that the builds really spilled, split and merged differently.
+// Run options, copies of triangles and the order of work do not affect the bytes of the file. The
+// reports show that the builds really spilled, split and merged in different ways.
 #include <algorithm>
 
 #include "tests/reference/reference_build.h"
@@ -20,7 +20,7 @@ Triangles mixed_scene(int resolution, int of_each_kind) {
   return scene;
 }
 
-// Builds with different subvolume sizes, threads and budgets equal the oracle.
+// Builds with different subvolume sizes, threads and budgets give the oracle's DAG.
 TEST_F(RunOptionsTest, NeverShow) {
   const Triangles scene = mixed_scene(256, 12);
   for (const uint32_t hash_bits : {4u, 16u, 64u}) {
@@ -88,8 +88,8 @@ TEST_F(RunOptionsTest, SplittingNeverShows) {
   }
 }
 
-// With few hash bits, the nodes have a different order in the file, but the DAG is the same: its
-// counts and voxels are equal. Run options again do not affect the bytes.
+// With few hash bits, the nodes are in another order in the file, but the DAG has the same counts
+// and voxels. Run options do not affect the bytes of these files either.
 TEST_F(RunOptionsTest, HashBitsChangeTheOrderOnly) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSpanning, 4, {{0, 0, 0}, 512}, 60);
   auto spec = spec_for(scene, 512);

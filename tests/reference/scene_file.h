@@ -17,7 +17,7 @@ std::vector<WorldTriangle> as_world(const Triangles& triangles);
 // Returns the triangles with their coordinates rounded to floats.
 std::vector<WorldTriangle> as_floats(std::vector<WorldTriangle> triangles);
 
-// `copies` of all triangles, one after the other.
+// Writes all triangles `copies` times, one copy after the other.
 void write_glb(const std::string& path, const std::vector<WorldTriangle>& triangles,
                int copies = 1);
 

@@ -1,5 +1,5 @@
-// Builds of real scenes. Independent code gave the expected counts. Run options do not affect the
-// bytes.
+// Builds of real scenes. The expected counts come from independent code. Run options do not affect
+// the bytes.
 #include <filesystem>
 
 #include "core/format/global/diff.h"
@@ -13,7 +13,7 @@ using voxdag::BuildSpec;
 
 class SharedScenes : public Reference {
  protected:
-  // Skips the test where the scenes are not.
+  // Chooses a scene and a resolution. Skips the test if the scene does not exist on this machine.
   void use(const std::string& name, uint64_t resolution) {
     const std::string path = std::string(VOXDAG_SHARED_SCENES) + "/" + name;
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "the shared scenes are not here: " << path;
@@ -74,8 +74,8 @@ TEST_F(SharedScenes, Dragon8192) {
   EXPECT_GT(rounds.spill_bytes, 10 * kMebibyte);
 }
 
-// Truncated hashes change the order of the nodes in the file. The voxels and the number of nodes
-// are the same.
+// Truncated hashes change the order of the nodes in the file, but not the voxels or the number of
+// nodes.
 TEST_F(SharedScenes, HashBits) {
   USE_SHARED_SCENE("sponza.glb", 512);
   const BuildReport full = run_with(256 * kMebibyte, 512, 1);

@@ -17,7 +17,7 @@ namespace {
 
 using Api = RunningService;
 
-// Two triangles with red corners.
+// Two triangles that form a red square.
 constexpr const char* kRedSquare =
     "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
     "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
@@ -39,7 +39,7 @@ class BytesOfText : public EncodedBytes {
   size_t at_ = 0;
 };
 
-// Pixels of a PNG picture that are clearly red.
+// Counts the clearly red pixels of a PNG picture.
 uint64_t red_pixels(const std::string& png) {
   MemoryBudget budget(uint64_t{1} << 28);
   BytesOfText bytes(png);
@@ -55,7 +55,7 @@ uint64_t red_pixels(const std::string& png) {
   return red;
 }
 
-// From the upload of a scene to the result, which has the bytes of `voxdag build`.
+// Uploads a scene, runs a job, and downloads the result, which has the bytes of `voxdag build`.
 TEST_F(Api, TurnsASceneIntoADag) {
   start();
   ASSERT_EQ(put_scene("m.glb", scene_bytes()).status, 201);
@@ -100,8 +100,8 @@ TEST_F(Api, RendersAPreview) {
   EXPECT_TRUE(http_->get("/api/v1/jobs/" + id + "/preview.png").body.starts_with("\x89PNG"));
 }
 
-// The preview of a job with colors shows them; the preview of the same scene without colors does
-// not.
+// The preview of a job with colors shows the colors. The preview of the same scene without colors
+// does not.
 TEST_F(Api, RendersColorsInAPreview) {
   start();
   ASSERT_EQ(put_scene("red.ply", kRedSquare).status, 201);
@@ -133,7 +133,7 @@ TEST_F(Api, ServesRanges) {
   part = get({{"Range", "bytes=100-"}, {"If-Range", tag}});
   EXPECT_EQ(part.body, whole.body.substr(100));
   EXPECT_EQ(get({{"Range", "bytes=100-"}, {"If-Range", "\"other\""}}).status, 200);
-  // cpp-httplib 0.11 reads all further bytes of the connection as the body of a 304.
+  // cpp-httplib 0.11 would read all further bytes of the connection as the body of the answer 304.
   EXPECT_EQ(get({{"If-None-Match", tag}, {"Connection", "close"}}).status, 304);
   part = get({{"Range", "bytes=0-3,8-11"}});
   EXPECT_EQ(part.status, 206);
@@ -153,7 +153,7 @@ TEST_F(Api, ResumesABrokenUpload) {
   start();
   const std::string bytes = scene_bytes(), path = "/api/v1/scenes/m.glb";
   const std::string size = std::to_string(bytes.size()), half = std::to_string(bytes.size() / 2);
-  // A connection that ends in the middle of the body.
+  // Sends an upload whose connection ends in the middle of the body.
   const int port = std::stoi(url().substr(url().rfind(':') + 1));
   raw_exchange(port, "PUT " + path + " HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + size +
                          "\r\n\r\n" + bytes.substr(0, bytes.size() / 2));
@@ -200,7 +200,7 @@ TEST_F(Api, IsIdempotentWithAKey) {
             "");
 }
 
-// Cancel, suspend, resume and retry a job that would run for minutes.
+// Cancels, suspends, resumes and retries a job that would run for minutes.
 TEST_F(Api, ControlsJobs) {
   start();
   put_scene("m.glb", scene_bytes());
@@ -242,7 +242,8 @@ TEST_F(Api, EstimatesAJob) {
             400);
 }
 
-// A stream begins with the job and reports every change until it has ended; Last-Event-ID resumes.
+// A stream begins with the job and reports every change until the job has ended. Last-Event-ID
+// resumes it.
 TEST_F(Api, StreamsEvents) {
   start();
   put_scene("m.glb", scene_bytes());
@@ -280,7 +281,7 @@ TEST_F(Api, ReportsWhyAJobFailed) {
   EXPECT_EQ(not_problem(http_->get("/api/v1/jobs/" + id + "/dag"), 404, "not_found"), "");
 }
 
-// Messages for clients name the scene as the clients did. They contain no folder of the service's
+// Messages for clients name a scene as the client did, and contain no folder of the service's
 // machine.
 TEST_F(Api, NamesNoFolderOfItsMachine) {
   start();
@@ -308,11 +309,11 @@ TEST_F(Api, NamesNoFolderOfItsMachine) {
   const std::string work = config_.data_folder + "/jobs/" + id + "/work";
   ASSERT_TRUE(until([&] { return std::filesystem::exists(work + "/job.db"); }));
   post("/api/v1/jobs/" + id + "/suspend");
-  // The job's process may still be writing: wait until it has ended.
+  // The job's process may still write files, so the test waits until the process has ended.
   ASSERT_TRUE(until([&] {
     return http_->get("/metrics").body.find("voxdag_job_processes 0") != std::string::npos;
   }));
-  // A build that had no plan yet has removed its folder.
+  // If the build had no plan yet, it has removed its work folder.
   std::filesystem::create_directories(work);
   for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(work + "/job.db" + suffix);
   write_file_atomically(system_files(), work + "/job.db", std::string(8192, 'x'));
@@ -323,7 +324,7 @@ TEST_F(Api, NamesNoFolderOfItsMachine) {
   expect_no_path(id);
 }
 
-// Scenes by path are accepted inside a scene root only.
+// A scene may be given by its path only if the path is inside a scene root.
 TEST_F(Api, AcceptsScenesInsideItsRootsOnly) {
   std::filesystem::create_directories(folder_.file("root/sub"));
   std::filesystem::create_directories(folder_.file("secret"));
@@ -346,7 +347,7 @@ TEST_F(Api, AcceptsScenesInsideItsRootsOnly) {
   EXPECT_EQ(status("/etc/passwd"), 404);
 }
 
-// The OpenAPI document, the pages and the messages list the endings of the table of formats.
+// The OpenAPI document, the pages and the messages list all file endings of the scene formats.
 TEST_F(Api, ListsTheEndingsOfTheSceneFormats) {
   start();
   std::string suffixes = list_scene_endings("|", "|");
@@ -367,8 +368,8 @@ TEST_F(Api, ListsTheEndingsOfTheSceneFormats) {
   EXPECT_EQ(http_->get("/api/v1/scenes/PART.STL").status, 404);
 }
 
-// The document is generated from the routes, so it can only lack a description of a status
-// (RunningService looks for these) or differ from docs/api.md.
+// The OpenAPI document is generated from the routes. So it can only miss a status (RunningService
+// checks this) or differ from docs/api.md.
 TEST_F(Api, TheDocumentAndThePageListTheSameRequests) {
   start();
   const Json api = Json::parse(http_->get("/openapi.json").body);
@@ -376,7 +377,7 @@ TEST_F(Api, TheDocumentAndThePageListTheSameRequests) {
   const std::string page =
       read_small_file(system_files(), VOXDAG_SOURCE_DIR "/docs/api.md", uint64_t{1} << 20);
   for (const auto& [path, operations] : api.at("paths").items()) {
-    // The page describes the tiles of unfinished jobs in a sentence.
+    // docs/api.md does not list the routes for tiles of unfinished jobs one by one.
     const bool is_partial = path.find("/partial/") != std::string::npos;
     for (const auto& [method, operation] : operations.items()) {
       std::string request = method + ' ' + path;
@@ -428,13 +429,13 @@ TEST_F(Api, DescribesItself) {
   EXPECT_EQ(method.header("Allow"), "POST, GET, HEAD");
 }
 
-// A second service on the same folder would start the same jobs.
+// A second service with the same data folder would start the same jobs.
 TEST_F(Api, LocksItsDataFolder) {
   start();
   EXPECT_THROW(Service(config_, system_files(), [](const std::string&) {}), Error);
 }
 
-// Changes are logged with their author, reads are not.
+// The log contains changes with the name of their author, but no reads.
 TEST_F(Api, WritesAnAuditLog) {
   start();
   put_scene("m.glb", "x");

@@ -19,7 +19,7 @@ class Hostile : public RunningService {
   }
 };
 
-// Malformed requests, and requests whose end is ambiguous.
+// Malformed requests, and requests whose end is ambiguous, are rejected.
 TEST_F(Hostile, MalformedRequestsAreRejected) {
   start();
   EXPECT_EQ(status("hello\r\n\r\n"), 400);
@@ -49,7 +49,7 @@ TEST_F(Hostile, MalformedRequestsAreRejected) {
   EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 200);
 }
 
-// An unread body is not parsed as the next request.
+// The service does not parse an unread body as the next request.
 TEST_F(Hostile, AnUnreadBodyClosesTheConnection) {
   start();
   const std::string answer = raw_exchange(
@@ -76,7 +76,7 @@ TEST_F(Hostile, TooLargeBodiesAreRejected) {
             "");
 }
 
-// The content type of a scene is ignored.
+// The service ignores the content type of a scene, so it does not parse a multipart body.
 TEST_F(Hostile, MultipartBodiesAreNotParsed) {
   start();
   const client::HeaderMap form = {{"Content-Type", "multipart/form-data; boundary=x"}};
@@ -97,7 +97,7 @@ TEST_F(Hostile, NamesCannotLeaveTheFolder) {
   EXPECT_EQ(put_scene("../x.glb", "x").status, 404);
 }
 
-// Clients that send their requests slowly block neither threads nor connections of others.
+// Clients that send their requests slowly do not prevent other clients from being answered.
 TEST_F(Hostile, SlowClientsDoNotBlockOthers) {
   config_.http.limits.max_connections = 40;
   start();
@@ -112,7 +112,7 @@ TEST_F(Hostile, SlowClientsDoNotBlockOthers) {
   for (const int socket : slow) close(socket);
 }
 
-// A header that takes too long closes its connection.
+// If a header takes too long, the connection is closed.
 TEST_F(Hostile, HeadersTimeOut) {
   config_.http.limits.header_timeout_s = 0.2;
   start();
@@ -142,7 +142,7 @@ TEST_F(Hostile, TokensAreRequired) {
       << log();
 }
 
-// Random bytes never stop the service.
+// Random bytes in requests never end the service.
 TEST_F(Hostile, SurvivesRandomBytes) {
   start();
   const unsigned seed = std::random_device{}();

@@ -1,4 +1,4 @@
-// Viewers of damaged files, and clients that are slow, disconnect, or come from other sites.
+// Damaged files in viewers, and clients that are slow, disconnect, or come from other sites.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -18,7 +18,7 @@ struct Answers : RunningService {
   using RunningService::not_problem;
 };
 
-// `voxdag view` of a colored file of several checksum blocks.
+// Serves a colored file with several checksum blocks, as `voxdag view` does.
 class HostileView : public testing::Test {
  protected:
   void SetUp() override {
@@ -71,7 +71,7 @@ class HostileView : public testing::Test {
   std::string log_;
 };
 
-// Only requests for data in the damaged block are refused. The damaged file is logged once.
+// Only requests for data of the damaged block are refused. The log mentions the damaged file once.
 TEST_F(HostileView, SeesThatAFileIsDamaged) {
   const auto file = open_global_file(path_);
   const uint32_t bricks = file->brick_level();
@@ -94,7 +94,7 @@ TEST_F(HostileView, SeesThatAFileIsDamaged) {
   EXPECT_TRUE(get(above + "/" + offset).body == whole);
 }
 
-// Only the pages of a damaged region of colors are refused.
+// Only the pages of the damaged color region are refused.
 TEST_F(HostileView, SeesThatColorsAreDamaged) {
   const uint64_t data = [&] {
     const auto file = open_global_file(path_);
@@ -106,7 +106,7 @@ TEST_F(HostileView, SeesThatColorsAreDamaged) {
     pages.push_back("colors?pages=6." + std::to_string(i >> 6) + '.' + std::to_string(i >> 3 & 7) +
                     '.' + std::to_string(i & 7));
   for (const std::string& page : pages) whole.push_back(get(page).body);
-  flip(data + 100000);  // of 240 KB: a block without parts of the DAG
+  flip(data + 100000);  // color data of 240 KB; a block without levels of the DAG
   size_t refused = 0;
   for (size_t i = 0; i < pages.size(); ++i) {
     const ClientResponse answer = get(pages[i]);
@@ -122,7 +122,8 @@ TEST_F(HostileView, SeesThatColorsAreDamaged) {
   EXPECT_EQ(lines_of_log(path_ + ": bytes "), 1u);
 }
 
-// A page of another site cannot use an open viewer, but a link to its start page works.
+// A page of another site cannot send requests to an open viewer, but a link to its start page
+// works.
 TEST_F(HostileView, RefusesRequestsOfOtherSites) {
   start();
   const auto status = [&](const std::string& path, const std::string& site) {
@@ -137,7 +138,8 @@ TEST_F(HostileView, RefusesRequestsOfOtherSites) {
     EXPECT_EQ(http_->get(path).header("Cross-Origin-Resource-Policy"), "same-origin") << path;
 }
 
-// The service stops work for clients that have left, answers other clients, and can be stopped.
+// If clients disconnect, the service stops their work, still answers other clients, and can be
+// stopped.
 TEST_F(HostileView, SurvivesClientsThatLeave) {
   start();
   std::string batch = "GET /api/v1/view/tiles/batch?v=" + digest_ + "&nodes=0.0";
@@ -152,7 +154,7 @@ TEST_F(HostileView, SurvivesClientsThatLeave) {
   EXPECT_EQ(get("0/0").status, 200);
 }
 
-// Sends one request after the other for tiles of a job.
+// Sends requests for tiles of a job, one after the other. Only one request may have a permit.
 class TilePermits : public RunningService {
  protected:
   void SetUp() override {
@@ -168,8 +170,8 @@ class TilePermits : public RunningService {
   std::string base_, version_;
 };
 
-// However a request ends, its permit becomes free for the next request, even if a client does not
-// read its answer.
+// However a request ends, its permit becomes free for the next request, even if the client does not
+// read the answer.
 TEST_F(TilePermits, AreFreeWhenTheWorkIsDone) {
   const std::string tile = base_ + "/0/0" + version_;
   const std::string tag = http_->get(tile).header("ETag");
@@ -180,14 +182,15 @@ TEST_F(TilePermits, AreFreeWhenTheWorkIsDone) {
               static_cast<ssize_t>(text.size()));
     return socket;
   };
-  // With "busy" in between: the permit of an answer may be there for a moment after it.
+  // Some answers are "busy" first, because the permit of an answer may be held briefly after the
+  // answer.
   const auto ends_with = [&](const std::string& path, int status,
                              const client::HeaderMap& headers = {}) {
     return until([&] { return http_->get(path, headers).status == status; });
   };
   std::vector<int> sockets;
   for (int i = 0; i < 3; ++i) {
-    // The client of cpp-httplib reads an answer without a length until the connection is closed.
+    // cpp-httplib reads an answer without a length until the connection is closed.
     EXPECT_TRUE(ends_with(tile, 304, {{"If-None-Match", tag}, {"Connection", "close"}}));
     EXPECT_TRUE(ends_with(base_ + "/0/1000000" + version_, 404));
     EXPECT_TRUE(ends_with(base_ + "/0/0?v=" + std::string(32, '0'), 410));

@@ -16,8 +16,8 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// A disk whose size the test sets. Only scenes use its space. Tests can set a hook for reads of
-// unfinished uploads.
+// A disk whose size the test sets, and on which only scenes take space. on_part_read is called at
+// each read of an unfinished upload.
 class TestDisk : public ForwardingFiles {
  public:
   TestDisk() : ForwardingFiles(system_files()) {}
@@ -100,8 +100,8 @@ class InterruptedUpload : public RunningService {
   TestDisk disk_;
 };
 
-// If a deletion fails halfway, its mark does not cause the deletion of the next scene with the same
-// name.
+// If a deletion fails halfway, the file that it marked is deleted later, but not the next scene
+// with the same name.
 TEST_F(InterruptedUpload, SurvivesADeletionThatFailed) {
   start();
   const std::string path = "/api/v1/scenes/m.glb", bytes = scene_bytes();
@@ -119,8 +119,8 @@ TEST_F(InterruptedUpload, SurvivesADeletionThatFailed) {
   EXPECT_TRUE(std::filesystem::exists(data("scenes/files/m.glb")));
 }
 
-// Clients that announce uploads as large as the disk, and send few bytes, block neither other
-// uploads nor jobs.
+// Clients that announce uploads as large as the disk but send few bytes do not block other uploads
+// or jobs.
 TEST_F(InterruptedUpload, IsNotBlockedBySlowOnes) {
   disk_.bytes = 200 * kMiB;
   config_.jobs.min_free_disk_bytes = 100 * kMiB;
@@ -136,7 +136,7 @@ TEST_F(InterruptedUpload, IsNotBlockedBySlowOnes) {
   for (const int socket : sockets) close(socket);
 }
 
-// An upload that starts over may use the space of the upload it replaces.
+// An upload that starts over may use the space of the upload that it replaces.
 TEST_F(InterruptedUpload, StartsOverInItsOwnSpace) {
   disk_.bytes = 60 * kMiB;
   config_.jobs.min_free_disk_bytes = 8 * kMiB;
@@ -150,8 +150,8 @@ TEST_F(InterruptedUpload, StartsOverInItsOwnSpace) {
   EXPECT_EQ(http_->get("/api/v1/scenes/n.glb").status, 404);
 }
 
-// The service stops without waiting until a large scene is read. The next service finishes the
-// upload, and the client does not send the bytes again.
+// The service stops without reading a large scene to its end. The next service finishes the upload,
+// and the client need not send the bytes again.
 TEST_F(InterruptedUpload, IsFinishedByTheNextService) {
   const std::string bytes = scene_bytes();
   ASSERT_GT(bytes.size(), 512u << 10) << "the digest reads it in several pieces";
@@ -190,7 +190,7 @@ TEST_F(InterruptedUpload, IsRefusedByAServiceThatStops) {
 }
 
 // A job that is submitted while the last bytes arrive uses the old scene. The upload is finished
-// after the job has ended.
+// after this job has ended.
 TEST_F(InterruptedUpload, IsFinishedAfterAJobThatUsedTheScene) {
   config_.jobs.min_free_disk_bytes = 100 * kMiB;
   start();
@@ -238,7 +238,7 @@ TEST_F(InterruptedUpload, IsNotAcknowledgedWithoutTheDatabase) {
   EXPECT_EQ(put_scene("m.glb", "x").status, 201);
 }
 
-// A clock that is temporarily ahead must not make all uploads count as old.
+// A clock that is far ahead for a while must not make uploads expire.
 TEST_F(InterruptedUpload, OutlivesAClockThatJumped) {
   const auto age = [&](const std::string& seconds) {
     SqlDatabase(data("scenes/scenes.db"), SqlDatabase::Mode::kReadWrite)
@@ -248,11 +248,11 @@ TEST_F(InterruptedUpload, OutlivesAClockThatJumped) {
   start();
   EXPECT_EQ(put_part("0123456789", 0, 5).status, 202);
   stop();
-  age("63072000");  // as if the clock was two years ahead now
+  age("63072000");  // now the clock seems to be two years ahead
   start();
   EXPECT_TRUE(until([&] { return log().find("no upload is deleted") != std::string::npos; }));
   EXPECT_EQ(offset("m.glb"), "5");
-  // The service was used recently, so the upload is really old.
+  // The service has recorded a recent change, so the clock is right and the upload is really old.
   EXPECT_EQ(put_scene("n.glb", "x").status, 201);
   stop();
   start();

@@ -1,4 +1,4 @@
-// Regression tests for defects that lost the results of jobs, or left jobs in a state that never
+// Regression tests for defects that lost results of jobs, or left jobs in a state that never
 // ended.
 #include <condition_variable>
 #include <csignal>
@@ -21,7 +21,7 @@ class JobRecovery : public RunningService {
   void edit_queue(const std::string& sql) {
     SqlDatabase(data("queue.db"), SqlDatabase::Mode::kReadWrite).execute(sql);
   }
-  // Replaces the program that runs jobs and plans.
+  // Makes the service run this script instead of voxdag for jobs and plans.
   void use_program(const std::string& script) {
     write_file_atomically(system_files(), folder_.file("program"), "#!/bin/sh\n" + script + "\n");
     std::filesystem::permissions(folder_.file("program"), std::filesystem::perms::owner_all);
@@ -38,8 +38,8 @@ class JobRecovery : public RunningService {
     return http_->send("DELETE", "/api/v1/jobs/" + id, "");
   }
 
-  // Makes the first step with this beginning wait until release(). With `when_armed`, it is the
-  // first such step after arm().
+  // Makes the first step whose name starts with `beginning` wait until release(). With
+  // `when_armed`, only steps after arm() count.
   void hold_step(const std::string& beginning, bool when_armed = false) {
     armed_ = !when_armed;
     config_.before_step = [this, beginning](const std::string& step) {
@@ -70,8 +70,8 @@ class JobRecovery : public RunningService {
   bool armed_ = true, held_ = false, free_ = false;
 };
 
-// The rest of a failed deletion is removed later. Until then the job does not run again, because
-// its new results would be deleted too.
+// If a deletion fails halfway, the rest is removed later. Until then the job cannot be retried,
+// because its new results would also be deleted.
 TEST_F(JobRecovery, AJobWhoseDeletionFailedIsNotTriedAgain) {
   start();
   const std::string id = posted_job();
@@ -89,7 +89,7 @@ TEST_F(JobRecovery, AJobWhoseDeletionFailedIsNotTriedAgain) {
   EXPECT_FALSE(std::filesystem::exists(data("jobs/" + id + ".deleted")));
 }
 
-// Only marked files are deleted. The job's new folder and its record are kept.
+// Only the marked folder is deleted. The job's new folder and the job's record are kept.
 TEST_F(JobRecovery, AMarkedFolderTakesNoOtherAlong) {
   start();
   const std::string id = posted_job(), waiting = posted_job();
@@ -116,7 +116,7 @@ TEST_F(JobRecovery, AMarkedFolderTakesNoOtherAlong) {
   EXPECT_EQ(delete_job(waiting).status, 204);
 }
 
-// The scene is not emptied under the process that reads it.
+// A scene cannot be deleted while a dry run reads it.
 TEST_F(JobRecovery, ASceneIsNotDeletedDuringADryRun) {
   use_program("until test -e " + folder_.file("go") + R"(; do sleep 0.1; done
 echo '{"json":"{\"triangles\":1}","message":"result"}')");
@@ -139,7 +139,7 @@ echo '{"json":"{\"triangles\":1}","message":"result"}')");
   EXPECT_EQ(http_->send("DELETE", "/api/v1/scenes/m.glb", "").status, 204);
 }
 
-// A retry is refused for the same reasons as a new job.
+// A retry is refused for the same reasons as a new job, such as a missing scene.
 TEST_F(JobRecovery, AJobWithoutItsSceneIsNotTriedAgain) {
   use_program("exec sleep 600");
   start();
@@ -154,7 +154,7 @@ TEST_F(JobRecovery, AJobWithoutItsSceneIsNotTriedAgain) {
   EXPECT_EQ(not_problem(http_->send("DELETE", "/api/v1/scenes/m.glb", ""), 409, "conflict"), "");
 }
 
-// One damaged record leaves the list of all jobs valid.
+// A damaged record of one job does not make the list of jobs invalid JSON.
 TEST_F(JobRecovery, AListWithADamagedRequestIsJson) {
   use_program("exec sleep 600");
   start();
@@ -171,7 +171,7 @@ TEST_F(JobRecovery, AListWithADamagedRequestIsJson) {
   }
 }
 
-// Once the outcome of a run is recorded, nothing of that run affects later requests of a client.
+// After the outcome of a run is recorded, the run does not affect later requests of clients.
 TEST_F(JobRecovery, ASuspendedJobIsCanceledWhileItsThreadEnds) {
   use_program("exec sleep 600");
   hold_step("remove the work folder of job");
@@ -199,7 +199,8 @@ TEST_F(JobRecovery, AJobThatWaitsForAnotherAttemptIsCanceledToo) {
   release();
 }
 
-// A new process that has not yet started the job's program inherits the service's signal handler.
+// A stop request also works for a process that has not yet started the job's program, although the
+// process has inherited the service's signal handler.
 TEST_F(JobRecovery, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
   use_program(R"(sleep 1; echo '{"json":"{}","message":"result"}')");
   hold_step("run ");
@@ -215,8 +216,8 @@ TEST_F(JobRecovery, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
   std::signal(SIGTERM, before);
 }
 
-// If a job were started after all others were stopped, it would run to its end, and the service
-// would wait for it.
+// A job that started after all other jobs were stopped would run to its end, and the service would
+// wait for it. So a stopping service starts no job.
 TEST_F(JobRecovery, AServiceThatStopsStartsNoOtherJob) {
   use_program("exec sleep 10");
   config_.jobs.max_concurrent = 2;

@@ -1,5 +1,5 @@
-// Kills the service at random moments, as a power failure would: every job still succeeds, with the
-// bytes of `voxdag build`.
+// Kills the service with SIGKILL at random moments. Every job still succeeds, with the bytes of
+// `voxdag build`.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kMaxWaitS = 600;
 
-// Returns how often the service is killed.
+// Returns the number of kills.
 int rounds() {
   const char* text = std::getenv("VOXDAG_CRASH_ROUNDS");
   return text ? std::atoi(text) : 4;
@@ -61,7 +61,7 @@ class KilledService : public testing::Test {
       usleep(2000);
     }
   }
-  // Stops the service with this signal. Returns the exit status, or minus the number of the signal.
+  // Sends this signal to the service. Returns its exit status, or minus the number of the signal.
   int end(int signal) {
     if (pid_ <= 0) return 0;
     kill(pid_, signal);
@@ -113,7 +113,7 @@ class KilledService : public testing::Test {
   std::string url_;
   std::unique_ptr<HttpClient> http_;
   pid_t pid_ = -1;
-  rlim_t max_files_ = 0;  // of the service; 0 for as many as the test has
+  rlim_t max_files_ = 0;  // limit for the service; 0: the limit of the test
 };
 
 TEST_F(KilledService, FinishesEveryJob) {
@@ -127,7 +127,7 @@ TEST_F(KilledService, FinishesEveryJob) {
     usleep(static_cast<useconds_t>(pause_us(random)));
     ASSERT_EQ(end(SIGKILL), -SIGKILL);
     start();
-    if (state(jobs_.back().id) == "succeeded") post_jobs();  // so that a job is always interrupted
+    if (state(jobs_.back().id) == "succeeded") post_jobs();  // each round must interrupt a job
   }
   std::map<int, std::string> expected;  // SHA-256 by resolution
   for (const auto& [id, resolution] : jobs_) {
@@ -149,7 +149,8 @@ TEST_F(KilledService, FinishesEveryJob) {
   }
 }
 
-// After SIGTERM builds stop at a checkpoint and the exit is clean; the next service resumes them.
+// After SIGTERM, builds stop at a checkpoint, and the service exits with status 0. The next service
+// resumes the builds.
 TEST_F(KilledService, DrainsAndResumes) {
   prepare();
   post_jobs();
@@ -165,7 +166,7 @@ TEST_F(KilledService, DrainsAndResumes) {
   EXPECT_EQ(end(SIGTERM), 0);
 }
 
-// Idle clients do not use up the number of files that the service may open.
+// Idle clients do not use up the files that the service may open.
 TEST_F(KilledService, FewOpenFilesLeaveConnections) {
   max_files_ = 64;
   prepare();
@@ -193,7 +194,7 @@ TEST_F(KilledService, FewOpenFilesLeaveConnections) {
   for (const int socket : slow) close(socket);
 }
 
-// Other users of the machine cannot read the data folder, whatever the umask is.
+// Other users of the machine cannot read the data folder, whatever the umask of the service is.
 TEST_F(KilledService, DataIsForTheServiceAlone) {
   prepare();
   const ClientResponse posted =

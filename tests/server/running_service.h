@@ -1,4 +1,4 @@
-// Runs the service within the test on a free port, with its jobs in real processes.
+// Runs the service in the test's process on a free port. Jobs run in separate processes.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ using client::HttpClient;
 class RunningService : public testing::Test {
  protected:
   RunningService();
-  // Expects that the service has answered only with documented statuses.
+  // Expects that all answers of the service had documented statuses.
   ~RunningService() override;
 
   void start();
@@ -33,16 +33,16 @@ class RunningService : public testing::Test {
   void begin_stop() { service_->stop(); }
   std::string url() const { return service_->url(); }
 
-  // Menger's sponge, 36 096 triangles.
+  // Returns a Menger sponge of 36 096 triangles.
   std::string scene_bytes();
   ClientResponse put_scene(const std::string& name, const std::string& bytes,
                            const client::HeaderMap& headers = {});
   ClientResponse post(const std::string& path, const Json& body = nullptr,
                       const client::HeaderMap& headers = {});
-  // Posts a job and expects it to be accepted; returns its id.
+  // Posts a job, expects that it is accepted, and returns its id.
   std::string post_job(const Json& body);
   Json job(const std::string& id);
-  // Polls the condition for up to ten minutes; returns whether it became true.
+  // Polls the condition for up to ten minutes. Returns whether it became true.
   bool until(const std::function<bool()>& condition);
   bool until_state(const std::string& id, const std::string& state);
   // Returns "" if the answer is this problem; otherwise a description of the answer.
@@ -65,7 +65,7 @@ class RunningService : public testing::Test {
 
 // Sends raw bytes and reads until the server closes the connection, or is silent for 30 s.
 std::string raw_exchange(int port, const std::string& bytes);
-// A connected socket.
+// Returns a connected socket.
 int raw_connect(int port);
 
 }  // namespace voxdag::server

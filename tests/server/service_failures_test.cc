@@ -1,5 +1,5 @@
 // Regression tests for defects that ended the service, lost files, or let one client block all
-// other clients.
+// others.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -27,7 +27,7 @@ class ServiceFailures : public RunningService {
   void edit_queue(const std::string& sql) {
     SqlDatabase(data("queue.db"), SqlDatabase::Mode::kReadWrite).execute(sql);
   }
-  // Returns a small job that has succeeded.
+  // Runs a small job until it succeeds, and returns its id.
   std::string finished_job() {
     put_scene("m.glb", scene_bytes());
     const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 64}});
@@ -36,8 +36,8 @@ class ServiceFailures : public RunningService {
   }
 };
 
-// Every step of the service and every handler throws when it is first called. The exceptions are of
-// different types.
+// Every step of the service and every handler throws at its first call, with exceptions of
+// different types. The service does not end.
 TEST_F(ServiceFailures, NoFailureEndsTheService) {
   std::mutex mutex;
   std::set<std::string> failed;
@@ -75,7 +75,7 @@ TEST_F(ServiceFailures, NoFailureEndsTheService) {
     std::lock_guard lock(mutex);
     return failed.contains("record a preview");
   }));
-  // One of the answers to DELETE is injected, whichever status it has.
+  // One of these calls of DELETE gets an injected error, so the status is not checked.
   EXPECT_TRUE(until([&] {
     http_->send("DELETE", "/api/v1/jobs/" + id, "");
     return http_->get("/api/v1/jobs/" + id).status == 404;
@@ -89,7 +89,7 @@ TEST_F(ServiceFailures, NoFailureEndsTheService) {
     EXPECT_TRUE(failed.contains(step)) << step;
 }
 
-// A step that always fails, as on a broken disk, prevents only the steps that depend on it.
+// Steps that always fail, as on a broken disk, prevent only the work that depends on them.
 TEST_F(ServiceFailures, StepsMayFailForEver) {
   std::atomic<bool> fails{true};
   config_.before_step = [&](const std::string& step) {
@@ -105,7 +105,7 @@ TEST_F(ServiceFailures, StepsMayFailForEver) {
   EXPECT_NE(log().find("failed to dispatch jobs: injected"), std::string::npos) << log();
 }
 
-// A client deletes jobs at the same time as the retention rule.
+// A client deletes a job while the retention rule removes it.
 TEST_F(ServiceFailures, RetentionMeetsADeletion) {
   config_.retention.finished_jobs = 0;
   std::atomic<bool> deleted = false;
@@ -124,7 +124,7 @@ TEST_F(ServiceFailures, RetentionMeetsADeletion) {
   EXPECT_EQ(log().find("failed to remove old job"), std::string::npos) << log();
 }
 
-// A job that another version of the program queued fails, and the next job runs.
+// A job that another version of the program has queued cannot be read and fails. The next job runs.
 TEST_F(ServiceFailures, AJobThatCannotBeReadFails) {
   start();
   const std::string first = finished_job(), second = finished_job();
@@ -142,7 +142,7 @@ TEST_F(ServiceFailures, AJobThatCannotBeReadFails) {
   EXPECT_EQ(Json::parse(http_->get("/api/v1/jobs").body)["jobs"].size(), 2u);
 }
 
-// Without its queue no file is removed, and nothing starts until the operator adopts the jobs.
+// If the queue is lost, no file is removed, and nothing starts until the operator adopts the jobs.
 TEST_F(ServiceFailures, ALostQueueCostsNothing) {
   start();
   const std::string id = finished_job();
@@ -190,7 +190,7 @@ TEST_F(ServiceFailures, AnUnfinishedJobIsAdopted) {
   EXPECT_TRUE(until_state(id, "succeeded"));
 }
 
-// At its start the service removes only files that it marked itself.
+// At its start, the service removes only files that it has marked itself.
 TEST_F(ServiceFailures, ForeignFilesAreLeftAlone) {
   start();
   const std::string intact = finished_job(), deleted = finished_job();
@@ -228,7 +228,8 @@ TEST_F(ServiceFailures, DeleteDuringUploadIsRefused) {
         std::to_string(bytes.size()) + "\r\n\r\n" + bytes.substr(0, 1000);
     ASSERT_EQ(send(socket, head.data(), head.size(), MSG_NOSIGNAL),
               static_cast<ssize_t>(head.size()));
-    // Deleting an upload of which nothing arrived yet is allowed.
+    // Deleting an upload is allowed until its first bytes arrive, so the test waits for the
+    // upload's record.
     ASSERT_TRUE(
         until([&] { return http_->head("/api/v1/scenes/m.glb").header("Upload-Offset") == "0"; }));
     EXPECT_EQ(not_problem(http_->send("DELETE", "/api/v1/scenes/m.glb", ""), 409, "conflict"), "");
@@ -270,7 +271,7 @@ TEST_F(ServiceFailures, AnUploadWhosePartIsLostStartsOver) {
   EXPECT_EQ(part(0, bytes.size()).status, 201);
 }
 
-// One client cannot take all places; the others are served.
+// One client cannot take all permits. Other clients are served.
 TEST_F(ServiceFailures, LimitsOfOneClient) {
   config_.transfers.max_per_client = 1;
   start();
@@ -286,9 +287,9 @@ TEST_F(ServiceFailures, LimitsOfOneClient) {
   EXPECT_TRUE(until([&] { return put_scene("m.glb", "x").status == 201; }));
 }
 
-// A plan is stopped when the client that requested it disconnects.
+// If the client that requested a plan disconnects, the plan is stopped.
 TEST_F(ServiceFailures, APlanEndsWithItsClient) {
-  // This script replaces the program: a plan that takes longer than the test.
+  // This script replaces the program. The plan takes longer than the test.
   write_file_atomically(system_files(), folder_.file("slow"), "#!/bin/sh\nexec sleep 600\n");
   std::filesystem::permissions(folder_.file("slow"), std::filesystem::perms::owner_all);
   config_.program = folder_.file("slow");
@@ -300,7 +301,7 @@ TEST_F(ServiceFailures, APlanEndsWithItsClient) {
   const std::string request =
       "POST /api/v1/jobs?dry_run=true HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
       "application/json\r\nContent-Length: " +
-      std::to_string(body.size()) + "\r\n\r\n" + body + "G";  // the begin of another request
+      std::to_string(body.size()) + "\r\n\r\n" + body + "G";  // begin of another request
   ASSERT_EQ(send(socket, request.data(), request.size(), MSG_NOSIGNAL),
             static_cast<ssize_t>(request.size()));
   const auto plans = [&] {
@@ -314,7 +315,7 @@ TEST_F(ServiceFailures, APlanEndsWithItsClient) {
   EXPECT_EQ(log().find("failed to"), std::string::npos) << log();
 }
 
-// A deeply nested JSON value affects neither the answer nor the job's place in the queue.
+// A deeply nested JSON value is refused, and does not end the service.
 TEST_F(ServiceFailures, ADeepValueIsNoPriority) {
   config_.transfers.max_body_bytes = 64 << 20;
   start();
@@ -336,7 +337,7 @@ TEST_F(ServiceFailures, ADeepValueIsNoPriority) {
   EXPECT_TRUE(is_alive());
 }
 
-// A queue or scenes deleted under the running service.
+// /readyz fails if the database of the queue or of the scenes is removed while the service runs.
 TEST_F(ServiceFailures, ReadyzNoticesThatTheQueueIsGone) {
   start();
   put_scene("m.glb", scene_bytes());
@@ -352,12 +353,12 @@ TEST_F(ServiceFailures, ReadyzNoticesThatTheQueueIsGone) {
   }
 }
 
-// A clock that is temporarily ahead must not make all results count as old.
+// A clock that is far ahead for a while must not make results expire.
 TEST_F(ServiceFailures, AClockThatJumpedDeletesNothing) {
   start();
   const std::string id = finished_job();
   stop();
-  // Moves the queue's times as if the clock were two years ahead now.
+  // Changes the times in the queue, so that the clock now seems to be two years ahead.
   edit_queue(
       "UPDATE job SET finished_s = finished_s - 63072000; "
       "UPDATE job_event SET at_s = at_s - 63072000");
@@ -366,13 +367,13 @@ TEST_F(ServiceFailures, AClockThatJumpedDeletesNothing) {
   usleep(200'000);
   EXPECT_EQ(job(id)["state"], "succeeded");
   stop();
-  // The service was used yesterday, so the job is really old.
+  // Now the queue has a recent event, so the clock is right and the job is really old.
   edit_queue("UPDATE job_event SET at_s = at_s + 63072000");
   start();
   EXPECT_TRUE(until([&] { return http_->get("/api/v1/jobs/" + id).status == 404; }));
 }
 
-// Tokens over plain HTTP can be read on the network.
+// With tokens, plain HTTP on the network gives a warning, because tokens can be read there.
 TEST_F(ServiceFailures, WarnsOfTokensInPlainText) {
   const NewToken admin = make_token("admin", "a");
   write_file_atomically(system_files(), folder_.file("tokens"), admin.line + "\n");

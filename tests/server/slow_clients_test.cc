@@ -1,4 +1,4 @@
-// Clients that try to use up the service's memory or its connections.
+// Clients that try to use up the memory or the connections of the service.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kMaxConnections = 40;
 constexpr size_t kAttackers = 64;
 constexpr useconds_t kAttackBeginsUs =
-    1'500'000;  // by then the service waits for all attackers, for more than a second
+    1'500'000;  // by then, the service has waited for all attackers for over a second
 
 class SlowClients : public RunningService {
  protected:
@@ -24,13 +24,13 @@ class SlowClients : public RunningService {
   }
 
   int port() const { return std::stoi(url().substr(url().rfind(':') + 1)); }
-  // Opens a connection and sends these bytes, until the service accepts no more of them.
+  // Opens a connection and sends these bytes, as far as the service accepts them without waiting.
   int open_with(const std::string& bytes) {
     sockets_.push_back(raw_connect(port()));
     send(sockets_.back(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     return sockets_.back();
   }
-  // Returns how many of twenty requests, each on a separate connection, are answered with 200.
+  // Sends twenty requests on separate connections. Returns how many are answered with 200.
   int answered() {
     int count = 0;
     for (int i = 0; i < 20; ++i)
@@ -39,7 +39,7 @@ class SlowClients : public RunningService {
     return count;
   }
   // Sends `bytes` repeatedly. Returns the number of bytes that the service accepts before it closes
-  // the connection.
+  // the connection, at most about max_bytes.
   size_t bytes_taken(int socket, const std::string& bytes, size_t max_bytes) {
     size_t total = 0;
     while (total < max_bytes) {
@@ -49,7 +49,7 @@ class SlowClients : public RunningService {
     }
     return total;
   }
-  // Bytes that the kernel holds for clients of the service.
+  // Returns the number of bytes that the kernel holds for clients of the service.
   size_t queued_bytes() {
     std::ifstream table("/proc/net/tcp");
     std::string line;
@@ -69,7 +69,7 @@ class SlowClients : public RunningService {
   std::vector<int> sockets_;
 };
 
-// The line before a chunk has a limit, and so have its extension and the fields after the last one.
+// The line before a chunk has a limit. So do its extension, and the fields after the last chunk.
 TEST_F(SlowClients, LinesOfChunksAreBounded) {
   start();
   const std::string head =
@@ -94,7 +94,7 @@ TEST_F(SlowClients, SlowBodiesDoNotBlockOthers) {
   EXPECT_EQ(answered(), 20);
 }
 
-// Connections whose answers are not read are closed in the same way, and the kernel buffers little
+// Connections whose answers are not read are also closed then, and the kernel buffers only little
 // of each answer.
 TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   start();
@@ -109,7 +109,8 @@ TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   EXPECT_EQ(answered(), 20);
 }
 
-// If a blank before a colon hid the length of the body, the body's end would be read as a request.
+// If a blank before a colon hid the length of a body, the service would read the rest of the body
+// as a request.
 TEST_F(SlowClients, ABlankBeforeTheColonIsRejected) {
   start();
   const std::string answer = raw_exchange(
@@ -127,7 +128,8 @@ TEST_F(SlowClients, TwoHostsAreRejected) {
           .starts_with("HTTP/1.1 400 "));
 }
 
-// Several clients request /readyz concurrently, with and without tokens.
+// Several clients request /readyz concurrently. All of them get the answer that the service is
+// ready.
 TEST_F(SlowClients, ReadinessDoesNotDependOnWhoElseAsks) {
   config_.transfers.max_requests_per_s = 0;
   start();
@@ -153,7 +155,7 @@ TEST_F(SlowClients, MalformedRequestsAreCounted) {
             std::string::npos);
 }
 
-// HEAD has no ranges.
+// A Range header has no effect on a HEAD request.
 TEST_F(SlowClients, HeadIgnoresRanges) {
   start();
   put_scene("m.glb", scene_bytes());

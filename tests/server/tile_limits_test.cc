@@ -1,4 +1,4 @@
-// The limits of requests for tiles: permits, the size of a tile, and a file that changes during a
+// The limits for requests of tiles: permits, the size of a tile, and a file that changes during a
 // request.
 #include <sys/socket.h>
 #include <unistd.h>
@@ -25,14 +25,14 @@ uint64_t bytes_of_fullest_tile(uint32_t levels) {
   return 4 * (4 + 9 * nodes + 4 * of_level);
 }
 
-// 64 times the tile of the root.
+// Returns the path of a batch that requests the root's tile 64 times.
 std::string largest_batch(const std::string& version) {
   std::string path = "/batch" + version + "&nodes=0.0";
   for (int i = 1; i < 64; ++i) path += ",0.0";
   return path;
 }
 
-// Makes a scene in which all cubes of level 3 have voxels and no two are equal: the tile of its
+// Makes a scene in which all cubes of level 3 have voxels and no two are equal. So the tile of its
 // root is as large as possible.
 void make_soup(const std::string& path) {
   const std::string command = std::string(VOXDAG_BINARY) + " generate soup " + path +
@@ -41,7 +41,7 @@ void make_soup(const std::string& path) {
 }
 
 // A service in which each client may have one tile request in progress, and all clients together
-// two.
+// may have two.
 class TileLimits : public RunningService {
  protected:
   void SetUp() override {
@@ -68,7 +68,7 @@ class TileLimits : public RunningService {
     HttpClient client(ClientOptions{url(), tokens_[name], "", 300});
     return client.get(base_ + path);
   }
-  // Requests the largest answer and reads only its beginning. After that the request holds a
+  // Requests the largest answer and reads only its beginning. The request then holds a
   // permit.
   int ask_and_read_nothing(const std::string& name) {
     const std::string text = "GET " + base_ + largest_batch(version_) +
@@ -99,8 +99,8 @@ class TileLimits : public RunningService {
   std::string base_, version_;
 };
 
-// A client that does not read a large answer blocks only its own permit, and only for tiles, until
-// it disconnects. Other clients are answered while permits are left.
+// A client that does not read a large answer blocks only its own requests for tiles, until it
+// disconnects. Other clients are answered while permits are left.
 TEST_F(TileLimits, ASlowReaderBlocksItselfAlone) {
   const std::string tile = "/0/0" + version_;
   const int anna = ask_and_read_nothing("anna");
@@ -119,7 +119,7 @@ TEST_F(TileLimits, ASlowReaderBlocksItselfAlone) {
   close(ben);
 }
 
-// A slow client finally reads a complete answer.
+// A slow client that continues to read gets the complete answer.
 TEST_F(TileLimits, ASlowReaderGetsItsAnswer) {
   const std::string whole = get("ben", largest_batch(version_)).body;
   EXPECT_GE(whole.size(), size_t{512} << 10) << "a small answer holds no permit";
@@ -132,7 +132,7 @@ TEST_F(TileLimits, ASlowReaderGetsItsAnswer) {
   EXPECT_TRUE(answer.substr(answer.find("\r\n\r\n") + 4) == whole);
 }
 
-// The fullest tile is as large as the documents say, and no larger.
+// A tile with the maximum contents has exactly the documented size.
 TEST_F(TileLimits, TilesAreNoLargerThanDocumented) {
   const Json manifest = Json::parse(get("anna", "").body);
   const uint32_t levels = manifest["tile_levels"];
@@ -150,7 +150,7 @@ TEST_F(TileLimits, TilesAreNoLargerThanDocumented) {
     EXPECT_LE(query::encode_tile(dag, depth, {0, 0}).size() * 4, bytes_of_fullest_tile(depth));
 }
 
-// Changes the file of `voxdag view` each time the service has checked its identity.
+// Changes the file of `voxdag view` after each check of its identity by the service.
 class ChangingFiles : public ForwardingFiles {
  public:
   using ForwardingFiles::ForwardingFiles;
@@ -166,7 +166,7 @@ class ChangingFiles : public ForwardingFiles {
         : ForwardingReader(std::move(file)), changes_(changes) {}
     FileIdentity identity() const override {
       const FileIdentity before = ForwardingReader::identity();
-      // As a program does that writes into the file; the time may be as coarse as a tick.
+      // Changes the file's time, as a write does. The loop is needed because times may be coarse.
       while (changes_ && system_files().open_read(path())->identity() == before)
         system_files().touch(path());
       return before;
@@ -177,8 +177,8 @@ class ChangingFiles : public ForwardingFiles {
   };
 };
 
-// Tiles made while the file is written may mix old and new contents. So they are not sent, and no
-// browser stores them. When the writing ends, requests are answered again.
+// While the file is being written, tiles may mix old and new contents. So the service does not send
+// them, and no browser stores them. After the writing ends, requests are answered again.
 TEST(OverwrittenFile, IsGoneWhileItsTilesAreMade) {
   const TemporaryFolder folder;
   const std::string path = folder.file("m.vdag"), scene = folder.file("m.glb");

@@ -1,4 +1,4 @@
-// The tiles of jobs' results and of `voxdag view`, as viewers get them.
+// Requests the tiles of jobs' results and of `voxdag view` as viewers do.
 #include <zlib.h>
 
 #include <filesystem>
@@ -16,7 +16,7 @@
 namespace voxdag::server {
 namespace {
 
-// The bytes of a tile of the file, little-endian words.
+// Returns the bytes of a tile of the file: little-endian words.
 std::string tile_bytes(const std::string& path, uint32_t tile_levels, uint32_t level,
                        uint64_t offset) {
   const auto file = open_global_file(path);
@@ -44,7 +44,7 @@ std::string inflated(const std::string& packed) {
   return out;
 }
 
-// True if this process has the file mapped.
+// True if this process has mapped the file.
 bool is_mapped(const std::string& path) {
   std::ifstream maps("/proc/self/maps");
   const std::string text{std::istreambuf_iterator<char>(maps), {}};
@@ -53,7 +53,7 @@ bool is_mapped(const std::string& path) {
 
 class Tiles : public RunningService {
  protected:
-  // Starts the service with one finished job.
+  // Starts the service and runs one job to its end.
   void finish_job() {
     start();
     put_scene("m.glb", scene_bytes());
@@ -93,7 +93,8 @@ TEST_F(Tiles, HaveAManifest) {
   EXPECT_EQ(http_->get(base_).header("Cache-Control"), "no-store");
 }
 
-// The contents of a URL with a digest never change, so they are sent once.
+// The contents of a URL with a digest never change, so a client that has them is not sent them
+// again.
 TEST_F(Tiles, AreSentOnce) {
   finish_job();
   const std::string path = base_ + "/0/0" + version_, root = tile_bytes(result_, levels_, 0, 0);
@@ -132,7 +133,7 @@ TEST_F(Tiles, AreCompressedForClientsThatAcceptIt) {
   EXPECT_LT(packed.size(), whole.size());
 }
 
-// The answer to a batch has all of its tiles in the requested order, or is an error.
+// The answer to a batch has all requested tiles in the requested order, or is an error.
 TEST_F(Tiles, ComeInBatches) {
   finish_job();
   const auto file = open_global_file(result_);
@@ -179,7 +180,7 @@ TEST_F(Tiles, OfWhatIsNotThereAreRefused) {
   post("/api/v1/jobs/" + unfinished + "/cancel");
 }
 
-// A deleted result takes up no disk.
+// The file of a deleted result is closed, so that it takes no disk space.
 TEST_F(Tiles, OfADeletedJobAreClosed) {
   finish_job();
   EXPECT_EQ(http_->get(base_ + "/0/0" + version_).status, 200);
@@ -203,7 +204,7 @@ TEST_F(Tiles, NeedTheRoleRead) {
   }
 }
 
-// While a job runs, its built part can be viewed. Afterwards the result is viewed instead.
+// While a job runs, its built part can be viewed. After that, its result can be viewed.
 TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
   start();
   put_scene("m.glb", scene_bytes());
@@ -228,7 +229,7 @@ TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
     for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(cube[axis].get<int>() % 2048, 0);
     EXPECT_GT(cube[4].get<uint64_t>() + cube[5].get<uint64_t>(), 0u);
   }
-  // The same as a DAG in tiles.
+  // The built part is also available as a DAG in tiles.
   const std::string base = path + "/tiles";
   Json m;
   ASSERT_TRUE(until([&] {
@@ -261,7 +262,7 @@ struct Answers : RunningService {
   using RunningService::not_problem;
 };
 
-// `voxdag view` of one file.
+// Serves one file, as `voxdag view` does.
 class View : public testing::Test {
  protected:
   ~View() override {
@@ -304,11 +305,11 @@ TEST_F(View, ServesTheFileAndTheAssets) {
   EXPECT_EQ(http_->get("/lib/dom.js").header("Content-Type"), "text/javascript; charset=utf-8");
   EXPECT_EQ(http_->get("/api/v1/jobs").status, 404);
   EXPECT_EQ(http_->send("POST", "/api/v1/view/tiles", "{}").status, 405);
-  // Any web page may send requests here, under its host name.
+  // Any web page may send requests to this port, with the host name of the page.
   EXPECT_EQ(http_->get("/api/v1/view/tiles", {{"Host", "evil.example"}}).status, 403);
 }
 
-// A viewer is not given tiles of a file that has been replaced by another one.
+// If the file was replaced, the service refuses requests with the old digest.
 TEST_F(View, NoticesThatTheFileWasReplaced) {
   build("64");
   start();
@@ -323,7 +324,7 @@ TEST_F(View, NoticesThatTheFileWasReplaced) {
   EXPECT_EQ(status("0/0", m["digest"]), 404);
 }
 
-// The file is truncated after a request has checked it and before the request reads it.
+// The file is truncated after a request has checked it, before the request reads it.
 TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   build("64");
   const FileTileSource file(path_, system_files().open_read(path_)->identity());
@@ -332,12 +333,13 @@ TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   try {
     query::encode_tile(file.dag(), kTileLevels, {0, 0});
   } catch (const Error&) {
-    // Or the zeros make a tile.
+    // Or encode_tile() makes a tile from the zeros that it reads instead.
   }
   EXPECT_THROW(file.expect_readable(), Error);
 }
 
-// The file is truncated after it is mapped, before or while its header and tables are read.
+// The file is truncated after it is mapped, before or while the service reads its header and
+// tables.
 TEST_F(View, AFileThatIsTruncatedWhileItIsOpenedIsAnErrorAndNoCrash) {
   build("64");
   const FileIdentity identity = system_files().open_read(path_)->identity();
@@ -356,7 +358,7 @@ TEST_F(View, AFileThatIsTruncatedWhileItIsOpenedIsAnErrorAndNoCrash) {
   }
 }
 
-// The colors of a file, 8 x 8 x 8 cells per page.
+// Pages contain the colors of the file, 8 x 8 x 8 cells per page.
 TEST_F(View, SendsColorPages) {
   build("64", "--color");
   start();

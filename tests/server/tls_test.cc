@@ -9,8 +9,8 @@
 namespace voxdag::server {
 namespace {
 
-// Writes a self-signed certificate for 127.0.0.1 and its key. A container may not resolve
-// localhost.
+// Writes a self-signed certificate for 127.0.0.1, and its key. The certificate is not for
+// localhost, because a container may not resolve this name.
 void make_certificate(const std::string& certificate_file, const std::string& key_file) {
   EVP_PKEY* key = EVP_EC_gen("P-256");
   X509* certificate = X509_new();
@@ -48,7 +48,7 @@ class Tls : public RunningService {
 };
 
 // Requests, bodies in both directions and event streams work over TLS. A client that does not trust
-// the certificate refuses to connect; a plain HTTP request closes the connection.
+// the certificate refuses to connect. A plain HTTP request closes the connection.
 TEST_F(Tls, EncryptsEverything) {
   start();
   const std::string port = url().substr(url().rfind(':'));

@@ -6,8 +6,8 @@
 
 namespace voxdag {
 
-// Returns the Error that `run` throws. If it throws none, the test fails and the returned message
-// is empty.
+// Calls `run` and returns the Error that it throws. If it throws none, the test fails, and the
+// message of the returned Error is empty.
 template <class Run>
 Error error_of(Run run) {
   try {

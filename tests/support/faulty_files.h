@@ -1,8 +1,8 @@
 // A file system that fails on request, modeled on LevelDB's fault_injection_test. It simulates a
-// disk that loses unsynced data or is full, and a process that is killed.
+// disk that is full or loses unsynced data, and a process that is killed.
 //
-// Every call that changes the disk is an operation. Operations are numbered from 1 in the order in
-// which they begin. With several threads, this order differs slightly from run to run. Thread-safe.
+// Each call that changes the disk is an operation. Operations are numbered from 1, in the order in
+// which they begin. With several threads, this order differs slightly between runs. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -50,20 +50,20 @@ class FaultyFiles : public voxdag::ForwardingFiles {
  private:
   friend class FaultyWriter;
   friend class FaultyReader;
-  // Gives the operation its number and runs it, or causes the planned fault. `half` does the part
-  // of the operation that a failing disk completes.
+  // Gives the operation its number. Then runs the operation, or causes the planned fault. `half`
+  // does the part of the operation that a failing disk still does.
   template <class Operation, class Half>
   void operate(const Operation& operation, const Half& half);
   template <class Operation>
   void operate(const Operation& operation) {
     operate([&](uint64_t) { operation(); }, [] {});
   }
-  // Like operate(), for a write. `half` writes the part that a failing disk completes; `flipped`
-  // writes the data with a wrong bit.
+  // Like operate(), for a write. `half` writes the part that a failing disk still writes. `flipped`
+  // writes the data with one wrong bit.
   template <class Operation, class Half, class Flipped>
   void write(const Operation& operation, const Half& half, const Flipped& flipped);
   void read();
-  // Reverts files and names to the state of their last sync, then sends SIGKILL.
+  // Reverts files and names to their state at the last sync, then sends SIGKILL.
   void cut_power();
 
   const FaultPlan plan_;

@@ -1,6 +1,6 @@
-// Small programs for the simulated device: broken programs, each of which breaks one rule of CUDA,
-// and correct programs. They are compiled like the backend's sources, so that the memory accesses
-// of their kernels are checked.
+// Small programs for the simulated device. Each broken program breaks one rule of CUDA; the others
+// are correct. They are compiled like the backend's sources, so that the memory accesses of their
+// kernels are checked.
 #pragma once
 
 #include <cstdint>
@@ -20,17 +20,17 @@ std::vector<BrokenProgram> broken_programs();
 // barrier, and reads its neighbor's word. Returns the words that the threads read.
 std::vector<uint32_t> exchange_with_neighbors(uint32_t blocks, uint32_t threads);
 
-// The host's target of a download, before and after the wait for the stream.
+// The host word that a download writes, before and after the host waits for the stream.
 struct DownloadedWord {
   uint32_t before = 0, after = 0;
 };
 DownloadedWord download_word(uint32_t value);
 
-// Uploads a value with the backend's CudaSpace, changes it immediately, and returns the value that
-// arrived.
+// Uploads a value with the backend's CudaSpace, and changes the value immediately after the call.
+// Returns the value that arrived on the device.
 uint64_t upload_then_change(uint64_t value);
 
-// Returns device memory, after removing its access rights.
+// Returns the address of device memory, after removing the access rights of the host.
 const volatile uint32_t* words_of_the_device();
 
 // Allocates device memory and does not release it. Returns the bytes that remain in use.

@@ -23,7 +23,7 @@ namespace voxdag::cuda_sim {
 
 class DeviceMemory {
  public:
-  static constexpr uint64_t kBytes = uint64_t{1} << 30;  // of addresses
+  static constexpr uint64_t kBytes = uint64_t{1} << 30;  // of address space
   static constexpr uint64_t kPage = 4096;
 
   DeviceMemory();
@@ -35,12 +35,13 @@ class DeviceMemory {
   void* reserve(uint64_t bytes);
   void begin_life(void* memory, uint64_t bytes, int device);
   void end_life(void* memory);
-  // Ends all lives.
+  // Ends all allocations.
   void reset();
 
-  // open() gives access to operations of a device, close() revokes it. The instrumented sources of
-  // the backend see this every time. For all other code, close() removes the access rights of the
-  // pages; it does so for only one of kCloseOneOf calls, chosen at random, because that is slow.
+  // open() gives the host access for operations of a device, and close() revokes it. The
+  // instrumented sources of the backend check this state at every access. For all other code,
+  // close() must remove the access rights of the pages. Because that is slow, it does so in one of
+  // kCloseOneOf calls, at random.
   void open(int device);
   void close();
   bool is_open() const { return open_; }
@@ -61,7 +62,7 @@ class DeviceMemory {
   // `first` the number of the first thread of its launch.
   void kernel_read(const void* p, uint64_t bytes, uint32_t first, uint32_t writer);
   void kernel_write(void* p, uint64_t bytes, uint32_t first, uint32_t writer);
-  // Call it before a launch whose thread numbers begin at 1 again: forgets the threads that wrote.
+  // Forgets which threads wrote. Call it before a launch whose thread numbers begin at 1 again.
   void forget_writers();
   void kernel_atomic(void* p, uint64_t bytes, uint32_t first);
 
@@ -86,7 +87,7 @@ class DeviceMemory {
 
   uint64_t base_ = 0;
   bool open_ = false, closed_ = true;
-  int device_ = 0;                   // the device whose operation runs
+  int device_ = 0;                   // device whose operation is running
   std::vector<uint32_t> page_life_;  // per page: index in lives_ + 1; 0: not allocated
   std::vector<Life> lives_;
   std::vector<uint32_t> free_lives_;

@@ -1,5 +1,5 @@
-// Simulates failures: a test chooses a call of the runtime that fails. Also stores each thread's
-// last error, as the runtime does.
+// Simulates failures: a test chooses which call of the runtime fails. Also stores the last error of
+// each thread, as the runtime does.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -27,8 +27,8 @@ void plan_no_fault();
 // True if the planned failure has happened.
 bool fault_happened();
 
-// Every call of the runtime begins with this. Returns the status with which the call must fail, or
-// cudaSuccess.
+// Every call of the runtime begins with this function. Returns the status with which the call must
+// fail, or cudaSuccess.
 cudaError_t begin_call(Call call);
 // Sets the thread's last error to `status`, and returns `status`.
 cudaError_t fail(cudaError_t status);

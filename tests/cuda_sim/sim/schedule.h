@@ -1,4 +1,5 @@
-// Decides by a seed when queued work runs, and in which order if the order is unspecified.
+// Decides, from a seed, when queued work runs, and the order of work whose order CUDA does not
+// specify.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +20,8 @@ Schedule schedule();
 // The next random number below `end`.
 uint32_t random_below(uint32_t end);
 
-// Visits each of 0 to n - 1 once: begins at a random number and adds a random stride, which has no
-// common divisor with n, modulo n.
+// Visits each number from 0 to n - 1 once. Begins at a random number and adds a random stride
+// modulo n; the stride and n have no common divisor.
 class RandomOrder {
  public:
   explicit RandomOrder(uint32_t n);

@@ -1,5 +1,5 @@
-// The shared memory of the thread block that runs, and its race detector. It works on words of 4
-// bytes. These are violations:
+// The shared memory of the running thread block, and its race detector, which works on words of 4
+// bytes. These accesses are violations:
 //   - Between two barriers, one thread writes a word and another thread reads or writes it, unless
 //     both accesses are atomic.
 //   - A thread reads bytes that no thread of its block has written.
@@ -17,7 +17,7 @@ enum class Access { kRead, kWrite, kAtomic };
 
 // Begins a block: forgets what earlier blocks wrote, and allows accesses to `shared_bytes` bytes.
 void begin_block(size_t shared_bytes);
-// Call it when all threads of the block have passed a barrier.
+// Call this function when all threads of the block have passed a barrier.
 void next_interval();
 
 bool in_shared_memory(const void* p);

@@ -1,6 +1,6 @@
-// Streams whose operations run late. A call only queues an operation. The operation runs when a
-// synchronization needs its result, or earlier if the schedule (schedule.h) decides so. It runs on
-// the host thread that synchronizes or makes the call, while this thread holds the lock.
+// Streams whose operations run late. A call of the runtime only queues an operation. The operation
+// runs when a synchronization needs its result, or earlier if the schedule (schedule.h) decides so.
+// It runs on the host thread that synchronizes or makes the call, while this thread holds the lock.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -19,7 +19,7 @@ struct CUstream_st {
     size_t host_bytes = 0;
   };
   std::deque<Operation> waiting;
-  uint64_t queued = 0;  // number of all operations, finished ones included
+  uint64_t queued = 0;  // number of all operations so far, including finished ones
   bool destroyed = false;
 };
 

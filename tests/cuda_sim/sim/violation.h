@@ -1,5 +1,5 @@
-// Reports a violation of a CUDA rule, even if hardware may tolerate it, and ends the process. The
-// tests of the simulation expect this end.
+// Reports a violation of a CUDA rule and ends the process, even if hardware may tolerate the
+// violation. The tests of the simulation expect that the process ends.
 #pragma once
 
 #include <string>

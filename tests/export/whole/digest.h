@@ -1,7 +1,7 @@
-// A set of cells as a count and two sums of 64-bit hashes of their positions. It does not depend on
-// the order of the cells, so that files of any size are compared one to one without being sorted or
-// held in memory: a missing, duplicate or misplaced cell changes all three, or the sums, except
-// with a probability of 2^-128.
+// A digest of a set of cells: the number of cells, and two sums of 64-bit hashes of their
+// positions. The digest does not depend on the order of the cells, so files of any size can be
+// compared without sorting their cells or holding them in memory. A missing, duplicate or misplaced
+// cell changes the digest, except with a probability of 2^-128.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace voxdag::test {
 
-// A file that does not hold what its format says.
+// Ends the program with an error: the file does not conform to its format.
 [[noreturn]] inline void fail(const std::string& message) {
   std::fprintf(stderr, "%s\n", message.c_str());
   std::exit(1);
@@ -22,7 +22,7 @@ inline void expect(bool right, const char* what) {
 
 class Digest {
  public:
-  // A cell, or one of its six faces, which are 1 to 6.
+  // Adds a cell, or one of the cell's six faces (1 to 6).
   void add(int64_t x, int64_t y, int64_t z, uint64_t face = 0) {
     if ((x | y | z) >> 20 != 0) fail("a cell outside the grid");
     const uint64_t key = face << 60 | static_cast<uint64_t>(x) << 40 |

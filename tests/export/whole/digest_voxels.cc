@@ -1,10 +1,12 @@
-// The digest of all voxels of a file:
+// Prints the digest of all voxels of a file:
 //
 //     digest_voxels vdag|faces FILE.vdag [X0 Y0 Z0 X1 Y1 Z1]    of a region, by the reader header
 //     digest_voxels FORMAT FILE ORIGIN_X ORIGIN_Y ORIGIN_Z VOXEL LEVELS
 //
-// `faces` counts the faces between voxels and empty cells, which form a glb file. Prints the count
-// and the hashes; exit status 1 for a file that breaks its format, 2 for a format without decoder.
+// With a region, vdag and faces use only the voxels in the region. `faces` counts the faces between
+// voxels and empty cells, which are the contents of a glb file. Prints the number of voxels or
+// faces, and the hashes. The exit status is 1 for a file that breaks its format, 2 for a format
+// without a decoder.
 #include <algorithm>
 
 #include "core/format/global/voxdag_reader.h"

@@ -1,5 +1,5 @@
-// Decoders of whole files in the formats of `voxdag export`, written from the formats' descriptions
-// or calling the formats' own libraries. They share nothing with the exporter.
+// Decoders of files in the formats of `voxdag export`. They were written from the descriptions of
+// the formats, or call the formats' own libraries. They share no code with the exports.
 #pragma once
 
 #include <fcntl.h>
@@ -24,8 +24,8 @@ struct Grid {
   int levels;    // the grid has 2^levels voxels per edge
 
   int64_t resolution() const { return int64_t{1} << levels; }
-  // The integer number of voxels between the grid's low corner and a world coordinate, plus
-  // `shift`.
+  // Returns the number of voxels between the grid's low corner and a world coordinate, minus
+  // `shift`. This number must be an integer.
   int64_t cell(int axis, double world, double shift) const {
     const double cell = (world - origin[static_cast<size_t>(axis)]) / voxel - shift;
     const double rounded = std::rint(cell);
@@ -34,7 +34,7 @@ struct Grid {
   }
 };
 
-// The bytes of a file. Numbers are little-endian, and are read anywhere in it.
+// The bytes of a file. Reads little-endian numbers at any offset.
 class MappedFile {
  public:
   explicit MappedFile(const std::string& path) {
@@ -63,7 +63,7 @@ class MappedFile {
     return number;
   }
   std::string text(uint64_t offset, uint64_t bytes) const { return {at(offset, bytes), bytes}; }
-  // The line at `offset`, without its end, which the offset moves past.
+  // Returns the line at `offset` without its end, and moves the offset to the next line.
   std::string line(uint64_t& offset) const {
     const uint64_t begin = offset;
     while (get<char>(offset) != '\n') ++offset;
@@ -84,7 +84,7 @@ void digest_voxel(const std::string& path, const Grid& grid, Digest& digest);
 void digest_vox(const std::string& path, const Grid& grid, Digest& digest);
 void digest_vdb(const std::string& path, const Grid& grid, Digest& digest);
 void digest_nvdb(const std::string& path, const Grid& grid, Digest& digest);
-// The faces between voxels and empty cells.
+// Adds the faces between voxels and empty cells.
 void digest_glb(const std::string& path, const Grid& grid, Digest& digest);
 
 }  // namespace voxdag::test

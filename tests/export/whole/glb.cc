@@ -1,4 +1,4 @@
-// glTF: rectangles of two triangles each, as the unit faces that they cover.
+// Decodes glTF: adds the unit faces that each rectangle, stored as two triangles, covers.
 #include <nlohmann/json.hpp>
 
 #include "tests/export/whole/formats.h"

@@ -1,4 +1,4 @@
-// NanoVDB's own reader.
+// Reads NanoVDB files with NanoVDB's own reader.
 #include <nanovdb/util/IO.h>
 
 #include "tests/export/whole/formats.h"
@@ -15,7 +15,7 @@ void digest_nvdb(const std::string& path, const Grid& grid, Digest& digest) {
       const nanovdb::Vec3d at = voxels->indexToWorld(nanovdb::Vec3d(voxel.getCoord()));
       digest.add(grid.cell(0, at[0], 0.5), grid.cell(1, at[1], 0.5), grid.cell(2, at[2], 0.5));
     }
-  // Tiles would stand for more voxels than the leaves have.
+  // The count differs if the tree has tiles, which stand for more voxels than the leaves have.
   expect(digest.count() == voxels->activeVoxelCount(), "all voxels in leaves");
 }
 

@@ -1,4 +1,4 @@
-// PLY and numpy's .npz: one position after the other.
+// Decodes PLY and .npz files, which store one position after the other.
 #include <map>
 
 #include "tests/export/whole/formats.h"
@@ -6,7 +6,8 @@
 namespace voxdag::test {
 namespace {
 
-// The offset of the data of each array in a ZIP archive that stores them as they are, by name.
+// Returns the offset of each array's data by the array's name, in a ZIP archive without
+// compression.
 std::map<std::string, uint64_t> stored_arrays(const MappedFile& file) {
   std::map<std::string, uint64_t> arrays;
   uint64_t at = 0;
@@ -27,7 +28,7 @@ std::map<std::string, uint64_t> stored_arrays(const MappedFile& file) {
   return arrays;
 }
 
-// Moves past the header of an array, and returns it.
+// Moves `at` past the header of an array, and returns the header.
 std::string npy_description(const MappedFile& file, uint64_t& at) {
   const uint16_t bytes = file.get<uint16_t>(at + 8);
   const std::string header = file.text(at + 10, bytes);

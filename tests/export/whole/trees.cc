@@ -1,4 +1,4 @@
-// Formats that are read from the root down: OctoMap's .bt, and DAGs of 32-bit words.
+// Decodes formats that store a tree from the root down: OctoMap's .bt, and DAGs of 32-bit words.
 #include <bit>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -10,7 +10,8 @@ namespace {
 
 using Corner = std::array<int64_t, 3>;
 
-// A child's corner in units of its edge; `axes` has the bits of x, y and z in `child`.
+// Returns a child's corner in units of the child's edge. `axes` has the bits of x, y and z in
+// `child`.
 Corner child_of(const Corner& corner, uint32_t child, const std::array<uint32_t, 3>& axes) {
   return {2 * corner[0] + (child & axes[0] ? 1 : 0), 2 * corner[1] + (child & axes[1] ? 1 : 0),
           2 * corner[2] + (child & axes[2] ? 1 : 0)};
@@ -21,8 +22,8 @@ uint32_t set_below(uint32_t mask, uint32_t bit) {
   return static_cast<uint32_t>(std::popcount(mask & ((1u << bit) - 1)));
 }
 
-// Depth first, two bytes for each inner node: per child 1 for free, 2 for occupied, 3 for an inner
-// node. All 16 levels of OctoMap's octree.
+// Reads the 16 levels of OctoMap's octree depth first. An inner node has two bytes, two bits per
+// child: 1 is free, 2 is occupied, and 3 is an inner node.
 struct BtReader {
   const MappedFile& file;
   uint64_t at;
@@ -52,7 +53,8 @@ struct BtReader {
   }
 };
 
-// A brick whose mask has the bits 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0.
+// Adds the voxels of a brick in which voxel (x, y, z) has the bit 32x1 + 16y1 + 8z1 + 4x0 + 2y0 +
+// z0.
 void add_brick(uint64_t mask, const Corner& corner, Digest& digest) {
   for (; mask != 0; mask &= mask - 1) {
     const int bit = std::countr_zero(mask);
@@ -63,7 +65,7 @@ void add_brick(uint64_t mask, const Corner& corner, Digest& digest) {
   }
 }
 
-// A file whose words begin at `words`.
+// A file of 32-bit words, which begin at the offset `words`.
 struct WordFile {
   const MappedFile& file;
   uint64_t words, count;

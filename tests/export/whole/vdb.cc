@@ -1,4 +1,4 @@
-// OpenVDB's own library.
+// Reads OpenVDB files with OpenVDB's own library.
 #include <openvdb/openvdb.h>
 
 #include "tests/export/whole/formats.h"

@@ -1,4 +1,4 @@
-// MagicaVoxel's .vox: models of at most 256^3 voxels, and a scene of places that show them.
+// Decodes MagicaVoxel's .vox: models of at most 256^3 voxels, and a scene that places the models.
 #include <map>
 #include <vector>
 
@@ -9,12 +9,12 @@ namespace {
 
 struct VoxModel {
   std::array<int32_t, 3> size;
-  uint64_t voxels = 0;  // offset of the first
+  uint64_t voxels = 0;  // offset of the first voxel
   uint32_t count = 0;
 };
 
-// A node of the scene: a transform has one child and a place, a group has children, a shape a
-// model.
+// A node of the scene. A transform has one child and a place, a group has children, and a shape has
+// a model.
 struct VoxNode {
   std::array<int64_t, 3> place{};
   std::vector<int32_t> children;
@@ -98,9 +98,9 @@ class VoxScene {
     for (const int32_t child : node.children) visit(child, place);
     if (node.model >= 0) show(models_.at(static_cast<size_t>(node.model)), place);
   }
-  // A model's center, rounded down, is at its place. z is up, and the origin in the middle of the
-  // grid's floor; a voxel has the coordinate of its low corner, which for -z is the high corner of
-  // z.
+  // Adds a model's voxels. The model's center, rounded down, is at its place. z is up, and the
+  // origin is the middle of the grid's floor. The file has the coordinates of a voxel's low corner;
+  // for voxdag's -z axis, this is the voxel's high corner along z.
   void show(const VoxModel& model, const std::array<int64_t, 3>& place) const {
     const int64_t middle = resolution_ / 2;
     for (uint64_t i = 0; i < model.count; ++i) {

@@ -1,5 +1,5 @@
-// Small scenes with compressed geometry for the fuzzers' corpus, one for each way of compression
-// that voxdag decodes. Without the libraries there are no such scenes.
+// Small scenes with compressed geometry for the corpus of the fuzzers, one for each compression
+// that voxdag decodes. Scenes whose library is missing are left out.
 #pragma once
 
 #include <map>
@@ -11,7 +11,7 @@
 
 namespace voxdag::test {
 
-// Files by name.
+// Returns the contents of the scenes' files by name.
 inline std::map<std::string, std::string> compressed_scenes() {
   std::map<std::string, std::string> files;
 #ifdef VOXDAG_HAS_DRACO
@@ -26,7 +26,7 @@ inline std::map<std::string, std::string> compressed_scenes() {
         Input{"draco_sequential_quantized", 3, true, draco::MESH_SEQUENTIAL_ENCODING, 8},
         Input{"draco_edgebreaker", 4, false, draco::MESH_EDGEBREAKER_ENCODING, 0},
         Input{"draco_edgebreaker_quantized", 4, true, draco::MESH_EDGEBREAKER_ENCODING, 10},
-        // With over 40 faces for each attribute, the encoder uses the other traversal.
+        // With over 40 faces per attribute, the encoder uses its other traversal.
         Input{"draco_edgebreaker_many", 12, true, draco::MESH_EDGEBREAKER_ENCODING, 6}}) {
     files[std::string(name) + ".glb"] =
         compressed_scene_of(encode_draco(*bumpy_grid(edge, with_normals), method, bits)).glb();

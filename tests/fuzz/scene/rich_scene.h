@@ -1,4 +1,4 @@
-// A small scene for fuzzers to start from. It has every feature of glTF that voxdag reads or skips.
+// A small scene from which fuzzers start. It has every feature of glTF that voxdag reads or skips.
 #pragma once
 
 #include "core/image/png_writer.h"

@@ -1,6 +1,6 @@
-// The common part of the fuzz targets. A target is one function: it passes the bytes to a decoder,
-// and aborts if a property does not hold. Errors that the decoder documents are valid results.
-// Every other exception ends the process, which is a finding.
+// The common part of the fuzz targets. A target is a function that passes the input bytes to a
+// decoder, and aborts if a property does not hold. Errors that the decoder documents are valid
+// results. Every other exception ends the process, which the fuzzer reports as a finding.
 #pragma once
 
 #include <cstddef>

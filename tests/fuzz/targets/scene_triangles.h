@@ -10,12 +10,13 @@
 
 namespace voxdag::fuzz {
 
-// A few bytes can declare any number of instances. Reading all of them would not test more.
+// Some bytes can declare any number of instances. Reading more triangles than this tests nothing
+// more.
 constexpr uint64_t kMaxTriangles = 2000;
 constexpr uint64_t kSceneBudgetBytes = uint64_t{16} << 20;
 
-// Reads all triangles of the file in one batch, and one by one, if it is a scene. `path` is the
-// name of the file. `files` may have other files that it refers to.
+// If the file is a scene, reads all its triangles, in one batch and one by one. `path` is the name
+// of the file. `files` has the other files to which the scene may refer.
 inline void check_scene(std::string file, const std::string& path = "scene",
                         test::MemoryFiles files = {}) {
   files.contents[path] = std::move(file);

@@ -22,7 +22,7 @@ inline Json draco_extension(int view, Json attributes) {
            {{"bufferView", view}, {"attributes", std::move(attributes)}}}};
 }
 
-// A scene with one compressed primitive.
+// Returns a scene with one compressed primitive.
 inline SceneBuilder compressed_scene(const std::vector<char>& data, uint64_t vertices,
                                      uint64_t indices, Json attributes = {{"POSITION", 0}}) {
   SceneBuilder scene;
@@ -42,8 +42,8 @@ inline SceneBuilder compressed_scene(const std::vector<char>& data, uint64_t ver
 
 #ifdef VOXDAG_HAS_DRACO
 
-// Returns a bumpy grid of 2 * n * n triangles. With `with_normals`, its normals differ from face to
-// face.
+// Returns a bumpy grid of 2 * n * n triangles. With `with_normals`, each face has its own
+// normal.
 inline std::unique_ptr<draco::Mesh> bumpy_grid(uint32_t n, bool with_normals) {
   auto mesh = std::make_unique<draco::Mesh>();
   const uint32_t points = with_normals ? 6 * n * n : (n + 1) * (n + 1);
@@ -89,7 +89,7 @@ inline std::unique_ptr<draco::Mesh> bumpy_grid(uint32_t n, bool with_normals) {
   return mesh;
 }
 
-// `speed` is from 0 to 10. Slower encoders use more kinds of prediction.
+// `speed` is from 0 to 10. At low speeds, the encoder uses more kinds of prediction.
 inline std::vector<char> encode_draco(const draco::Mesh& mesh, int method, int quantization_bits,
                                       int speed = 5) {
   draco::ExpertEncoder encoder(mesh);

@@ -13,7 +13,8 @@
 
 namespace voxdag::test {
 
-// A view that `bytes` are compressed to, whose own buffer, the second one, is not there.
+// Adds a view whose data is compressed to `bytes`. The view's own buffer, the second one, does not
+// exist.
 inline int add_compressed(SceneBuilder& scene, const std::vector<unsigned char>& bytes,
                           size_t count, size_t stride, const char* mode,
                           Json more = Json::object()) {

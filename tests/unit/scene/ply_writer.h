@@ -12,7 +12,7 @@ namespace voxdag::test {
 
 enum class PlyFormat { kAscii, kLittle, kBig };
 
-// Writes a file: appends numbers in the types that the header lines name.
+// Builds a file: appends numbers in the types that the header lines name.
 class PlyWriter {
  public:
   explicit PlyWriter(PlyFormat format, std::string line_end = "\n")

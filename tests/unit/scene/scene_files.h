@@ -26,7 +26,7 @@ inline std::string little_endian(uint32_t value) {
   return bytes;
 }
 
-// A GLB of any JSON text and any binary chunk.
+// Returns a GLB file with any JSON text and any binary chunk.
 inline std::string make_glb(std::string json, std::string bin) {
   json.resize((json.size() + 3) / 4 * 4, ' ');
   bin.resize((bin.size() + 3) / 4 * 4, '\0');
@@ -49,15 +49,15 @@ inline std::string base64(const std::string& bytes) {
   return text;
 }
 
-// Component types, as accessors name them.
+// Component types of accessors.
 enum : int { kI8 = 5120, kU8 = 5121, kI16 = 5122, kU16 = 5123, kU32 = 5125, kF32 = 5126 };
 
-// A glTF scene in the making: `root` is its JSON, `bin` its only buffer.
+// A glTF scene that a test builds: `root` is its JSON, and `bin` is its only buffer.
 struct SceneBuilder {
   Json root = {{"asset", {{"version", "2.0"}}}};
   std::string bin;
 
-  // Appends to an array of the root and returns the index there.
+  // Appends a value to an array of the root, and returns its index.
   int add(const char* section, Json value) {
     root[section].push_back(std::move(value));
     return static_cast<int>(root[section].size()) - 1;
@@ -88,7 +88,7 @@ struct SceneBuilder {
   int add_mesh(Json primitive) {
     return add("meshes", {{"primitives", Json::array({std::move(primitive)})}});
   }
-  // A root node of the only scene.
+  // Adds a root node to the only scene, and returns its index.
   int add_root(Json node) {
     const int index = add("nodes", std::move(node));
     root["scene"] = 0;
@@ -108,7 +108,7 @@ struct SceneBuilder {
   }
 };
 
-// The triangle (0 0 0) (1 0 0) (0 1 0), drawn by one node.
+// Returns a scene with the triangle (0 0 0) (1 0 0) (0 1 0), drawn by one node.
 inline SceneBuilder one_triangle() {
   SceneBuilder scene;
   const int positions = scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
@@ -119,7 +119,7 @@ inline SceneBuilder one_triangle() {
   return scene;
 }
 
-// The x, y, z of three corners.
+// The coordinates x, y, z of the three corners of a triangle.
 using Corners = std::array<std::array<double, 3>, 3>;
 
 inline std::vector<Corners> triangles_of(TriangleSource& source) {
@@ -149,7 +149,7 @@ inline SceneBuilder textured(const std::string& image) {
   return scene;
 }
 
-// The surfaces of all triangles.
+// Returns the surfaces of all triangles.
 inline std::vector<SurfaceTriangle> surfaces_of(TriangleSource& source) {
   std::vector<SurfaceTriangle> all;
   source.open(1)->read_surfaces(0, source.declared_triangles(), [&](auto batch) {
@@ -164,7 +164,7 @@ inline std::vector<std::string> texts_of(const std::vector<Warning>& warnings) {
   return texts;
 }
 
-// A scene file in memory, opened.
+// Opens a scene file in memory.
 struct OpenScene {
   explicit OpenScene(std::string file, SceneOptions options = {},
                      uint64_t budget_bytes = uint64_t{64} << 20)
@@ -185,7 +185,8 @@ inline std::vector<Corners> triangles_of_file(std::string file) {
   return OpenScene(std::move(file)).triangles();
 }
 
-// Returns the error of opening and streaming the file. If there is no error, its message is empty.
+// Opens a file and reads all its triangles. Returns the error; its message is empty if there is
+// none.
 inline Error error_of_file(std::string file) {
   try {
     OpenScene(std::move(file)).triangles();

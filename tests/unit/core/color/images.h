@@ -1,4 +1,4 @@
-// Images for tests: pyramids in memory that show noise and stripes from a seed.
+// Images for tests: pyramids in memory that show noise and stripes, made from a seed.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,10 @@ struct TestLevel {
   const std::array<uint16_t, 4>& at(uint32_t x, uint32_t y) const { return texels[y * width + x]; }
 };
 
-// As the rule wants its textures.
+// The images in the form that the color rule needs.
 class TestImages {
  public:
-  // Smooth waves and some noise; alpha is 0 in stripes.
+  // Adds an image of smooth waves with some noise. Alpha is 0 in stripes.
   void add(uint32_t width, uint32_t height, uint64_t seed) {
     oracle::Random random(seed);
     TestLevel image{width, height, {}};
@@ -29,8 +29,8 @@ class TestImages {
       for (uint32_t x = 0; x < width; ++x) {
         std::array<uint16_t, 4> texel;
         for (int c = 0; c < 3; ++c) {
-          // Uses triangle waves instead of sines, because the mathematical library differs between
-          // machines and the digest must not.
+          // Triangle waves instead of sines: sines differ between the mathematical libraries of
+          // machines, and the digest must not.
           const double phase = wave * (c + 1) * x / width + (wave - c) * y / height;
           const double up = phase - std::floor(phase);
           texel[static_cast<size_t>(c)] =

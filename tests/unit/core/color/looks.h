@@ -1,5 +1,5 @@
-// Surfaces for tests: triangles of the oracle's scenes, with materials and texture coordinates from
-// a seed.
+// Surfaces for tests: triangles of the oracle's scenes, with materials and texture coordinates made
+// from a seed.
 #pragma once
 
 #include <cstdint>
@@ -43,7 +43,7 @@ struct TestLooks {
     }
   }
 
-  // `widest`: of texture coordinates, in 2^-24 images.
+  // `widest`: largest texture coordinate, in units of 2^-24 of the image's width.
   std::vector<FixedSurface> surfaces(const oracle::Triangles& triangles, uint64_t seed,
                                      int64_t widest = int64_t{3} << kTextureBits) const {
     oracle::Random random(seed);

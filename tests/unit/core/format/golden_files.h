@@ -1,4 +1,4 @@
-// What the files in tests/golden were made from.
+// The contents of the files in tests/golden.
 #pragma once
 
 #include "tests/unit/core/format/test_artifacts.h"
@@ -6,8 +6,8 @@
 
 namespace voxdag {
 
-// The worked example of docs/format.md: in a grid of 8^3 voxels, the floor y = 0 and a pillar of 8
-// voxels at its corner.
+// Returns the example of docs/format.md: in a grid of 8^3 voxels, the floor y = 0 and a pillar of 8
+// voxels at a corner.
 inline oracle::Dag floor_and_pillar() {
   oracle::Voxels voxels(8);
   for (int x = 0; x < 8; ++x)

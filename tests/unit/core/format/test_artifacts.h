@@ -14,8 +14,8 @@
 namespace voxdag {
 
 // Returns random rows that obey the rules of an artifact: `count` bricks, and `count` nodes on each
-// of `node_levels` levels. Some rows have no parents, as in artifacts of a merge pass, which have
-// many roots.
+// of `node_levels` levels. Some rows have no parent, as in the artifacts of a merge pass, which
+// have many roots.
 inline SubDag random_rows(uint64_t seed, size_t count, uint32_t grid_levels, uint32_t node_levels,
                           uint32_t hash_bits) {
   oracle::Random random(seed);

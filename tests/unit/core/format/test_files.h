@@ -33,7 +33,7 @@ inline void write_bytes(const std::string& path, const ByteString& bytes) {
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
-// Returns voxels of blobs, walls and scattered points. Their DAGs have shared nodes on every level.
+// Returns blobs, walls and scattered voxels. Their DAGs have shared nodes on every level.
 inline oracle::Voxels random_voxels(uint64_t seed, int edge) {
   oracle::Random random(seed);
   oracle::Voxels voxels(edge);
@@ -53,8 +53,8 @@ inline oracle::Voxels random_voxels(uint64_t seed, int edge) {
   return voxels;
 }
 
-// Returns the words of the oracle's levels in the layout of the global file, bricks first. Levels
-// of over `narrow_words` words are wide.
+// Returns the words of the oracle's levels in the layout of the global file, beginning with the
+// bricks. Levels with more than `narrow_words` words are wide.
 inline std::vector<std::vector<uint32_t>> level_words(
     const oracle::Dag& dag, uint64_t narrow_words = global_layout::kNarrowLevelWords) {
   std::vector<std::vector<uint32_t>> levels;

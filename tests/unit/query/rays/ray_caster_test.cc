@@ -120,7 +120,7 @@ TEST(RayCaster, SeesNoCracksAtHighResolution) {
     const bool from_below = i & 1;
     const Vec origin{{from_below ? -anywhere(random) * edge : (1 + anywhere(random)) * edge,
                       anywhere(random) * edge, anywhere(random) * edge}};
-    // Every other ray is aimed at a corner of the lattice.
+    // Half of the rays are aimed at a corner of a cell.
     Vec target{{static_cast<double>(kPlane) + (from_below ? 0 : 1), anywhere(random) * edge,
                 anywhere(random) * edge}};
     if (i & 2) {

@@ -1,5 +1,5 @@
 // A small, strict reader of the .glb files that voxdag generates. It shares no code with voxdag's
-// reader, and checks the rules of glTF while it reads.
+// reader, and checks the rules of glTF.
 #pragma once
 
 #include <gtest/gtest.h>

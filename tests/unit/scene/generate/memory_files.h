@@ -1,5 +1,5 @@
-// Files in memory. Implements the part of FileSystem that is needed to write a scene. The simulated
-// disk can be full.
+// Files in memory. Implements the part of FileSystem that writing a scene needs. The simulated disk
+// can be full.
 #pragma once
 
 #include <map>

@@ -1,5 +1,5 @@
-// Helpers for the tests of drawing: tiles at any position of the largest grid, and the voxels in
-// them.
+// Helpers for the tests that draw triangles: tiles at any position of the largest grid, and their
+// voxels.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@
 
 namespace voxdag::cpu {
 
-// A triangle of the oracle in the form of this backend: coordinates by axis, followed by a spare
-// element, because kernels load four coordinates instead of three.
+// A triangle of the oracle in the form that this backend uses: coordinates by axis. A spare element
+// follows, because kernels load four coordinates instead of three.
 template <class Coordinate>
 struct Padded {
   explicit Padded(const oracle::Triangle& t) {
@@ -27,7 +27,7 @@ struct Padded {
   Triangle<Coordinate> spare{};
 };
 
-// All kernels that this machine can run.
+// Returns all kernels that this machine can run.
 inline std::vector<const Kernels*> all_kernels() {
   std::vector<const Kernels*> all = {&portable_kernels()};
   for (const Kernels* kernels : {avx2_kernels(), avx512_kernels()})
@@ -44,7 +44,7 @@ inline LatticeCube box_of(const oracle::Region& region) {
   return box;
 }
 
-// A cube of 2^size_log2 voxels, aligned, in a grid of 2^20.
+// Returns an aligned cube of 2^size_log2 voxels per edge in a grid of 2^20.
 inline oracle::Region random_region(oracle::Random& random, int size_log2) {
   oracle::Region region;
   region.edge = 1 << size_log2;
@@ -64,7 +64,7 @@ inline oracle::Voxels voxels_of(TileBricks& tile, int edge) {
   return voxels;
 }
 
-// A triangle drawn into an empty tile.
+// Draws a triangle into an empty tile, and returns the tile's voxels.
 template <class Coordinate, class Draw>
 oracle::Voxels drawn(const Triangle<Coordinate>& triangle, bool inside,
                      const oracle::Region& region, Draw draw) {

@@ -24,7 +24,8 @@ namespace voxdag {
 
 using Codes = std::vector<uint64_t>;
 
-// Returns the sums of the surfaces in a cell of the color grid, which is given by its Morton code.
+// Returns the color sum of the surfaces in a cell of the color grid. `code` is the cell's Morton
+// code.
 using SumOf = std::function<ColorSum(uint64_t code)>;
 
 struct ColoredScene {
@@ -32,7 +33,7 @@ struct ColoredScene {
   Codes voxels;  // Morton codes, increasing
   SumOf sum_of;
 
-  // The set cells of a level, in Morton order.
+  // Returns the set cells of a level, in Morton order.
   Codes cells(uint32_t level) const {
     Codes codes;
     for (const uint64_t voxel : voxels)
@@ -55,7 +56,7 @@ inline ColorSum sum_of_color(int r, int g, int b, uint64_t weight) {
   return sum;
 }
 
-// Smooth over the grid, with some noise.
+// Returns colors that change smoothly over the grid, with some noise.
 inline SumOf smooth_colors(uint32_t color_levels, int noise) {
   return [=](uint64_t code) {
     uint32_t x, y, z;
@@ -65,13 +66,13 @@ inline SumOf smooth_colors(uint32_t color_levels, int noise) {
       const auto value = static_cast<int64_t>(uint64_t{v} * 255 >> color_levels);
       return static_cast<int>(std::clamp<int64_t>(value + random.between(-noise, noise), 0, 255));
     };
-    // In this order with every compiler.
+    // Named variables fix the order of these calls for every compiler.
     const int r = channel(x), g = channel(y), b = channel(z);
     return sum_of_color(r, g, b, 1 + code % 7);
   };
 }
 
-// Spheres, lines and dust in a grid of any size.
+// Returns spheres, lines and scattered voxels in a grid of any size.
 inline Codes random_codes(uint64_t seed, uint32_t levels, int count) {
   oracle::Random random(seed);
   std::set<uint64_t> codes;
@@ -90,12 +91,12 @@ inline Codes random_codes(uint64_t seed, uint32_t levels, int count) {
   return {codes.begin(), codes.end()};
 }
 
-// The DAG of voxels in a grid that may be large.
+// Returns the DAG of voxels in a grid that may be large.
 inline oracle::Dag sparse_dag(const Codes& voxels, uint32_t levels) {
   oracle::Dag dag;
   if (voxels.empty()) return dag;
   dag.voxels = voxels.size();
-  std::map<uint64_t, uint64_t> masks;  // of the bricks
+  std::map<uint64_t, uint64_t> masks;  // masks of the bricks
   for (const uint64_t voxel : voxels) masks[voxel >> 6] |= uint64_t{1} << (voxel & 63);
   std::set<std::pair<uint64_t, uint64_t>> bricks;
   for (const auto& [code, mask] : masks) bricks.emplace(oracle::brick_hash(mask), mask);
@@ -136,7 +137,7 @@ inline oracle::Dag sparse_dag(const Codes& voxels, uint32_t levels) {
   return dag;
 }
 
-// The regions of tier 0, encoded, in Morton order.
+// Returns the encoded regions of tier 0, in Morton order.
 inline std::vector<EncodedRegion> encode_regions(const ColoredScene& scene) {
   const uint32_t levels = std::min(scene.color_levels, kRegionLevels);
   std::map<uint64_t, std::vector<ColoredCell>> cells;
@@ -178,14 +179,14 @@ inline GlobalFileSummary write_colored(const std::string& path, const ColoredSce
   return writer.finish({dag.voxels, dag.svo_nodes});
 }
 
-// The number of `size` bytes at an offset.
+// Reads a little-endian number of `size` bytes at an offset.
 inline uint64_t number_at(const ByteString& bytes, uint64_t at, size_t size) {
   uint64_t value = 0;
   for (size_t i = size; i-- > 0;) value = value << 8 | static_cast<unsigned char>(bytes.at(at + i));
   return value;
 }
 
-// Corrects the checksums of a damaged file that has a single checksum block.
+// Updates the checksums of a damaged file that has only one checksum block.
 inline void put_checksums_right(ByteString& file) {
   const uint64_t table = number_at(file, 96, 8);
   const auto data = std::as_bytes(std::span(file));
@@ -197,7 +198,7 @@ inline void put_checksums_right(ByteString& file) {
   std::memcpy(file.data() + 4088, &header, 8);
 }
 
-// Decodes the color section of a file's bytes as docs/format.md describes it.
+// Decodes the color section in the bytes of a file, as docs/format.md describes it.
 class SectionDecoder {
  public:
   using Color3 = std::array<int, 3>;
@@ -230,12 +231,12 @@ class SectionDecoder {
     EXPECT_EQ(u(entry + 24, 8), all_cells);
   }
 
-  // By level and Morton code.
+  // Returns the colors by level and Morton code.
   const std::map<std::pair<uint32_t, uint64_t>, Color3>& colors() const { return colors_; }
 
  private:
   uint64_t u(uint64_t at, size_t size) const { return number_at(bytes_, at, size); }
-  // `count` bits from bit `bit` of the block.
+  // Reads `count` bits of the block, from bit `bit` on.
   unsigned bits(uint64_t block, unsigned bit, unsigned count) const {
     unsigned value = 0;
     for (unsigned i = count; i-- > 0;)

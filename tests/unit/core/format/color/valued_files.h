@@ -9,7 +9,7 @@
 
 namespace voxdag {
 
-// Returns the attribute's value in a finest cell, which is given by its Morton code.
+// Returns the attribute's value of a finest cell. `code` is the cell's Morton code.
 inline uint32_t value_of_code(Attribute attribute, uint64_t code, uint64_t materials) {
   oracle::Random random(code * 8 + static_cast<uint64_t>(attribute));
   if (attribute == Attribute::kAlpha) return static_cast<uint32_t>(random.between(0, 255));
@@ -18,7 +18,7 @@ inline uint32_t value_of_code(Attribute attribute, uint64_t code, uint64_t mater
   return static_cast<uint32_t>(random.between(0, 254) | random.between(0, 254) << 8);
 }
 
-// Returns the names "", "m1", "m2m2", and so on. The last name is empty and stands for cells
+// Returns the names "", "m1", "m2m2", and so on. The last name is empty: it stands for cells
 // without a material.
 inline std::vector<std::string> names_of_materials(size_t count) {
   std::vector<std::string> names(count);
@@ -68,7 +68,7 @@ inline GlobalFileSummary write_valued(const std::string& path, const ColoredScen
 // in Morton order, with `bytes` bytes per cell, in blocks of 32 cells.
 class ValueDecoder {
  public:
-  // `index`: of the section in the table.
+  // `index`: index of the section in the section table.
   ValueDecoder(const ByteString& file, const ColoredScene& scene, size_t index, uint32_t kind,
                uint64_t bytes)
       : file_(file) {
@@ -118,7 +118,7 @@ class ValueDecoder {
     EXPECT_EQ(begin + (end - begin + 15) / 16 * 16, table);
   }
 
-  // By level and Morton code.
+  // Returns the values by level and Morton code.
   const std::map<std::pair<uint32_t, uint64_t>, uint64_t>& values() const { return values_; }
   const std::vector<std::string>& names() const { return names_; }
 

@@ -147,7 +147,7 @@ TEST(ConcurrencyLimits, EachClientHasALimitOfItsOwn) {
   EXPECT_TRUE(limiter.acquire("a"));
 }
 
-// A client is a token or an address, and all addresses of a /64 are one.
+// A client is a token or an address. All addresses of a /64 network are one client.
 TEST_F(AccessControlTest, ClientsAreTokensOrNetworks) {
   const NewToken reader = make_token("read", "r");
   write_file_atomically(system_files(), folder_.file("t"), reader.line);
