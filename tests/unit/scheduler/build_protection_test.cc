@@ -124,8 +124,8 @@ TEST_F(BuildProtection, DisksAreToldApartByTheirDevice) {
   EXPECT_NE(refusal().find("the build's work folder is"), std::string::npos) << refusal();
 }
 
-// The second build waits for the lock of its output. Meanwhile the first build publishes its file.
-// The lock's file must still have its name, so that a third build also waits.
+// The second build waits for the lock of its output while the first build publishes its file. The
+// lock's file must still have its name, so that a third build also waits.
 TEST_F(BuildProtection, ALockOfTheOutputHasAName) {
   auto first = std::make_unique<OutputLock>(files_, output());
   std::unique_ptr<OutputLock> second;
