@@ -53,8 +53,8 @@ struct BtReader {
   }
 };
 
-// Adds the voxels of a brick in which voxel (x, y, z) has the bit 32x1 + 16y1 + 8z1 + 4x0 + 2y0 +
-// z0.
+// Adds the voxels of a brick. Voxel (x, y, z) has the bit 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0, where
+// x1 is the high bit of x and x0 its low bit; likewise for y and z.
 void add_brick(uint64_t mask, const Corner& corner, Digest& digest) {
   for (; mask != 0; mask &= mask - 1) {
     const int bit = std::countr_zero(mask);

@@ -18,8 +18,8 @@ inline uint32_t value_of_code(Attribute attribute, uint64_t code, uint64_t mater
   return static_cast<uint32_t>(random.between(0, 254) | random.between(0, 254) << 8);
 }
 
-// Returns the names "", "m1", "m2m2", and so on. The last name is empty: it stands for cells
-// without a material.
+// Returns `count` names. Name i is "m" and the number i, repeated i mod 5 times. The last name is
+// empty: it stands for cells without a material.
 inline std::vector<std::string> names_of_materials(size_t count) {
   std::vector<std::string> names(count);
   for (size_t i = 0; i + 1 < count; ++i)
