@@ -45,6 +45,7 @@ Option Option::required() { return Option(option_->required()); }
 Option Option::group(const char* heading) { return Option(option_->group(heading)); }
 Option Option::environment(const char* variable) { return Option(option_->envname(variable)); }
 Option Option::show_default() { return Option(option_->capture_default_str()); }
+Option Option::one_value_each() { return Option(option_->allow_extra_args(false)); }
 Option Option::positive() {
   const auto problem = [](const std::string& text) {
     const bool positive = text.find_first_of("123456789") != std::string::npos;

@@ -44,6 +44,8 @@ class Option {
   // option.
   Option environment(const char* variable);
   Option show_default();
+  // Takes one value of a list for each occurrence of the option, not all following arguments.
+  Option one_value_each();
   Option positive();
   Option range(int low, int high);
   Option range(double low, double high);

@@ -37,7 +37,8 @@ class OptionDeclarer {
     if constexpr (std::is_same_v<T, bool>) {
       return command_.flag(names.c_str(), value, field.help);
     } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
-      return command_.option(names.c_str(), value, field.help);
+      const Option option = command_.option(names.c_str(), value, field.help);
+      return field.is_positional ? option : Option(option).one_value_each();
     } else {
       const auto set = [field, &value](const std::string& text) {
         if (!parse_text(field, text, value))

@@ -120,6 +120,10 @@ void declare(Command& command, VerifyCommand& state) {
                  "half edge of the cube that replaces each point, as in the build");
   command.option("--columns", state.scene_options.columns,
                  "columns of text files with points, as in the build");
+  command
+      .option("--ignore-extension", state.scene_options.ignored_extensions,
+              "required extension of a glTF file to ignore, as in the build; repeatable")
+      .one_value_each();
   command.threads_option(state.threads);
   command.json_flag(state.json);
 }

@@ -22,6 +22,7 @@ BuildSpec spec_of(const BuildOptions& options) {
   geometry.skip_invalid = options.skip_invalid;
   geometry.point_radius = options.point_radius;
   geometry.columns = options.columns;
+  geometry.ignore_extension = options.ignore_extension;
   geometry.hash_bits = options.hash_bits;
   geometry.attributes[Attribute::kColor] = options.color;
   geometry.attributes[Attribute::kAlpha] = options.alpha;

@@ -122,6 +122,8 @@ struct SceneOptions {
   // Names of the columns of text files with points, such as "x,y,z,_,r,g,b"; "": the first row
   // decides. scene/points/columns.h defines the names.
   std::string columns = {};
+  // Names of required glTF extensions to ignore, although voxdag does not read them.
+  std::vector<std::string> ignored_extensions = {};
 };
 
 }  // namespace voxdag

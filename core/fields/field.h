@@ -271,7 +271,8 @@ bool fits(const Field& field, const T& value) {
   } else if constexpr (std::is_same_v<T, std::string>) {
     return !field.is_line || is_valid_line(field, value);
   } else if constexpr (IsVector<T>::value) {
-    return !field.max_items || (!value.empty() && value.size() <= field.max_items);
+    return (!field.max_items || (!value.empty() && value.size() <= field.max_items)) &&
+           std::ranges::all_of(value, [&](const auto& item) { return fits(field, item); });
   } else {
     return true;
   }

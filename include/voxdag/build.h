@@ -54,6 +54,9 @@ struct BuildOptions {
   // Names of the columns of text files with points, such as "x,y,z,_,r,g,b" (docs/scenes.md). If
   // `columns` is empty, the header line or the first row of a file determines its columns.
   std::string columns;
+  // Names of extensions that a glTF file requires and voxdag does not read. The files are read
+  // without them, with a warning.
+  std::vector<std::string> ignore_extension;
   bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
   uint32_t hash_bits = 64;    // bits of the node hash, 4 to 64
   // The attributes to store for each cell of the color grid. `color_resolution` is the number of

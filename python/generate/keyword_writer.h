@@ -23,6 +23,9 @@ std::string python_type(const Field& field) {
     return "Literal[\"" + joined(choices_of<T>(), "\", \"") + "\"]";
   } else if constexpr (NameSet<T>) {
     return "Sequence[Literal[\"" + joined(NameSetTraits<T>::all(), "\", \"") + "\"]]";
+  } else if constexpr (IsVector<T>::value) {
+    const std::string item = python_type<typename T::value_type>(field);
+    return "Union[" + item + ", Sequence[" + item + "]]";
   } else {
     return field.is_path ? "Path" : "str";
   }

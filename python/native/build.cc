@@ -91,6 +91,9 @@ class KeywordReader {
              std::ranges::all_of(names, [&](const std::string& name) {
                return NameSetTraits<T>::add(value, name);
              });
+    } else if constexpr (IsVector<T>::value) {
+      const bool is_item = nb::isinstance<nb::str>(object);
+      return is_item ? read(field, object, value.emplace_back()) : nb::try_cast<T>(object, value);
     } else {
       return nb::try_cast<T>(object, value);
     }

@@ -59,6 +59,10 @@ void fields(Visitor& visit, GeometryOptions& g) {
             .unset_means("the file's header line, or x,y,z and colors")
             .or_unset(),
         g.columns);
+  visit(option("ignore_extension", "required extension of a glTF file to ignore; repeatable")
+            .line(128)
+            .items(64),
+        g.ignore_extension);
   visit(option("bounds", "the grid's cube, by its low corner and edge")
             .with(&Field::parts, "X,Y,Z,EDGE")
             .above_zero(),

@@ -37,8 +37,9 @@ struct GeometryOptions {
   std::optional<std::array<double, 4>> bounds;  // X, Y, Z of the low corner, EDGE
   std::optional<double> voxel_size;
   bool skip_invalid = false;
-  std::optional<double> point_radius;  // half edge of the cube that replaces each point
-  std::string columns;                 // names of the columns of text files with points
+  std::optional<double> point_radius;         // half edge of the cube that replaces each point
+  std::string columns;                        // names of the columns of text files with points
+  std::vector<std::string> ignore_extension;  // required extensions of glTF files
   uint32_t hash_bits = 64;
   AttributeSet attributes;  // attributes of the color grid's cells
   // Cells per edge of the color grid, a power of two from 4 to the resolution; 0: the build chooses

@@ -35,7 +35,8 @@ SceneOptions BuildScene::scene_options() const {
   return {.skip_invalid = options_.skip_invalid,
           .scratch_path = scratch_path_,
           .point_radius = options_.point_radius.value_or(0),
-          .columns = options_.columns};
+          .columns = options_.columns,
+          .ignored_extensions = options_.ignore_extension};
 }
 
 }  // namespace voxdag

@@ -37,6 +37,7 @@ class Fields {
       voxel_size: this.number({step: "any", min: "0"}),
       point_radius: this.number({step: "any", min: "0", placeholder: "one voxel"}),
       columns: h("input", {placeholder: "x,y,z,r,g,b", autocomplete: "off", on}),
+      ignore_extension: h("input", {placeholder: "ACME_bent, …", autocomplete: "off", on}),
       color_resolution: this.choice([kAutomatic, ...gridChoices(kMinLevel, kMaxLevel)]),
       hash_bits: this.number({min: "4", max: "64", step: "1", placeholder: "64"}),
       memory: h("input", {placeholder: "2GiB", autocomplete: "off", on}),
@@ -93,6 +94,9 @@ export class JobOptions {
         field(
             "Point radius", options.point_radius, "Draws each point as a cube of this half edge."),
         field("Columns", options.columns, "Names of the columns of text files with points."),
+        field(
+            "Ignored extensions", options.ignore_extension,
+            "Required extensions of glTF files to read without."),
         checkRow(flags.skip_invalid, "Skip invalid triangles"),
         checkRow(flags.color, "Colors of the scene"),
         attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,
@@ -180,6 +184,7 @@ function checkRow(input, label) {
 // Returns the value of an option, in the form that a request needs.
 function valueOf(name, input) {
   if (["memory", "backend", "method", "columns"].includes(name)) return input.value.trim();
+  if (name === "ignore_extension") return input.value.split(",").map((text) => text.trim());
   return numberOf(input, `The ${name.replace("_", " ")}`);
 }
 

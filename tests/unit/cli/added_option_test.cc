@@ -68,6 +68,10 @@ TEST(AddedOption, IsOnTheCommandLine) {
   };
   EXPECT_EQ(run_command(build), 3);
   EXPECT_EQ(run_command(with("7")), 7);
+  EXPECT_EQ(run_command({"voxdag", "build", "-r", "64", "-o", "a.vdag", "--ignore-extension", "A",
+                         "--ignore-extension", "B", "a.glb"}),
+            3)
+      << "an option for a list takes one value";
   try {
     run_command(with("10"));
     ADD_FAILURE() << "was accepted";
@@ -98,6 +102,8 @@ TEST(AddedOption, IsAPythonKeyword) {
   EXPECT_THAT(writer.documents, HasSubstr("rounds of smoothing: a whole number from 0 to 9"));
   EXPECT_THAT(writer.members, HasSubstr("    memory: Optional[Union[int, str]]\n"));
   EXPECT_THAT(writer.members, HasSubstr("    color: Optional[bool]\n"));
+  EXPECT_THAT(writer.members,
+              HasSubstr("    ignore_extension: Optional[Union[str, Sequence[str]]]\n"));
   EXPECT_THAT(writer.members, HasSubstr("    backend: Optional[Literal[\"auto\", \"cpu\""));
 }
 

@@ -27,6 +27,7 @@ TEST(JobRequestBody, HasTheOptionsOfTheCommandLine) {
   const JobRequest request = parse_job_request(R"({
       "scene": ["a.glb", "/srv/b.gltf"], "resolution": 4096, "name": "n", "priority": -3,
       "options": {"bounds": [0, -1.5, 2, 8], "skip_invalid": true, "hash_bits": 16,
+                  "ignore_extension": ["ACME_bent", "ACME_twisted"],
                   "attributes": ["normal", "material"], "color_resolution": 64,
                   "memory": "2GiB", "threads": 2, "subvolume": 512, "backend": "cpu",
                   "method": "consing"}})");
@@ -38,6 +39,7 @@ TEST(JobRequestBody, HasTheOptionsOfTheCommandLine) {
   EXPECT_EQ(g.bounds, (std::array<double, 4>{0, -1.5, 2, 8}));
   EXPECT_TRUE(g.skip_invalid);
   EXPECT_EQ(g.hash_bits, 16u);
+  EXPECT_EQ(g.ignore_extension, (std::vector<std::string>{"ACME_bent", "ACME_twisted"}));
   EXPECT_EQ(g.attributes, (AttributeSet{Attribute::kNormal, Attribute::kMaterial}));
   EXPECT_EQ(g.color_resolution, 64u);
   EXPECT_EQ(request.spec.run.memory_bytes, uint64_t{2} << 30);
