@@ -98,6 +98,8 @@ LAYERS = {
         "scene/gltf/compressed",
         "scene/gltf/document",
         "scene/gltf/json",
+        "scene/gltf/uri",
+        "scene/gltf/extensions",
         "scene/ply",
         "scene/ply/rows",
         "scene/points",

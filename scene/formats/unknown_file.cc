@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "scene/formats/formats.h"
+#include "scene/lfs_pointer.h"
 #include "scene/messages.h"
 
 namespace voxdag {
@@ -34,8 +35,7 @@ struct KnownFormat {
 
 // The first matching row is used, so longer patterns come before their prefixes.
 constexpr KnownFormat kKnown[] = {
-    {0, "version https://git-lfs.github.com/spec/", "a Git LFS pointer, not the file itself",
-     "run git lfs pull"},
+    {0, kLfsPointerBegin, "a Git LFS pointer, not the file itself", "run git lfs pull"},
     {0, "\x1f\x8b", "compressed by gzip", kUnpack},
     {0, "\x28\xb5\x2f\xfd", "compressed by Zstandard", kUnpack},
     {0, {"\xfd\x37zXZ\0", 6}, "compressed by xz", kUnpack},

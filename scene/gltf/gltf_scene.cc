@@ -18,8 +18,9 @@
 namespace voxdag::gltf {
 namespace {
 
-Document read_checked(ReadableFile& file, MemoryBudget& budget, const CancelToken& cancel) {
-  Document document = read_document(file, budget, cancel);
+Document read_checked(ReadableFile& file, const SceneOptions& options, MemoryBudget& budget,
+                      const CancelToken& cancel) {
+  Document document = read_document(file, options.ignored_extensions, budget, cancel);
   check_document(document);
   resolve_materials(document);
   return document;
@@ -75,7 +76,7 @@ class GltfScene : public TriangleSource {
         budget_(budget),
         cancel_(cancel),
         file_(std::move(file)),
-        document_(read_checked(*file_, budget, cancel)),
+        document_(read_checked(*file_, options, budget, cancel)),
         external_files_(file_->path(), budget),
         decoded_(files, options.scratch_path, document_, budget) {
     BufferReader reader = buffers(1);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "core/base/text.h"
 #include "scene/base64.h"
 
 namespace voxdag {
@@ -59,8 +60,9 @@ size_t ImageBytes::read_plain(std::span<std::byte> out) {
   return size;
 }
 
-// Reads the next character of the base64 text. Returns false at the end of the range. Decodes the
-// JSON escapes \/ and \u00xx; any other \u escape becomes "!", which is not base64.
+// Reads the next character of the text. Returns false at the end of the range. Decodes JSON's
+// escapes: white space becomes a blank, and a \u escape over \u007f becomes "!", which is not
+// base64.
 bool ImageBytes::next_character(char& c) {
   const auto raw = [&](char& out) {
     if (window_at_ == window_.size()) {
@@ -75,6 +77,7 @@ bool ImageBytes::next_character(char& c) {
   if (!raw(c)) return false;
   if (c != '\\') return true;
   if (!raw(c)) return false;
+  if (c == 'n' || c == 'r' || c == 't' || c == 'f') c = ' ';
   if (c != 'u') return true;
   int code = 0;
   for (int i = 0; i < 4; ++i) {
@@ -87,12 +90,28 @@ bool ImageBytes::next_character(char& c) {
   return true;
 }
 
+// Reads the next character of the base64 text. Skips white space, decodes percent escapes, and
+// translates the URL-safe alphabet.
+bool ImageBytes::next_base64_character(char& c) {
+  do {
+    if (!next_character(c)) return false;
+  } while (c == ' ' || (c >= '\t' && c <= '\r'));
+  if (c == '%') {
+    std::string escape = "%00";
+    if (!next_character(escape[1]) || !next_character(escape[2])) return false;
+    c = percent_decoded(escape).value_or("!").front();
+  }
+  if (c == '-') c = '+';
+  if (c == '_') c = '/';
+  return true;
+}
+
 bool ImageBytes::next_group() {
   group_at_ = group_size_ = 0;
   std::array<std::byte, 4> characters;
   size_t count = 0;
   char c = 0;
-  while (!has_ended_ && count < characters.size() && next_character(c)) {
+  while (!has_ended_ && count < characters.size() && next_base64_character(c)) {
     has_ended_ = c == '=' || c == '"';
     if (!has_ended_) characters[count++] = static_cast<std::byte>(c);
   }

@@ -22,6 +22,7 @@ class ImageBytes : public EncodedBytes {
  private:
   size_t read_plain(std::span<std::byte> out);
   bool next_character(char& c);
+  bool next_base64_character(char& c);
   bool next_group();
 
   const std::unique_ptr<ReadableFile> file_;

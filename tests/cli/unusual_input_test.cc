@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 #include "tests/cli/command_line.h"
 #include "tests/cli/serve_process.h"
@@ -218,6 +219,30 @@ TEST_F(UnusualInput, OutputThatCannotBeWrittenIsAnError) {
     EXPECT_NE(status, 0);
     EXPECT_NE(contents("errors").find("standard output"), std::string::npos);
   }
+}
+
+// An extension that a scene requires can be ignored, by each command that reads scenes.
+TEST_F(UnusualInput, RequiredExtensionsAreIgnoredOnRequest) {
+  std::ofstream(folder_.file("t.gltf"))
+      << R"({"asset":{"version":"2.0"},"extensionsRequired":["ACME_bent","ACME_twisted"],)"
+         R"("buffers":[{"byteLength":36,"uri":"data:;base64,)"
+         R"(AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],)"
+         R"("bufferViews":[{"buffer":0,"byteLength":36}],)"
+         R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],)"
+         R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}]})";
+  expect_error(2, "ACME_bent", {"build", "t.gltf", "-r", "64", "-o", "t.vdag"});
+  const auto ignoring = [](std::vector<std::string> args, const std::string& scene) {
+    args.insert(args.end(), {"--ignore-extension", "ACME_bent", "--ignore-extension",
+                             "ACME_twisted", scene, "-r", "64"});
+    return args;
+  };
+  EXPECT_EQ(run_json(ignoring({"plan"}, "t.gltf")).at("triangles"), 1);
+  const Json report = run_json(ignoring({"build", "-o", "t.vdag"}, "t.gltf"));
+  EXPECT_EQ(report.at("triangles"), 1);
+  EXPECT_EQ(report.at("warnings").size(), 2u);
+  expect_error(2, "ACME_bent", {"verify", "t.vdag", "--against", "t.gltf"});
+  run_json({"verify", "t.vdag", "--ignore-extension", "ACME_bent", "--ignore-extension",
+            "ACME_twisted", "--against", "t.gltf"});
 }
 
 }  // namespace

@@ -18,24 +18,44 @@ const auto& at(const Array& a, int i) {
   return a[static_cast<size_t>(i)];
 }
 
+// Warns if the view has a byteStride that glTF does not allow.
+void warn_of_stride(Document& d, int view, bool is_vertices) {
+  const uint64_t stride = view < 0 ? 0 : at(d.views, view).byte_stride;
+  if (stride == 0 || (is_vertices && stride <= 252 && stride % 4 == 0)) return;
+  d.warn("byte-stride", "bufferView " + std::to_string(view),
+         "its byteStride of " + std::to_string(stride) +
+             (is_vertices ? " is used, expected a multiple of 4 up to 252"
+                          : " is used, expected none because it is not for vertices"));
+}
+
+// Warns of integers where glTF without KHR_mesh_quantization has floats.
+void warn_of_quantization(Document& d, int index, const std::string& where) {
+  if (index < 0 || d.quantized || at(d.accessors, index).component_type == kFloat) return;
+  d.warn("undeclared-quantization", where + ": " + d.name_accessor(index),
+         "has integers, but the file does not declare KHR_mesh_quantization; they are read");
+}
+
 // If `index` is not -1, checks this accessor of the geometry and marks its buffers as read.
 void check_geometry(Document& d, int index, const AccessorUse& use) {
   if (index < 0) return;
   check_accessor(d, index, use);
-  for (int buffer : buffers_of(d, at(d.accessors, index)))
-    d.buffers[static_cast<size_t>(buffer)].is_read = true;
+  const Accessor& accessor = at(d.accessors, index);
+  warn_of_stride(d, accessor.view, use.components > 1);
+  if (accessor.is_sparse) {
+    warn_of_stride(d, accessor.sparse.index_view, false);
+    warn_of_stride(d, accessor.sparse.value_view, false);
+  }
+  for (int buffer : buffers_of(d, accessor)) d.buffers[static_cast<size_t>(buffer)].is_read = true;
 }
 
-AccessorUse position_use(const Document& d, const std::string& where) {
-  if (!d.quantized) return {where, 3, {kFloat}};
+AccessorUse position_use(const std::string& where) {
   return {where,
           3,
           {kFloat, kByte, kUnsignedByte, kShort, kUnsignedShort},
           {kByte, kUnsignedByte, kShort, kUnsignedShort}};
 }
 
-AccessorUse displacement_use(const Document& d, const std::string& where) {
-  if (!d.quantized) return {where, 3, {kFloat}};
+AccessorUse displacement_use(const std::string& where) {
   return {where, 3, {kFloat, kByte, kShort}, {kByte, kShort}};
 }
 
@@ -77,12 +97,14 @@ void warn_of_leftovers(Document& d, const Primitive& primitive, const std::strin
 
 void check_triangles(Document& d, Primitive& primitive, const std::string& where) {
   place_draco_primitive(d, primitive, where);
-  check_geometry(d, primitive.position, position_use(d, where + ": POSITION"));
+  check_geometry(d, primitive.position, position_use(where + ": POSITION"));
+  warn_of_quantization(d, primitive.position, where + ": POSITION");
   check_geometry(d, primitive.indices,
                  {where + ": indices", 1, {kUnsignedByte, kUnsignedShort, kUnsignedInt}});
   const uint64_t vertices = at(d.accessors, primitive.position).count;
   for (int target : primitive.targets) {
-    check_geometry(d, target, displacement_use(d, where + ": POSITION of a morph target"));
+    check_geometry(d, target, displacement_use(where + ": POSITION of a morph target"));
+    warn_of_quantization(d, target, where + ": POSITION of a morph target");
     check_count(d, target, vertices, where + ": POSITION of a morph target");
   }
   check_joint_sets(d, primitive, vertices, where);
@@ -177,9 +199,11 @@ void check_drawn_meshes(Document& d) {
   for (int node : nodes) {
     const auto [mesh, skin] = std::pair(at(d.nodes, node).mesh, at(d.nodes, node).skin);
     check_index(d, d.meshes.size(), mesh, d.name_node(node), "mesh");
+    d.check_usable("meshes", mesh);
     d.meshes[static_cast<size_t>(mesh)].is_drawn = true;
     if (skin < 0) continue;
     check_index(d, d.skins.size(), skin, d.name_node(node), "skin");
+    d.check_usable("skins", skin);
     has_skin[static_cast<size_t>(skin)] = true;
   }
   for (int i = 0; i < size_of(d.meshes); ++i)

@@ -66,7 +66,8 @@ int add_buffer(Document& d, BufferSource buffer, uint64_t heap) {
 }
 
 bool exists(const Document& d, int accessor) {
-  return accessor >= 0 && static_cast<size_t>(accessor) < d.accessors.size();
+  return accessor >= 0 && static_cast<size_t>(accessor) < d.accessors.size() &&
+         !d.broken.contains({"accessors", accessor});
 }
 
 const Accessor& at(const Document& d, int accessor) {
@@ -116,6 +117,7 @@ CompressedBytes bytes_of_view(const Document& d, int view, const std::string& wh
   if (static_cast<size_t>(view) >= d.views.size())
     refuse(d.path, what + ": bufferView " + std::to_string(view) + " does not exist, there are " +
                        std::to_string(d.views.size()));
+  d.check_usable("bufferViews", view);
   const BufferView& v = d.views[static_cast<size_t>(view)];
   return {v.buffer, v.byte_offset, v.byte_length};
 }
@@ -315,6 +317,7 @@ void check_compressed(const Document& d, const BufferSource& buffer, const std::
   if (from.buffer < 0 || index >= d.buffers.size() ||
       d.buffers[index].kind == BufferSource::Kind::kDecoded)
     refuse(d.path, what + ": buffer " + std::to_string(from.buffer) + " does not exist");
+  d.check_usable("buffers", from.buffer);
   const BufferSource& source = d.buffers[index];
   const uint128 end = static_cast<uint128>(from.byte_offset) + from.byte_length;
   if (end > source.byte_length)

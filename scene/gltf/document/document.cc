@@ -35,6 +35,18 @@ void Document::warn(const char* code, const std::string& place, const std::strin
   warnings.add({code, place.empty() ? path : path + ": " + place, message, count});
 }
 
+void Document::add_broken(std::string_view section, int index, const std::string& message) {
+  constexpr uint64_t kMapBytes = 96;
+  charge.add(kMapBytes + sizeof(message) + message.size());
+  broken.emplace(std::pair(std::string(section), index), message);
+}
+
+void Document::check_usable(const char* section, int index) const {
+  if (broken.empty()) return;
+  const auto found = broken.find({section, index});
+  if (found != broken.end()) refuse(path, found->second);
+}
+
 std::string Document::name_node(int node) const { return name_of("node ", nodes, node); }
 std::string Document::name_mesh(int mesh) const { return name_of("mesh ", meshes, mesh); }
 std::string Document::name_skin(int skin) const { return name_of("skin ", skins, skin); }

@@ -6,14 +6,16 @@
 //      none;
 //   2. every accessor that is read has the type its use requires. Its bytes are inside its buffer
 //      view, the view is inside its buffer, and the buffer is inside the existing bytes;
-//   3. nodes form trees, and `roots` have no parents.
+//   3. the nodes below `roots` form trees, and no root is below another one.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -36,7 +38,7 @@ struct BufferSource {
     kBinChunk,  // the bytes `range` of the scene file
     kExternal,  // the file `uri`, percent-encoded and relative to the scene file
     kBase64,    // the base64 characters `range` of the scene file
-    kMemory,    // the base64 `characters`, from the URI at `range`, which has JSON escapes
+    kMemory,    // `bytes`, decoded from the data: URI at `range`
     kDecoded,   // the decoded bytes of `meshopt` or `draco`; not a buffer of the file
   };
   Kind kind = Kind::kNone;
@@ -47,7 +49,8 @@ struct BufferSource {
   bool is_fallback = false;
   FileRange range;
   std::string uri;
-  std::string characters;
+  std::string bytes;
+  bool is_base64 = true;  // the data: URI is base64, not percent-encoded
   std::shared_ptr<const MeshoptView> meshopt;
   std::shared_ptr<const DracoPart> draco;
 };
@@ -148,6 +151,7 @@ struct Node {
   int parent = -1;
   int mesh = -1;
   int skin = -1;
+  bool is_hidden = false;  // KHR_node_visibility hides the node and its descendants
   Instancing instancing;
 };
 
@@ -190,12 +194,22 @@ struct Document {
   std::deque<std::vector<int>> scenes;                 // root nodes of each scene
   std::shared_ptr<const DocumentMaterials> materials;  // set by resolve_materials()
   int scene = -1;                                      // the default scene; -1: none
-  std::vector<int> roots;  // roots of the scene to draw; set by check_document()
+  std::vector<int> roots;                // roots of the scene to draw; set by check_document()
+  std::map<int, Transform> above_roots;  // global transforms of the parents of roots that have one
+  // Messages about buffers, bufferViews, accessors, meshes and skins that break a rule of glTF, by
+  // section and index. check_usable() throws the message.
+  std::map<std::pair<std::string, int>, std::string> broken;
   WarningList warnings;
 
   // Adds a warning about `place`, an element of the document; "" is the document.
   void warn(const char* code, const std::string& place, const std::string& message,
             uint64_t count = 1);
+
+  // Records that element `index` of `section` breaks a rule. This is an error only if the element
+  // is used.
+  void add_broken(std::string_view section, int index, const std::string& message);
+  // Throws Error{kInvalidInput} if add_broken() was called for the element.
+  void check_usable(const char* section, int index) const;
 
   // Return a kind, an index and a name for messages: node 3 "wheel".
   std::string name_node(int node) const;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "scene/gltf/document/tinygltf.h"
+#include "scene/gltf/uri/data_uri.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
@@ -69,10 +70,10 @@ void ModelReader::add_image(const JsonElement& element) {
     image.mimeType = string_or_empty(value, "mimeType");
     image.uri = string_or_empty(value, "uri");
     if (!image.uri.empty()) uri = element.uri();
-    if (image.uri.starts_with("data:")) image.uri.resize(image.uri.find(',') + 1);
-    const auto view = value.find("bufferView");
-    if (view != value.end() && view->is_number_unsigned() && view->get<uint64_t>() <= INT_MAX)
-      image.bufferView = view->get<int>();
+    if (is_data_uri(image.uri)) image.uri.resize(image.uri.find(',') + 1);
+    const auto view = element.find("bufferView");
+    const auto index = view ? view->whole_number() : std::nullopt;
+    if (index && *index <= INT_MAX) image.bufferView = static_cast<int>(*index);
   }
   model_charge_.add(2 * (sizeof(image) + sizeof(uri)) + image.name.size() + image.uri.size() +
                     image.mimeType.size());

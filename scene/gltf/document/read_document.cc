@@ -6,7 +6,7 @@
 #include "core/base/process_limits.h"
 #include "scene/gltf/document/model_reader.h"
 #include "scene/gltf/document/read_elements.h"
-#include "scene/gltf/document/tinygltf.h"
+#include "scene/gltf/extensions/extension_info.h"
 #include "scene/gltf/json/container.h"
 #include "scene/gltf/json/json_sections.h"
 #include "scene/messages.h"
@@ -14,30 +14,28 @@
 namespace voxdag::gltf {
 namespace {
 
-// The extensions that voxdag reads.
-constexpr std::string_view kRead[] = {"EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
-                                      "KHR_draco_mesh_compression", "KHR_mesh_primitive_restart",
-                                      "KHR_mesh_quantization"};
-
-// Prefixes of extension names for materials, lights, motion and metadata. They do not affect
-// vertices.
-constexpr std::string_view kHarmless[] = {
-    "KHR_materials_",      "KHR_texture_",          "EXT_texture_", "MSFT_texture_",
-    "KHR_lights_punctual", "EXT_lights_",           "KHR_xmp",      "KHR_animation_pointer",
-    "ADOBE_materials_",    "MSFT_packing_",         "AGI_stk_",     "EXT_structural_metadata",
-    "EXT_mesh_features",   "EXT_instance_features", "KHR_audio",    "KHR_techniques_webgl",
-    "FB_geometry_metadata"};
-
-// True if the geometry could be different if voxdag read the extension.
-bool may_change_geometry(const std::string& extension) {
-  return std::ranges::find(kRead, extension) == std::end(kRead) &&
-         std::ranges::none_of(kHarmless, [&](auto p) { return extension.starts_with(p); });
-}
-
-void check_required_extensions(const std::string& path, const std::deque<std::string>& required) {
-  for (const std::string& name : required)
-    if (may_change_geometry(name))
-      refuse(path, "requires the extension " + printable(name) + ", which voxdag does not read");
+// Refuses required extensions that may change the geometry, except ignored ones, and warns of all
+// extensions that are not read.
+void check_extensions(Document& d, const std::vector<std::string>& ignored) {
+  const auto warn = [&](const char* code, const std::string& message) {
+    d.warn(code, "", message);
+  };
+  for (const std::string& name : d.extensions_required) {
+    const ExtensionInfo info = extension_info(name);
+    const std::string extension = "the required extension " + printable(name);
+    if (info.support == ExtensionSupport::kHarmless)
+      warn("harmless-extension", extension + " is not read: " + info.purpose);
+    if (info.support != ExtensionSupport::kUnknown) continue;
+    if (std::ranges::find(ignored, name) == ignored.end())
+      refuse(d.path,
+             "requires the extension " + printable(name) +
+                 ", which voxdag does not read; --ignore-extension reads the file without it");
+    warn("ignored-extension", extension + " is ignored on request");
+  }
+  for (const std::string& name : d.extensions_used)
+    if (extension_info(name).support == ExtensionSupport::kUnknown &&
+        std::ranges::find(d.extensions_required, name) == d.extensions_required.end())
+      warn("ignored-extension", "the optional extension " + printable(name) + " is ignored");
 }
 
 void check_version(const std::string& path, const Asset& asset) {
@@ -59,15 +57,32 @@ void place_bin_chunk(const Container& container, Document& d) {
 // Memory per node of check_document(), which follows the parents of all nodes.
 constexpr uint64_t kCheckBytesPerNode = 2 * sizeof(int);
 
+// Returns read(element), or T() if the element breaks a rule, which is an error only if it is used.
+template <class T, class Read>
+T read_or_note(Document& document, size_t index, const JsonElement& element, const Read& read) {
+  try {
+    return read(element);
+  } catch (const Violation& violation) {
+    document.add_broken(element.key(), static_cast<int>(index), violation.message);
+    return T();
+  }
+}
+
 // Returns a function that converts an element by `read`, charges its memory and appends it to
-// `array`.
-template <class T>
-auto store(Document& document, std::deque<T>& array, T (*read)(const JsonElement&)) {
+// `array`. store() fails for an element that breaks a rule, store_or_note() keeps the message.
+template <class T, class Read>
+auto store(Document& document, std::deque<T>& array, const Read& read) {
   return [&, read](const JsonElement& element) {
     T value = read(element);
     document.charge.add(sizeof(T) + heap_bytes(value));
     array.push_back(std::move(value));
   };
+}
+template <class T>
+auto store_or_note(Document& document, std::deque<T>& array, T (*read)(const JsonElement&)) {
+  return store(document, array, [&, read](const JsonElement& element) {
+    return read_or_note<T>(document, array.size(), element, read);
+  });
 }
 
 // Reads all sections; returns the message of the first violation, or "".
@@ -94,14 +109,16 @@ std::string read_structure(const ReadableFile& file, FileRange json, Document& d
         [&](const JsonElement& element) { model.add_image(element); }},
        {"buffers", kArray, kChecked,
         [&](const JsonElement& element) {
-          BufferSource buffer = read_buffer(element, file, budget);
-          d.charge.add(sizeof(buffer) + buffer.uri.capacity() + buffer.characters.capacity());
+          BufferSource buffer = read_or_note<BufferSource>(
+              d, d.buffers.size(), element,
+              [&](const JsonElement& e) { return read_buffer(e, file, budget); });
+          d.charge.add(sizeof(buffer) + buffer.uri.capacity() + buffer.bytes.capacity());
           d.buffers.push_back(std::move(buffer));
         }},
-       {"bufferViews", kArray, kChecked, store(d, d.views, read_view)},
-       {"accessors", kArray, kChecked, store(d, d.accessors, read_accessor)},
-       {"meshes", kArray, kChecked, store(d, d.meshes, read_mesh)},
-       {"skins", kArray, kChecked, store(d, d.skins, read_skin)},
+       {"bufferViews", kArray, kChecked, store_or_note(d, d.views, read_view)},
+       {"accessors", kArray, kChecked, store_or_note(d, d.accessors, read_accessor)},
+       {"meshes", kArray, kChecked, store_or_note(d, d.meshes, read_mesh)},
+       {"skins", kArray, kChecked, store_or_note(d, d.skins, read_skin)},
        {"nodes", kArray, kChecked,
         [&](const JsonElement& element) {
           const int index = static_cast<int>(d.nodes.size());
@@ -118,14 +135,15 @@ std::string read_structure(const ReadableFile& file, FileRange json, Document& d
 
 }  // namespace
 
-Document read_document(const ReadableFile& file, MemoryBudget& budget, const CancelToken& cancel) {
+Document read_document(const ReadableFile& file, const std::vector<std::string>& ignored_extensions,
+                       MemoryBudget& budget, const CancelToken& cancel) {
   const Container container = read_container(file);
   Document d(file.path(), budget);
   ModelReader model(file.path(), budget);
   const std::string violation = read_structure(file, container.json, d, model, budget, cancel);
   model.parse(d);
   check_version(d.path, d.asset);
-  check_required_extensions(d.path, d.extensions_required);
+  check_extensions(d, ignored_extensions);
   if (!violation.empty()) refuse(d.path, violation);
   place_bin_chunk(container, d);
 
@@ -134,9 +152,6 @@ Document read_document(const ReadableFile& file, MemoryBudget& budget, const Can
       d.quantized = d.quantized || name == "KHR_mesh_quantization";
       d.has_restarts = d.has_restarts || name == "KHR_mesh_primitive_restart";
     }
-  for (const std::string& name : d.extensions_used)
-    if (may_change_geometry(name))
-      d.warn("ignored-extension", "", "the optional extension " + printable(name) + " is ignored");
   trim_heap();  // returns the parser's freed blocks to the system
   return d;
 }

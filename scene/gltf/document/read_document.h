@@ -1,6 +1,9 @@
 // Makes a Document from the bytes of a scene file.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "core/base/memory_budget.h"
 #include "core/io/file_system.h"
 #include "scene/gltf/document/document.h"
@@ -10,8 +13,9 @@ namespace voxdag::gltf {
 
 // Returns the document of an open scene file, not yet checked by check_document(). Throws
 // Error{kInvalidInput} for malformed JSON, a member of a wrong type, another glTF version, or a
-// required extension that voxdag does not support. Throws Error{kOutOfMemory} for a structure that
-// does not fit the budget.
-Document read_document(const ReadableFile& file, MemoryBudget& budget, const CancelToken& cancel);
+// required extension that voxdag does not support and that `ignored_extensions` does not name.
+// Throws Error{kOutOfMemory} for a structure that does not fit the budget.
+Document read_document(const ReadableFile& file, const std::vector<std::string>& ignored_extensions,
+                       MemoryBudget& budget, const CancelToken& cancel);
 
 }  // namespace voxdag::gltf

@@ -4,6 +4,7 @@
 #include <array>
 #include <string_view>
 
+#include "scene/gltf/uri/data_uri.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
@@ -17,9 +18,8 @@ int index_or_none(const JsonElement& object, const char* key) {
 // Returns the index, or -1 for a value that is not an index. Used for members that do not affect
 // the geometry.
 int index_if_any(const JsonElement& element) {
-  const auto& value = element.value();
-  const bool is_index = value.is_number_unsigned() && value.get<uint64_t>() <= INT32_MAX;
-  return is_index ? value.get<int>() : -1;
+  const auto number = element.whole_number();
+  return number && *number <= INT32_MAX ? static_cast<int>(*number) : -1;
 }
 
 uint64_t size_or_zero(const JsonElement& object, const char* key) {
@@ -49,20 +49,10 @@ std::vector<double> numbers(const JsonElement& object, const char* key) {
 }
 
 int component_type(const JsonElement& member) {
-  const auto& value = member.value();
-  if (!value.is_number_unsigned() || value.get<uint64_t>() > INT32_MAX ||
-      component_bytes(value.get<int>()) == 0)
+  const auto number = member.whole_number();
+  if (!number || *number > INT32_MAX || component_bytes(static_cast<int>(*number)) == 0)
     member.violate("a component type (5120 to 5123, 5125 or 5126)");
-  return value.get<int>();
-}
-
-uint64_t stride(const JsonElement& view) {
-  const auto member = view.find("byteStride");
-  if (!member) return 0;
-  const auto& value = member->value();
-  if (!value.is_number_unsigned() || value.get<uint64_t>() > 252 || value.get<uint64_t>() % 4 != 0)
-    member->violate("a multiple of 4 up to 252");
-  return value.get<uint64_t>();
+  return static_cast<int>(*number);
 }
 
 int component_count(const JsonElement& type) {
@@ -158,6 +148,13 @@ Transform read_transform(const JsonElement& node, const std::string& where, Docu
   return local;
 }
 
+bool is_hidden(const JsonElement& node) {
+  const auto extensions = node.find("extensions");
+  const auto extension = extensions ? extensions->find("KHR_node_visibility") : std::nullopt;
+  const auto visible = extension ? extension->find("visible") : std::nullopt;
+  return visible && !visible->as_boolean();
+}
+
 Instancing read_instancing(const JsonElement& node) {
   const auto extensions = node.find("extensions");
   if (!extensions) return {};
@@ -169,17 +166,49 @@ Instancing read_instancing(const JsonElement& node) {
           index_or_none(attributes, "SCALE")};
 }
 
-// Returns the characters of a data: URI from `begin`, without JSON escapes.
-std::string unescape(const ReadableFile& file, const RawString& uri, size_t begin,
-                     MemoryBudget& budget) {
-  // Number of copies of the text in memory: the quoted text, and the parser's copies, which grow by
-  // doubling.
-  constexpr uint64_t kCopies = 6;
-  const MemoryCharge charge(budget, kCopies * uri.characters.size,
-                            "a data: URI with JSON escapes in " + file.path());
+// Returns the text of a data: URI, without JSON escapes.
+std::string unescape(const ReadableFile& file, const RawString& uri) {
   std::string quoted(static_cast<size_t>(uri.characters.size) + 2, '"');
   file.read_at(uri.characters.begin - 1, std::as_writable_bytes(std::span(quoted)));
-  return JsonElement::Json::parse(quoted).get_ref<const std::string&>().substr(begin);
+  return uri.is_escaped ? JsonElement::Json::parse(quoted).get<std::string>()
+                        : quoted.substr(1, quoted.size() - 2);
+}
+
+// True if the positions of base64 characters do not determine their bytes, so that all must be
+// decoded together.
+bool is_irregular(const ReadableFile& file, FileRange base64, const RawString& uri) {
+  if (uri.is_escaped) return true;
+  std::array<char, size_t{16} << 10> window;
+  for (uint64_t at = 0; at < base64.size; at += window.size()) {
+    const auto n = static_cast<size_t>(std::min<uint64_t>(window.size(), base64.size - at));
+    file.read_at(base64.begin + at, std::as_writable_bytes(std::span(window).first(n)));
+    if (has_unusual_base64(std::span(window).first(n))) return true;
+  }
+  return false;
+}
+
+// Sets the contents of a buffer from its data: URI.
+void read_data_uri(const JsonElement& member, const RawString& uri, const ReadableFile& file,
+                   MemoryBudget& budget, BufferSource& out) {
+  const auto parsed = parse_data_uri(member.as_string());
+  if (!parsed) throw Violation{member.path() + " is a data: URI without data, expected a comma"};
+  out.is_base64 = parsed->is_base64;
+  out.range = {uri.characters.begin + parsed->begin, uri.characters.size - parsed->begin};
+  if (parsed->is_base64 && !is_irregular(file, out.range, uri)) {
+    out.kind = BufferSource::Kind::kBase64;
+    return;
+  }
+  // Number of copies of the text in memory: the quoted text, the parser's copies, which grow by
+  // doubling, and the decoded bytes.
+  constexpr uint64_t kCopies = 6;
+  const MemoryCharge charge(budget, kCopies * uri.characters.size,
+                            "a data: URI with escapes or blanks in " + file.path());
+  auto bytes =
+      decode_data(std::string_view(unescape(file, uri)).substr(parsed->begin), parsed->is_base64);
+  if (!bytes) throw Violation{member.path() + " has a character that is not base64"};
+  out.kind = BufferSource::Kind::kMemory;
+  out.range = uri.characters;
+  out.bytes = std::move(*bytes);
 }
 
 template <class T>
@@ -209,22 +238,12 @@ BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_f
   if (!member) return out;
   const std::string& text = member->as_string();
   const RawString& uri = element.uri();
-  if (!text.starts_with("data:")) {
+  if (is_data_uri(text)) {
+    read_data_uri(*member, uri, scene_file, budget, out);
+  } else {
     if (uri.is_clipped) throw Violation{member->path() + " is longer than any file name"};
     out.kind = BufferSource::Kind::kExternal;
     out.uri = text;
-    return out;
-  }
-  const size_t comma = text.find(',');
-  if (comma == std::string::npos || !std::string_view(text).substr(0, comma).ends_with(";base64"))
-    throw Violation{member->path() + " is a data: URI that is not base64"};
-  if (uri.is_escaped) {
-    out.kind = BufferSource::Kind::kMemory;
-    out.characters = unescape(scene_file, uri, comma + 1, budget);
-    out.range = uri.characters;
-  } else {
-    out.kind = BufferSource::Kind::kBase64;
-    out.range = {uri.characters.begin + comma + 1, uri.characters.size - comma - 1};
   }
   return out;
 }
@@ -234,7 +253,7 @@ BufferView read_view(const JsonElement& element) {
   out.buffer = element.at("buffer").as_index();
   out.byte_offset = size_or_zero(element, "byteOffset");
   out.byte_length = element.at("byteLength").as_size();
-  out.byte_stride = stride(element);
+  out.byte_stride = size_or_zero(element, "byteStride");
   if (const auto extensions = element.find("extensions"))
     if (const auto meshopt = extensions->find("EXT_meshopt_compression"))
       out.meshopt = read_meshopt(*meshopt);
@@ -281,6 +300,7 @@ Node read_node(const JsonElement& element, int index, Document& document) {
   out.weights = numbers(element, "weights");
   out.mesh = index_or_none(element, "mesh");
   out.skin = index_or_none(element, "skin");
+  out.is_hidden = is_hidden(element);
   out.instancing = read_instancing(element);
   return out;
 }

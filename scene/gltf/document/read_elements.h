@@ -13,8 +13,8 @@ namespace voxdag::gltf {
 
 Asset read_asset(const JsonElement& element);
 std::string read_string(const JsonElement& element);
-// Reads a buffer. If it is a data: URI with JSON escapes, reads its characters into memory. Throws
-// Error{kOutOfMemory} if they do not fit the budget.
+// Reads a buffer. Decodes a data: URI into memory, except base64 without JSON escapes, blanks and
+// other irregular characters. Throws Error{kOutOfMemory} if the URI does not fit the budget.
 BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_file,
                          MemoryBudget& budget);
 BufferView read_view(const JsonElement& element);

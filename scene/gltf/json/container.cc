@@ -25,6 +25,26 @@ uint32_t read_u32(const ReadableFile& file, uint64_t offset) {
   return value;
 }
 
+// Some programs pad JSON with zeros.
+bool is_filler(std::byte b) {
+  return b == std::byte{0} || b == std::byte{' '} || b == std::byte{'\t'} || b == std::byte{'\n'} ||
+         b == std::byte{'\r'};
+}
+
+// Returns the range without zeros and white space at its end.
+FileRange without_padding(const ReadableFile& file, FileRange range) {
+  std::array<std::byte, 4096> window;
+  while (range.size > 0) {
+    const size_t n = static_cast<size_t>(std::min<uint64_t>(range.size, window.size()));
+    const std::span<std::byte> bytes(window.data(), n);
+    file.read_at(range.begin + range.size - n, bytes);
+    const auto last = std::find_if_not(bytes.rbegin(), bytes.rend(), is_filler);
+    range.size -= static_cast<uint64_t>(last - bytes.rbegin());
+    if (last != bytes.rend()) break;
+  }
+  return range;
+}
+
 struct Chunk {
   uint32_t type = 0;
   FileRange content;
@@ -44,6 +64,14 @@ Chunk read_chunk(const ReadableFile& file, uint64_t offset, uint64_t end) {
   return {read_u32(file, offset + 4), {begin, length}};
 }
 
+// True if the bytes from `offset` are too few for a chunk, and all zero or blank.
+bool is_padding(const ReadableFile& file, uint64_t offset, uint64_t end) {
+  if (end - offset >= kChunkHeaderBytes) return false;
+  std::array<std::byte, kChunkHeaderBytes> bytes{};
+  file.read_at(offset, std::span(bytes).first(static_cast<size_t>(end - offset)));
+  return std::ranges::all_of(bytes, [](std::byte b) { return is_filler(b); });
+}
+
 Container read_glb(const ReadableFile& file) {
   if (file.size() < kHeaderBytes) refuse(file.path(), "the GLB ends inside its header");
   const uint32_t version = read_u32(file, 4);
@@ -59,11 +87,13 @@ Container read_glb(const ReadableFile& file) {
   const Chunk json = read_chunk(file, kHeaderBytes, end);
   if (json.type != kJsonChunk) refuse(file.path(), "the first chunk of the GLB is not JSON");
   Container container{json.content, false, {}};
-  const uint64_t next = json.content.begin + json.content.size;
-  if (next < end) {
-    const Chunk bin = read_chunk(file, next, end);
-    container.has_bin = bin.type == kBinChunk;
-    container.bin = bin.content;
+  // Chunks of other types may come before BIN. The padding after the last one may be incomplete.
+  uint64_t next = json.content.begin + json.content.size;
+  while (!container.has_bin && next < end && !is_padding(file, next, end)) {
+    const Chunk chunk = read_chunk(file, next, end);
+    container.has_bin = chunk.type == kBinChunk;
+    if (container.has_bin) container.bin = chunk.content;
+    next = chunk.content.begin + chunk.content.size;
   }
   return container;
 }
@@ -84,12 +114,12 @@ bool is_gltf(const ReadableFile& file) {
 }
 
 Container read_container(const ReadableFile& file) {
-  const Container container =
-      is_glb(file) ? read_glb(file) : Container{{0, file.size()}, false, {}};
+  Container container = is_glb(file) ? read_glb(file) : Container{{0, file.size()}, false, {}};
   if (container.json.size > kMaxJsonBytes)
     throw Error(ErrorCode::kLimit, file.path() + ": its JSON has " +
                                        std::to_string(container.json.size) +
                                        " bytes, the limit is 1 GiB");
+  container.json = without_padding(file, container.json);
   return container;
 }
 

@@ -1,5 +1,6 @@
 // The two containers of glTF 2.0: a GLB (a header, a JSON chunk and an optional BIN chunk), or the
 // plain JSON of a .gltf. They are distinguished by the first bytes of the file, not by its name.
+// Chunks of other types are skipped, and zeros after the JSON are padding.
 #pragma once
 
 #include "core/io/file_system.h"

@@ -1,15 +1,29 @@
 #include "scene/gltf/json/element_text.h"
 
+#include <cmath>
 #include <utility>
 
 namespace voxdag::gltf {
 
+namespace {
+
 using Json = nlohmann::json;
+
+// tinygltf accepts integers only without a decimal point.
+std::string text_of(const Json& value) {
+  constexpr double kExact = 0x1p53;
+  const double number = value.is_number_float() ? value.get<double>() : 0.5;
+  const bool is_whole = number == std::floor(number) && std::abs(number) <= kExact;
+  return is_whole && !std::signbit(number) ? std::to_string(static_cast<int64_t>(number))
+                                           : value.dump();
+}
+
+}  // namespace
 
 void ElementTextWriter::add_scalar(std::string_view key, const Json& value) {
   begin_value(key);
   if (value.is_string()) written_.string_bytes += value.get_ref<const std::string&>().size();
-  written_.text += value.dump();
+  written_.text += text_of(value);
 }
 
 void ElementTextWriter::start(std::string_view key, const Json& value) {

@@ -1,5 +1,5 @@
 // Writes the JSON text of one element from its values, as a parser delivers them. Numbers, strings
-// and the order of members are kept; blanks are not.
+// and the order of members are kept; blanks are not. Whole numbers have no decimal point.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,7 @@
 #include "scene/gltf/json/json_element.h"
 
+#include <cmath>
+
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
@@ -37,16 +39,25 @@ void JsonElement::expect_object() const {
   if (!value_.is_object()) violate("an object");
 }
 
+std::optional<uint64_t> JsonElement::whole_number() const {
+  constexpr double kExact = 0x1p53;
+  if (value_.is_number_unsigned()) return value_.get<uint64_t>();
+  if (!value_.is_number()) return {};
+  const double number = value_.get<double>();  // "-0" is a signed integer
+  if (!(number >= 0 && number <= kExact) || number != std::floor(number)) return {};
+  return static_cast<uint64_t>(number);
+}
+
 int JsonElement::as_index() const {
-  if (!value_.is_number_unsigned() || value_.get<uint64_t>() > INT32_MAX)
-    violate("a whole number from 0 to 2147483647");
-  return value_.get<int>();
+  const auto number = whole_number();
+  if (!number || *number > INT32_MAX) violate("a whole number from 0 to 2147483647");
+  return static_cast<int>(*number);
 }
 
 uint64_t JsonElement::as_size() const {
-  if (!value_.is_number_unsigned() || value_.get<uint64_t>() > INT64_MAX)
-    violate("a whole number that is not negative");
-  return value_.get<uint64_t>();
+  const auto number = whole_number();
+  if (!number || *number > INT64_MAX) violate("a whole number that is not negative");
+  return *number;
 }
 
 double JsonElement::as_number() const {

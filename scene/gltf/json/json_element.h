@@ -60,6 +60,9 @@ class JsonElement {
   }
 
   void expect_object() const;
+  // Returns the value of a whole number that is not negative, also if it is written like 36.0 or
+  // 3.6e1; nullopt for any other value.
+  std::optional<uint64_t> whole_number() const;
   int as_index() const;      // a whole number from 0 to 2^31 - 1
   uint64_t as_size() const;  // a whole number from 0 to 2^63 - 1
   double as_number() const;

@@ -1,6 +1,7 @@
 #include "scene/gltf/json/json_window.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
 
 #include "scene/messages.h"
@@ -20,6 +21,13 @@ constexpr uint64_t kMaxWordCharacters = 1024;  // max length of a number or lite
 // ASCII that JSON does not escape within a string.
 bool is_plain(char c) { return c >= ' ' && c <= '~'; }
 
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+// Spellings of NaN and infinity after an optional sign, in lower case. Longer ones come first.
+constexpr std::string_view kNonFinite[] = {"nan(snan)", "nan(ind)", "nan",    "infinity", "inf",
+                                           "1.#qnan",   "1.#snan",  "1.#ind", "1.#inf"};
+constexpr std::string_view kEndsOfWords = ",]} \t\r\n";
+
 }  // namespace
 
 JsonWindow::JsonWindow(const ReadableFile& file, FileRange json, MemoryBudget& budget,
@@ -33,16 +41,28 @@ JsonWindow::JsonWindow(const ReadableFile& file, FileRange json, MemoryBudget& b
 
 JsonWindow::int_type JsonWindow::uflow() {
   char c;
+  if (!replacement_.empty()) {
+    c = replacement_.front();
+    replacement_.remove_prefix(1);
+    return traits_type::to_int_type(c);
+  }
   do {
     if (!next(c)) return traits_type::eof();
     track(c);
   } while (is_withheld(c));
+  if (word_ == 1 && !in_string_) {
+    if (const size_t length = non_finite_length()) {
+      position_ += length - 1;
+      c = 'n';
+      replacement_ = "ull";
+    }
+  }
   charge_.grow_to(kCopies * ++collected_);
   return traits_type::to_int_type(c);
 }
 
 bool JsonWindow::next(char& c) {
-  if (position_ == window_begin_ + window_.size()) {
+  if (position_ >= window_begin_ + window_.size()) {
     const uint64_t left = json_.begin + json_.size - position_;
     if (left == 0) return false;
     cancel_.check();
@@ -110,6 +130,35 @@ void JsonWindow::track_in_string(char c) {
     in_string_ = c != '"';
   }
   string_.characters.size += in_string_;
+}
+
+std::string_view JsonWindow::peek(std::span<char, kPeekCharacters> space) const {
+  const uint64_t begin = position_ - 1;
+  const size_t n =
+      static_cast<size_t>(std::min<uint64_t>(kPeekCharacters, json_.begin + json_.size - begin));
+  const auto at = static_cast<size_t>(begin - window_begin_);
+  if (at + n <= window_.size()) return {window_.data() + at, n};
+  file_.read_at(begin, std::as_writable_bytes(space.first(n)));
+  return {space.data(), n};
+}
+
+size_t JsonWindow::non_finite_length() const {
+  std::array<char, kPeekCharacters> space;
+  const std::string_view text = peek(space);
+  const size_t sign = text.front() == '-' || text.front() == '+' ? 1 : 0;
+  const std::string_view word = text.substr(sign);
+  // Nearly all words end here.
+  if (!word.starts_with("1.#") && word.find_first_of("NnIi") != 0) return 0;
+  for (const std::string_view spelling : kNonFinite) {
+    if (!std::ranges::equal(word.substr(0, spelling.size()), spelling, {}, lower)) continue;
+    size_t length = spelling.size();
+    if (spelling.front() == '1')  // printf pads with zeros: "1.#INF00"
+      length = std::min(word.find_first_not_of('0', length), word.size());
+    const bool has_ended =
+        length == word.size() || kEndsOfWords.find(word[length]) != kEndsOfWords.npos;
+    return has_ended ? sign + length : 0;
+  }
+  return 0;
 }
 
 // True if the parser does not receive the character. Escapes and multi-byte characters always reach

@@ -5,12 +5,16 @@
 // would collect them in memory. So the window withholds the plain characters of a string past the
 // first few thousand, and records the string's position in the file. The readers of buffers and
 // images later decode the string from there, in windows. If there are several blanks between two
-// values, the parser receives one. A number with more digits than any value needs is refused. The
-// memory for the characters that the parser collects is charged to the budget. Not thread-safe.
+// values, the parser receives one. NaN and infinities, which some programs write although JSON has
+// no such numbers, reach the parser as null. A number with more digits than any value needs is
+// refused. The memory for the characters that the parser collects is charged to the budget. Not
+// thread-safe.
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <streambuf>
+#include <string_view>
 #include <vector>
 
 #include "core/io/file_system.h"
@@ -32,6 +36,8 @@ class JsonWindow : public std::streambuf {
   const RawString& last_string() const { return string_; }
 
  private:
+  static constexpr size_t kPeekCharacters = 32;  // enough for all spellings of NaN and infinity
+
   // Returns the next character for the parser.
   int_type uflow() override;
   bool next(char& c);
@@ -39,6 +45,11 @@ class JsonWindow : public std::streambuf {
   void track_outside_strings(char c);
   void track_in_string(char c);
   bool is_withheld(char c);
+  // Returns the length of NaN or an infinity that begins with the last character; 0 if none does.
+  size_t non_finite_length() const;
+  // Returns the next characters of the file, beginning with the last character. `space` may hold
+  // them.
+  std::string_view peek(std::span<char, kPeekCharacters> space) const;
 
   const ReadableFile& file_;
   const FileRange json_;
@@ -55,6 +66,7 @@ class JsonWindow : public std::streambuf {
   bool after_blank_ = false;      // the last character outside of strings is blank
   bool is_second_blank_ = false;  // the last two such characters are blank
   uint64_t word_ = 0;             // characters of the number or literal so far
+  std::string_view replacement_;  // characters that the parser receives next
   // Characters passed to the parser for the current string or number.
   uint64_t collected_ = 0;
   RawString string_;

@@ -7,7 +7,8 @@
 #include "core/base/error.h"
 #include "scene/gltf/document/document.h"
 #include "scene/gltf/document/tinygltf.h"
-#include "scene/gltf/mesh_data/buffer_reader.h"
+#include "scene/gltf/uri/data_uri.h"
+#include "scene/gltf/uri/file_uri.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
@@ -21,7 +22,7 @@ void set_file(const ReadableFile& file, FileRange range, ImageSource& out) {
 
 void set_external(FileSystem& files, const std::string& scene_path, const std::string& uri,
                   const std::string& where, ImageSource& out) {
-  const auto file = files.open_read(resolve_uri(scene_path, uri, where));
+  const auto file = open_uri(files, scene_path, uri, where);
   set_file(*file, {0, file->size()}, out);
 }
 
@@ -45,6 +46,7 @@ void set_buffer(FileSystem& files, const ReadableFile& scene_file, const Documen
       break;
     case BufferSource::Kind::kBase64:
     case BufferSource::Kind::kMemory:
+      if (!buffer.is_base64) out.problem = "is in " + where + ", whose data: URI is not base64";
       set_file(scene_file, buffer.range, out);
       out.is_base64 = true;
       out.is_data_uri = buffer.kind == BufferSource::Kind::kMemory;
@@ -58,10 +60,11 @@ void find(FileSystem& files, const ReadableFile& scene_file, const Document& d, 
           ImageSource& out) {
   const tinygltf::Image& image = d.model->images[static_cast<size_t>(index)];
   const RawString& uri = d.image_uris[static_cast<size_t>(index)];
-  if (image.uri.starts_with("data:")) {
+  if (is_data_uri(image.uri)) {
     set_file(scene_file, uri.characters, out);
     out.is_base64 = out.is_data_uri = true;
-    if (!image.uri.ends_with(";base64,")) out.problem = "has a data: URI that is not base64";
+    const auto parsed = parse_data_uri(image.uri);
+    if (!parsed || !parsed->is_base64) out.problem = "has a data: URI that is not base64";
   } else if (!image.uri.empty()) {
     if (uri.is_clipped)
       out.problem = "has a uri that is longer than any file name";

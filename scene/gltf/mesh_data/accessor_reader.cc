@@ -55,6 +55,10 @@ void decode(const std::byte* bytes, const Layout& layout, size_t count, To* out)
   }
 }
 
+size_t stride_of(const BufferView& view, size_t element) {
+  return view.byte_stride ? static_cast<size_t>(view.byte_stride) : element;
+}
+
 // Reads `count` elements, the first at `offset` of the view, window by window.
 template <class To>
 void read_elements(const BufferView& view, BufferReader& buffers, const Layout& layout,
@@ -88,7 +92,7 @@ void AccessorReader::read(uint64_t first, size_t count, T* out) {
     std::fill_n(out, count * static_cast<size_t>(accessor_.components), T{0});
   } else {
     const BufferView& view = document_.views[static_cast<size_t>(accessor_.view)];
-    const size_t stride = view.byte_stride ? static_cast<size_t>(view.byte_stride) : element;
+    const size_t stride = stride_of(view, element);
     const Layout layout{accessor_.component_type, accessor_.components, accessor_.normalized,
                         stride};
     read_elements(view, buffers_, layout, element, accessor_.byte_offset + first * stride, count,
@@ -116,7 +120,7 @@ void AccessorReader::replace_sparse(uint64_t first, size_t count, T* out) {
       if (index < first) continue;
       if (index >= first + count) return;
       read_elements(view, buffers_, layout, element,
-                    accessor_.sparse.value_offset + (k + i) * element, 1,
+                    accessor_.sparse.value_offset + (k + i) * stride_of(view, element), 1,
                     out + (index - first) * static_cast<size_t>(accessor_.components));
     }
   }
@@ -126,9 +130,10 @@ void AccessorReader::read_sparse_indices(uint64_t first, size_t count) {
   const Sparse& sparse = accessor_.sparse;
   const auto bytes = static_cast<size_t>(component_bytes(sparse.index_type));
   sparse_indices_.resize(count);
-  read_elements(document_.views[static_cast<size_t>(sparse.index_view)], buffers_,
-                Layout{sparse.index_type, 1, false, bytes}, bytes,
-                sparse.index_offset + first * bytes, count, sparse_indices_.data());
+  const BufferView& view = document_.views[static_cast<size_t>(sparse.index_view)];
+  const size_t stride = stride_of(view, bytes);
+  read_elements(view, buffers_, Layout{sparse.index_type, 1, false, stride}, bytes,
+                sparse.index_offset + first * stride, count, sparse_indices_.data());
 }
 
 void AccessorReader::check_sparse_indices() {

@@ -4,8 +4,9 @@
 #include <array>
 
 #include "core/base/error.h"
-#include "core/base/text.h"
 #include "scene/base64.h"
+#include "scene/gltf/uri/file_uri.h"
+#include "scene/lfs_pointer.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
@@ -19,41 +20,7 @@ constexpr uint64_t kMapNodeBytes = 48;
 // inside one group and end inside another.
 constexpr size_t kMaxGroups = BufferReader::kWindowBytes / 3 + 2;
 
-// Reads base64 characters [begin, begin + out.size()) of a buffer.
-void read_characters(const ReadableFile& scene_file, const BufferSource& buffer, uint64_t begin,
-                     std::span<std::byte> out) {
-  if (buffer.kind == BufferSource::Kind::kBase64)
-    return scene_file.read_at(buffer.range.begin + begin, out);
-  const auto from = buffer.characters.begin() + static_cast<ptrdiff_t>(begin);
-  std::transform(from, from + static_cast<ptrdiff_t>(out.size()), out.begin(),
-                 [](char c) { return static_cast<std::byte>(c); });
-}
-
-uint64_t character_count(const BufferSource& buffer) {
-  return buffer.kind == BufferSource::Kind::kBase64 ? buffer.range.size : buffer.characters.size();
-}
-
-// True if there is a colon before the first slash: "http://...", "file:...", "C:\...".
-bool has_scheme(const std::string& uri) {
-  const size_t end = uri.find_first_of(":/");
-  return end != std::string::npos && uri[end] == ':';
-}
-
-[[noreturn]] void refuse_uri(const std::string& where, const char* what) {
-  throw Error(ErrorCode::kInvalidInput, where + ": its uri " + what);
-}
-
 }  // namespace
-
-std::string resolve_uri(const std::string& scene_path, const std::string& uri,
-                        const std::string& where) {
-  if (uri.empty()) refuse_uri(where, "is empty");
-  if (has_scheme(uri) || uri[0] == '/') refuse_uri(where, "is not a relative path");
-  const auto path = percent_decoded(uri);
-  if (!path) refuse_uri(where, "has a broken percent escape");
-  if (path->find('\0') != std::string::npos) refuse_uri(where, "has a zero byte");
-  return parent_directory(scene_path) + "/" + *path;
-}
 
 void ExternalFiles::add(int buffer, const SourceFile& file) {
   const std::lock_guard lock(mutex_);
@@ -93,8 +60,9 @@ void BufferReader::check_lengths() {
 
 std::span<const std::byte> BufferReader::window(int index, uint64_t offset, size_t size) {
   const BufferSource& buffer = document_.buffers[static_cast<size_t>(index)];
-  if (buffer.kind == BufferSource::Kind::kBase64 || buffer.kind == BufferSource::Kind::kMemory)
-    return decode_base64(index, offset, size);
+  if (buffer.kind == BufferSource::Kind::kBase64) return decode_base64(index, offset, size);
+  if (buffer.kind == BufferSource::Kind::kMemory)
+    return std::as_bytes(std::span(buffer.bytes)).subspan(offset, size);
   const std::span<std::byte> bytes(window_.data(), size);
   if (buffer.kind == BufferSource::Kind::kDecoded)
     decoded_.read(index, offset, bytes, [this](int from, uint64_t begin, std::span<std::byte> out) {
@@ -129,13 +97,14 @@ void BufferReader::check_length(int index) {
     case BufferSource::Kind::kExternal:
       there = external(index).size();
       break;
-    case BufferSource::Kind::kBase64:
-    case BufferSource::Kind::kMemory: {
+    case BufferSource::Kind::kMemory:
+      there = buffer.bytes.size();
+      break;
+    case BufferSource::Kind::kBase64: {
       std::array<std::byte, 2> tail{};
-      const uint64_t characters = character_count(buffer);
-      const size_t n = static_cast<size_t>(std::min<uint64_t>(2, characters));
-      read_characters(scene_file_, buffer, characters - n, std::span(tail).first(n));
-      there = base64_bytes(characters, std::span(tail).first(n));
+      const size_t n = static_cast<size_t>(std::min<uint64_t>(2, buffer.range.size));
+      scene_file_.read_at(buffer.range.begin + buffer.range.size - n, std::span(tail).first(n));
+      there = base64_bytes(buffer.range.size, std::span(tail).first(n));
       break;
     }
   }
@@ -151,14 +120,17 @@ const ReadableFile& BufferReader::external(int index) {
   if (found != open_.end()) return *found->file;
   const std::string where = document_.path + ": buffer " + std::to_string(index);
   const std::string& uri = document_.buffers[static_cast<size_t>(index)].uri;
-  const std::string path = resolve_uri(document_.path, uri, where);
   if (open_.size() == max_open_) open_.erase(open_.begin());
+  std::unique_ptr<ReadableFile> file;
   try {
-    open_.push_back({index, files_.open_read(path)});
+    file = open_uri(files_, document_.path, uri, where);
   } catch (const Error& e) {
+    if (e.message().starts_with(where)) throw;
     throw Error(e.code(), where + ": " + e.message());
   }
-  external_files_.add(index, {path, open_.back().file->identity()});
+  refuse_lfs_pointer(*file, where);
+  external_files_.add(index, {file->path(), file->identity()});
+  open_.push_back({index, std::move(file)});
   return *open_.back().file;
 }
 
@@ -169,9 +141,9 @@ std::span<const std::byte> BufferReader::decode_base64(int index, uint64_t offse
   const uint64_t first_group = offset / 3;
   const uint64_t group_count = (offset + size + 2) / 3 - first_group;
   const uint64_t begin = 4 * first_group;
-  const uint64_t end = std::min(begin + 4 * group_count, character_count(buffer));
+  const uint64_t end = std::min(begin + 4 * group_count, buffer.range.size);
   const std::span<std::byte> characters(characters_.data(), static_cast<size_t>(end - begin));
-  read_characters(scene_file_, buffer, begin, characters);
+  scene_file_.read_at(buffer.range.begin + begin, characters);
   if (!voxdag::decode_base64(characters, window_.data()))
     refuse(document_.path,
            "buffer " + std::to_string(index) + ": a character of its data: URI is not base64");

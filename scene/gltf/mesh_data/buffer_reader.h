@@ -35,12 +35,6 @@ class ExternalFiles {
   GrowingCharge charge_;
 };
 
-// Returns the path of the file that `uri` (percent-encoded, RFC 3986) names relative to the folder
-// of the scene file. Throws Error{kInvalidInput}, beginning with `where`, for anything but a
-// relative path.
-std::string resolve_uri(const std::string& scene_path, const std::string& uri,
-                        const std::string& where);
-
 class BufferReader {
  public:
   static constexpr size_t kWindowBytes = size_t{256} << 10;

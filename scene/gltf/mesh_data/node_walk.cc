@@ -25,7 +25,9 @@ bool NodeWalk::descend() {
   }
   if (next_root_ == document_.roots.size()) return false;
   const int root = document_.roots[next_root_++];
-  enter(root, node_at(root).local);
+  const auto above = document_.above_roots.find(root);
+  enter(root, above == document_.above_roots.end() ? node_at(root).local
+                                                   : multiply(above->second, node_at(root).local));
   return true;
 }
 

@@ -1,6 +1,7 @@
 // The buffers of a scene: external files, data: URIs, the binary chunk.
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 
@@ -89,11 +90,81 @@ TEST(GltfBuffers, ExternalThatIsNotRead) {
 
 // Only relative paths are followed.
 TEST(GltfBuffers, UrisThatAreNotFollowed) {
-  for (const char* uri : {"", "/etc/passwd", "http://example.org/a.bin", "file:a.bin", "C:\\a.bin",
-                          "a%2.bin", "a%zz", "a%00b"}) {
+  for (const char* uri :
+       {"", "/etc/passwd", "http://example.org/a.bin", "file:a.bin", "C:\\a.bin", "a%00b"}) {
     const Error error = error_among({{"folder/scene", one_triangle().gltf(uri)}});
     EXPECT_EQ(error.code(), ErrorCode::kInvalidInput) << uri;
     EXPECT_NE(error.message().find("buffer 0: its uri"), std::string::npos) << error.message();
+  }
+}
+
+// Files whose names other programs write without the encoding that RFC 3986 requires.
+TEST(GltfBuffers, UrisOfOtherPrograms) {
+  const std::pair<const char*, const char*> names[] = {{"mesh.bin?v=3", "mesh.bin"},
+                                                       {"mesh.bin#part", "mesh.bin"},
+                                                       {"mesh.bin?t=12:30#a", "mesh.bin"},
+                                                       {"mesh.bin?v=3", "mesh.bin?v=3"},
+                                                       {"sub\\mesh.bin", "sub/mesh.bin"},
+                                                       {"sub\\my%20mesh.bin?v", "sub/my mesh.bin"},
+                                                       {"sub%5Cmesh.bin", "sub/mesh.bin"},
+                                                       {"sub\\mesh.bin", "sub\\mesh.bin"},
+                                                       {"example 10%.bin", "example 10%.bin"},
+                                                       {"a%2.bin", "a%2.bin"},
+                                                       {"a%zz%20b", "a%zz b"},
+                                                       {"100%25.bin", "100%25.bin"},
+                                                       {"100%25.bin", "100%.bin"},
+                                                       {"a b+c.bin", "a b+c.bin"},
+                                                       {".\\mesh.bin", "./mesh.bin"},
+                                                       {"10:30 o'clock.bin", "10:30 o'clock.bin"}};
+  const SceneBuilder scene = one_triangle();
+  for (const auto& [uri, name] : names)
+    EXPECT_EQ(triangles_among(
+                  {{"folder/scene", scene.gltf(uri)}, {std::string("folder/") + name, scene.bin}})
+                  .size(),
+              1u)
+        << uri;
+}
+
+// The file with exactly this name comes before others.
+TEST(GltfBuffers, TheExactNameComesFirst) {
+  const SceneBuilder scene = one_triangle();
+  EXPECT_EQ(triangles_among({{"folder/scene", scene.gltf("a.bin?b")},
+                             {"folder/a.bin?b", scene.bin},
+                             {"folder/a.bin", ""}})
+                .size(),
+            1u);
+  const Error missing = error_among({{"folder/scene", scene.gltf("sub\\a.bin?b")}});
+  EXPECT_EQ(missing.code(), ErrorCode::kNotFound);
+  EXPECT_NE(missing.message().find("sub\\a.bin?b"), std::string::npos) << missing.message();
+}
+
+// Backslashes at the beginning do not make a path absolute.
+TEST(GltfBuffers, BackslashesDoNotMakeAbsolutePaths) {
+  const SceneBuilder scene = one_triangle();
+  for (const char* uri : {"\\etc\\a.bin", "\\\\host\\a.bin", "%5Cetc%5Ca.bin"})
+    EXPECT_EQ(error_among({{"folder/scene", scene.gltf(uri)},
+                           {"/etc/a.bin", scene.bin},
+                           {"folder//etc/a.bin", scene.bin},
+                           {"//host/a.bin", scene.bin}})
+                  .code(),
+              ErrorCode::kNotFound)
+        << uri;
+}
+
+// A Git LFS pointer in place of a buffer is named, whatever length the buffer has.
+TEST(GltfBuffers, LfsPointers) {
+  const std::string pointer =
+      "version https://git-lfs.github.com/spec/v1\noid sha256:0123456789abcdef0123456789abcdef"
+      "0123456789abcdef0123456789abcdef\nsize 42\n";
+  for (const size_t length : {size_t{0}, size_t{1000}}) {
+    SceneBuilder scene = one_triangle();
+    scene.bin.resize(scene.bin.size() + length);
+    const Error error =
+        error_among({{"folder/scene", scene.gltf("a.bin")}, {"folder/a.bin", pointer}});
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+    EXPECT_EQ(error.message(),
+              "folder/scene: buffer 0: folder/a.bin is a Git LFS pointer, not the file itself: run "
+              "git lfs pull");
   }
 }
 
@@ -173,15 +244,48 @@ TEST(GltfBuffers, DataUriWithJsonEscapes) {
   EXPECT_EQ(triangles_of_file(file).size(), 1u);
 }
 
+// Data URIs in forms that RFC 2397 does not allow, and percent-encoded ones.
+TEST(GltfBuffers, DataUrisOfOtherPrograms) {
+  SceneBuilder scene = one_triangle();
+  for (int i = 0; i < 300; ++i) scene.bin += static_cast<char>(i);
+  const std::string text = base64(scene.bin);
+  std::string broken_lines, url_safe, escaped, percent;
+  for (size_t i = 0; i < text.size(); ++i) {
+    broken_lines += (i % 76 == 75 ? "\r\n" : "") + text.substr(i, 1);
+    url_safe += text[i] == '+' ? '-' : text[i] == '/' ? '_' : text[i];
+    escaped += text[i] == '/' ? "%2F" : text[i] == '+' ? "%2b" : text.substr(i, 1);
+  }
+  for (const unsigned char c : scene.bin) {
+    const char* const digits = "0123456789ABCDEF";
+    const bool is_plain = std::isalnum(c) || c == '-';
+    percent += is_plain ? std::string(1, static_cast<char>(c))
+                        : std::string{'%', digits[c / 16], digits[c % 16]};
+  }
+  const std::string unpadded = url_safe.substr(0, url_safe.find('='));
+  ASSERT_NE(unpadded, text);
+  for (const std::string& uri :
+       {"data:application/octet-stream;base64,\n  " + broken_lines + "\n",
+        "data:;base64," + text.substr(0, 60) + " \t" + text.substr(60), "data:;base64," + url_safe,
+        "data:;base64," + unpadded, "data:;base64," + escaped,
+        "DATA:application/octet-stream;BASE64," + text,
+        "data:application/gltf-buffer;charset=utf-8; base64 ," + text,
+        "data:application/octet-stream," + percent, "data:," + percent})
+    EXPECT_EQ(triangles_of_file(scene.gltf(uri)), triangles_of_file(one_triangle().glb()))
+        << uri.substr(0, 60);
+}
+
 TEST(GltfBuffers, BrokenDataUris) {
   const SceneBuilder scene = one_triangle();
   const std::string text = base64(scene.bin);
   const auto message = [&](const std::string& uri) {
     return error_of_file(scene.gltf(uri)).message();
   };
-  EXPECT_NE(message("data:text/plain,abc").find("is a data: URI that is not base64"),
+  EXPECT_NE(message("data:text/plain,abc").find("buffer 0 claims 42 bytes, 3 are present"),
             std::string::npos);
-  EXPECT_NE(message("data:;base64").find("is a data: URI that is not base64"), std::string::npos);
+  EXPECT_NE(message("data:;base64").find("is a data: URI without data"), std::string::npos);
+  EXPECT_NE(message("data:;base64, ?" + text.substr(1)).find("is not base64"), std::string::npos);
+  EXPECT_NE(message("data:;base64, " + text + "A").find("is not base64"), std::string::npos);
+  EXPECT_NE(message("data:;base64, AA==" + text).find("is not base64"), std::string::npos);
   EXPECT_NE(message("data:;base64," + text.substr(4)).find("buffer 0 claims 42 bytes, 39 are"),
             std::string::npos)
       << message("data:;base64," + text.substr(4));

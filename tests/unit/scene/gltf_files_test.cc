@@ -50,6 +50,136 @@ TEST(GltfContainer, TrailingBytes) {
   EXPECT_EQ(triangles_of_file(scene.glb()).size(), 1u);
 }
 
+// A GLB with these chunks after its JSON.
+std::string glb_with_chunks(std::string json,
+                            const std::vector<std::pair<std::string, std::string>>& chunks) {
+  std::string body = little_endian(static_cast<uint32_t>(json.size())) + "JSON" + json;
+  for (const auto& [type, content] : chunks)
+    body += little_endian(static_cast<uint32_t>(content.size())) + type + content;
+  return "glTF" + little_endian(2) + little_endian(static_cast<uint32_t>(12 + body.size())) + body;
+}
+
+// Chunks of other types may be anywhere, and bytes too few for a chunk are padding.
+TEST(GltfContainer, OtherChunks) {
+  SceneBuilder scene = one_triangle();
+  scene.root["buffers"] = {{{"byteLength", scene.bin.size()}}};
+  const std::string json = scene.root.dump(), bin_type("BIN\0", 4), &bin = scene.bin;
+  EXPECT_EQ(
+      triangles_of_file(glb_with_chunks(json, {{"XTRA", "12345678"}, {bin_type, bin}})).size(), 1u);
+  EXPECT_EQ(
+      triangles_of_file(
+          glb_with_chunks(json, {{"XTRA", ""}, {"MORE", "1"}, {bin_type, bin}, {"LAST", "x"}}))
+          .size(),
+      1u);
+  const std::string empty = R"({"asset":{"version":"2.0"}})";
+  for (const std::string& padding : {std::string(3, '\0'), std::string("   ")}) {
+    std::string glb = glb_with_chunks(empty, {}) + padding;
+    put_u32(glb, 8, static_cast<uint32_t>(glb.size()));
+    EXPECT_EQ(error_of_file(glb).message(), "");
+  }
+  std::string cut = glb_with_chunks(empty, {}) + "BIN";
+  put_u32(cut, 8, static_cast<uint32_t>(cut.size()));
+  EXPECT_NE(error_of_file(cut).message().find("inside the header of a chunk"), std::string::npos);
+}
+
+// The JSON may begin with a byte order mark, and end with zeros or white space.
+TEST(GltfContainer, PaddedJson) {
+  SceneBuilder scene = one_triangle();
+  scene.root["buffers"] = {{{"byteLength", scene.bin.size()}}};
+  const std::string bin_type("BIN\0", 4);
+  for (const std::string& json :
+       {scene.root.dump() + std::string(3, '\0'), scene.root.dump() + std::string(5000, '\0'),
+        "\xef\xbb\xbf" + scene.root.dump() + " \r\n", " \n" + scene.root.dump() + "\n"}) {
+    EXPECT_EQ(triangles_of_file(glb_with_chunks(json, {{bin_type, scene.bin}})).size(), 1u);
+  }
+  const std::string text = scene.gltf("data:;base64," + base64(scene.bin));
+  EXPECT_EQ(triangles_of_file("\xef\xbb\xbf" + text + std::string(7, '\0')).size(), 1u);
+  EXPECT_NE(error_of_file(text + "x").message(), "");
+}
+
+// NaN and infinities, in all spellings, count as null where they are not needed.
+TEST(GltfNumbers, NotFinite) {
+  const std::string json = one_triangle().gltf("data:;base64," + base64(one_triangle().bin));
+  const auto with = [&](const std::string& member) {
+    std::string text = json;
+    text.insert(text.find("\"bufferView\":0"), member + ",");
+    return text;
+  };
+  for (const char* number :
+       {"NaN",       "-NaN",    "nan",  "-nan(ind)", "nan(snan)", "Infinity", "-Infinity",
+        "+Infinity", "inf",     "-inf", "INF",       "1.#QNAN",   "-1.#IND",  "1.#INF",
+        "-1.#INF00", "1.#IND0", "null", "-1.5",      "1.5",       "10",       "-1"}) {
+    SCOPED_TRACE(number);
+    const std::string text = number;
+    for (const std::string& member : {"\"max\":[" + text + ",2,3]", "\"min\":[0," + text + "]",
+                                      "\"max\": [ " + text + " ]", "\"extras\":" + text}) {
+      EXPECT_EQ(triangles_of_file(with(member)).size(), 1u) << member;
+      // Across the end of a window.
+      for (const size_t blanks : {size_t{65536} - 400, size_t{65536} - 300})
+        EXPECT_EQ(
+            triangles_of_file(with("\"extras\":\"" + std::string(blanks, 'x') + "\"," + member))
+                .size(),
+            1u);
+    }
+  }
+  for (const char* number : {"NaNa", "Inf1", "1.#", "nil", "1.#INFx", "N", "-", "+1"})
+    EXPECT_NE(error_of_file(with(std::string("\"max\":[") + number + "]"))
+                  .message()
+                  .find("JSON is broken"),
+              std::string::npos)
+        << number;
+  EXPECT_EQ(error_of_file(R"({"asset":{"version":"2.0"},"nodes":[{"scale":[1,NaN,1]}]})").message(),
+            "folder/scene: nodes[0].scale[1] is null, expected a number");
+  EXPECT_EQ(error_of_file(R"({"asset":{"version":"2.0"}} NaN)").message().empty(), false);
+}
+
+// NaN at every position relative to the end of a window of the file.
+TEST(GltfNumbers, NotFiniteAcrossWindows) {
+  for (size_t shift = 0; shift < 24; ++shift) {
+    const std::string begin = R"({"asset":{"version":"2.0"},"extras":")";
+    const std::string text = begin + std::string(65536 - begin.size() - shift, 'x') +
+                             R"(","extras2":[-Infinity,NaN,-1.#INF]})";
+    EXPECT_EQ(error_of_file(text).message(), "") << shift;
+  }
+}
+
+// Integers may be written like 36.0 and 3.6e1.
+TEST(GltfNumbers, WholeNumbersWithPoints) {
+  SceneBuilder scene = textured(std::string());
+  scene.root["images"] = {{{"bufferView", 0}}};
+  std::string json = scene.gltf("data:;base64," + base64(scene.bin));
+  const auto expect_same = [&](const std::string& text) {
+    OpenScene plain(json), open(text);
+    EXPECT_EQ(open.triangles(), plain.triangles());
+    EXPECT_EQ(open.source->materials().images.size(), plain.source->materials().images.size());
+    EXPECT_EQ(texts_of(open.source->materials().warnings.list()),
+              texts_of(plain.source->materials().warnings.list()));
+  };
+  const auto number_end = [](const std::string& text, size_t at) {
+    return std::min(text.find_first_not_of("0123456789", at), text.size());
+  };
+  for (const char* suffix : {".0", ".000", "e0", ".0E+0"}) {
+    std::string text;
+    bool in_string = false;
+    for (size_t i = 0; i < json.size();) {
+      if (json[i] == '"') in_string = !in_string;
+      if (in_string || json[i] < '0' || json[i] > '9') {
+        text += json[i++];
+        continue;
+      }
+      const size_t end = number_end(json, i);
+      text += json.substr(i, end - i) + suffix;
+      i = end;
+    }
+    expect_same(text);
+  }
+  for (const char* number : {"0.5", "1e300", "-1.0", "3.6e-1", "9007199254740994.0"}) {
+    std::string text = json;
+    text.replace(text.find("\"count\":3") + 8, 1, number);
+    EXPECT_NE(error_of_file(text).message().find(".count is "), std::string::npos) << number;
+  }
+}
+
 // A file whose header declares more than 1 GiB of JSON is refused before the JSON is read.
 TEST(GltfContainer, JsonOfMoreThanTheLimit) {
   class HugeFile : public ReadableFile {
@@ -249,7 +379,7 @@ TEST(GltfModel, TextOfMaterialsIsFiltered) {
   files.contents["scene"] = scene.glb();
   MemoryBudget budget(uint64_t{1} << 20);
   const gltf::Document document =
-      gltf::read_document(*files.open_read("scene"), budget, CancelToken());
+      gltf::read_document(*files.open_read("scene"), {}, budget, CancelToken());
   const auto& materials = document.model->materials;
 
   ASSERT_EQ(materials.size(), 2u);
@@ -288,7 +418,7 @@ TEST(GltfModel, HasTheMaterials) {
   const std::string& text = files.contents["scene"] = scene.glb();
   MemoryBudget budget(uint64_t{1} << 20);
   const gltf::Document document =
-      gltf::read_document(*files.open_read("scene"), budget, CancelToken());
+      gltf::read_document(*files.open_read("scene"), {}, budget, CancelToken());
   const gltf::tinygltf::Model& model = *document.model;
 
   ASSERT_EQ(model.materials.size(), 1u);

@@ -121,6 +121,123 @@ TEST(GltfNodes, WhichSceneIsDrawn) {
   EXPECT_EQ(corners_of(scene), (std::vector<Point>{{11, 2, 3}, {31, 2, 3}, {51, 2, 3}}));
 }
 
+std::vector<Warning> warnings_of(const SceneBuilder& scene) {
+  return OpenScene(scene.glb()).source->warnings();
+}
+
+// A listed node with a parent keeps its parent's transform. A node that is listed twice, or with an
+// ancestor, is drawn once.
+TEST(GltfNodes, ListedNodesWithParents) {
+  SceneBuilder scene = corner_scene();
+  scene.add("nodes", Json::object());
+  scene.add("nodes", {{"children", {2}}, {"translation", {10, 0, 0}}});
+  scene.add("nodes", {{"children", {3, 4}}, {"translation", {0, 20, 0}}, {"mesh", 0}});
+  scene.add("nodes", {{"mesh", 0}, {"translation", {0, 0, 30}}});
+  scene.add("nodes", {{"mesh", 0}, {"translation", {0, 0, 40}}});
+  const Point all[] = {{11, 22, 3}, {11, 22, 33}, {11, 22, 43}};
+  const auto expect = [&](const std::vector<int>& listed, const std::vector<Point>& points,
+                          const std::vector<std::string>& codes) {
+    scene.root["scenes"] = {{{"nodes", listed}}};
+    EXPECT_EQ(corners_of(scene), points);
+    std::vector<std::string> found;
+    for (const Warning& warning : warnings_of(scene)) found.push_back(warning.code);
+    EXPECT_EQ(found, codes);
+  };
+  const std::vector<Point> whole(std::begin(all), std::end(all));
+  expect({1}, whole, {});
+  expect({2}, whole, {"root-with-parent"});
+  expect({4}, {all[2]}, {"root-with-parent"});
+  expect({4, 3}, {all[2], all[1]}, {"root-with-parent"});
+  expect({1, 2}, whole, {"root-with-parent"});
+  expect({2, 1}, whole, {"root-with-parent"});
+  expect({4, 1}, whole, {"root-with-parent"});
+  expect({3, 2}, whole, {"root-with-parent", "root-with-parent"});
+  expect({1, 1}, whole, {"repeated-node"});
+  expect({3, 3, 1, 2, 1}, whole, {"repeated-node", "root-with-parent"});
+  scene.root["nodes"][2]["children"] = {3, 4, 3};
+  expect({1}, whole, {"repeated-node"});
+}
+
+// A message names the scene and the node.
+TEST(GltfNodes, ListedNodesWithParentsAreNamed) {
+  SceneBuilder scene = corner_scene();
+  scene.add("nodes", Json::object());
+  scene.add("nodes", {{"children", {2}}});
+  scene.add("nodes", {{"mesh", 0}, {"name", "body"}});
+  scene.root["scenes"] = {{{"nodes", {2}}}};
+  EXPECT_EQ(texts_of(warnings_of(scene)),
+            (std::vector<std::string>{
+                "folder/scene: scene 0: node 2 \"body\": is listed although it has a parent; it "
+                "keeps its parent's transform"}));
+}
+
+// A long chain of parents, each of them with a listed child, takes linear time.
+TEST(GltfNodes, ManyListedNodesBelowAChain) {
+  constexpr int kCount = 20000;
+  SceneBuilder scene = corner_scene();
+  scene.add("nodes", Json::object());
+  for (int i = 0; i < kCount; ++i)
+    scene.add("nodes", {{"children", {i + 2}}, {"translation", {1, 0, 0}}});
+  const int deepest = scene.add("nodes", Json::object());
+  std::vector<int> listed;
+  for (int i = 0; i < kCount; ++i) listed.push_back(scene.add("nodes", {{"mesh", 0}}));
+  scene.root["nodes"][static_cast<size_t>(deepest)]["children"] = listed;
+  scene.root["scenes"] = {{{"nodes", listed}}};
+  const std::vector<Point> corners = corners_of(scene);
+  ASSERT_EQ(corners.size(), size_t{kCount});
+  EXPECT_EQ(corners.front(), (Point{kCount + 1, 2, 3}));
+  EXPECT_EQ(corners.back(), corners.front());
+}
+
+// KHR_node_visibility hides a node with its descendants, whether it is required or not.
+TEST(GltfNodes, HiddenNodes) {
+  const Json hidden = {{"KHR_node_visibility", {{"visible", false}}}};
+  SceneBuilder scene = corner_scene();
+  scene.add_root({{"mesh", 0}});
+  scene.add_root({{"mesh", 0}, {"translation", {10, 0, 0}}, {"extensions", hidden}});
+  const int child = scene.add("nodes", {{"mesh", 0}, {"translation", {20, 0, 0}}});
+  const int parent = scene.add("nodes", {{"children", {child}}});
+  scene.add_root({{"children", {parent}}, {"mesh", 0}, {"translation", {0, 30, 0}}});
+  for (const char* list : {"extensionsUsed", "extensionsRequired"}) {
+    scene.root[list] = {"KHR_node_visibility"};
+    EXPECT_EQ(corners_of(scene), (std::vector<Point>{{1, 2, 3}, {1, 32, 3}, {21, 32, 3}}));
+    EXPECT_TRUE(warnings_of(scene).empty());
+  }
+  Json& nodes = scene.root["nodes"];
+  nodes[static_cast<size_t>(parent)]["extensions"] = hidden;
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{1, 2, 3}, {1, 32, 3}}));
+  nodes[static_cast<size_t>(parent)]["extensions"]["KHR_node_visibility"]["visible"] = true;
+  EXPECT_EQ(corners_of(scene).size(), 3u);
+  nodes[static_cast<size_t>(parent)]["extensions"]["KHR_node_visibility"] = Json::object();
+  EXPECT_EQ(corners_of(scene).size(), 3u);
+  // A hidden node that is not listed hides its listed child.
+  nodes[static_cast<size_t>(parent)]["extensions"] = hidden;
+  scene.root["scenes"][0]["nodes"] = {0, child};
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{1, 2, 3}}));
+  nodes[static_cast<size_t>(parent)]["extensions"]["KHR_node_visibility"]["visible"] = "no";
+  EXPECT_THROW(corners_of(scene), Error);
+}
+
+// A hidden joint still moves the skin, and broken meshes of hidden nodes are not read.
+TEST(GltfNodes, HiddenNodesAreNotChecked) {
+  SceneBuilder scene = corner_scene();
+  scene.add_root({{"mesh", 0}});
+  scene.add_root({{"mesh", 77}, {"extensions", {{"KHR_node_visibility", {{"visible", false}}}}}});
+  EXPECT_EQ(corners_of(scene), (std::vector<Point>{{1, 2, 3}}));
+}
+
+// A scene without triangles says why.
+TEST(GltfNodes, ScenesThatDrawNoMesh) {
+  SceneBuilder scene = corner_scene();
+  for (int i = 0; i < 2; ++i)
+    scene.add_root({{"mesh", 0}, {"extensions", {{"KHR_node_visibility", {{"visible", false}}}}}});
+  EXPECT_EQ(texts_of(warnings_of(scene)),
+            (std::vector<std::string>{"folder/scene: all its nodes with meshes are hidden "
+                                      "(KHR_node_visibility) (2 times)"}));
+  scene.root["scenes"] = {{{"name", "empty"}}, {{"nodes", {0}}}};
+  EXPECT_EQ(warnings_of(scene).at(0).code, "scene-without-meshes");
+}
+
 // A rotation whose length is far from 1 is used unchanged, with a warning. A thousand such
 // rotations do not cause a thousand warnings.
 TEST(GltfNodes, RotationsThatAreNone) {

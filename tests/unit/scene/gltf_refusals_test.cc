@@ -30,8 +30,6 @@ const Refusal kRefusals[] = {
     {"a node that is its own child", "/nodes/0/children", {0}, "node 0 \"it\" is its own ancestor"},
     {"a child that is not there", "/nodes/0/children", {7}, "node 0 \"it\": child node 7"},
     {"a negative child", "/nodes/0/children", {-1}, "nodes[0].children[0] is -1"},
-    {"a root with a parent", "/nodes/1/children", {0}, "node 0 \"it\" is not a root"},
-    {"a node twice in the scene", "/scenes/0/nodes", {0, 0}, "node 0 \"it\" is listed twice"},
     {"a scene node that is not there", "/scenes/0/nodes", {0, 2}, "scene 0: node 2 does not exist"},
     {"a default scene that is not there", "/scene", 3, "scene 3 does not exist"},
     {"a mesh that is not there", "/nodes/0/mesh", 4, "node 0 \"it\": mesh 4 does not exist"},
@@ -69,8 +67,8 @@ const Refusal kRefusals[] = {
      "mesh 0: primitive 0: indices: accessor 9 does not exist"},
     {"POSITION of scalars", "/meshes/0/primitives/0/attributes/POSITION", 1,
      "POSITION: accessor 1 has 1 components, expected 3"},
-    {"POSITION of integers", "/accessors/0/componentType", kI16,
-     "accessor 0 has components of type short, expected float"},
+    {"POSITION of wide integers", "/accessors/0/componentType", kU32,
+     "accessor 0 has components of type unsigned int, expected float"},
     {"normalized floats", "/accessors/0/normalized", true, "accessor 0 has normalized"},
     {"indices of floats", "/accessors/1/componentType", kF32,
      "indices: accessor 1 has components of type float"},
@@ -96,9 +94,11 @@ const Refusal kRefusals[] = {
     {"a stride below the element", "/bufferViews/0/byteStride", 8,
      "the byteStride of bufferView 0"},
     {"a stride beyond the view", "/bufferViews/0/byteStride", 252, "ends past the 36 bytes"},
-    {"a stride over 252", "/bufferViews/0/byteStride", 256, "bufferViews[0].byteStride is 256"},
-    {"an odd stride", "/bufferViews/0/byteStride", 13, "bufferViews[0].byteStride is 13"},
-    {"indices with a stride", "/bufferViews/1/byteStride", 4, "bufferView 1 has a byteStride"},
+    {"a stride over 252", "/bufferViews/0/byteStride", 256, "ends past the 36 bytes"},
+    {"a stride of 2^62", "/bufferViews/0/byteStride", int64_t{1} << 62, "ends past the 36 bytes"},
+    {"an odd stride beyond the view", "/bufferViews/0/byteStride", 13, "ends past the 36 bytes"},
+    {"a negative stride", "/bufferViews/0/byteStride", -12, "bufferViews[0].byteStride is -12"},
+    {"indices with a stride beyond the view", "/bufferViews/1/byteStride", 4, "ends past the 6 b"},
     {"a view past its buffer", "/bufferViews/0/byteLength", 4096, "ends past the"},
     {"a view that overflows", "/bufferViews/0/byteOffset", INT64_MAX, "ends past the"},
     {"a fractional view", "/bufferViews/0/byteLength", 1e300, "bufferViews[0].byteLength is 1e"},
@@ -288,9 +288,10 @@ TEST(GltfRefusals, NamesAreMadePrintable) {
   const Error error = error_of_file(scene.glb());
   EXPECT_NE(error.message().find("node 0 \"a?b?x"), std::string::npos) << error.message();
   EXPECT_LT(error.message().size(), 200u);
-  const std::string key = error_of_file(R"({"asset":{"version":"2.0"},"meshes":[{"primitives":[)"
-                                        R"({"attributes":{"X\n2026\u001b[31m":"a"}}]}]})")
-                              .message();
+  const std::string key =
+      error_of_file(R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[)"
+                    R"({"attributes":{"X\n2026\u001b[31m":"a"}}]}]})")
+          .message();
   EXPECT_NE(key.find("attributes.X?2026?[31m is a string"), std::string::npos) << key;
 }
 
@@ -303,6 +304,84 @@ TEST(GltfRefusals, ExtensionsThatAreNot) {
   EXPECT_EQ(open.triangles().size(), 1u);
   ASSERT_EQ(open.source->warnings().size(), 1u);
   EXPECT_NE(open.source->warnings()[0].message.find("ACME_bent"), std::string::npos);
+}
+
+// Required extensions that do not move vertices cause a warning with their purpose.
+TEST(GltfExtensions, HarmlessOnesMayBeRequired) {
+  for (const char* name : {"KHR_technique_webgl", "KHR_techniques_webgl", "FB_ngon_encoding",
+                           "KHR_materials_clearcoat", "KHR_lights_punctual", "EXT_lights_ies",
+                           "KHR_xmp_json_ld", "KHR_audio_emitter", "KHR_animation_pointer"}) {
+    SCOPED_TRACE(name);
+    SceneBuilder scene = valid_scene();
+    scene.root["extensionsRequired"] = scene.root["extensionsUsed"] = {name};
+    OpenScene open(scene.glb());
+    EXPECT_EQ(open.triangles().size(), 1u);
+    const auto warnings = open.source->warnings();
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_EQ(warnings[0].code, "harmless-extension");
+    EXPECT_NE(warnings[0].message.find(name + std::string(" is not read: it ")), std::string::npos)
+        << warnings[0].message;
+  }
+}
+
+// An unknown required extension is refused, unless the user asks to ignore it.
+TEST(GltfExtensions, RequiredOnesAreIgnoredOnRequest) {
+  SceneBuilder scene = valid_scene();
+  scene.root["extensionsRequired"] = scene.root["extensionsUsed"] = {"ACME_bent", "ACME_twisted"};
+  EXPECT_NE(error_of_file(scene.glb())
+                .message()
+                .find("requires the extension ACME_bent, which voxdag does not read; "
+                      "--ignore-extension reads"),
+            std::string::npos);
+  EXPECT_THROW(OpenScene(scene.glb(), {.ignored_extensions = {"ACME_bent"}}), Error);
+  EXPECT_THROW(OpenScene(scene.glb(), {.ignored_extensions = {"ACME_"}}), Error);
+  OpenScene open(scene.glb(), {.ignored_extensions = {"ACME_twisted", "other", "ACME_bent"}});
+  EXPECT_EQ(open.triangles().size(), 1u);
+  const auto warnings = open.source->warnings();
+  ASSERT_EQ(warnings.size(), 2u);
+  EXPECT_EQ(warnings[0].code, "ignored-extension");
+  EXPECT_EQ(warnings[0].message, "the required extension ACME_bent is ignored on request");
+}
+
+// An element that breaks a rule is an error only if the drawn geometry uses it.
+TEST(GltfUnused, BrokenElementsCauseAWarning) {
+  const std::pair<const char*, Json> unused[] = {
+      {"accessors", {{"count", -1}, {"componentType", kF32}, {"type", "VEC3"}}},
+      {"accessors", {{"count", 3}, {"componentType", 5124}, {"type", "VEC3"}}},
+      {"accessors", "text"},
+      {"bufferViews", {{"buffer", 0}}},
+      {"meshes", {{"primitives", {{{"indices", 0}}}}}},
+      {"meshes", Json::object()},
+      {"skins", Json::object()},
+      {"buffers", {{"byteLength", "long"}}}};
+  for (const auto& [section, value] : unused) {
+    SCOPED_TRACE(value.dump());
+    SceneBuilder scene = valid_scene();
+    scene.root["buffers"] = {{{"byteLength", scene.bin.size()}}};
+    const int index = scene.add(section, value);
+    const std::string file = make_glb(scene.root.dump(), scene.bin);
+    OpenScene open(file);
+    EXPECT_EQ(open.triangles().size(), 1u);
+    const auto warnings = open.source->warnings();
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_EQ(warnings[0].code, "broken-element");
+    EXPECT_NE(warnings[0].message.find(section + ("[" + std::to_string(index) + "]")),
+              std::string::npos)
+        << warnings[0].message;
+  }
+}
+
+// Meshes and skins that no drawn node uses are not checked.
+TEST(GltfUnused, MeshesAndSkinsAreNotChecked) {
+  SceneBuilder scene = valid_scene();
+  const int mesh = scene.add_mesh({{"attributes", {{"POSITION", 99}}}, {"mode", 17}});
+  const int skin = scene.add("skins", {{"joints", {99}}});
+  scene.add("nodes", {{"mesh", mesh}, {"skin", skin}, {"children", {99}}});
+  scene.add("nodes", {{"mesh", 99}});
+  OpenScene open(scene.glb());
+  EXPECT_EQ(open.triangles().size(), 1u);
+  EXPECT_EQ(surfaces_of(*open.source).size(), 1u);
+  EXPECT_TRUE(open.source->warnings().empty());
 }
 
 // Invalid triangles end the build, or are dropped and counted with --skip-invalid. Vertices that no

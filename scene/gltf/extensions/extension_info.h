@@ -1,0 +1,21 @@
+// The table of known glTF extensions.
+#pragma once
+
+#include <string_view>
+
+namespace voxdag::gltf {
+
+enum class ExtensionSupport {
+  kRead,      // voxdag reads it
+  kHarmless,  // it does not move vertices, so the voxels are right without it
+  kUnknown    // the voxels may be wrong without it
+};
+
+struct ExtensionInfo {
+  ExtensionSupport support = ExtensionSupport::kUnknown;
+  const char* purpose = "";  // of a harmless extension: "it describes materials"
+};
+
+ExtensionInfo extension_info(std::string_view name);
+
+}  // namespace voxdag::gltf
