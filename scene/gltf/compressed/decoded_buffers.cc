@@ -16,9 +16,10 @@ constexpr uint64_t kTrimBytes = uint64_t{4} << 20;
 
 std::string name_of(const BufferSource& buffer) {
   return buffer.draco ? buffer.draco->where
-                      : "EXT_meshopt_compression of " + std::to_string(buffer.meshopt->count) +
-                            " elements in buffer " + std::to_string(buffer.meshopt->from.buffer) +
-                            " from byte " + std::to_string(buffer.meshopt->from.byte_offset);
+                      : std::string(buffer.meshopt->extension) + " of " +
+                            std::to_string(buffer.meshopt->count) + " elements in buffer " +
+                            std::to_string(buffer.meshopt->from.buffer) + " from byte " +
+                            std::to_string(buffer.meshopt->from.byte_offset);
 }
 
 }  // namespace

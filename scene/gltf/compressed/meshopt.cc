@@ -1,5 +1,9 @@
 // The only file that calls meshoptimizer. Its decoders allocate no memory and check their input.
+// Vertex streams of version 1 and the filter COLOR, which most versions of the library lack, have
+// decoders of their own.
 #include "scene/gltf/compressed/codecs.h"
+#include "scene/gltf/compressed/color_filter.h"
+#include "scene/gltf/compressed/vertex_stream.h"
 
 #ifdef VOXDAG_HAS_MESHOPT
 #include <meshoptimizer.h>
@@ -15,7 +19,9 @@ void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compress
   const auto count = static_cast<size_t>(view.count);
   const auto stride = static_cast<size_t>(view.stride);
   int failure = 0;
-  if (view.mode == MeshoptView::Mode::kAttributes)
+  if (view.mode == MeshoptView::Mode::kAttributes && is_vertex_stream_1(compressed))
+    failure = decode_vertex_stream_1(compressed, stride, out) ? 0 : 1;
+  else if (view.mode == MeshoptView::Mode::kAttributes)
     failure = meshopt_decodeVertexBuffer(out.data(), count, stride, from, compressed.size());
   else if (view.mode == MeshoptView::Mode::kTriangles)
     failure = meshopt_decodeIndexBuffer(out.data(), count, stride, from, compressed.size());
@@ -33,6 +39,8 @@ void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compress
       return meshopt_decodeFilterQuat(out.data(), count, stride);
     case MeshoptView::Filter::kExponential:
       return meshopt_decodeFilterExp(out.data(), count, stride);
+    case MeshoptView::Filter::kColor:
+      return decode_color_filter(out, stride);
   }
 }
 

@@ -34,13 +34,13 @@ void check_view(const Document& d, const BufferView& view, const std::string& wh
   d.check_usable("buffers", view.buffer);
   const BufferSource& buffer = at(d.buffers, view.buffer);
   const std::string name = "buffer " + std::to_string(view.buffer);
+  if (buffer.kind == BufferSource::Kind::kDecoded) check_compressed(d, view, where);
   const uint128 end = static_cast<uint128>(view.byte_offset) + view.byte_length;
   if (end > buffer.byte_length)
     refuse(d.path,
            where + " ends past the " + std::to_string(buffer.byte_length) + " bytes of " + name);
   if (buffer.kind == BufferSource::Kind::kNone)
     refuse(d.path, where + ": " + name + " has no uri and is not in the file");
-  if (buffer.kind == BufferSource::Kind::kDecoded) check_compressed(d, buffer, where);
 }
 
 void check_extent(const Document& d, const Extent& extent, const std::string& where) {

@@ -52,8 +52,11 @@ void check_layout(const MeshoptView& view, const std::string& path) {
   using Filter = MeshoptView::Filter;
   if (view.filter == Filter::kNone) return;
   if (!is_vertices) violate(".filter is for ATTRIBUTES only");
-  if (view.filter == Filter::kOctahedral && view.stride != 4 && view.stride != 8)
+  const bool is_4_or_8 = view.stride == 4 || view.stride == 8;
+  if (view.filter == Filter::kOctahedral && !is_4_or_8)
     violate(".byteStride is not 4 or 8, as OCTAHEDRAL requires");
+  if (view.filter == Filter::kColor && !is_4_or_8)
+    violate(".byteStride is not 4 or 8, as COLOR requires");
   if (view.filter == Filter::kQuaternion && view.stride != 8)
     violate(".byteStride is not 8, as QUATERNION requires");
 }
@@ -123,17 +126,16 @@ CompressedBytes bytes_of_view(const Document& d, int view, const std::string& wh
 }
 
 // Checks that the view's length and stride fit the decoded bytes.
-void check_parent(const Document& d, const BufferView& view, size_t index) {
-  const std::string where = "bufferView " + std::to_string(index);
+void check_parent(const Document& d, const BufferView& view, const std::string& where) {
   const MeshoptView& meshopt = *view.meshopt;
+  const std::string name = meshopt.extension;
   if (view.byte_length > meshopt.decoded_bytes())
     refuse(d.path, where + " has byteLength " + std::to_string(view.byte_length) +
                        ": expected at most " + std::to_string(meshopt.decoded_bytes()) +
-                       ", the bytes that its EXT_meshopt_compression decodes to");
+                       ", the bytes that its " + name + " decodes to");
   if (view.byte_stride != 0 && view.byte_stride != meshopt.stride)
     refuse(d.path, where + " has byteStride " + std::to_string(view.byte_stride) + ": expected " +
-                       std::to_string(meshopt.stride) +
-                       ", the stride of its EXT_meshopt_compression");
+                       std::to_string(meshopt.stride) + ", the stride of its " + name);
 }
 
 }  // namespace
@@ -145,7 +147,13 @@ uint64_t DracoPart::decoded_bytes() const {
   return bytes;
 }
 
-std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extension) {
+std::optional<std::pair<JsonElement, const char*>> find_meshopt(const JsonElement& extensions) {
+  for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"})
+    if (const auto extension = extensions.find(name)) return std::pair(*extension, name);
+  return std::nullopt;
+}
+
+std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extensions) {
   using ViewMode = MeshoptView::Mode;
   using Filter = MeshoptView::Filter;
   static constexpr std::pair<std::string_view, ViewMode> kModes[] = {
@@ -156,8 +164,13 @@ std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extension) {
       {"NONE", Filter::kNone},
       {"OCTAHEDRAL", Filter::kOctahedral},
       {"QUATERNION", Filter::kQuaternion},
-      {"EXPONENTIAL", Filter::kExponential}};
+      {"EXPONENTIAL", Filter::kExponential},
+      {"COLOR", Filter::kColor}};
+  const auto found = find_meshopt(extensions);
+  if (!found) return nullptr;
+  const JsonElement& extension = found->first;
   auto out = std::make_shared<MeshoptView>();
+  out->extension = found->second;
   const auto offset = extension.find("byteOffset");
   out->from = {extension.at("buffer").as_index(), offset ? offset->as_size() : 0,
                extension.at("byteLength").as_size()};
@@ -166,8 +179,8 @@ std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extension) {
   extension.at("mode");
   out->mode =
       named(extension, "mode", "ATTRIBUTES, TRIANGLES or INDICES", kModes, ViewMode::kIndices);
-  out->filter = named(extension, "filter", "NONE, OCTAHEDRAL, QUATERNION or EXPONENTIAL", kFilters,
-                      Filter::kNone);
+  out->filter = named(extension, "filter", "NONE, OCTAHEDRAL, QUATERNION, EXPONENTIAL or COLOR",
+                      kFilters, Filter::kNone);
   check_layout(*out, extension.path());
   return out;
 }
@@ -206,7 +219,6 @@ void place_meshopt_views(Document& d) {
     const bool is_there = view.buffer >= 0 && static_cast<size_t>(view.buffer) < own_buffers;
     if (!is_there || d.buffers[static_cast<size_t>(view.buffer)].kind != BufferSource::Kind::kNone)
       continue;
-    check_parent(d, view, i);
     BufferSource decoded;
     decoded.kind = BufferSource::Kind::kDecoded;
     decoded.byte_length = view.meshopt->decoded_bytes();
@@ -308,9 +320,11 @@ void place_draco_surface(Document& d, Primitive& primitive, int set) {
   for (const Replaced& r : replaced) offset += move_accessor(d, *r.accessor, buffer, offset);
 }
 
-void check_compressed(const Document& d, const BufferSource& buffer, const std::string& where) {
+void check_compressed(const Document& d, const BufferView& view, const std::string& where) {
+  const BufferSource& buffer = d.buffers[static_cast<size_t>(view.buffer)];
   const char* const name =
-      buffer.meshopt ? "EXT_meshopt_compression" : "KHR_draco_mesh_compression";
+      buffer.meshopt ? buffer.meshopt->extension : "KHR_draco_mesh_compression";
+  if (buffer.meshopt) check_parent(d, view, where);
   const CompressedBytes& from = buffer.meshopt ? buffer.meshopt->from : buffer.draco->from;
   const std::string what = where + ": its " + name;
   const auto index = static_cast<size_t>(from.buffer);

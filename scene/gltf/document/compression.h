@@ -1,13 +1,15 @@
-// Compressed geometry: EXT_meshopt_compression compresses buffer views, KHR_draco_mesh_compression
-// compresses primitives. Each becomes an additional buffer of the document, and all other code
-// reads this buffer like stored bytes. If a file also stores the geometry uncompressed (a
-// fallback), the fallback is read. So the result does not depend on the libraries that voxdag was
-// built with.
+// Compressed geometry: EXT_meshopt_compression and KHR_meshopt_compression compress buffer views,
+// KHR_draco_mesh_compression compresses primitives. Each becomes an additional buffer of the
+// document, and all other code reads this buffer like stored bytes. If a file also stores the
+// geometry uncompressed (a fallback), the fallback is read. So the result does not depend on the
+// libraries that voxdag was built with.
 #pragma once
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "scene/gltf/json/json_element.h"
@@ -26,11 +28,12 @@ struct CompressedBytes {
   uint64_t byte_length = 0;
 };
 
-// EXT_meshopt_compression of a buffer view.
+// EXT_meshopt_compression or KHR_meshopt_compression of a buffer view.
 struct MeshoptView {
   enum class Mode { kAttributes, kTriangles, kIndices };
-  enum class Filter { kNone, kOctahedral, kQuaternion, kExponential };
+  enum class Filter { kNone, kOctahedral, kQuaternion, kExponential, kColor };
 
+  const char* extension = "";  // the extension's name
   CompressedBytes from;
   uint64_t count = 0;   // number of elements
   uint64_t stride = 0;  // bytes per element
@@ -76,9 +79,13 @@ struct DracoPart {
   uint64_t decoded_bytes() const;
 };
 
-// Throws Violation for a member that is missing or of a wrong type, or for a layout that the
-// extension does not allow.
-std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extension);
+// Returns the meshopt extension of a buffer or view, if `extensions` has one, and its name.
+std::optional<std::pair<JsonElement, const char*>> find_meshopt(const JsonElement& extensions);
+
+// Throw Violation for a member that is missing or of a wrong type, or for a layout that the
+// extension does not allow. `extensions` are those of a buffer view. read_meshopt() returns null if
+// it has no meshopt extension.
+std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extensions);
 std::shared_ptr<const DracoExtension> read_draco(const JsonElement& extension);
 
 uint64_t heap_bytes(const DracoExtension& draco);
@@ -92,9 +99,9 @@ void place_draco_primitive(Document& document, Primitive& primitive, const std::
 // Adds a buffer for the accessors of the primitive's surface, if place_draco_primitive() placed its
 // positions. `set` is the n of the surface's TEXCOORD_n, if it has one.
 void place_draco_surface(Document& document, Primitive& primitive, int set);
-// Checks a buffer made by one of the functions above. Throws Error{kInvalidInput} if its compressed
-// bytes do not exist, or if voxdag was built without the library that decodes them.
-void check_compressed(const Document& document, const BufferSource& buffer,
-                      const std::string& where);
+// Checks a view of a buffer made by one of the functions above. Throws Error{kInvalidInput} if its
+// compressed bytes do not exist or decode to another layout, or if voxdag was built without the
+// library that decodes them. `where` names the view.
+void check_compressed(const Document& document, const BufferView& view, const std::string& where);
 
 }  // namespace voxdag::gltf

@@ -44,8 +44,7 @@ struct BufferSource {
   Kind kind = Kind::kNone;
   uint64_t byte_length = 0;
   bool is_read = false;  // some triangles use it; set by check_document()
-  // The buffer is a fallback for readers without EXT_meshopt_compression. It is never the BIN
-  // chunk.
+  // The buffer is a fallback for readers without meshopt extensions. It is never the BIN chunk.
   bool is_fallback = false;
   FileRange range;
   std::string uri;

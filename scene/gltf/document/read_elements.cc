@@ -232,8 +232,9 @@ BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_f
   BufferSource out;
   out.byte_length = element.at("byteLength").as_size();
   if (const auto extensions = element.find("extensions"))
-    if (const auto meshopt = extensions->find("EXT_meshopt_compression"))
-      if (const auto fallback = meshopt->find("fallback")) out.is_fallback = fallback->as_boolean();
+    if (const auto meshopt = find_meshopt(*extensions))
+      if (const auto fallback = meshopt->first.find("fallback"))
+        out.is_fallback = fallback->as_boolean();
   const auto member = element.find("uri");
   if (!member) return out;
   const std::string& text = member->as_string();
@@ -254,9 +255,7 @@ BufferView read_view(const JsonElement& element) {
   out.byte_offset = size_or_zero(element, "byteOffset");
   out.byte_length = element.at("byteLength").as_size();
   out.byte_stride = size_or_zero(element, "byteStride");
-  if (const auto extensions = element.find("extensions"))
-    if (const auto meshopt = extensions->find("EXT_meshopt_compression"))
-      out.meshopt = read_meshopt(*meshopt);
+  if (const auto extensions = element.find("extensions")) out.meshopt = read_meshopt(*extensions);
   return out;
 }
 

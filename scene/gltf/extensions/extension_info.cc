@@ -16,6 +16,7 @@ constexpr std::string_view kRead[] = {
     "KHR_materials_unlit",
     "KHR_mesh_primitive_restart",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_node_visibility",
     "KHR_texture_transform",
 };

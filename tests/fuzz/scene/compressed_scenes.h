@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/unit/scene/draco_scenes.h"
-#include "tests/unit/scene/meshopt_scenes.h"
+#include "tests/unit/scene/compressed/draco_scenes.h"
+#include "tests/unit/scene/compressed/meshopt_scenes.h"
 
 namespace voxdag::test {
 

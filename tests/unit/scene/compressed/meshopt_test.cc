@@ -1,12 +1,13 @@
-// EXT_meshopt_compression: a scene with compressed views gives the same triangles as a scene that
-// stores the decoded bytes uncompressed.
+// EXT_meshopt_compression and KHR_meshopt_compression: a scene with compressed views gives the same
+// triangles as a scene that stores the decoded bytes uncompressed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "tests/unit/scene/meshopt_scenes.h"
+#include "tests/unit/scene/compressed/meshopt_scenes.h"
+#include "tests/unit/scene/compressed/vertex_stream_writer.h"
 
 namespace voxdag::test {
 namespace {
@@ -84,6 +85,7 @@ TEST(GltfMeshopt, EqualsTheDecodedScene) {
     const auto scene =
         compressed_grid(encode_vertices(positions, 12), encode_triangles(triangles), index_bytes);
     EXPECT_EQ(triangles_of_file(meshopt_glb(scene)), expected) << index_bytes;
+    EXPECT_EQ(triangles_of_file(khr_meshopt_glb(scene)), expected) << index_bytes;
   }
 }
 
@@ -129,6 +131,60 @@ TEST(GltfMeshopt, ExponentialFilter) {
   EXPECT_EQ(triangles_of_file(meshopt_glb(compressed)), triangles_of_file(plain.glb()));
 }
 
+// Streams of version 1 are decoded with every version of the library.
+TEST(GltfMeshopt, VertexStreamsOfVersion1) {
+  const auto positions = grid_positions<float>(0);
+  const auto triangles = grid_triangles();
+  SceneBuilder plain;
+  draw(plain, plain.add_positions(positions),
+       plain.add_accessor("SCALAR", kU32, turned(triangles)));
+  const std::string bytes(reinterpret_cast<const char*>(positions.data()),
+                          positions.size() * sizeof(float));
+  const auto scene = compressed_grid(write_vertex_stream_1(bytes, 12, {0x42, 1, 0}, 1),
+                                     encode_triangles(triangles), 4);
+  EXPECT_EQ(triangles_of_file(khr_meshopt_glb(scene)), triangles_of_file(plain.glb()));
+}
+
+// COLOR stores Y, Co, Cg and alpha, which decode to red, green, blue and alpha.
+TEST(GltfMeshopt, ColorFilter) {
+  const auto read = [](int view, SceneBuilder& scene, int type, const std::string& file) {
+    Json& primitive = scene.root["meshes"][0]["primitives"][0];
+    primitive["attributes"]["COLOR_0"] = scene.add("accessors", {{"bufferView", view},
+                                                                 {"componentType", type},
+                                                                 {"normalized", true},
+                                                                 {"count", 3},
+                                                                 {"type", "VEC4"}});
+    std::vector<std::array<uint32_t, 4>> colors;
+    OpenScene open(file == "KHR" ? khr_meshopt_glb(scene) : meshopt_glb(scene));
+    for (const SurfaceCorner& corner : surfaces_of(*open.source)[0].corners)
+      colors.push_back({corner.color[0], corner.color[1], corner.color[2], corner.color[3]});
+    EXPECT_TRUE(open.source->materials().warnings.list().empty());
+    return colors;
+  };
+  const auto compressed = [&](const auto& values, int type, const char* file) {
+    SceneBuilder scene = one_triangle();
+    const size_t stride = 4 * sizeof(values[0]);
+    const int view = add_compressed(scene, encode_vertices(values, stride), 3, stride, "ATTRIBUTES",
+                                    {{"filter", "COLOR"}});
+    return read(view, scene, type, file);
+  };
+  const auto plain = [&](const auto& values, int type) {
+    SceneBuilder scene = one_triangle();
+    return read(scene.add_view(values), scene, type, "EXT");
+  };
+  // Components of 8, 6 and 2 bits: Y, Co, Cg, and alpha below the bit that marks the size.
+  const std::vector<uint8_t> encoded8 = {100, 30, 0xec, 0xff, 31, 0, 0, 0x20, 3, 0, 0, 2};
+  const std::vector<uint8_t> decoded8 = {150, 80, 90, 255, 125, 125, 125, 0, 255, 255, 255, 0};
+  EXPECT_EQ(compressed(encoded8, kU8, "KHR"), plain(decoded8, kU8));
+  EXPECT_EQ(compressed(encoded8, kU8, "EXT"), plain(decoded8, kU8));
+  // Components of 16, 12 and 8 bits.
+  const std::vector<uint16_t> encoded16 = {40000, 100,   0xff9c, 0xc000, 4095, 0,
+                                           0,     0xfff, 128,    0,      0,    0x80};
+  const std::vector<uint16_t> decoded16 = {40200, 39900, 40000, 32768, 65535, 65535,
+                                           65535, 65535, 32896, 32896, 32896, 0};
+  EXPECT_EQ(compressed(encoded16, kU16, "KHR"), plain(decoded16, kU16));
+}
+
 // Rotations of instances, which decode to quaternions of 16 bits.
 TEST(GltfMeshopt, QuaternionFilterOfInstances) {
   const std::vector<int16_t> encoded{100, 200, -300, 0x7ff0 | 3, -500, 0, 900, 0x7ff0 | 1};
@@ -171,6 +227,7 @@ TEST(GltfMeshopt, WhatDoesNotFitIsRefusedByName) {
   EXPECT_THAT(with({{"filter", "ROUND"}}, same), HasSubstr("filter is ROUND, expected NONE"));
   EXPECT_THAT(with({{"filter", "QUATERNION"}}, same), HasSubstr("not 8, as QUATERNION requires"));
   EXPECT_THAT(with({{"filter", "OCTAHEDRAL"}}, same), HasSubstr("not 4 or 8, as OCTAHEDRAL"));
+  EXPECT_THAT(with({{"filter", "COLOR"}}, same), HasSubstr("not 4 or 8, as COLOR"));
   EXPECT_THAT(with({{"byteStride", 10}}, same), HasSubstr("not a multiple of 4 up to 256"));
   EXPECT_THAT(with({{"byteStride", 16}}, same), HasSubstr("has byteStride 12: expected 16, the"));
   EXPECT_THAT(with({{"count", 3599}}, same),
@@ -244,15 +301,32 @@ TEST(GltfMeshopt, IsRefusedWithoutTheLibrary) {
 
 #endif
 
+// Views that are not used may have any fault.
+TEST(GltfMeshopt, UnusedViewsMayBeBroken) {
+  SceneBuilder scene = one_triangle();
+  const auto expected = triangles_of_file(scene.glb());
+  add_compressed(scene, {1, 2, 3}, 3, 12, "ATTRIBUTES", {{"byteLength", 1 << 20}});
+  add_compressed(scene, {1, 2, 3}, 3, 12, "ATTRIBUTES", {{"count", 1}});
+  EXPECT_EQ(triangles_of_file(meshopt_glb(scene)), expected);
+  EXPECT_EQ(triangles_of_file(khr_meshopt_glb(scene)), expected);
+}
+
 // If a view's own buffer has the uncompressed bytes, they are read, with and without the library.
 TEST(GltfMeshopt, AFallbackIsRead) {
   SceneBuilder scene = one_triangle();
   const auto expected = triangles_of_file(scene.glb());
   const Json broken = {
       {"buffer", 0}, {"byteLength", 3}, {"byteStride", 12}, {"count", 3}, {"mode", "ATTRIBUTES"}};
-  scene.root["bufferViews"][0]["extensions"]["EXT_meshopt_compression"] = broken;
-  scene.root["extensionsUsed"] = {"EXT_meshopt_compression"};
-  EXPECT_EQ(triangles_of_file(scene.glb()), expected);
+  for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
+    SceneBuilder with_extension = scene;
+    with_extension.root["bufferViews"][0]["extensions"][name] = broken;
+    with_extension.root["extensionsUsed"] = {name};
+    OpenScene open(with_extension.glb());
+    EXPECT_EQ(open.triangles(), expected);
+    EXPECT_TRUE(open.source->warnings().empty());
+    with_extension.root["extensionsRequired"] = {name};
+    EXPECT_EQ(triangles_of_file(with_extension.glb()), expected);
+  }
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <random>
 #include <thread>
 
-#include "tests/unit/scene/draco_scenes.h"
+#include "tests/unit/scene/compressed/draco_scenes.h"
 
 #ifdef VOXDAG_HAS_DRACO
 #include <draco/metadata/geometry_metadata.h>

@@ -1,4 +1,4 @@
-// Scenes with EXT_meshopt_compression.
+// Scenes with EXT_meshopt_compression, and their forms with KHR_meshopt_compression.
 #pragma once
 
 #include <string>
@@ -42,6 +42,22 @@ inline std::string meshopt_glb(const SceneBuilder& scene) {
   whole["extensionsUsed"].push_back("EXT_meshopt_compression");
   whole["extensionsRequired"] = {"EXT_meshopt_compression"};
   return make_glb(whole.dump(), scene.bin);
+}
+
+// Returns the scene with the Khronos form of the extension.
+inline std::string khr_meshopt_glb(const SceneBuilder& scene) {
+  SceneBuilder khr = scene;
+  for (Json& view : khr.root["bufferViews"]) {
+    if (!view.contains("extensions")) continue;
+    const Json extension = view["extensions"]["EXT_meshopt_compression"];
+    view["extensions"] = {{"KHR_meshopt_compression", extension}};
+  }
+  khr.root["buffers"] = {{{"byteLength", scene.bin.size()}},
+                         {{"byteLength", 1 << 30},
+                          {"extensions", {{"KHR_meshopt_compression", {{"fallback", true}}}}}}};
+  khr.root["extensionsUsed"].push_back("KHR_meshopt_compression");
+  khr.root["extensionsRequired"] = {"KHR_meshopt_compression"};
+  return make_glb(khr.root.dump(), scene.bin);
 }
 
 inline int add_accessor_of(SceneBuilder& scene, int view, int type, size_t count,
