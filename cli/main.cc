@@ -17,7 +17,7 @@ constexpr int kDefectStatus = 70;
 
 CancelToken g_cancel;
 
-// The first signal cancels the command, a second one terminates the process.
+// The first signal cancels the command; a second one terminates the process.
 void on_signal(int signal) {
   if (g_cancel.canceled()) _Exit(128 + signal);
   g_cancel.cancel();

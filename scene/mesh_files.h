@@ -1,6 +1,6 @@
 // Presents a mesh in memory as a scene file. MeshFiles is a file system with one additional path,
 // under which it provides the mesh as a PLY file. All other paths refer to the underlying file
-// system. The build reads the PLY file in windows, like every scene file. Each read generates the
+// system. The build reads the PLY file in parts, like every scene file. Each read generates the
 // requested bytes from the mesh.
 #pragma once
 

@@ -40,7 +40,8 @@ void refuse_other_options(const BuildJob& job) {
                ", this program's " + std::to_string(kWorkFormatVersion));
   const std::string requested = geometry_json(job.spec.geometry);
   if (stored->geometry != requested)
-    job.refuse("its geometry options are " + stored->geometry + ", requested are " + requested);
+    job.refuse("its geometry options are " + stored->geometry + "; the requested options are " +
+               requested);
 }
 
 // Prepares the work folder for this job. Removes the state of an earlier job if the build starts
@@ -127,7 +128,7 @@ void report_artifacts(BuildJob& job) {
   const std::vector<StoredSubvolume> leaves = job.store->leaves();
   job.report.subvolumes = leaves.size();
   job.report.artifact_bytes = job.report.artifact_nodes = 0;
-  for (const ArtifactRef& artifact : distinct_artifacts(leaves))
+  for (const ArtifactRef& artifact : distinct_artifacts(leaves, job.work.store_path()))
     job.report.artifact_bytes += artifact.bytes;
   for (const StoredSubvolume& subvolume : leaves)
     job.report.artifact_nodes += subvolume.summary.dag_nodes;

@@ -20,7 +20,7 @@ struct DagShape {
   bool operator==(const DagShape&) const = default;
 };
 
-// The position of a sub-DAG in the octree, and the hash bits of its nodes. This is a struct so that
+// The levels of a sub-DAG, from its root to its bricks, and its hash bits. This is a struct so that
 // callers name the numbers (`{.cube_level = 2, .grid_levels = 11, .hash_bits = 64}`). As adjacent
 // parameters, the numbers could be swapped by mistake.
 struct SubDagShape {

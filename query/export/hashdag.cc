@@ -145,7 +145,7 @@ class HashDagWriter {
       } else {
         throw Error(ErrorCode::kLimit,
                     job_.output + ": a node of level " + std::to_string(level) + " encloses " +
-                        count_text(count) + " voxels, but HashDAG takes less than " +
+                        count_text(count) + " voxels, but HashDAG takes fewer than " +
                         count_text(kMaxCount) + ". " + coarser_options(job_, 17) +
                         " (131072 voxels per edge) fits, or take a smaller "
                         "--region");
@@ -187,7 +187,7 @@ void require_hashdag_limits(const ExportJob& job, const SelectedDag& dag) {
            ") are needed, but the indices of HashDAG reach " + count_text(kMaxHashDagWords));
   if (nodes >= kMaxCount)
     refuse("the top " + std::to_string(top_levels(dag.grid_levels())) + " levels have " +
-           count_text(nodes) + " nodes, but HashDAG takes less than " + count_text(kMaxCount));
+           count_text(nodes) + " nodes, but HashDAG takes fewer than " + count_text(kMaxCount));
   if (job.has_colors && dag.voxels() > kMaxHashDagColors)
     refuse(count_text(dag.voxels()) + " voxels are selected, but HashDAG numbers at most " +
            count_text(kMaxHashDagColors) + " for colors (--gray leaves them out)");

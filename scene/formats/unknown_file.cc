@@ -15,6 +15,7 @@ namespace {
 constexpr size_t kFirstBytes = 512;
 
 constexpr const char* kUnpack = "unpack it first";
+constexpr const char* kRecode = "convert it first: iconv -f UTF-16 -t UTF-8 IN > OUT";
 constexpr const char* kConvert = "convert it first, for example with Blender";
 #ifdef VOXDAG_HAS_ASSIMP
 constexpr const char* kImport = "convert it first: voxdag import IN OUT.glb";
@@ -45,6 +46,8 @@ constexpr KnownFormat kKnown[] = {
     {0, "Rar!", "a RAR archive", kUnpack},
     {257, "ustar", "a tar archive", kUnpack},
     {0, "PK\x03\x04", "a zip archive, as 3MF, USDZ and KMZ files are", kUnpackOrImport},
+    {0, "\xff\xfe", "text in UTF-16", kRecode},
+    {0, "\xfe\xff", "text in UTF-16", kRecode},
     {0, "Kaydara FBX Binary", "an FBX file", kImport},
     {0, "; FBX", "an FBX file", kImport},
     {0, "BLENDER", "a Blender file", "export it as .glb"},

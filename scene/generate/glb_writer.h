@@ -13,7 +13,7 @@ namespace voxdag {
 
 class GlbWriter : public BlockSink {
  public:
-  // Writes the header and `json` immediately. Advances `progress` by stored triangles.
+  // Writes the header and `json` immediately. Advances `progress` by each triangle of the file.
   GlbWriter(FileSystem& files, const std::string& path, const std::string& json, uint64_t bin_bytes,
             Progress& progress, const CancelToken& cancel)
       : progress_(progress), cancel_(cancel), file_(files, path, json, bin_bytes) {}

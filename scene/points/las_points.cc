@@ -18,7 +18,7 @@ namespace {
 
 // Maximum number of records that are decoded in one loop.
 constexpr uint64_t kLasWindowRecords = 1024;
-// The number of kept points before every kLasBlockRecords-th record is stored.
+// Records per block. LasFile stores the number of kept points before each block.
 constexpr uint64_t kLasBlockRecords = 1024;
 
 // Calls visit(record, bytes) for records [first, first + count).

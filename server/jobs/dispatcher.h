@@ -44,8 +44,8 @@ class Dispatcher {
   // Calls stop().
   ~Dispatcher();
 
-  // Stops every build at a checkpoint and waits for all builds, up to JobLimits::stop_timeout_s.
-  // The jobs remain in the queue.
+  // Tells every build to stop at a checkpoint, and kills builds that still run after
+  // JobLimits::stop_timeout_s. The jobs remain in the queue.
   void stop();
 
   // Each of these functions throws RequestError: kNotFound for an unknown job, or kConflict if the

@@ -96,8 +96,8 @@ VOXDAG_HD inline void add_weighted_one_by_one(Texel texel, uint64_t weight, uint
   sum.weight += weight;
   sum.seen_weight += seen;
 }
-// Does the same as add_weighted_one_by_one(). Uses SSE2, if available, for two of the eight sums
-// per step.
+// Does the same as add_weighted_one_by_one(). If SSE2 is available, each of its instructions adds
+// to two of the eight sums.
 VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, ColorSum& sum) {
 #ifdef VOXDAG_SSE2
   static_assert(sizeof(ColorSum) == 4 * sizeof(__m128i));

@@ -160,6 +160,11 @@ void ObjFile::add_warnings(const Scan& scan) {
   };
   add("degenerate-faces", scan.small_faces, "a face of fewer than three corners makes no voxels");
   add("points-or-lines", scan.points_or_lines, "points and lines make no voxels");
+  if (faces_ == 0 && vertices_ > 0 && scan.points_or_lines.count == 0)
+    warnings_.add({"points-or-lines", file_->path(),
+                   "vertices without faces make no voxels; points are read from text (.xyz), PLY "
+                   "and LAS",
+                   vertices_});
   const std::string unknown =
       "the unknown statement \"" + printable(scan.unknown.keyword) + "\" is ignored";
   add("unknown-statements", scan.unknown, unknown.c_str());

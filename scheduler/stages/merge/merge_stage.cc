@@ -32,7 +32,8 @@ class StoredCheckpoint : public Checkpoint {
 
 }  // namespace
 
-std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> subvolumes) {
+std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> subvolumes,
+                                            const std::string& store_path) {
   std::vector<ArtifactRef> artifacts;
   std::map<std::pair<uint32_t, uint64_t>, ArtifactRef> seen;
   for (const StoredSubvolume& subvolume : subvolumes) {
@@ -42,7 +43,7 @@ std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> sub
     if (is_new)
       artifacts.push_back(artifact);
     else if (first->second != artifact)
-      throw Error(ErrorCode::kCorrupt, "job.db: two artifacts are at byte " +
+      throw Error(ErrorCode::kCorrupt, store_path + ": it lists two different artifacts at byte " +
                                            std::to_string(artifact.offset) + " of segment " +
                                            std::to_string(artifact.segment) + ": expected one");
   }
@@ -53,7 +54,7 @@ void merge_artifacts(BuildJob& job, GlobalFileWriter& out) {
   BuildReport& report = job.report;
   MergeInputs inputs;
   inputs.shape = job.shape();
-  inputs.artifacts = distinct_artifacts(job.store->leaves());
+  inputs.artifacts = distinct_artifacts(job.store->leaves(), job.work.store_path());
   const MemoryCharge list(job.budget, inputs.artifacts.size() * sizeof(ArtifactRef),
                           "the list of artifacts");
   inputs.open_segment = [&](uint32_t id) { return job.work.open_segment(id); };

@@ -15,7 +15,9 @@
 namespace voxdag {
 
 // Returns the different artifacts of built subvolumes. Several subvolumes may share one.
-std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> subvolumes);
+// `store_path` is the job store that lists them, for messages.
+std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> subvolumes,
+                                            const std::string& store_path);
 
 // Writes all levels to `out` and fills in the report.
 void merge_artifacts(BuildJob& job, GlobalFileWriter& out);

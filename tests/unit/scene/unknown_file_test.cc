@@ -30,6 +30,8 @@ TEST(UnknownFile, IsNamedByItsFirstBytes) {
       {"\x89PNG\r\n", "is a PNG image"},
       {"", "is empty; expected a scene"},
       {" \n\n", "begins with blanks only"},
+      {std::string("\xff\xfev\0 \0", 6), "is text in UTF-16: convert it first"},
+      {"caf\xe9 caf\xc3\xa9", "it begins with caf? caf\xc3\xa9"},
       {"hello\x1b[2J", "has an unknown format; it begins with hello?[2J"},
   };
   for (const auto& [bytes, message] : cases) {

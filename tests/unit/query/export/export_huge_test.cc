@@ -148,7 +148,7 @@ TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
   expect_not_refused(levels, "hashdag");
   ++levels[9].nodes;
   expect_refused(levels, "hashdag",
-                 "the top 10 levels have 16 777 216 nodes, but HashDAG takes less than 16 777 216",
+                 "the top 10 levels have 16 777 216 nodes, but HashDAG takes fewer than 16 777 216",
                  "16 (65536");
 }
 

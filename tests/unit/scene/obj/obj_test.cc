@@ -33,6 +33,11 @@ TEST(Obj, FacesInEveryForm) {
     EXPECT_EQ(triangles_of_file(kVertices + others + face), std::vector<Corners>{kLower}) << face;
 }
 
+TEST(Obj, VerticesWithoutFaces) {
+  EXPECT_THAT(warnings_of(kVertices), ElementsAre(HasSubstr("vertices without faces")));
+  EXPECT_THAT(warnings_of(kVertices + "p 1\n"), ElementsAre(HasSubstr("points and lines")));
+}
+
 TEST(Obj, LineEndsAndByteOrderMark) {
   const std::string text = "# comment \\\n" + kVertices + "f 1 2 3\n";
   for (const char* line_end : {"\n", "\r\n", "\r"}) {

@@ -16,8 +16,9 @@
 namespace voxdag {
 namespace {
 
-// Small triangles along a diagonal. Every tenth is far outside the grid, and every hundredth is
-// invalid. `fails_at` and `too_far_at` are indices of triangles.
+// Small triangles along a diagonal. Every tenth is far outside the grid. One in a hundred is left
+// out, as if it were invalid and dropped. read() fails at triangle `fails_at`; triangle
+// `too_far_at` has a coordinate of -1e15, too far away to be ingested.
 class Diagonal : public TriangleSource {
  public:
   static constexpr uint64_t kTriangles = 200'000;
