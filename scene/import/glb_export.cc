@@ -72,13 +72,25 @@ json GlbExport::nodes() {
   for (size_t i = 0; i < order.size(); ++i) {
     json node = node_of(*order[i]);
     for (unsigned c = 0; c < order[i]->mNumChildren; ++c) {
+      if (!order[i]->mChildren[c]) continue;  // a fault of assimp's reader of .raw files
       order.push_back(order[i]->mChildren[c]);
       node["children"].push_back(order.size());
     }
     nodes.push_back(std::move(node));
   }
   report_.nodes = nodes.size();
+  warn_of_unused_meshes();
   return nodes;
+}
+
+void GlbExport::warn_of_unused_meshes() {
+  std::vector<bool> is_used(primitives_.size());
+  for (const auto& [parts, number] : mesh_numbers_)
+    for (const unsigned part : parts) is_used[part] = true;
+  for (size_t i = 0; i < primitives_.size(); ++i)
+    if (!is_used[i] && !primitives_[i].is_null())
+      warnings_.add({"unused-mesh", scene_.path() + ": mesh " + std::to_string(i),
+                     "no node has the mesh, so it makes no voxels"});
 }
 
 json GlbExport::node_of(const aiNode& node) {

@@ -32,6 +32,7 @@ class GlbExport {
  private:
   void add_meshes(GlbArrays& arrays);
   nlohmann::json nodes();
+  void warn_of_unused_meshes();
   nlohmann::json node_of(const aiNode& node);
   std::optional<size_t> mesh_of(const aiNode& node);
 

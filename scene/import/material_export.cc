@@ -41,9 +41,9 @@ const MediaType& media_type_of(std::span<const std::byte> begin) {
   const ImageFormat* const format = image_format_of(begin);
   for (const MediaType& type : kMediaTypes)
     if (format && format->decoder == type.decoder) return type;
-  throw Error(ErrorCode::kInvalidInput, std::string("it is ") +
-                                            (format ? format->name : "of an unknown format") +
-                                            ", expected PNG, JPEG, WebP or AVIF");
+  throw Error(ErrorCode::kInvalidInput,
+              std::string("it is ") + (format ? format->name : "of an unknown format") +
+                  ", expected PNG, JPEG, WebP or AVIF; convert it with: magick IN OUT.png");
 }
 
 int wrap_mode(int mode) {

@@ -139,6 +139,15 @@ TEST_F(Import, UnitAndAxesOfFbx) {
   for (const Corners& corners : all) EXPECT_EQ(std::ranges::count(corners, inner), 1);
 }
 
+// assimp reads two meshes of this file, but only one node.
+TEST_F(Import, MeshesWithoutNodesAreWarnings) {
+  import("a.raw",
+         "a\n0.5 0.5 0.5 0 0 0 0 1 0 1 0 0\nb\n0.1 0 0 0 0 3 0 1 3 1 0 3\n"
+         "0.5 0.5 0.5 0 0 6 0 1 6 1 0 6\n");
+  EXPECT_THAT(warnings_, ElementsAre("unused-mesh"));
+  EXPECT_FALSE(triangles().empty());
+}
+
 TEST_F(Import, LossesAreWarnings) {
   const std::string extra =
       R"(<library_cameras><camera id="c"><optics><technique_common><perspective><xfov>45</xfov>
