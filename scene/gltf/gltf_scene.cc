@@ -1,5 +1,6 @@
 #include "scene/gltf/gltf_scene.h"
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "scene/gltf/document/read_document.h"
 #include "scene/gltf/materials/document_materials.h"
 #include "scene/gltf/materials/image_sources.h"
+#include "scene/gltf/mesh_data/draco_counts.h"
 #include "scene/gltf/mesh_data/index_restarts.h"
 #include "scene/gltf/mesh_data/skin_weights.h"
 #include "scene/gltf/triangle_reader.h"
@@ -18,10 +20,22 @@
 namespace voxdag::gltf {
 namespace {
 
-Document read_checked(ReadableFile& file, const SceneOptions& options, MemoryBudget& budget,
-                      const CancelToken& cancel) {
+// Corrects the counts of Draco primitives before the scene's readers exist.
+void correct_counts(FileSystem& files, const ReadableFile& file, Document& document,
+                    MemoryBudget& budget) {
+  if (std::ranges::none_of(document.buffers, [](const BufferSource& b) { return !!b.draco; }))
+    return;
+  ExternalFiles opened(file.path(), budget);
+  DecodedBuffers decoded(files, "", document, budget);
+  BufferReader buffers(files, file, document, opened, decoded, budget, 1);
+  correct_draco_counts(document, buffers);
+}
+
+Document read_checked(FileSystem& files, ReadableFile& file, const SceneOptions& options,
+                      MemoryBudget& budget, const CancelToken& cancel) {
   Document document = read_document(file, options.ignored_extensions, budget, cancel);
   check_document(document);
+  correct_counts(files, file, document, budget);
   resolve_materials(document);
   return document;
 }
@@ -76,7 +90,7 @@ class GltfScene : public TriangleSource {
         budget_(budget),
         cancel_(cancel),
         file_(std::move(file)),
-        document_(read_checked(*file_, options, budget, cancel)),
+        document_(read_checked(files, *file_, options, budget, cancel)),
         external_files_(file_->path(), budget),
         decoded_(files, options.scratch_path, document_, budget) {
     BufferReader reader = buffers(1);

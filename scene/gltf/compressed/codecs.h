@@ -16,14 +16,22 @@ struct BrokenData {
   std::string message;
 };
 
+// Maximum number of a strip's declared triangles per Draco face. A strip declares more triangles,
+// because degenerate triangles join its pieces.
+constexpr uint64_t kMaxStripTrianglesPerFace = 8;
+
 // Decodes `compressed` into `out`, whose size is view.decoded_bytes(). Throws BrokenData.
 void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compressed,
                     std::span<std::byte> out);
 
-// Passes the decoded bytes of a part to `write`, from first to last. Charges the decoder's memory
+// Passes the decoded bytes of a part to `write`, from first to last. If the part declares more
+// vertices than the data have, the surplus vertices are zeros. Charges the decoder's memory
 // to `charge` before it is allocated, and does not reduce the charge afterwards. Overwrites
 // `compressed`. Throws BrokenData, or Error{kOutOfMemory} for a part that does not fit the budget.
 void decode_draco(const DracoPart& part, std::span<std::byte> compressed, MemoryCharge& charge,
                   const std::function<void(std::span<const std::byte>)>& write);
+
+// Decodes the connectivity and returns the number of vertices. Otherwise like decode_draco().
+uint64_t count_draco_vertices(std::span<std::byte> compressed, MemoryCharge& charge);
 
 }  // namespace voxdag::gltf

@@ -38,11 +38,13 @@ constexpr uint64_t kBytesPerFaceOfTable = 64;
 constexpr uint64_t kMapBytesPerValue = 16;
 constexpr uint64_t kBytesPerAttribute = 1024;  // objects of an attribute and its decoder
 
-// Maximum number of a strip's declared triangles per Draco face. A strip declares more triangles,
-// because degenerate triangles join its pieces.
-constexpr uint64_t kMaxStripTrianglesPerFace = 8;
-
 constexpr size_t kWriteElements = 16384;
+
+// Thrown once the number of vertices is known, if only this number is needed.
+struct VertexCount {
+  uint64_t vertices;
+};
+constexpr uint64_t kCountVertices = UINT64_MAX;
 
 void charge_more(MemoryCharge& charge, uint64_t bytes) {
   const uint64_t total = charge.bytes() + bytes;
@@ -57,6 +59,7 @@ void charge_more(MemoryCharge& charge, uint64_t bytes) {
 template <class Decoder>
 class BoundedDecoder : public Decoder {
  public:
+  // `vertices`: maximum number of vertices, or kCountVertices to throw VertexCount.
   BoundedDecoder(const DracoHeader& header, uint64_t vertices, MemoryCharge& charge)
       : header_(header), vertices_(vertices), charge_(charge) {}
 
@@ -101,7 +104,8 @@ class BoundedDecoder : public Decoder {
 
   void check_attributes() {
     const draco::PointCloud& mesh = *this->point_cloud();
-    if (mesh.num_points() != vertices_)
+    if (vertices_ == kCountVertices) throw VertexCount{mesh.num_points()};
+    if (mesh.num_points() > vertices_)
       throw BrokenData{"its Draco data have " + std::to_string(mesh.num_points()) +
                        " vertices, its accessors " + std::to_string(vertices_)};
     uint64_t bytes_per_vertex = 0;
@@ -110,7 +114,7 @@ class BoundedDecoder : public Decoder {
       bytes_per_vertex += 2 * static_cast<uint64_t>(a.byte_stride()) + kMapBytesPerValue +
                           sizeof(int32_t) * static_cast<uint64_t>(a.num_components());
     }
-    charge_more(charge_, vertices_ * bytes_per_vertex);
+    charge_more(charge_, mesh.num_points() * bytes_per_vertex);
     // Called after the charge, because the charge limits the number of values to walk over.
     check_attribute_tables(attributes_, *this, admit_table_);
   }
@@ -128,8 +132,8 @@ class BoundedDecoder : public Decoder {
 };
 
 template <class Decoder>
-void decode_mesh(const DracoPart& part, const DracoHeader& header, std::span<const std::byte> data,
-                 MemoryCharge& charge, draco::Mesh& mesh) {
+void decode_as(const DracoHeader& header, std::span<const std::byte> data, MemoryCharge& charge,
+               uint64_t max_vertices, draco::Mesh& mesh) {
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char*>(data.data()), data.size());
   // Quantized values remain integers. write_dequantized() computes the positions with operations
@@ -137,7 +141,7 @@ void decode_mesh(const DracoPart& part, const DracoHeader& header, std::span<con
   draco::DecoderOptions options;
   for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::GENERIC})
     options.SetAttributeBool(type, "skip_attribute_transform", true);
-  BoundedDecoder<Decoder> decoder(header, part.vertices, charge);
+  BoundedDecoder<Decoder> decoder(header, max_vertices, charge);
   const draco::Status status = decoder.Decode(options, &buffer, &mesh);
   if (decoder.refusal) std::rethrow_exception(decoder.refusal);
   if (!status.ok())
@@ -145,6 +149,18 @@ void decode_mesh(const DracoPart& part, const DracoHeader& header, std::span<con
                      (status.error_msg_string().empty()
                           ? ""
                           : " (" + printable(status.error_msg_string()) + ")")};
+}
+
+// Decodes into `mesh`. `compressed` contains the header.
+void decode_mesh(std::span<std::byte> compressed, const DracoHeader& header, MemoryCharge& charge,
+                 uint64_t max_vertices, draco::Mesh& mesh) {
+  charge_more(charge,
+              header.faces * (kBytesPerFace + kBytesPerFaceOfTable * header.attribute_tables));
+  const std::span<const std::byte> data = compressed.subspan(header.begin);
+  if (header.is_edgebreaker)
+    decode_as<draco::MeshEdgebreakerDecoder>(header, data, charge, max_vertices, mesh);
+  else
+    decode_as<draco::MeshSequentialDecoder>(header, data, charge, max_vertices, mesh);
 }
 
 // Collects elements and writes them in pieces.
@@ -178,10 +194,10 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
     const draco::Mesh::Face& face =
         mesh.face(draco::FaceIndex(static_cast<uint32_t>(std::min(i, faces - 1))));
     for (const draco::PointIndex& corner : face) {
-      if (corner.value() >= part.vertices)
+      if (corner.value() >= mesh.num_points())
         throw BrokenData{"index " + std::to_string(corner.value()) +
                          " of its Draco data does not exist, there are " +
-                         std::to_string(part.vertices) + " vertices"};
+                         std::to_string(mesh.num_points()) + " vertices"};
       out.add(corner.value());
     }
     out.flush_if_full();
@@ -189,13 +205,24 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
   out.flush();
 }
 
-// Writes the values of all vertices, each `wanted.components` numbers of type T.
+// Writes zeros for the declared vertices that the data do not have.
 template <class T>
-void write_values(const DracoPart& part, const DracoPart::Attribute& wanted,
+void pad(const DracoPart& part, const DracoPart::Attribute& wanted, uint32_t points,
+         Writer<T>& out) {
+  for (uint64_t v = points; v < part.vertices; ++v) {
+    for (int c = 0; c < wanted.components; ++c) out.add(T{0});
+    out.flush_if_full();
+  }
+}
+
+// Writes the values of all vertices, each `wanted.components` numbers of type T. `points` is the
+// number of vertices in the data.
+template <class T>
+void write_values(const DracoPart& part, const DracoPart::Attribute& wanted, uint32_t points,
                   const draco::PointAttribute& found, const typename Writer<T>::Write& write) {
   Writer<T> out(write);
   std::array<T, 16> value{};
-  for (uint32_t v = 0; v < part.vertices; ++v) {
+  for (uint32_t v = 0; v < points; ++v) {
     const draco::AttributeValueIndex index = found.mapped_index(draco::PointIndex(v));
     if (index.value() >= found.size() ||
         !found.ConvertValue<T>(index, static_cast<int8_t>(wanted.components), value.data()))
@@ -204,11 +231,12 @@ void write_values(const DracoPart& part, const DracoPart::Attribute& wanted,
     for (int c = 0; c < wanted.components; ++c) out.add(value[static_cast<size_t>(c)]);
     out.flush_if_full();
   }
+  pad(part, wanted, points, out);
   out.flush();
 }
 
 // Writes integer * (range / max integer) + minimum, in floats, as Draco's decoders compute it.
-void write_dequantized(const DracoPart& part, const DracoPart::Attribute& wanted,
+void write_dequantized(const DracoPart& part, const DracoPart::Attribute& wanted, uint32_t points,
                        const draco::PointAttribute& found,
                        const draco::AttributeQuantizationTransform& transform,
                        const Writer<float>::Write& write) {
@@ -216,7 +244,7 @@ void write_dequantized(const DracoPart& part, const DracoPart::Attribute& wanted
   const float step = transform.range() / largest;
   Writer<float> out(write);
   std::array<int32_t, 16> value{};
-  for (uint32_t v = 0; v < part.vertices; ++v) {
+  for (uint32_t v = 0; v < points; ++v) {
     const draco::AttributeValueIndex index = found.mapped_index(draco::PointIndex(v));
     if (index.value() >= found.size() ||
         !found.ConvertValue<int32_t>(index, static_cast<int8_t>(wanted.components), value.data()))
@@ -225,6 +253,7 @@ void write_dequantized(const DracoPart& part, const DracoPart::Attribute& wanted
       out.add(static_cast<float>(value[static_cast<size_t>(c)]) * step + transform.min_value(c));
     out.flush_if_full();
   }
+  pad(part, wanted, points, out);
   out.flush();
 }
 
@@ -239,26 +268,27 @@ void write_attribute(const DracoPart& part, const DracoPart::Attribute& wanted,
     throw BrokenData{"its Draco attribute " + wanted.name + " has " +
                      std::to_string(found.num_components()) + " components, its accessor " +
                      std::to_string(wanted.components)};
+  const uint32_t points = mesh.num_points();
   draco::AttributeQuantizationTransform transform;
   if (transform.InitFromAttribute(found)) {
     if (wanted.component_type != kFloat)
       throw BrokenData{"its Draco attribute " + wanted.name + " is of floats, its accessor of " +
                        component_name(wanted.component_type)};
-    return write_dequantized(part, wanted, found, transform, write);
+    return write_dequantized(part, wanted, points, found, transform, write);
   }
   switch (wanted.component_type) {
     case kByte:
-      return write_values<int8_t>(part, wanted, found, write);
+      return write_values<int8_t>(part, wanted, points, found, write);
     case kUnsignedByte:
-      return write_values<uint8_t>(part, wanted, found, write);
+      return write_values<uint8_t>(part, wanted, points, found, write);
     case kShort:
-      return write_values<int16_t>(part, wanted, found, write);
+      return write_values<int16_t>(part, wanted, points, found, write);
     case kUnsignedShort:
-      return write_values<uint16_t>(part, wanted, found, write);
+      return write_values<uint16_t>(part, wanted, points, found, write);
     case kUnsignedInt:
-      return write_values<uint32_t>(part, wanted, found, write);
+      return write_values<uint32_t>(part, wanted, points, found, write);
     default:
-      return write_values<float>(part, wanted, found, write);
+      return write_values<float>(part, wanted, points, found, write);
   }
 }
 
@@ -278,15 +308,9 @@ void decode_draco(const DracoPart& part, std::span<std::byte> compressed, Memory
                   const std::function<void(std::span<const std::byte>)>& write) {
   const DracoHeader header = read_draco_header(compressed);
   check_faces(part, header.faces);
-  charge_more(charge,
-              header.faces * (kBytesPerFace + kBytesPerFaceOfTable * header.attribute_tables));
   try {
     draco::Mesh mesh;
-    const std::span<const std::byte> data = compressed.subspan(header.begin);
-    if (header.is_edgebreaker)
-      decode_mesh<draco::MeshEdgebreakerDecoder>(part, header, data, charge, mesh);
-    else
-      decode_mesh<draco::MeshSequentialDecoder>(part, header, data, charge, mesh);
+    decode_mesh(compressed, header, charge, part.vertices, mesh);
     check_faces(part, mesh.num_faces());
     if (part.has_indices) write_faces(part, mesh, write);
     for (const DracoPart::Attribute& attribute : part.attributes)
@@ -298,10 +322,26 @@ void decode_draco(const DracoPart& part, std::span<std::byte> compressed, Memory
   }
 }
 
+uint64_t count_draco_vertices(std::span<std::byte> compressed, MemoryCharge& charge) {
+  const DracoHeader header = read_draco_header(compressed);
+  try {
+    draco::Mesh mesh;
+    decode_mesh(compressed, header, charge, kCountVertices, mesh);
+    return mesh.num_points();
+  } catch (const VertexCount& count) {
+    return count.vertices;
+  } catch (const std::exception&) {
+    throw BrokenData{"its Draco data claim more memory than there is"};
+  }
+}
+
 #else
 
 void decode_draco(const DracoPart&, std::span<std::byte>, MemoryCharge&,
                   const std::function<void(std::span<const std::byte>)>&) {
+  throw BrokenData{"voxdag was built without libdraco"};
+}
+uint64_t count_draco_vertices(std::span<std::byte>, MemoryCharge&) {
   throw BrokenData{"voxdag was built without libdraco"};
 }
 

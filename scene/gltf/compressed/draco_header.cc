@@ -95,10 +95,13 @@ DracoHeader read_draco_header(std::span<std::byte> data) {
   header.is_edgebreaker = method == kEdgebreaker;
   if (header.is_edgebreaker) {
     header.has_valences = bytes.next() == kValenceConnectivity;
-    bytes.varint();  // number of vertices
+    header.vertices = bytes.varint();
   }
   header.faces = bytes.varint();
-  if (header.is_edgebreaker) header.attribute_tables = bytes.next();
+  if (header.is_edgebreaker)
+    header.attribute_tables = bytes.next();
+  else
+    header.vertices = bytes.varint();
   return header;
 }
 

@@ -12,6 +12,9 @@ struct DracoHeader {
   bool is_edgebreaker = false;  // false: the faces are stored one after another
   bool has_valences = false;    // edgebreaker with one context per vertex valence
   uint64_t faces = 0;
+  // Number of vertices. Edgebreaker does not count a position twice if its other attributes differ
+  // from face to face, so the decoded mesh can have more.
+  uint64_t vertices = 0;
   // Number of attributes with a separate connectivity table, because fewer corners share a value
   // than share a position. Edgebreaker only.
   uint64_t attribute_tables = 0;

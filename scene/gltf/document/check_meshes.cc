@@ -71,8 +71,7 @@ void check_weights(Document& d, const std::vector<double>& weights, const Mesh& 
            "ignored, and missing weights are 0");
 }
 
-void check_joint_sets(Document& d, const Primitive& primitive, uint64_t vertices,
-                      const std::string& where) {
+void check_joint_sets(Document& d, const Primitive& primitive, const std::string& where) {
   const AccessorUse joints{where + ": JOINTS", 4, {kUnsignedByte, kUnsignedShort}};
   const AccessorUse weights{where + ": WEIGHTS",
                             4,
@@ -83,8 +82,6 @@ void check_joint_sets(Document& d, const Primitive& primitive, uint64_t vertices
       refuse(d.path, where + " has JOINTS_n without WEIGHTS_n of the same n, or the reverse");
     check_geometry(d, set.joints, joints);
     check_geometry(d, set.weights, weights);
-    check_count(d, set.joints, vertices, joints.where);
-    check_count(d, set.weights, vertices, weights.where);
   }
 }
 
@@ -101,13 +98,13 @@ void check_triangles(Document& d, Primitive& primitive, const std::string& where
   warn_of_quantization(d, primitive.position, where + ": POSITION");
   check_geometry(d, primitive.indices,
                  {where + ": indices", 1, {kUnsignedByte, kUnsignedShort, kUnsignedInt}});
-  const uint64_t vertices = at(d.accessors, primitive.position).count;
   for (int target : primitive.targets) {
     check_geometry(d, target, displacement_use(where + ": POSITION of a morph target"));
     warn_of_quantization(d, target, where + ": POSITION of a morph target");
-    check_count(d, target, vertices, where + ": POSITION of a morph target");
   }
-  check_joint_sets(d, primitive, vertices, where);
+  check_joint_sets(d, primitive, where);
+  // Draco data can have other counts than the accessors; correct_draco_counts() checks them.
+  if (!decoded_buffer(d, primitive)) check_vertex_counts(d, primitive, where);
   warn_of_leftovers(d, primitive, where);
 }
 
@@ -192,6 +189,23 @@ std::vector<int> drawing_nodes(const Document& d) {
 }
 
 }  // namespace
+
+BufferSource* decoded_buffer(Document& d, const Primitive& primitive) {
+  const int view = at(d.accessors, primitive.position).view;
+  if (view < 0) return nullptr;
+  BufferSource& buffer = d.buffers[static_cast<size_t>(at(d.views, view).buffer)];
+  return buffer.draco ? &buffer : nullptr;
+}
+
+void check_vertex_counts(const Document& d, const Primitive& primitive, const std::string& where) {
+  const uint64_t vertices = at(d.accessors, primitive.position).count;
+  for (int target : primitive.targets)
+    check_count(d, target, vertices, where + ": POSITION of a morph target");
+  for (const JointSet& set : primitive.joint_sets) {
+    check_count(d, set.joints, vertices, where + ": JOINTS");
+    check_count(d, set.weights, vertices, where + ": WEIGHTS");
+  }
+}
 
 void check_drawn_meshes(Document& d) {
   const std::vector<int> nodes = drawing_nodes(d);

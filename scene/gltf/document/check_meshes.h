@@ -1,6 +1,8 @@
 // Checks the meshes and skins that the scene draws. All others may be broken.
 #pragma once
 
+#include <string>
+
 #include "scene/gltf/document/document.h"
 
 namespace voxdag::gltf {
@@ -8,5 +10,12 @@ namespace voxdag::gltf {
 // Marks the meshes that nodes of the scene draw. Checks these meshes and the nodes' skins and
 // instances. Places compressed primitives. Throws Error{kInvalidInput}.
 void check_drawn_meshes(Document& document);
+
+// Returns the buffer of decoded Draco data that a checked primitive's positions are in, or null.
+BufferSource* decoded_buffer(Document& document, const Primitive& primitive);
+
+// Checks that morph targets, joints and weights have as many elements as the positions.
+void check_vertex_counts(const Document& document, const Primitive& primitive,
+                         const std::string& where);
 
 }  // namespace voxdag::gltf

@@ -77,10 +77,11 @@ const Accessor& at(const Document& d, int accessor) {
   return d.accessors[static_cast<size_t>(accessor)];
 }
 
-// Adds a copy of accessor `accessor` whose packed elements begin at `offset` of buffer `buffer`,
-// and sets `accessor` to the index of the copy. Returns the bytes of all its elements.
-uint64_t move_accessor(Document& d, int& accessor, int buffer, uint64_t offset) {
+// Adds a copy of accessor `accessor` whose `count` packed elements begin at `offset` of buffer
+// `buffer`, and sets `accessor` to the index of the copy. Returns the bytes of all its elements.
+uint64_t move_accessor(Document& d, int& accessor, uint64_t count, int buffer, uint64_t offset) {
   Accessor copy = at(d, accessor);
+  copy.count = count;
   if (copy.same_as < 0) copy.same_as = accessor;
   const uint64_t bytes = copy.count * element_bytes(copy);
   copy.view = static_cast<int>(d.views.size());
@@ -274,24 +275,19 @@ void place_draco_primitive(Document& d, Primitive& primitive, const std::string&
   const std::vector<Replaced> replaced = replaced_attributes(*primitive.draco, primitive);
   for (const Replaced& r : replaced) {
     if (!exists(d, *r.accessor)) return;
-    const uint64_t count = at(d, *r.accessor).count;
-    if (count != part->vertices)
-      refuse(d.path, what + ": " + d.name_accessor(*r.accessor) + " of " + r.name + " has " +
-                         std::to_string(count) + " elements, expected " +
-                         std::to_string(part->vertices));
     add_attribute(d, r, *part);
   }
   const int buffer = add_part(d, part);
   // The decoded faces are a triangle list, whatever the original mode was.
   primitive.mode = kTriangleList;
   const uint64_t corners = part->corners;
-  move_accessor(d, primitive.indices, buffer, 0);
+  move_accessor(d, primitive.indices, corners, buffer, 0);
   Accessor& indices = d.accessors.back();
   indices.component_type = kUnsignedInt;
-  indices.count = corners;
   d.views.back().byte_length = corners * sizeof(uint32_t);
   uint64_t offset = corners * sizeof(uint32_t);
-  for (const Replaced& r : replaced) offset += move_accessor(d, *r.accessor, buffer, offset);
+  for (const Replaced& r : replaced)
+    offset += move_accessor(d, *r.accessor, part->vertices, buffer, offset);
 }
 
 void place_draco_surface(Document& d, Primitive& primitive, int set) {
@@ -307,9 +303,7 @@ void place_draco_surface(Document& d, Primitive& primitive, int set) {
   std::vector<Replaced> replaced{{primitive.draco->color, &surface.color, "COLOR_0"},
                                  {n < ids.size() ? ids[n] : -1, &surface.texture_coordinates,
                                   "TEXCOORD_" + std::to_string(set)}};
-  std::erase_if(replaced, [&](const Replaced& r) {
-    return r.id < 0 || !exists(d, *r.accessor) || at(d, *r.accessor).count != geometry->vertices;
-  });
+  std::erase_if(replaced, [&](const Replaced& r) { return r.id < 0 || !exists(d, *r.accessor); });
   if (replaced.empty()) return;
   auto part = std::make_shared<DracoPart>(*geometry);
   part->has_indices = false;
@@ -317,7 +311,8 @@ void place_draco_surface(Document& d, Primitive& primitive, int set) {
   for (const Replaced& r : replaced) add_attribute(d, r, *part);
   const int buffer = add_part(d, part);
   uint64_t offset = 0;
-  for (const Replaced& r : replaced) offset += move_accessor(d, *r.accessor, buffer, offset);
+  for (const Replaced& r : replaced)
+    offset += move_accessor(d, *r.accessor, part->vertices, buffer, offset);
 }
 
 void check_compressed(const Document& d, const BufferView& view, const std::string& where) {

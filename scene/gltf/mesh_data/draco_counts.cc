@@ -1,0 +1,120 @@
+#include "scene/gltf/mesh_data/draco_counts.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/base/error.h"
+#include "scene/gltf/compressed/codecs.h"
+#include "scene/gltf/compressed/draco_header.h"
+#include "scene/gltf/document/check_meshes.h"
+
+namespace voxdag::gltf {
+namespace {
+
+// Enough for a header without metadata.
+constexpr uint64_t kHeaderBytes = 64;
+
+// Reads up to `size` bytes of the compressed data.
+std::vector<std::byte> read_bytes(BufferReader& buffers, const CompressedBytes& from,
+                                  uint64_t size) {
+  std::vector<std::byte> bytes;
+  for (size = std::min(size, from.byte_length); bytes.size() < size;) {
+    const auto n =
+        static_cast<size_t>(std::min<uint64_t>(size - bytes.size(), BufferReader::kWindowBytes));
+    const auto window = buffers.window(from.buffer, from.byte_offset + bytes.size(), n);
+    bytes.insert(bytes.end(), window.begin(), window.end());
+  }
+  return bytes;
+}
+
+DracoHeader read_header(BufferReader& buffers, const CompressedBytes& from) {
+  try {
+    std::vector<std::byte> bytes = read_bytes(buffers, from, kHeaderBytes);
+    return read_draco_header(bytes);
+  } catch (const BrokenData&) {
+    std::vector<std::byte> bytes = read_bytes(buffers, from, BufferReader::kWindowBytes);
+    return read_draco_header(bytes);
+  }
+}
+
+// True if the data cannot have this number of vertices.
+bool contradicts(const DracoHeader& header, uint64_t vertices) {
+  if (!header.is_edgebreaker || header.attribute_tables == 0) return vertices != header.vertices;
+  return vertices < header.vertices || vertices > 3 * header.faces;
+}
+
+// Triangles that join the parts of a strip are not faces.
+bool fits_strip(const DracoPart& part, uint64_t faces) {
+  const uint64_t triangles = part.corners / 3;
+  return part.is_strip && faces <= triangles && triangles <= kMaxStripTrianglesPerFace * faces;
+}
+
+// Returns the part with the counts of its data.
+DracoPart correct(const DracoPart& part, BufferReader& buffers) {
+  DracoPart out = part;
+  buffers.check_length(part.from.buffer);
+  const DracoHeader header = read_header(buffers, part.from);
+  if (!fits_strip(part, header.faces)) out.corners = 3 * header.faces;
+  if (!contradicts(header, part.vertices)) return out;
+  MemoryCharge charge(buffers.budget(), 2 * part.from.byte_length, "Draco");
+  std::vector<std::byte> bytes = read_bytes(buffers, part.from, part.from.byte_length);
+  out.vertices = count_draco_vertices(bytes, charge);
+  return out;
+}
+
+// Returns the corrected part, or nothing if the data cannot be read.
+std::optional<DracoPart> try_correct(const DracoPart& part, BufferReader& buffers) {
+  try {
+    return correct(part, buffers);
+  } catch (const BrokenData&) {
+    return std::nullopt;
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kOutOfMemory) throw;
+    return std::nullopt;
+  }
+}
+
+// Sets the counts and places of the primitive's accessors: the indices, then the attributes, in the
+// order in which place_draco_primitive() added them.
+void replace_part(Document& d, const Primitive& primitive, BufferSource& buffer, DracoPart part) {
+  const auto indices = static_cast<size_t>(primitive.indices);
+  const auto place = [&](size_t accessor, uint64_t count, uint64_t offset) {
+    Accessor& a = d.accessors[accessor];
+    BufferView& view = d.views[static_cast<size_t>(a.view)];
+    a.count = count;
+    view.byte_offset = offset;
+    view.byte_length = count * element_bytes(a);
+    return offset + view.byte_length;
+  };
+  uint64_t offset = place(indices, part.corners, 0);
+  for (size_t k = 1; k <= part.attributes.size(); ++k)
+    offset = place(indices + k, part.vertices, offset);
+  buffer.byte_length = part.decoded_bytes();
+  buffer.draco = std::make_shared<const DracoPart>(std::move(part));
+}
+
+void correct_primitive(Document& d, const Primitive& primitive, BufferReader& buffers) {
+  BufferSource* const buffer = decoded_buffer(d, primitive);
+  if (!buffer) return;
+  const std::shared_ptr<const DracoPart> part = buffer->draco;
+  std::optional<DracoPart> corrected = try_correct(*part, buffers);
+  if (corrected && (corrected->corners != part->corners || corrected->vertices != part->vertices)) {
+    d.warn("draco-counts", part->where,
+           "the counts of its accessors differ from its Draco data, which are read");
+    replace_part(d, primitive, *buffer, std::move(*corrected));
+  }
+  check_vertex_counts(d, primitive, part->where);
+}
+
+}  // namespace
+
+void correct_draco_counts(Document& document, BufferReader& buffers) {
+  for (const Mesh& mesh : document.meshes)
+    for (const Primitive& primitive : mesh.primitives)
+      if (mesh.is_drawn && primitive.draco && primitive.makes_triangles())
+        correct_primitive(document, primitive, buffers);
+}
+
+}  // namespace voxdag::gltf
