@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import operator
 import os
+import tempfile
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Callable, SupportsIndex, Union
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from . import _native
 from ._error import Error, Path, path_text
+from ._laz import decompressed
 from ._options import PATHS, BuildOptions
 
 if TYPE_CHECKING:
@@ -39,7 +41,8 @@ def build(
     scene             one file, several files that are one scene together, or a mesh in memory: a
                       tuple of vertices (N, 3), which keep the precision of float32 or float64,
                       and triangles (M, 3), the indexes of their vertices; do not change these
-                      arrays before build() returns
+                      arrays before build() returns. A LAZ file is decompressed to a temporary LAS
+                      file next to the output, which needs laspy and lazrs
     resolution        voxels per edge of the grid, a power of two from 4 to 2^20
     output            the .vdag file to write
     progress          called up to 20 times a second; if it raises an exception, build() cancels
@@ -50,7 +53,8 @@ def build(
 
     """
     output = path_text(output)
-    return _call(_native.build, scene, resolution, output, progress, options)
+    las_prefix = f"{output}.laz-"
+    return _call(_native.build, scene, resolution, output, progress, options, las_prefix)
 
 
 def plan(
@@ -67,7 +71,8 @@ def plan(
 
     """
     output = "voxdag-plan" if output is None else path_text(output)
-    return _call(_native.plan, scene, resolution, output, progress, options)
+    with tempfile.TemporaryDirectory(prefix="voxdag-") as folder:
+        return _call(_native.plan, scene, resolution, output, progress, options, f"{folder}/")
 
 
 for _function in (build, plan):
@@ -82,6 +87,7 @@ def _call(
     output: str,
     progress: Progress | None,
     options: BuildOptions,
+    las_prefix: str,
 ) -> Any:
     resolution = operator.index(resolution)
     if not 0 < resolution < 1 << 63:
@@ -97,7 +103,8 @@ def _call(
         if given.get(name) is not None:
             given[name] = path_text(given[name])
     files, mesh = _parts_of(scene)
-    return json.loads(function(files, mesh, resolution, progress, given))
+    with decompressed(files, las_prefix) as readable:
+        return json.loads(function(readable, mesh, resolution, progress, given))
 
 
 def _parts_of(scene: Scene) -> tuple[list[str], _Arrays | None]:

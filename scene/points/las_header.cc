@@ -79,8 +79,9 @@ class LasHeaderParser {
     // LASzip sets the high bits of the point format.
     if ((stored & 0xC0) != 0)
       refuse(
-          "is a compressed LAZ file, which voxdag does not read; convert it to LAS first: in "
-          "Python, laspy.read(\"x.laz\").write(\"x.las\"), with pip install laspy[lazrs]");
+          "is a compressed LAZ file, which only voxdag's Python package reads; convert it to LAS "
+          "first: in Python, laspy.read(\"x.laz\").write(\"x.las\"), with pip install "
+          "laspy[lazrs]");
     if (stored >= std::size(kRecordLayouts))
       refuse("its LAS header gives the point format " + std::to_string(stored) +
              ", expected 0 to 10");
