@@ -64,6 +64,16 @@ Chunk read_chunk(const ReadableFile& file, uint64_t offset, uint64_t end) {
   return {read_u32(file, offset + 4), {begin, length}};
 }
 
+// Returns the offset of the chunk after `end_of_chunk`: the next multiple of four, if only there is
+// a BIN chunk. Some programs do not count the padding of a chunk in its length.
+uint64_t next_chunk(const ReadableFile& file, uint64_t end_of_chunk, uint64_t end) {
+  const auto is_bin = [&](uint64_t at) {
+    return at + kChunkHeaderBytes <= end && read_u32(file, at + 4) == kBinChunk;
+  };
+  const uint64_t aligned = (end_of_chunk + 3) / 4 * 4;
+  return !is_bin(end_of_chunk) && is_bin(aligned) ? aligned : end_of_chunk;
+}
+
 // True if the bytes from `offset` are too few for a chunk, and all zero or blank.
 bool is_padding(const ReadableFile& file, uint64_t offset, uint64_t end) {
   if (end - offset >= kChunkHeaderBytes) return false;
@@ -88,12 +98,12 @@ Container read_glb(const ReadableFile& file) {
   if (json.type != kJsonChunk) refuse(file.path(), "the first chunk of the GLB is not JSON");
   Container container{json.content, false, {}};
   // Chunks of other types may come before BIN. The padding after the last one may be incomplete.
-  uint64_t next = json.content.begin + json.content.size;
+  uint64_t next = next_chunk(file, json.content.begin + json.content.size, end);
   while (!container.has_bin && next < end && !is_padding(file, next, end)) {
     const Chunk chunk = read_chunk(file, next, end);
     container.has_bin = chunk.type == kBinChunk;
     if (container.has_bin) container.bin = chunk.content;
-    next = chunk.content.begin + chunk.content.size;
+    next = next_chunk(file, chunk.content.begin + chunk.content.size, end);
   }
   return container;
 }

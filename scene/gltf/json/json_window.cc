@@ -148,7 +148,9 @@ size_t JsonWindow::non_finite_length() const {
   const size_t sign = text.front() == '-' || text.front() == '+' ? 1 : 0;
   const std::string_view word = text.substr(sign);
   // Nearly all words end here.
-  if (!word.starts_with("1.#") && word.find_first_of("NnIi") != 0) return 0;
+  const bool begins_with_letter =
+      !word.empty() && std::string_view("NnIi").find(word.front()) != std::string_view::npos;
+  if (!begins_with_letter && !word.starts_with("1.#")) return 0;
   for (const std::string_view spelling : kNonFinite) {
     if (!std::ranges::equal(word.substr(0, spelling.size()), spelling, {}, lower)) continue;
     size_t length = spelling.size();

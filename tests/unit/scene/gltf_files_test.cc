@@ -71,11 +71,16 @@ TEST(GltfContainer, OtherChunks) {
           glb_with_chunks(json, {{"XTRA", ""}, {"MORE", "1"}, {bin_type, bin}, {"LAST", "x"}}))
           .size(),
       1u);
+  // Lengths without the padding.
+  const std::string padded = json + std::string(4 - json.size() % 4, ' ');
+  std::string glb = glb_with_chunks(padded, {{bin_type, bin}});
+  put_u32(glb, 12, static_cast<uint32_t>(json.size()));
+  EXPECT_EQ(triangles_of_file(glb).size(), 1u);
   const std::string empty = R"({"asset":{"version":"2.0"}})";
   for (const std::string& padding : {std::string(3, '\0'), std::string("   ")}) {
-    std::string glb = glb_with_chunks(empty, {}) + padding;
-    put_u32(glb, 8, static_cast<uint32_t>(glb.size()));
-    EXPECT_EQ(error_of_file(glb).message(), "");
+    std::string file = glb_with_chunks(empty, {}) + padding;
+    put_u32(file, 8, static_cast<uint32_t>(file.size()));
+    EXPECT_EQ(error_of_file(file).message(), "");
   }
   std::string cut = glb_with_chunks(empty, {}) + "BIN";
   put_u32(cut, 8, static_cast<uint32_t>(cut.size()));

@@ -161,6 +161,29 @@ TEST(Textures, InBase64Buffers) {
   }
 }
 
+// The data: URI of an image, in forms that RFC 2397 does not allow.
+TEST(Textures, InDataUrisOfOtherPrograms) {
+  const std::string png = png_of(5, 5, noise(4 * 25)), text = base64(png);
+  std::string lines, url_safe, percent;
+  for (size_t i = 0; i < text.size(); ++i) {
+    lines += (i % 20 == 19 ? "\r\n" : "") + text.substr(i, 1);
+    url_safe += text[i] == '+' ? '-' : text[i] == '/' ? '_' : text[i];
+    percent += text[i] == '+' ? "%2B" : text[i] == '/' ? "%2f" : text.substr(i, 1);
+  }
+  ASSERT_NE(url_safe, text);
+  Textures plain(textured(png).glb());
+  for (const std::string& uri :
+       {"data:image/png;base64,\n" + lines + "\n", "data:image/png;base64, " + url_safe,
+        "data:image/png;base64," + percent, "DATA:image/png; Base64," + text}) {
+    SceneBuilder scene = textured("");
+    scene.root["images"][0]["uri"] = uri;
+    Textures t(scene.glb());
+    ASSERT_TRUE(t.warnings.all.empty()) << t.warnings.all[0];
+    for (int x = 0; x < 5; ++x)
+      EXPECT_EQ(t.set->open(0)->texel(0, 0, x, 2), plain.set->open(0)->texel(0, 0, x, 2));
+  }
+}
+
 // An image that cannot be read causes a warning that names the image and a material. Other images
 // are not affected.
 TEST(Textures, BrokenImages) {
