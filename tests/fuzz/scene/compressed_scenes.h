@@ -8,6 +8,7 @@
 
 #include "tests/unit/scene/compressed/draco_scenes.h"
 #include "tests/unit/scene/compressed/meshopt_scenes.h"
+#include "tests/unit/scene/compressed/vertex_stream_writer.h"
 
 namespace voxdag::test {
 
@@ -56,6 +57,10 @@ inline std::map<std::string, std::string> compressed_scenes() {
   add("meshopt_triangles", encode_vertices(square, 12), Json::object(), false);
   add("meshopt_strip", encode_vertices(square, 12), Json::object(), true);
   add("meshopt_exponential", encode_vertices(exponents, 12), {{"filter", "EXPONENTIAL"}}, false);
+  const std::string bytes(reinterpret_cast<const char*>(square.data()),
+                          square.size() * sizeof(float));
+  add("meshopt_version_1", write_vertex_stream_1(bytes, 12, {0x42, 1, 0}, 1), Json::object(),
+      false);
 #endif
   return files;
 }
