@@ -16,6 +16,10 @@ namespace {
 // Enough for a header without metadata.
 constexpr uint64_t kHeaderBytes = 64;
 
+// Faces per document whose connectivity is decoded although the header does not contradict the
+// accessors. More would take a noticeable time.
+constexpr uint64_t kMaxCheckedFaces = 4096;
+
 // Reads up to `size` bytes of the compressed data.
 std::vector<std::byte> read_bytes(BufferReader& buffers, const CompressedBytes& from,
                                   uint64_t size) {
@@ -39,9 +43,14 @@ DracoHeader read_header(BufferReader& buffers, const CompressedBytes& from) {
   }
 }
 
+// True if the header has the number of vertices.
+bool has_exact_count(const DracoHeader& header) {
+  return !header.is_edgebreaker || header.attribute_tables == 0;
+}
+
 // True if the data cannot have this number of vertices.
 bool contradicts(const DracoHeader& header, uint64_t vertices) {
-  if (!header.is_edgebreaker || header.attribute_tables == 0) return vertices != header.vertices;
+  if (has_exact_count(header)) return vertices != header.vertices;
   return vertices < header.vertices || vertices > 3 * header.faces;
 }
 
@@ -51,13 +60,17 @@ bool fits_strip(const DracoPart& part, uint64_t faces) {
   return part.is_strip && faces <= triangles && triangles <= kMaxStripTrianglesPerFace * faces;
 }
 
-// Returns the part with the counts of its data.
-DracoPart correct(const DracoPart& part, BufferReader& buffers) {
+// Returns the part with the counts of its data. Subtracts the faces that are decoded without need
+// from `checked_faces`, and decodes no more than that.
+DracoPart correct(const DracoPart& part, BufferReader& buffers, uint64_t& checked_faces) {
   DracoPart out = part;
   buffers.check_length(part.from.buffer);
   const DracoHeader header = read_header(buffers, part.from);
   if (!fits_strip(part, header.faces)) out.corners = 3 * header.faces;
-  if (!contradicts(header, part.vertices)) return out;
+  if (!contradicts(header, part.vertices)) {
+    if (has_exact_count(header) || header.faces > checked_faces) return out;
+    checked_faces -= header.faces;
+  }
   MemoryCharge charge(buffers.budget(), 2 * part.from.byte_length, "Draco");
   std::vector<std::byte> bytes = read_bytes(buffers, part.from, part.from.byte_length);
   out.vertices = count_draco_vertices(bytes, charge);
@@ -65,9 +78,10 @@ DracoPart correct(const DracoPart& part, BufferReader& buffers) {
 }
 
 // Returns the corrected part, or nothing if the data cannot be read.
-std::optional<DracoPart> try_correct(const DracoPart& part, BufferReader& buffers) {
+std::optional<DracoPart> try_correct(const DracoPart& part, BufferReader& buffers,
+                                     uint64_t& checked_faces) {
   try {
-    return correct(part, buffers);
+    return correct(part, buffers, checked_faces);
   } catch (const BrokenData&) {
     return std::nullopt;
   } catch (const Error& error) {
@@ -95,11 +109,12 @@ void replace_part(Document& d, const Primitive& primitive, BufferSource& buffer,
   buffer.draco = std::make_shared<const DracoPart>(std::move(part));
 }
 
-void correct_primitive(Document& d, const Primitive& primitive, BufferReader& buffers) {
+void correct_primitive(Document& d, const Primitive& primitive, BufferReader& buffers,
+                       uint64_t& checked_faces) {
   BufferSource* const buffer = decoded_buffer(d, primitive);
   if (!buffer) return;
   const std::shared_ptr<const DracoPart> part = buffer->draco;
-  std::optional<DracoPart> corrected = try_correct(*part, buffers);
+  std::optional<DracoPart> corrected = try_correct(*part, buffers, checked_faces);
   if (corrected && (corrected->corners != part->corners || corrected->vertices != part->vertices)) {
     d.warn("draco-counts", part->where,
            "the counts of its accessors differ from its Draco data, which are read");
@@ -111,10 +126,11 @@ void correct_primitive(Document& d, const Primitive& primitive, BufferReader& bu
 }  // namespace
 
 void correct_draco_counts(Document& document, BufferReader& buffers) {
+  uint64_t checked_faces = kMaxCheckedFaces;
   for (const Mesh& mesh : document.meshes)
     for (const Primitive& primitive : mesh.primitives)
       if (mesh.is_drawn && primitive.draco && primitive.makes_triangles())
-        correct_primitive(document, primitive, buffers);
+        correct_primitive(document, primitive, buffers, checked_faces);
 }
 
 }  // namespace voxdag::gltf

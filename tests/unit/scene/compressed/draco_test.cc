@@ -229,6 +229,12 @@ TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
   EXPECT_EQ(strip, faces);
 }
 
+std::string message_of(const SceneBuilder& scene, ErrorCode code = ErrorCode::kInvalidInput) {
+  const Error error = error_of_file(scene.glb());
+  EXPECT_EQ(error.code(), code) << error.message();
+  return error.message();
+}
+
 // The counts of the data win: more and fewer vertices and faces, for both methods of Draco, and for
 // data whose other attributes divide vertices.
 TEST(GltfDraco, CountsOfTheDataAreRead) {
@@ -251,7 +257,8 @@ TEST(GltfDraco, CountsOfTheDataAreRead) {
         }
       };
       expect(points, 216, 0);
-      for (const uint64_t vertices : {uint64_t{1}, uint64_t{9}, 400 * points, uint64_t{1} << 31})
+      for (const uint64_t vertices :
+           {uint64_t{1}, points - 3, points + 3, 400 * points, uint64_t{1} << 31})
         expect(vertices, 216, 1);
       for (const uint64_t indices :
            {uint64_t{0}, uint64_t{3}, uint64_t{213}, uint64_t{219}, uint64_t{3} << 30})
@@ -260,6 +267,18 @@ TEST(GltfDraco, CountsOfTheDataAreRead) {
       expect(points, 3000, 1, 5);
       expect(points, 20, 1, 5);
     }
+}
+
+// Large meshes whose faces do not share normals are not decoded to check their counts. More
+// vertices than the accessors declare are an error then, and fewer are not noticed.
+TEST(GltfDraco, CountsThatTheHeaderDoesNotShow) {
+  const auto data = encode_draco(*bumpy_grid(60, true), draco::MESH_EDGEBREAKER_ENCODING, 10);
+  const auto mesh = decode_draco(data);
+  const uint64_t points = mesh->num_points();
+  EXPECT_THAT(message_of(compressed_scene(data, points - 1, 3 * mesh->num_faces())),
+              testing::HasSubstr("its accessors " + std::to_string(points - 1)));
+  EXPECT_EQ(triangles_of_file(compressed_scene(data, points + 1, 3 * mesh->num_faces()).glb()),
+            triangles_of_file(plain_scene(*mesh).glb()));
 }
 
 // The accessors of colors and texture coordinates follow the corrected count of the positions.
@@ -323,12 +342,6 @@ TEST(GltfDraco, ReadersShareWhatIsDecoded) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(equal, 4);
-}
-
-std::string message_of(const SceneBuilder& scene, ErrorCode code = ErrorCode::kInvalidInput) {
-  const Error error = error_of_file(scene.glb());
-  EXPECT_EQ(error.code(), code) << error.message();
-  return error.message();
 }
 
 TEST(GltfDraco, WhatDoesNotFitIsRefusedByName) {
