@@ -1,6 +1,7 @@
 #include "scene/text/side_files.h"
 
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include "core/base/error.h"
@@ -38,19 +39,25 @@ std::vector<std::string> candidates_of(std::string_view given) {
 
 }  // namespace
 
+std::unique_ptr<ReadableFile> open_first(FileSystem& files, const std::string& from,
+                                         std::span<const std::string> paths) {
+  std::optional<Error> first;
+  for (const std::string& path : paths) {
+    try {
+      return files.open_read(parent_directory(from) + "/" + path);
+    } catch (const Error& error) {
+      if (!first) first = error;
+    }
+  }
+  throw *first;
+}
+
 std::unique_ptr<ReadableFile> open_side_file(FileSystem& files, const std::string& from,
                                              std::string_view name) {
   const std::vector<std::string> candidates = candidates_of(name);
   if (candidates.empty() || name.find('\0') != name.npos)
     throw Error(ErrorCode::kInvalidInput, "it has no file name");
-  for (size_t i = 0;; ++i) {
-    try {
-      return files.open_read(parent_directory(from) + "/" + candidates[i]);
-    } catch (const Error&) {
-      if (i + 1 < candidates.size()) continue;
-    }
-    return files.open_read(parent_directory(from) + "/" + candidates[0]);
-  }
+  return open_first(files, from, candidates);
 }
 
 }  // namespace voxdag

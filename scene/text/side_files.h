@@ -2,12 +2,18 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 
 #include "core/io/file_system.h"
 
 namespace voxdag {
+
+// Opens the first of these paths that can be opened, relative to the folder of `from`. If none can,
+// throws the Error about the first path. There must be a path.
+std::unique_ptr<ReadableFile> open_first(FileSystem& files, const std::string& from,
+                                         std::span<const std::string> paths);
 
 // Opens the file `name`, relative to the folder of `from`, the file that refers to it. If it cannot
 // be opened, tries the name with slashes instead of backslashes, and then only its last component.

@@ -1,12 +1,12 @@
 #include "scene/gltf/uri/file_uri.h"
 
 #include <algorithm>
-#include <optional>
 #include <string_view>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "scene/gltf/uri/percent.h"
+#include "scene/text/side_files.h"
 
 namespace voxdag::gltf {
 namespace {
@@ -49,15 +49,7 @@ std::vector<std::string> candidate_paths(const std::string& uri, const std::stri
 
 std::unique_ptr<ReadableFile> open_uri(FileSystem& files, const std::string& scene_path,
                                        const std::string& uri, const std::string& where) {
-  std::optional<Error> first;
-  for (const std::string& path : candidate_paths(uri, where)) {
-    try {
-      return files.open_read(parent_directory(scene_path) + "/" + path);
-    } catch (const Error& error) {
-      if (!first) first = error;
-    }
-  }
-  throw *first;
+  return open_first(files, scene_path, candidate_paths(uri, where));
 }
 
 }  // namespace voxdag::gltf
