@@ -15,6 +15,7 @@
 #include "query/verify/color_sample.h"
 #include "query/verify/surface_sample.h"
 #include "scene/formats/formats.h"
+#include "scene/textures/find_cutouts.h"
 
 namespace voxdag::cli {
 namespace {
@@ -23,6 +24,7 @@ struct VerifyCommand {
   std::string path;
   std::vector<std::string> scenes;
   SceneOptions scene_options;
+  std::string cutouts;
   uint64_t seed = 1;
   std::string memory;
   unsigned threads = default_threads();
@@ -39,6 +41,18 @@ struct Sample {
   std::optional<query::ColorSampleReport> colors;  // for a file with attributes
 };
 
+// Returns the cutouts that the build left out.
+std::optional<Cutouts> cutouts_of(const VerifyCommand& command, const voxdag_reader::File& file,
+                                  const TriangleSource& scene, MemoryBudget& budget,
+                                  CommandContext& context) {
+  const bool is_skipped = command.cutouts.empty() ? attributes_of(file).has(Attribute::kColor)
+                                                  : command.cutouts == "skip";
+  const SceneMaterials materials = is_skipped ? scene.materials() : SceneMaterials{};
+  if (!may_have_cutouts(materials)) return std::nullopt;
+  WarningList problems;
+  return find_cutouts(context.files, materials, command.threads, budget, context.cancel, problems);
+}
+
 Sample check_against(const VerifyCommand& command, const voxdag_reader::File& file,
                      Progress& progress, CommandContext& context) {
   const Grid grid = grid_of(file);
@@ -46,14 +60,17 @@ Sample check_against(const VerifyCommand& command, const voxdag_reader::File& fi
   MemoryBudget budget(memory_limit(command.memory));
   const auto scene =
       open_scene(context.files, command.scenes, command.scene_options, budget, context.cancel);
-  const auto boxes = query::sample_surface(*scene, grid, command.seed, progress, context.cancel);
+  const std::optional<Cutouts> found = cutouts_of(command, file, *scene, budget, context);
+  const Cutouts* const cutouts = found ? &*found : nullptr;
+  const auto boxes =
+      query::sample_surface(*scene, grid, command.seed, progress, context.cancel, cutouts);
   Sample sample;
   with_reader_errors([&] {
     sample.voxels = query::compare_with_sample(file, boxes);
     if (has_attributes)
       sample.colors = query::compare_sampled_colors(
           file, grid, context.files, *scene, command.seed, file.path() + ".images.vdspill",
-          command.threads, budget, progress, context.cancel);
+          command.threads, budget, progress, context.cancel, cutouts);
   });
   return sample;
 }
@@ -116,6 +133,8 @@ void declare(Command& command, VerifyCommand& state) {
                  "memory for the scene of --against; default: half the RAM");
   command.flag("--skip-invalid", state.scene_options.skip_invalid,
                "drop invalid triangles of the scene, as the build did");
+  command.option("--cutouts", state.cutouts, "skip or keep, as in the build")
+      .one_of({"skip", "keep"});
   command.option("--point-radius", state.scene_options.point_radius,
                  "half edge of the cube that replaces each point, as in the build");
   command.option("--columns", state.scene_options.columns,

@@ -39,6 +39,8 @@ BuildSpec checked(const BuildSpec& spec) {
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();
   if (g.attributes.any() && !g.color_resolution)
     out.geometry.color_resolution = std::min(g.resolution, kColorResolution);
+  if (g.cutouts == CutoutRule::kDefault)
+    out.geometry.cutouts = g.attributes[Attribute::kColor] ? CutoutRule::kSkip : CutoutRule::kKeep;
   return out;
 }
 

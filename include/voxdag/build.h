@@ -35,6 +35,11 @@ namespace voxdag {
 enum class BackendName { kAuto, kCpu, kCuda, kParallelHost };
 enum class MethodName { kDefault, kConsing, kPointers, kHashes };
 
+// Cutouts are parts of a surface that its material makes invisible (alpha modes MASK and BLEND).
+// kSkip leaves out voxels in which all surfaces are cut out; kKeep ignores cutouts. kDefault is
+// kSkip with colors, and kKeep without.
+enum class CutoutRule { kDefault, kSkip, kKeep };
+
 struct BuildOptions {
   // The scene: files (glTF 2.0, PLY, OBJ, STL, LAS, text with points), a mesh in memory, or both.
   // The files and the mesh form one scene.
@@ -58,7 +63,8 @@ struct BuildOptions {
   // without them, with a warning.
   std::vector<std::string> ignore_extension;
   bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
-  uint32_t hash_bits = 64;    // bits of the node hash, 4 to 64
+  CutoutRule cutouts = CutoutRule::kDefault;
+  uint32_t hash_bits = 64;  // bits of the node hash, 4 to 64
   // The attributes to store for each cell of the color grid. `color_resolution` is the number of
   // cells per edge of this grid, a power of two. 0 means the smaller of `resolution` and 4096.
   bool color = false, alpha = false, normal = false, material = false;

@@ -10,6 +10,7 @@
 #include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
+#include "scene/textures/find_cutouts.h"
 #include "scene/textures/texture_set.h"
 
 namespace voxdag::query {
@@ -175,7 +176,7 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
                                          FileSystem& files, TriangleSource& scene, uint64_t seed,
                                          const std::string& scratch_path, unsigned threads,
                                          MemoryBudget& budget, Progress& progress,
-                                         const CancelToken& cancel) {
+                                         const CancelToken& cancel, const Cutouts* cutouts) {
   const AttributeSet attributes = attributes_of(file);
   const ColorGrid grid = sampled_grid(file);
   std::vector<SampledRegion> regions = draw_regions(file, grid, seed);
@@ -189,16 +190,17 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
                                          ") differs from the scene's list (" +
                                          std::to_string(materials.names.size()) +
                                          ") in number, names or order");
+  if (cutouts) materials = with_separate_images(std::move(materials), *cutouts);
   if (!attributes.use_images()) materials.drop_images();
   progress.begin_stage("images", materials.images.size(), "images");
-  const auto textures =
-      TextureSet::prepare(files, materials, scratch_path, threads, budget, progress, cancel);
+  const auto textures = TextureSet::prepare(files, materials, scratch_path, threads, budget,
+                                            progress, cancel, cutouts);
   progress.end_stage();
 
   const MemoryCharge baking(budget, RegionBaker<TextureReader>::kMaxBytes, "baking colors");
   MemoryCharge values_charge(budget, 0, "normals and materials of a sampled region");
   const auto reader = textures->open(budget.available() / 2);
-  RegionBaker<TextureReader> baker(grid, textures->materials(), *reader, attributes);
+  RegionBaker<TextureReader> baker(grid, textures->materials(), *reader, attributes, cutouts);
   std::vector<ColoredCell> cells;
   std::vector<CellValues> values;
   ColorSampleReport report;

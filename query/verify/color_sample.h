@@ -8,6 +8,7 @@
 
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
+#include "core/color/cutouts/cutouts.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
@@ -30,12 +31,13 @@ struct ColorSampleReport {
 
 // Compares the attributes of `file`, which must have at least one, with `scene`, which must be the
 // scene of the build. `grid` is the file's grid. Makes one pass over the scene. Stores large images
-// in a scratch file at `scratch_path`. Throws Error{kCorrupt} with the first wrong region, and the
-// errors of TextureSet::prepare().
+// in a scratch file at `scratch_path`. `cutouts`: the cutouts that the file leaves out, or null.
+// Throws Error{kCorrupt} with the first wrong region, and the errors of TextureSet::prepare().
 ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const Grid& grid,
                                          FileSystem& files, TriangleSource& scene, uint64_t seed,
                                          const std::string& scratch_path, unsigned threads,
                                          MemoryBudget& budget, Progress& progress,
-                                         const CancelToken& cancel);
+                                         const CancelToken& cancel,
+                                         const Cutouts* cutouts = nullptr);
 
 }  // namespace voxdag::query

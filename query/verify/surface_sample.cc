@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/color/cutouts/visible_part.h"
 #include "core/geometry/overlap.h"
 
 namespace voxdag::query {
@@ -67,30 +68,65 @@ double area(const FixedTriangle& t) {
   return std::sqrt(sum);
 }
 
-// Calls `visit` with every triangle that may touch the grid.
-template <class Visit>
-void for_each_snapped(TriangleSource& scene, const Grid& grid, Progress& progress,
-                      const CancelToken& cancel, Visit visit) {
-  scene.for_each_batch([&](std::span<const WorldTriangle> batch) {
-    cancel.check();
-    progress.advance(batch.size());
-    for (const WorldTriangle& world : batch) {
-      FixedTriangle triangle;
-      const SnapResult result = snap_triangle(grid, world, triangle);
-      if (result == SnapResult::kTooFar)
-        throw Error(
-            ErrorCode::kLimit,
-            "a triangle of the scene reaches into the file's grid and has a vertex 2^32 or more "
-            "voxels away from the grid's low corner: expected a scene that voxdag can build");
-      if (result == SnapResult::kInside) visit(triangle);
-    }
-  });
-}
+// Calls visit(triangle, surface) with every triangle that may touch the grid. `surface` is null
+// without cutouts.
+class SnappedScene {
+ public:
+  SnappedScene(TriangleSource& scene, const Grid& grid, bool has_cutouts, Progress& progress,
+               const CancelToken& cancel)
+      : scene_(scene),
+        grid_(grid),
+        has_cutouts_(has_cutouts),
+        progress_(progress),
+        cancel_(cancel) {}
 
-std::vector<FixedTriangle> draw_triangles(TriangleSource& scene, const Grid& grid, Random& random,
-                                          Progress& progress, const CancelToken& cancel) {
+  template <class Visit>
+  void for_each(const Visit& visit) const {
+    const auto for_batch = [&](const auto& batch) {
+      cancel_.check();
+      progress_.advance(batch.size());
+      for (const auto& triangle : batch) add(triangle, visit);
+    };
+    if (has_cutouts_)
+      scene_.open(1)->read_surfaces(0, scene_.declared_triangles(), for_batch);
+    else
+      scene_.for_each_batch(for_batch);
+  }
+
+ private:
+  bool snap(const WorldTriangle& world, FixedTriangle& triangle) const {
+    const SnapResult result = snap_triangle(grid_, world, triangle);
+    if (result == SnapResult::kTooFar)
+      throw Error(
+          ErrorCode::kLimit,
+          "a triangle of the scene reaches into the file's grid and has a vertex 2^32 or more "
+          "voxels away from the grid's low corner: expected a scene that voxdag can build");
+    return result == SnapResult::kInside;
+  }
+  template <class Visit>
+  void add(const WorldTriangle& world, const Visit& visit) const {
+    FixedTriangle triangle;
+    if (snap(world, triangle)) visit(triangle, nullptr);
+  }
+  template <class Visit>
+  void add(const SurfaceTriangle& world, const Visit& visit) const {
+    FixedSurface surface;
+    if (!snap(world.position, surface.position)) return;
+    surface.corners = world.corners;
+    surface.material = world.material;
+    visit(surface.position, &surface);
+  }
+
+  TriangleSource& scene_;
+  const Grid& grid_;
+  const bool has_cutouts_;
+  Progress& progress_;
+  const CancelToken& cancel_;
+};
+
+std::vector<FixedTriangle> draw_triangles(const SnappedScene& scene, Random& random) {
   Reservoir uniform(kSampleBoxes / 2), by_area(kSampleBoxes / 2);
-  for_each_snapped(scene, grid, progress, cancel, [&](const FixedTriangle& triangle) {
+  scene.for_each([&](const FixedTriangle& triangle, const FixedSurface*) {
     uniform.offer(triangle, 1.0, random);
     by_area.offer(triangle, area(triangle), random);
   });
@@ -125,8 +161,9 @@ SampleBox box_around(const std::array<int64_t, 3>& voxel, const Grid& grid, Rand
   return box;
 }
 
-// Sets the voxels of the box that the triangle touches.
-void mark(const FixedTriangle& t, SampleBox& box) {
+// Sets the voxels of the box that the triangle touches, and in which it is visible. `part` is null
+// if the triangle is not cut out.
+void mark(const FixedTriangle& t, const VisiblePart* part, SampleBox& box) {
   int64_t first[3], last[3], corner[3];
   for (int a = 0; a < 3; ++a) {
     first[a] = std::max(box.low[a], t.low(a) >> kUnitBits);
@@ -141,18 +178,22 @@ void mark(const FixedTriangle& t, SampleBox& box) {
         const int64_t low[3] = {x * kUnitsPerVoxel, y * kUnitsPerVoxel, z * kUnitsPerVoxel};
         const size_t bit = static_cast<size_t>(
             ((x - box.low[0]) * kBoxEdge + (y - box.low[1])) * kBoxEdge + (z - box.low[2]));
-        if (!box.set[bit] && triangle_touches_cube(t, low, kUnitsPerVoxel)) box.set.set(bit);
+        if (!box.set[bit] && triangle_touches_cube(t, low, kUnitsPerVoxel) &&
+            (!part || part->is_visible({x, y, z})))
+          box.set.set(bit);
       }
 }
 
 }  // namespace
 
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
-                                      Progress& progress, const CancelToken& cancel) {
+                                      Progress& progress, const CancelToken& cancel,
+                                      const Cutouts* cutouts) {
+  const SnappedScene snapped(scene, grid, cutouts != nullptr, progress, cancel);
   progress.begin_stage("sample", 2 * scene.declared_triangles(), "triangles");
   Random random(seed);
   std::vector<SampleBox> boxes;
-  for (const FixedTriangle& triangle : draw_triangles(scene, grid, random, progress, cancel)) {
+  for (const FixedTriangle& triangle : draw_triangles(snapped, random)) {
     // Maximum number of random points per triangle. The first ones may be outside the grid, because
     // a triangle may be mostly outside the grid.
     constexpr int kTries = 16;
@@ -162,12 +203,16 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
   }
   std::sort(boxes.begin(), boxes.end(),
             [](const SampleBox& a, const SampleBox& b) { return a.low[0] < b.low[0]; });
-  for_each_snapped(scene, grid, progress, cancel, [&](const FixedTriangle& triangle) {
+  snapped.for_each([&](const FixedTriangle& triangle, const FixedSurface* surface) {
+    std::optional<VisiblePart> part;
+    if (surface && cutouts->may_cut(surface->material))
+      part.emplace(*surface, *cutouts, grid.levels);
     const int64_t first = (triangle.low(0) >> kUnitBits) - kBoxEdge + 1;
     const int64_t last = triangle.high(0) >> kUnitBits;
     auto box = std::lower_bound(boxes.begin(), boxes.end(), first,
                                 [](const SampleBox& b, int64_t x) { return b.low[0] < x; });
-    for (; box != boxes.end() && box->low[0] <= last; ++box) mark(triangle, *box);
+    for (; box != boxes.end() && box->low[0] <= last; ++box)
+      mark(triangle, part ? &*part : nullptr, *box);
   });
   progress.end_stage();
   return boxes;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/progress.h"
+#include "core/color/cutouts/cutouts.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/geometry/grid.h"
 #include "scene/triangle_source.h"
@@ -29,8 +30,10 @@ struct SampleBox {
 };
 
 // Computes a sample. Returns at most kSampleBoxes boxes, and none if no triangle touches the grid.
+// `cutouts`: the cutouts that the file leaves out, or null.
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
-                                      Progress& progress, const CancelToken& cancel);
+                                      Progress& progress, const CancelToken& cancel,
+                                      const Cutouts* cutouts = nullptr);
 
 struct SampleReport {
   uint64_t boxes = 0;

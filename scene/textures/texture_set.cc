@@ -10,6 +10,8 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
+#include "core/color/cutouts/hidden.h"
+#include "core/color/rule/texture_lookup.h"
 #include "core/format/checksum.h"
 #include "core/image/image_reader.h"
 #include "scene/messages.h"
@@ -23,8 +25,10 @@ namespace {
 // Converts rows of pixels to texels: linear light by a table, alpha unchanged.
 class TexelRow {
  public:
-  TexelRow(const ImageReader& image, MemoryBudget& budget)
-      : is_wide_(image.bits() == 16),
+  // `cut_by`: a material with a mask of this image, or null.
+  TexelRow(const ImageReader& image, const Material* cut_by, MemoryBudget& budget)
+      : cut_by_(cut_by),
+        is_wide_(image.bits() == 16),
         bytes_(budget, size_t{image.width()} * (is_wide_ ? 8 : 4), "a row of an image"),
         texels_(budget, image.width(), "a row of an image"),
         table_(is_wide_ ? 65536 : 256) {
@@ -37,10 +41,22 @@ class TexelRow {
       texels_[x] = linear(channel(4 * x)) | linear(channel(4 * x + 1)) << 16 |
                    linear(channel(4 * x + 2)) << 32 |
                    (is_wide_ ? channel(4 * x + 3) : channel(4 * x + 3) * 257) << 48;
+    if (cut_by_)
+      for (uint64_t& texel : std::span(texels_.data(), texels_.size())) texel = visible(texel);
     return {texels_.data(), texels_.size()};
   }
 
  private:
+  // Multiplies a texel by its visible part.
+  uint64_t visible(uint64_t texel) const {
+    const uint32_t alpha = color::channel(texel, 3);
+    if (color::is_hidden(*cut_by_, alpha)) return 0;
+    if (cut_by_->alpha_mode == AlphaMode::kMask) return texel | uint64_t{kFullIntensity} << 48;
+    uint64_t out = uint64_t{alpha} << 48;
+    for (int c = 0; c < 3; ++c)
+      out |= uint64_t{color::scaled(color::channel(texel, c), alpha)} << 16 * c;
+    return out;
+  }
   uint64_t linear(uint64_t value) const { return table_[value]; }
   uint64_t channel(size_t i) const {
     if (!is_wide_) return static_cast<uint8_t>(bytes_[i]);
@@ -49,6 +65,7 @@ class TexelRow {
     return value;
   }
 
+  const Material* const cut_by_;
   const bool is_wide_;
   PageBuffer<std::byte> bytes_;
   PageBuffer<uint64_t> texels_;
@@ -191,11 +208,12 @@ std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageS
 class TextureSet::Builder {
  public:
   Builder(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
-          const CancelToken& cancel)
+          const CancelToken& cancel, const Cutouts* cutouts)
       : files_(files),
         materials_(materials),
         budget_(budget),
         cancel_(cancel),
+        cutouts_(cutouts),
         set_(new TextureSet(budget)),
         users_(materials.images.size()),
         problems_(materials.images.size()),
@@ -285,7 +303,7 @@ class TextureSet::Builder {
   }
 
   void decode_image(size_t i, ImageReader& image) {
-    TexelRow row(image, budget_);
+    TexelRow row(image, cut_by(static_cast<uint32_t>(i)), budget_);
     PyramidBuilder builder(levels_[i], budget_,
                            [&](uint64_t first, std::span<const uint64_t> texels) {
                              cancel_.check();
@@ -293,6 +311,14 @@ class TextureSet::Builder {
                            });
     for (uint32_t y = 0; y < image.height(); ++y) builder.add_row(row.read(image));
     expect_unchanged(files_, materials_.images[i]);
+  }
+
+  // Returns a material with a mask of the image, or null.
+  const Material* cut_by(uint32_t image) const {
+    for (uint32_t m = 0; cutouts_ && m < materials_.materials.size(); ++m)
+      if (materials_.materials[m].image == image && cutouts_->mask(m))
+        return &cutouts_->materials[m];
+    return nullptr;
   }
 
   void write_pages(uint64_t first, std::span<const uint64_t> texels) {
@@ -310,6 +336,7 @@ class TextureSet::Builder {
   const SceneMaterials& materials_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
+  const Cutouts* const cutouts_;
   std::unique_ptr<TextureSet> set_;
   std::unique_ptr<WritableFile> writer_;  // writes the scratch file; null if none is needed
   // Held shared by every thread that decodes. Held exclusively by a thread whose image did not fit
@@ -324,8 +351,8 @@ class TextureSet::Builder {
 std::unique_ptr<TextureSet> TextureSet::prepare(FileSystem& files, const SceneMaterials& materials,
                                                 const std::string& path, unsigned threads,
                                                 MemoryBudget& budget, Progress& progress,
-                                                const CancelToken& cancel) {
-  Builder builder(files, materials, budget, cancel);
+                                                const CancelToken& cancel, const Cutouts* cutouts) {
+  Builder builder(files, materials, budget, cancel, cutouts);
   builder.measure(threads);
   builder.reserve(path);
   builder.decode(threads, progress);

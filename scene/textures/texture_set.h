@@ -3,6 +3,10 @@
 // no column or row, for any image size. The texels depend only on the scene, never on memory or
 // threads.
 //
+// With cutouts, the texels of an image whose materials have a mask are multiplied by alpha. Then
+// the coarser levels also have no light of hidden texels. Alpha is 0 for hidden texels, and 1 for
+// visible texels of materials with the alpha mode MASK.
+//
 // The pyramids are kept in memory if they take at most half of the free budget. Otherwise they are
 // in a scratch file. Images are decoded row by row.
 //
@@ -21,6 +25,7 @@
 
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
+#include "core/color/cutouts/cutouts.h"
 #include "core/io/file_system.h"
 #include "scene/textures/texture_reader.h"
 #include "scene/triangle_source.h"
@@ -38,11 +43,13 @@ class TextureSet {
   // The scratch file is created at `path`, in an existing folder, only if it is needed. Its name is
   // removed as soon as it is open. Throws Error{kOutOfMemory} with image and material, {kNoSpace},
   // {kIo}, {kCanceled}, and {kInvalidInput} for an image file that changed since the scene was
-  // opened. `files` and `budget` must outlive the set.
+  // opened. `files` and `budget` must outlive the set. With `cutouts`, no image may be used by
+  // materials with different masks (with_separate_images()).
   static std::unique_ptr<TextureSet> prepare(FileSystem& files, const SceneMaterials& materials,
                                              const std::string& path, unsigned threads,
                                              MemoryBudget& budget, Progress& progress,
-                                             const CancelToken& cancel);
+                                             const CancelToken& cancel,
+                                             const Cutouts* cutouts = nullptr);
 
   // The materials of the scene. `image` is kNoImage for unreadable images.
   const std::vector<Material>& materials() const { return materials_; }

@@ -50,6 +50,11 @@ void fields(Visitor& visit, GeometryOptions& g) {
   visit(option("hash_bits", "bits of a node's hash that count").range(4, 64).key(true),
         g.hash_bits);
   visit(option("skip_invalid", "drop and count invalid triangles").key(true), g.skip_invalid);
+  visit(option("cutouts", "leave out voxels whose surfaces are cut out by alpha, or keep them")
+            .unset_means("skip with colors, otherwise keep")
+            .or_unset()
+            .key(g.cutouts == CutoutRule::kSkip),
+        g.cutouts);
   visit(option("point_radius", "half edge of the cube that replaces each point, in scene units")
             .above_zero()
             .unset_means("a point sets one voxel"),

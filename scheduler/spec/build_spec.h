@@ -27,6 +27,7 @@ constexpr std::array<const char*, 4> enum_names(BackendName) {
 constexpr std::array<const char*, 4> enum_names(MethodName) {
   return {"", "consing", "pointers", "hashes"};
 }
+constexpr std::array<const char*, 3> enum_names(CutoutRule) { return {"", "skip", "keep"}; }
 enum class ClusterEngine { kNone, kSlurm };
 constexpr std::array<const char*, 2> enum_names(ClusterEngine) { return {"", "slurm"}; }
 
@@ -37,6 +38,7 @@ struct GeometryOptions {
   std::optional<std::array<double, 4>> bounds;  // X, Y, Z of the low corner, EDGE
   std::optional<double> voxel_size;
   bool skip_invalid = false;
+  CutoutRule cutouts = CutoutRule::kDefault;
   std::optional<double> point_radius;         // half edge of the cube that replaces each point
   std::string columns;                        // names of the columns of text files with points
   std::vector<std::string> ignore_extension;  // required extensions of glTF files

@@ -4,6 +4,7 @@
 #include <limits>
 #include <string>
 
+#include "scheduler/triangles/chunk.h"
 #include "scheduler/triangles/triangle_file.h"
 
 namespace voxdag {
@@ -53,6 +54,14 @@ void append_surface(const FixedSurface& surface, bool has_image, std::vector<std
   if (flags & kColored)
     for (const SurfaceCorner& corner : surface.corners)
       for (const uint16_t value : corner.color) sink.put(value);
+}
+
+void append_identity(const FixedSurface& surface, const Cutouts* cutouts, size_t record_bytes,
+                     std::vector<std::byte>& out) {
+  const size_t at = out.size();
+  out.resize(at + record_bytes);
+  encode_triangle(surface.position, record_bytes, out.data() + at);
+  if (cutouts && cutouts->may_cut(surface.material)) append_surface(surface, true, out);
 }
 
 std::optional<FixedSurface> SurfaceRecords::next() {

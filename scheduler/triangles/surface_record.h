@@ -16,6 +16,7 @@
 #include <span>
 #include <vector>
 
+#include "core/color/cutouts/cutouts.h"
 #include "core/color/surface.h"
 #include "core/format/bytes.h"
 #include "scheduler/triangles/record_store.h"
@@ -26,6 +27,12 @@ inline constexpr size_t kMaxSurfaceRecordBytes = 1 + 4 + 9 * 8 + 6 * 8 + 12 * 2;
 
 // Appends the record of a surface. `has_image` is true if its material has a readable image.
 void append_surface(const FixedSurface& surface, bool has_image, std::vector<std::byte>& out);
+
+// Appends the data of a snapped triangle that decide which voxels it sets: its positions as a
+// record of `record_bytes` bytes (chunk.h) and, if it may be cut out, the record of its surface.
+// `cutouts` may be null.
+void append_identity(const FixedSurface& surface, const Cutouts* cutouts, size_t record_bytes,
+                     std::vector<std::byte>& out);
 
 // Reads the records in `bytes`, in the form that append_surface() writes. The caller has verified
 // the checksum of the bytes. Invalid records are reported as damage of the file.

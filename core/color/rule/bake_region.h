@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "core/color/color_sum.h"
+#include "core/color/cutouts/visible_part.h"
 #include "core/color/rule/cell_triangle.h"
 #include "core/color/rule/closest_point.h"
 #include "core/color/rule/color_grid.h"
@@ -48,11 +49,12 @@ class RegionBaker {
   static constexpr uint32_t kTriangleCells = 4u << (2 * kRegionLevels);
 
   // The references must outlive this object. Each triangle's material is an index into `materials`.
+  // With `cutouts`, a triangle contributes only to the cells in which it is visible.
   // `wanted`: the values that finish() computes in addition to colors. The value for materials is
   // Material::number.
   RegionBaker(const ColorGrid& grid, std::span<const Material> materials, Textures& textures,
-              const AttributeSet& wanted = {})
-      : grid_(grid), materials_(materials), textures_(textures), cells_(wanted) {
+              const AttributeSet& wanted = {}, const Cutouts* cutouts = nullptr)
+      : grid_(grid), materials_(materials), textures_(textures), cutouts_(cutouts), cells_(wanted) {
     waiting_.reserve(kMaxWaiting);
     for (int a = 0; a < 3; ++a)
       for (uint32_t k = 0; k < 64; ++k)
@@ -122,7 +124,8 @@ class RegionBaker {
       if (box.high[a] < first_[a] || box.low[a] > last_[a]) return;
     if (box.low[0] == box.high[0] && box.low[1] == box.high[1] && box.low[2] == box.high[2] &&
         !may_cover(triangle)) {
-      wait(index, code_of(box.low));
+      const auto part = visible_part(triangles_[index]);
+      if (!part || part->is_visible_in(cell_at(box.low))) wait(index, code_of(box.low));
     } else if (color::is_narrow(triangle)) {
       add_in<int64_t>(index, box);
     } else {
@@ -162,7 +165,7 @@ class RegionBaker {
       if (collected_ == 0) return;
       if (!look_)
         look_.emplace(surface_, baker_.materials_[surface_.material], baker_.textures_,
-                      triangle_.cell_bits, triangle_.area);
+                      triangle_.cell_bits, triangle_.area, baker_.has_mask(surface_.material));
       for (Cell& added : std::span(batch_).first(collected_)) {
         const color::ColumnTotals totals = color::totals_of(added.columns);
         added.weight = covered_.weight(totals);
@@ -215,8 +218,16 @@ class RegionBaker {
       low[d] = first_[a];
     }
     CoveredCells<Int> covered(*this, surface, triangle);
+    const std::optional<VisiblePart> part = visible_part(surface);
     color::TouchedCells<Int>(triangle, range)
         .visit([&](int64_t p, int64_t q, int64_t r, uint32_t columns) {
+          if (part) {
+            int64_t cell[3];
+            cell[triangle.axis[0]] = p;
+            cell[triangle.axis[1]] = q;
+            cell[triangle.axis[2]] = r;
+            if (!part->is_visible_in(cell_at(cell))) return;
+          }
           const uint32_t code =
               spread[0][p - low[0]] | spread[1][q - low[1]] | spread[2][r - low[2]];
           if (columns == 0)
@@ -244,7 +255,7 @@ class RegionBaker {
       const FixedSurface& surface = triangles_[waiting.triangle];
       if (!look || last != waiting.triangle) {
         look.emplace(surface, materials_[surface.material], textures_, grid_.cell_bits(),
-                     color::area_of(surface.position));
+                     color::area_of(surface.position), has_mask(surface.material));
         if (cells_.attributes().is_needed()) facing = facing_of(surface);
       }
       last = waiting.triangle;
@@ -260,6 +271,17 @@ class RegionBaker {
     return color::facing_of(surface, materials_[surface.material].number);
   }
 
+  bool has_mask(uint32_t material) const { return cutouts_ && cutouts_->mask(material); }
+  // Returns the visible part of a surface, if it may be cut out.
+  std::optional<VisiblePart> visible_part(const FixedSurface& surface) const {
+    if (!cutouts_ || !cutouts_->may_cut(surface.material)) return std::nullopt;
+    return VisiblePart(surface, *cutouts_, grid_.levels);
+  }
+  Cube cell_at(const int64_t (&position)[3]) const {
+    return {grid_.color_levels,
+            {static_cast<uint32_t>(position[0]), static_cast<uint32_t>(position[1]),
+             static_cast<uint32_t>(position[2])}};
+  }
   uint32_t code_of(const int64_t (&position)[3]) const {
     return spread_[0][position[0] - first_[0]] | spread_[1][position[1] - first_[1]] |
            spread_[2][position[2] - first_[2]];
@@ -277,6 +299,7 @@ class RegionBaker {
   const ColorGrid grid_;
   const std::span<const Material> materials_;
   Textures& textures_;
+  const Cutouts* const cutouts_;
   uint32_t spread_[3][64];  // per axis, the bits of a coordinate in a code
   std::span<const FixedSurface> triangles_;
   uint32_t max_cells_ = 0;

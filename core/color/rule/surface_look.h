@@ -126,9 +126,13 @@ VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, 
 template <class Textures>
 class SurfaceLook {
  public:
+  // `is_cut`: the material has a mask, so the texels of its image are multiplied by alpha.
   VOXDAG_HD SurfaceLook(const FixedSurface& surface, const Material& material, Textures& textures,
-                        int cell_bits, double area)
-      : corners_(surface.corners.data()), material_(material) {
+                        int cell_bits, double area, bool is_cut = false)
+      : corners_(surface.corners.data()),
+        material_(material),
+        textures_(textures),
+        is_cut_(is_cut) {
     for (size_t a = 0; a < 2; ++a) {
       wrap_[a] = material.wrap[a];
       for (size_t i = 0; i < 2; ++i)
@@ -137,9 +141,10 @@ class SurfaceLook {
     is_near_ = true;
     for (const auto& change : change_)
       for (const int64_t c : change) is_near_ = is_near_ && c < kNear && c > -kNear;
-    if (material.image != Material::kNoImage)
-      view_.emplace(textures.view(
-          material.image, pyramid_level(surface, textures, material.image, cell_bits, area)));
+    if (material.image != Material::kNoImage) {
+      level_ = pyramid_level(surface, textures, material.image, cell_bits, area);
+      view_.emplace(textures.view(material.image, level_));
+    }
     one_tint_ = corners_[0].color == corners_[1].color && corners_[0].color == corners_[2].color;
     if (one_tint_) set_tint({0, 0});
     no_tint_ = one_tint_;
@@ -164,7 +169,7 @@ class SurfaceLook {
   // Adds the color at a spot to `sum` with `weight`, which is less than 2^24.
   VOXDAG_HD void add(const Spot& spot, uint64_t weight, ColorSum& sum) {
     Texel texel = ~Texel{0};
-    if (view_) texel = look_up(*view_, spot.texels);
+    if (view_) texel = is_cut_ ? visible_texel(spot) : look_up(*view_, spot.texels);
     if (!no_tint_) {
       if (!one_tint_) set_tint(spot.point);
       texel = tinted(texel, tint_);
@@ -173,6 +178,26 @@ class SurfaceLook {
   }
 
  private:
+  // Returns the color of the visible texels around a spot, in the finest level that has any, and
+  // their mean alpha.
+  VOXDAG_HD Texel visible_texel(const Spot& spot) {
+    Texel texel = look_up(*view_, spot.texels);
+    for (uint32_t level = level_ + 1;
+         channel(texel, 3) == 0 && level < textures_.levels(material_.image); ++level) {
+      auto view = textures_.view(material_.image, level);
+      texel = look_up(
+          view, texels_around(view, wrap_, coordinate(spot.point, 0), coordinate(spot.point, 1)));
+    }
+    const uint32_t alpha = channel(texel, 3);
+    if (alpha == 0) return 0;
+    Texel out = Texel{alpha} << 48;
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t intensity = (channel(texel, c) * uint32_t{kFullIntensity} + alpha / 2) / alpha;
+      out |= Texel{intensity < kFullIntensity ? intensity : kFullIntensity} << 16 * c;
+    }
+    return out;
+  }
+
   // Sets tint_ to the material's factor times the vertex color at a point.
   VOXDAG_HD void set_tint(const SurfacePoint& point) {
     const int64_t first = kPointOne - point.second - point.third;
@@ -201,7 +226,8 @@ class SurfaceLook {
   // Converts an alpha value of 16 bits to 8 bits, by the material's alpha mode.
   VOXDAG_HD uint32_t alpha_of(uint32_t alpha) const {
     if (material_.alpha_mode == AlphaMode::kOpaque) return 255;
-    if (material_.alpha_mode == AlphaMode::kMask) return alpha >= material_.alpha_cutoff ? 255 : 0;
+    if (material_.alpha_mode == AlphaMode::kMask)
+      return is_cut_ || alpha >= material_.alpha_cutoff ? 255 : 0;
     return (alpha * 255 + 32768) >> 16;
   }
 
@@ -209,6 +235,9 @@ class SurfaceLook {
 
   const SurfaceCorner* corners_;
   const Material& material_;
+  Textures& textures_;
+  const bool is_cut_;
+  uint32_t level_ = 0;                           // level of view_
   std::optional<typename Textures::View> view_;  // if there is an image
   Wrap wrap_[2];
   int64_t change_[2][2];  // changes of texture coordinates from corner 0 to corners 1 and 2

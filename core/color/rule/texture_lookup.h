@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "core/base/host_device.h"
+#include "core/color/intensity.h"
 #include "core/color/surface.h"
 
 namespace voxdag::color {
@@ -14,12 +15,6 @@ using Texel = uint64_t;
 
 VOXDAG_HD inline uint32_t channel(Texel texel, int index) {
   return static_cast<uint32_t>(texel >> (16 * index)) & 0xffff;
-}
-
-// Returns a b / 65535, rounded to nearest: the product of two intensities.
-VOXDAG_HD inline uint32_t scaled(uint32_t a, uint32_t b) {
-  const uint32_t product = a * b + 32768;
-  return (product + (product >> 16)) >> 16;
 }
 
 // Wraps a coordinate into [0, 2^kTextureBits].

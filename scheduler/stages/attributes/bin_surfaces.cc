@@ -1,6 +1,7 @@
 #include "scheduler/stages/attributes/bin_surfaces.h"
 
 #include "core/format/checksum.h"
+#include "scheduler/stages/ingest/ingest.h"
 #include "scheduler/stages/ingest/read_pieces.h"
 #include "scheduler/stages/partition/partition.h"
 #include "scheduler/state/checkpoint/content_digest.h"
@@ -15,10 +16,11 @@ class SurfacePiece {
   SurfacePiece(const SurfaceBinning& binning, const CubeTree& tree, MemoryBudget& budget)
       : binning_(binning),
         tree_(tree),
-        charge_(budget,
-                kPieceTriangles * (kMaxSurfaceRecordBytes + binning.record_bytes + sizeof(Record)) +
-                    kMaxPlaces * sizeof(Place),
-                "a piece of the scene") {}
+        charge_(
+            budget,
+            kPieceTriangles * (2 * kMaxSurfaceRecordBytes + binning.record_bytes + sizeof(Record)) +
+                kMaxPlaces * sizeof(Place),
+            "a piece of the scene") {}
 
   void read(TriangleCursor& cursor, uint64_t first, uint64_t count) {
     bytes_.clear();
@@ -81,9 +83,8 @@ class SurfacePiece {
     surface.corners = triangle.corners;
     surface.material = triangle.material;
     surface.is_flipped = triangle.is_flipped;
-    const size_t at = triangles_.size(), begin = bytes_.size(), record = records_.size();
-    triangles_.resize(at + binning_.record_bytes);
-    encode_triangle(surface.position, binning_.record_bytes, triangles_.data() + at);
+    const size_t begin = bytes_.size(), record = records_.size();
+    append_identity(surface, binning_.cutouts, binning_.record_bytes, triangles_);
     append_surface(surface, has_image(surface.material), bytes_);
     records_.push_back({static_cast<uint32_t>(begin),
                         static_cast<uint32_t>(bytes_.size() - begin),
@@ -105,8 +106,8 @@ class SurfacePiece {
   const CubeTree& tree_;
   const MemoryCharge charge_;
   CubeTree::Hint hint_;
-  std::vector<std::byte> bytes_, triangles_;
-  std::vector<Record> records_;  // their data is in bytes_
+  std::vector<std::byte> bytes_, triangles_;  // records, and what ingest's digest covers
+  std::vector<Record> records_;               // their data is in bytes_
   std::vector<Place> places_;
   size_t late_ = kNone;  // first record whose places were not added
   Checksum128 checksum_;
@@ -121,7 +122,7 @@ BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning
   binned.bins.resize(binning.cubes.size());
   binned.contents.resize(binning.cubes.size());
   ChunkWriter writer = surface_writer(store, binned.bins, binning.buffer_bytes);
-  ContentDigest digest(binning.grid);
+  ContentDigest digest = initial_digest(binning.grid, binning.cutouts);
   uint64_t position = 0;
   context.build.progress.begin_stage("surfaces", scene.declared_triangles(), "triangles");
   read_pieces<SurfacePiece>(

@@ -22,6 +22,7 @@ struct SurfaceBinning {
   std::span<const Material> materials;
   std::span<const Checksum128> looks;  // look_digests() of the materials
   std::span<const Cube> cubes;         // these cubes cover the grid
+  const Cutouts* cutouts;              // cutouts that the build leaves out, or null
   size_t record_bytes;                 // bytes per triangle in ingest's digest (triangles/chunk.h)
   std::string digest;                  // digest of the triangles that ingest read
   size_t buffer_bytes;                 // max bytes of records not yet in the bins; uncharged

@@ -1,6 +1,7 @@
 #include "scheduler/stages/attributes/color_keys.h"
 
 #include "core/format/bytes.h"
+#include "scene/textures/find_cutouts.h"
 
 namespace voxdag {
 namespace {
@@ -13,7 +14,9 @@ constexpr uint32_t kColorVersion = 2;
 
 std::vector<Checksum128> look_digests(std::span<const Material> materials,
                                       std::span<const std::string> images,
-                                      const AttributeSet& attributes) {
+                                      const AttributeSet& attributes, const Cutouts* cutouts) {
+  // Cutouts also decide which cells the material's triangles touch, so all of them count.
+  const Checksum128 cut = cutouts ? cutout_digest(*cutouts) : Checksum128{};
   std::vector<Checksum128> digests;
   digests.reserve(materials.size());
   std::vector<std::byte> bytes;
@@ -26,6 +29,8 @@ std::vector<Checksum128> look_digests(std::span<const Material> materials,
     for (const Wrap wrap : m.wrap) sink.put(static_cast<uint8_t>(wrap));
     if (m.image != Material::kNoImage) sink.put_bytes(std::as_bytes(std::span(images[m.image])));
     if (attributes.have_names()) sink.put(m.number);
+    if (cutouts && m.alpha_mode != AlphaMode::kOpaque)
+      for (const uint64_t word : {cut.low, cut.high}) sink.put(word);
     digests.push_back(checksum128(bytes));
   }
   return digests;

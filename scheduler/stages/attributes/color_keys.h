@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/color/attribute_set.h"
+#include "core/color/cutouts/cutouts.h"
 #include "core/color/rule/color_grid.h"
 #include "core/color/surface.h"
 #include "core/format/checksum.h"
@@ -36,9 +37,11 @@ struct StoredAttribute {
 
 // Returns the look of each material: a digest of all properties of the material that influence the
 // attributes. The material's name is not included. `images` are digests of the image contents.
+// `cutouts`: the cutouts that the build leaves out, or null.
 std::vector<Checksum128> look_digests(std::span<const Material> materials,
                                       std::span<const std::string> images,
-                                      const AttributeSet& attributes);
+                                      const AttributeSet& attributes,
+                                      const Cutouts* cutouts = nullptr);
 
 // Returns a digest of a surface's record (surface_record.h) and its material's look.
 Checksum128 surface_digest(std::span<const std::byte> record, const Checksum128& look);

@@ -19,6 +19,7 @@
 #include "core/format/global/global_layout.h"
 #include "core/geometry/morton.h"
 #include "scene/formats/formats.h"
+#include "scene/textures/find_cutouts.h"
 #include "scene/textures/texture_set.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/attributes/bin_surfaces.h"
@@ -99,6 +100,7 @@ struct ColorStage::State {
   const ColorGrid grid;
   const std::vector<Cube> cubes;
   SceneMaterials materials;
+  std::optional<Cutouts> cutouts_found;
   std::vector<StoredAttribute> attributes;
   std::vector<std::string> images;  // digests of the images
   // Set after the surfaces are read:
@@ -118,6 +120,9 @@ struct ColorStage::State {
         cubes(bins_of(grid)) {}
 
   void open();
+  void find_cutouts();
+  // The cutouts that the build leaves out, or null.
+  const Cutouts* cutouts() const { return cutouts_found ? &*cutouts_found : nullptr; }
   void read_surfaces();
   std::unique_ptr<TextureSet> decode_images(const ColorStore& artifacts);
   bool is_stored(const ColorStore& artifacts, size_t cube) const;
@@ -142,10 +147,20 @@ void ColorStage::State::open() {
   for (const Attribute attribute : wanted.list())
     attributes.push_back({attribute, value_bytes(attribute, materials.names.size())});
   if (wanted.have_names()) check_list(materials.names);
+  find_cutouts();
   if (!wanted.use_images()) materials.drop_images();
   const WarningList warnings = std::exchange(materials.warnings, {});
   for (const Warning& warning : warnings.list()) build.progress.warn_of_input(warning);
   images = image_digests(build.files, materials.images, context.threads, build.cancel);
+}
+
+void ColorStage::State::find_cutouts() {
+  if (source.options.cutouts != CutoutRule::kSkip || !may_have_cutouts(materials)) return;
+  WarningList reported_by_decode_images;
+  cutouts_found.emplace(voxdag::find_cutouts(context.build.files, materials, context.threads,
+                                             context.budget, context.build.cancel,
+                                             reported_by_decode_images));
+  materials = with_separate_images(std::move(materials), *cutouts_found);
 }
 
 void ColorStage::State::read_surfaces() {
@@ -153,12 +168,13 @@ void ColorStage::State::read_surfaces() {
   share.emplace(context.budget.available() / 3, &context.budget);
   store.emplace(context.build.files, source.work_folder + "/surfaces.vdspill", *share, "surfaces");
   const std::vector<Checksum128> looks =
-      look_digests(materials.materials, images, source.options.attributes);
+      look_digests(materials.materials, images, source.options.attributes, cutouts());
   const SurfaceBinning binning{
       .grid = source.grid,
       .materials = materials.materials,
       .looks = looks,
       .cubes = cubes,
+      .cutouts = cutouts(),
       .record_bytes = triangle_record_bytes(source.options.bounds.has_value()),
       .digest = source.digest,
       .buffer_bytes = MemoryPlan::divide(context.budget.limit()).partition_buffer_bytes};
@@ -188,9 +204,9 @@ std::unique_ptr<TextureSet> ColorStage::State::decode_images(const ColorStore& a
   const auto prepare = [&] {
     build.progress.begin_stage("images", materials.images.size(), "images");
     build.progress.resume_at(materials.images.size() - count);
-    auto textures =
-        TextureSet::prepare(build.files, shown, source.work_folder + "/images.vdspill",
-                            context.threads, context.budget, build.progress, build.cancel);
+    auto textures = TextureSet::prepare(build.files, shown, source.work_folder + "/images.vdspill",
+                                        context.threads, context.budget, build.progress,
+                                        build.cancel, cutouts());
     build.progress.end_stage();
     return textures;
   };
@@ -243,7 +259,7 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
           worker.textures = textures.open(memory.texture_bytes);
           worker.baker.emplace(grid, attributes, textures.materials(), *worker.textures, *store,
                                memory.region_bytes, memory.surface_bytes, context.budget,
-                               build.cancel);
+                               build.cancel, cutouts());
         }
         worker.baker->bake(cubes[item], surfaces.bins[item], worker.records,
                            [&](CubeBaker::Records& records) {

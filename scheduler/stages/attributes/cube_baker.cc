@@ -46,7 +46,7 @@ AttributeSet set_of(std::span<const StoredAttribute> attributes) {
 CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
                      std::span<const Material> materials, TextureReader& textures,
                      RecordStore& store, uint64_t region_bytes, uint64_t surface_bytes,
-                     MemoryBudget& budget, const CancelToken& cancel)
+                     MemoryBudget& budget, const CancelToken& cancel, const Cutouts* cutouts)
     : grid_(grid),
       attributes_(attributes),
       store_(store),
@@ -56,7 +56,7 @@ CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> att
       cancel_(cancel),
       charge_(budget, region_bytes + ColorMemory::value_bytes(set_of(attributes)), "baking colors"),
       sum_charge_(budget, 0, "normals and materials of a region"),
-      baker_(grid, materials, textures, set_of(attributes)) {}
+      baker_(grid, materials, textures, set_of(attributes), cutouts) {}
 
 void CubeBaker::bake(const Cube& cube, ChunkList& bin, Records& records, const TakeRecords& take) {
   bake(cube, bin, {records, take});

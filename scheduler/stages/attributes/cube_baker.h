@@ -25,11 +25,12 @@ class CubeBaker {
 
   // Charges `region_bytes`, which must be at least ColorMemory::kRegionBytes, plus
   // ColorMemory::value_bytes(). With more memory, regions are baked in fewer pieces. In addition,
-  // surfaces in memory take up to `surface_bytes`. The references must outlive the baker.
+  // surfaces in memory take up to `surface_bytes`. `cutouts` may be null. The references must
+  // outlive the baker.
   CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
             std::span<const Material> materials, TextureReader& textures, RecordStore& store,
             uint64_t region_bytes, uint64_t surface_bytes, MemoryBudget& budget,
-            const CancelToken& cancel);
+            const CancelToken& cancel, const Cutouts* cutouts = nullptr);
 
   // Receives the records collected so far, all of them complete, and empties the vectors.
   using TakeRecords = std::function<void(Records& records)>;

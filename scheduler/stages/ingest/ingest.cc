@@ -8,8 +8,11 @@
 
 #include "core/base/error.h"
 #include "core/base/page_buffer.h"
+#include "core/color/cutouts/visible_voxels.h"
+#include "scene/textures/find_cutouts.h"
 #include "scheduler/stages/ingest/read_pieces.h"
 #include "scheduler/triangles/chunk.h"
+#include "scheduler/triangles/surface_record.h"
 
 namespace voxdag {
 namespace {
@@ -28,55 +31,149 @@ class PieceBounds {
 // A piece of the scene after snapping.
 class SnappedPiece {
  public:
-  SnappedPiece(const Grid& grid, const TopTree& top, size_t record_bytes, MemoryBudget& budget)
+  SnappedPiece(const Grid& grid, const TopTree& top, size_t record_bytes, const Cutouts* cutouts,
+               MemoryBudget& budget)
       : grid_(grid),
         record_bytes_(record_bytes),
-        records_(budget, kPieceTriangles * record_bytes, "a piece of the scene"),
-        tally_(top) {}
+        cutouts_(cutouts),
+        records_(budget, (cutouts ? 2 : 1) * kPieceTriangles * record_bytes,
+                 "a piece of the scene"),
+        tally_(top) {
+    if (cutouts_) charge_ = MemoryCharge(budget, kCutoutBytes, "a piece of the scene");
+  }
 
   void read(TriangleCursor& cursor, uint64_t first, uint64_t count) {
     counts_ = {};
     too_far_.reset();
-    tally_.clear();
+    clear();
+    if (cutouts_) return read_surfaces(cursor, first, count);
     cursor.read_snapped(first, count, grid_, [this](std::span<const SnappedTriangle> batch) {
       for (const SnappedTriangle& triangle : batch) add(triangle);
     });
     checksum_ = checksum128(records());
   }
 
+  // Adds the segments of the triangles that have too many of them for the piece. Calls flush()
+  // whenever the buffer of records() is full, and at the end.
+  template <class Flush>
+  void add_late(const Flush& flush) {
+    for (const FixedSurface& surface : late_) {
+      const VisiblePart part(surface, *cutouts_, grid_.levels);
+      VisibleVoxels(part, grid_.levels).for_each_segment([&](const FixedTriangle& segment) {
+        if (stored_ == records_.size() / record_bytes_) {
+          flush();
+          clear();
+        }
+        add_segment(segment);
+        return true;
+      });
+    }
+    if (!late_.empty()) flush();
+  }
+
   const IngestCounts& counts() const { return counts_; }
   // Number of valid triangles in this piece before the first triangle beyond the coordinate limit;
   // nullopt if there is no such triangle.
   const std::optional<uint64_t>& too_far() const { return too_far_; }
-  std::span<const std::byte> records() const {
-    return {records_.data(), counts_.triangles * record_bytes_};
-  }
+  std::span<const std::byte> records() const { return {records_.data(), stored_ * record_bytes_}; }
   const Checksum128& checksum() const { return checksum_; }
   TopTree::Tally& tally() { return tally_; }
 
  private:
+  // Max number of segments of a piece, and of one triangle, that are found when the piece is read.
+  static constexpr size_t kMaxSegments = kPieceTriangles;
+  static constexpr uint64_t kCutoutBytes =
+      kPieceTriangles * (kMaxSurfaceRecordBytes + 2 * sizeof(FixedSurface)) +
+      kMaxSegments * sizeof(FixedTriangle);
+
+  void clear() {
+    tally_.clear();
+    stored_ = 0;
+    counts_.expected_voxels = 0;
+  }
+
+  // Returns true if the triangle is in the grid. Counts it otherwise.
+  bool is_inside(SnapResult result) {
+    if (result == SnapResult::kOutside) ++counts_.dropped_outside;
+    if (result == SnapResult::kTooFar && !too_far_)
+      too_far_ = counts_.triangles + counts_.dropped_outside;
+    return result == SnapResult::kInside;
+  }
+
   void add(const SnappedTriangle& snapped) {
     FixedTriangle triangle;
-    switch (to_fixed(grid_, snapped, triangle)) {
-      case SnapResult::kOutside:
-        ++counts_.dropped_outside;
-        return;
-      case SnapResult::kTooFar:
-        if (!too_far_) too_far_ = counts_.triangles + counts_.dropped_outside;
-        return;
-      case SnapResult::kInside:
-        break;
-    }
-    const ExpectedWork work = expected_work(snapped);
+    if (!is_inside(to_fixed(grid_, snapped, triangle))) return;
+    ++counts_.triangles;
+    store(triangle, expected_work(snapped));
+  }
+
+  void store(const FixedTriangle& triangle, const ExpectedWork& work) {
     counts_.expected_voxels += work.voxels;
     tally_.add(triangle, work.bricks);
-    encode_triangle(triangle, record_bytes_, records_.data() + counts_.triangles * record_bytes_);
+    encode_triangle(triangle, record_bytes_, records_.data() + stored_ * record_bytes_);
+    ++stored_;
+  }
+
+  // The checksum covers the triangles with their corners, not the segments, so that later stages
+  // can compare it with the scene.
+  void read_surfaces(TriangleCursor& cursor, uint64_t first, uint64_t count) {
+    late_.clear();
+    identity_.clear();
+    segments_in_piece_ = 0;
+    cursor.read_surfaces(first, count, [this](std::span<const SurfaceTriangle> batch) {
+      for (const SurfaceTriangle& triangle : batch) add(triangle);
+    });
+    checksum_ = checksum128(identity_);
+  }
+
+  void add(const SurfaceTriangle& world) {
+    SnappedTriangle snapped = world.position;
+    for (auto& vertex : snapped.v) snap_vertices(grid_, vertex);
+    FixedSurface surface;
+    if (!is_inside(to_fixed(grid_, snapped, surface.position))) return;
     ++counts_.triangles;
+    surface.corners = world.corners;
+    surface.material = world.material;
+    surface.is_flipped = world.is_flipped;
+    append_identity(surface, cutouts_, record_bytes_, identity_);
+    if (!cutouts_->may_cut(surface.material))
+      return store(surface.position, expected_work(snapped));
+    const VisiblePart part(surface, *cutouts_, grid_.levels);
+    const VisiblePart::Sight sight = part.sight(Cube{});
+    if (sight == VisiblePart::Sight::kVisible) store(surface.position, expected_work(snapped));
+    if (sight == VisiblePart::Sight::kMixed) add_segments(surface, part);
+  }
+
+  void add_segments(const FixedSurface& surface, const VisiblePart& part) {
+    segments_.clear();
+    const bool is_complete =
+        VisibleVoxels(part, grid_.levels).for_each_segment([&](const FixedTriangle& segment) {
+          if (segments_in_piece_ + segments_.size() == kMaxSegments) return false;
+          segments_.push_back(segment);
+          return true;
+        });
+    if (!is_complete) return late_.push_back(surface);
+    segments_in_piece_ += segments_.size();
+    for (const FixedTriangle& segment : segments_) add_segment(segment);
+  }
+
+  void add_segment(const FixedTriangle& segment) {
+    double voxels = 1;
+    for (int a = 0; a < 3; ++a)
+      voxels += static_cast<double>((segment.high(a) - segment.low(a)) >> kUnitBits);
+    store(segment, {voxels, 1 + voxels / 8});
   }
 
   const Grid grid_;
   const size_t record_bytes_;
+  const Cutouts* const cutouts_;
+  MemoryCharge charge_;
   PageBuffer<std::byte> records_;
+  size_t stored_ = 0;                    // number of records
+  std::vector<FixedTriangle> segments_;  // of one triangle
+  size_t segments_in_piece_ = 0;
+  std::vector<FixedSurface> late_;  // triangles with too many segments
+  std::vector<std::byte> identity_;
   IngestCounts counts_;
   std::optional<uint64_t> too_far_;
   TopTree::Tally tally_;
@@ -86,7 +183,6 @@ class SnappedPiece {
 void add(const IngestCounts& piece, IngestCounts& total) {
   total.triangles += piece.triangles;
   total.dropped_outside += piece.dropped_outside;
-  total.expected_voxels += piece.expected_voxels;
 }
 
 }  // namespace
@@ -116,15 +212,23 @@ Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds) {
   return Grid::around(bounds, levels);
 }
 
+ContentDigest initial_digest(const Grid& grid, const Cutouts* cutouts) {
+  ContentDigest digest(grid);
+  if (cutouts) digest.add(cutout_digest(*cutouts));
+  return digest;
+}
+
 void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, TopTree& top,
-            const StageContext& context, const AfterPiece& after_piece) {
+            const StageContext& context, const AfterPiece& after_piece, const Cutouts* cutouts) {
   Progress& progress = context.build.progress;
   progress.begin_stage("ingest", state.declared_triangles, "triangles");
   progress.resume_at(state.position);
   IngestCounts& counts = state.counts;
   read_pieces<SnappedPiece>(
       scene, state.position, context,
-      [&](auto& piece) { piece.emplace(state.grid, top, store.record_bytes(), context.budget); },
+      [&](auto& piece) {
+        piece.emplace(state.grid, top, store.record_bytes(), cutouts, context.budget);
+      },
       [&](SnappedPiece& piece, uint64_t position) {
         if (piece.too_far())
           throw Error(
@@ -134,9 +238,15 @@ void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, Top
                   " of the scene reaches into the grid and has a vertex 2^32 or more voxels away "
                   "from the grid's low corner: expected less than 2^32 voxels on each axis "
                   "(--bounds)");
+        const auto add_to_store = [&] {
+          context.build.cancel.check();
+          counts.expected_voxels += piece.counts().expected_voxels;
+          top.add(piece.tally());
+          add_records(store, kSceneBin, piece.records());
+        };
         add(piece.counts(), counts);
-        top.add(piece.tally());
-        add_records(store, kSceneBin, piece.records());
+        add_to_store();
+        piece.add_late(add_to_store);
         state.digest.add(piece.checksum());
         state.position = position;
         after_piece();

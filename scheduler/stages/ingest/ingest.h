@@ -9,6 +9,7 @@
 
 #include <functional>
 
+#include "core/color/cutouts/cutouts.h"
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/stages/ingest/top_tree.h"
 #include "scheduler/state/checkpoint/ingest_record.h"
@@ -29,7 +30,14 @@ Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds);
 // Stores the scene's snapped triangles in the scene's bin of `store` and counts them in `top`.
 // Throws Error{kLimit} for a triangle that reaches into the grid and has a vertex beyond
 // kCoordinateLimit.
+//
+// With `cutouts`, a triangle that is cut out in part is replaced by segments through the voxels in
+// which it is visible (core/color/cutouts). A triangle that is cut out completely is not stored.
 void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, TopTree& top,
-            const StageContext& context, const AfterPiece& after_piece);
+            const StageContext& context, const AfterPiece& after_piece,
+            const Cutouts* cutouts = nullptr);
+
+// Returns the digest of a scene before its first triangle.
+ContentDigest initial_digest(const Grid& grid, const Cutouts* cutouts);
 
 }  // namespace voxdag

@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "scene/formats/formats.h"
+#include "scene/textures/find_cutouts.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/ingest/ingest.h"
 
@@ -62,7 +66,12 @@ class Preparation {
 
  private:
   void open() {
-    if (!checkpoint_.matches(scene_.open().files())) {
+    find_cutouts();
+    if (cutouts_) {
+      // A checkpoint does not notice changes of images.
+      checkpoint_.disable();
+      state_ = {};
+    } else if (!checkpoint_.matches(scene_.open().files())) {
       state_ = {};
       enable_checkpoints();
     }
@@ -71,6 +80,31 @@ class Preparation {
     if (state_.position == 0) checkpoint_.check_disk_space(scene);
     for (const Warning& warning : scene.warnings()) context_.progress.warn_of_input(warning);
   }
+
+  // Finds the cutouts that the build leaves out, and warns if it keeps cutouts.
+  void find_cutouts() {
+    const CutoutRule rule = spec_.geometry.cutouts;
+    if (rule == CutoutRule::kDefault) return;
+    const SceneMaterials materials = scene_.open().materials();
+    if (!may_have_cutouts(materials)) return;
+    if (rule == CutoutRule::kKeep) return warn_of_kept_cutouts(count_cutout_materials(materials));
+    WarningList problems;
+    Cutouts found = voxdag::find_cutouts(context_.files, materials, spec_.run.threads, budget_,
+                                         context_.cancel, problems);
+    // With colors, the color stage reports unreadable images.
+    if (!spec_.geometry.attributes.use_images())
+      for (const Warning& warning : problems.list()) context_.progress.warn_of_input(warning);
+    cutouts_.emplace(std::move(found));
+  }
+  void warn_of_kept_cutouts(uint64_t materials) {
+    if (materials == 0) return;
+    context_.progress.warn_of_input(
+        {"kept-cutouts", spec_.geometry.scenes.front(),
+         std::to_string(materials) + (materials == 1 ? " material has" : " materials have") +
+             " an alpha mode that may cut out parts of surfaces, which are kept; --cutouts skip "
+             "leaves them out"});
+  }
+  const Cutouts* cutouts() const { return cutouts_ ? &*cutouts_ : nullptr; }
 
   // Enables checkpoints. If the scene's files are slightly too young for their times to be trusted,
   // waits first.
@@ -94,7 +128,7 @@ class Preparation {
     state_.grid = choose_grid(spec_.geometry, state_.bounds);
     state_.stage = IngestStage::kIngest;
     state_.position = 0;
-    state_.digest = ContentDigest(state_.grid);
+    state_.digest = initial_digest(state_.grid, cutouts());
     state_.top_tree_depth = TopTree::depth_within(state_.grid.levels, memory_.top_tree_bytes);
     checkpoint_.save(state_);
   }
@@ -110,9 +144,12 @@ class Preparation {
     if (checkpoint_.has_top_tree(state_))
       checkpoint_.load_top_tree(state_, top.fill(state_.top_tree_weight));
     if (state_.stage == IngestStage::kIngest) {
-      ingest(scene_.open(), state_, *prepared_.triangles, top, stage_context(), [&] {
-        if (checkpoint_.is_due()) checkpoint_.save_in_background(state_, cells_of(top));
-      });
+      ingest(
+          scene_.open(), state_, *prepared_.triangles, top, stage_context(),
+          [&] {
+            if (checkpoint_.is_due()) checkpoint_.save_in_background(state_, cells_of(top));
+          },
+          cutouts());
       state_.stage = IngestStage::kPartition;
       state_.position = 0;
       checkpoint_.save(state_, cells_of(top));
@@ -128,6 +165,7 @@ class Preparation {
   const MemoryPlan memory_ = MemoryPlan::divide(budget_.limit());
   const BuildContext& context_;
   IngestCheckpoint& checkpoint_;
+  std::optional<Cutouts> cutouts_;  // cutouts that are left out
   PreparedScene prepared_;
   IngestState& state_ = prepared_.state;
 };

@@ -1,0 +1,245 @@
+#include "core/color/cutouts/visible_part.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/color/cutouts/hidden.h"
+#include "core/geometry/octree_descent.h"
+
+namespace voxdag {
+namespace {
+
+// The least depth, in texels, to which a polygon must reach into a texel.
+constexpr double kDepth = 0x1p-16;
+// Enlargement of the cubes of sight(), in lattice units, and of the boxes around their polygons, in
+// texels. Larger than all rounding errors.
+constexpr double kCubeMargin = 0x1p-4, kBoxMargin = 0x1p-10;
+// Enlargement of a voxel whose polygon is lost by rounding.
+constexpr double kVoxelMargin = 0x1p-6;
+// A polygon across more periods of the image along an axis covers all texels.
+constexpr double kMaxPeriods = 16;
+// Half of the size of squares at the border of a clamped image, which continue without end.
+constexpr double kEndless = 0x1p45;
+
+std::array<int64_t, 3> low_corner(const Cube& cube, uint32_t grid_levels) {
+  const int64_t units = cube.edge_voxels(grid_levels) * kUnitsPerVoxel;
+  std::array<int64_t, 3> low;
+  for (size_t a = 0; a < 3; ++a) low[a] = static_cast<int64_t>(cube.position[a]) * units;
+  return low;
+}
+
+// Maps a coordinate in texels to the image of its period: period 0 begins at 0.
+double in_image(double texel, double period, double size, Wrap wrap) {
+  const double at = texel - period * size;
+  const bool is_mirrored = wrap == Wrap::kMirroredRepeat && std::fmod(period, 2) != 0;
+  return is_mirrored ? size - at : at;
+}
+
+// A range of texels along an axis.
+struct Range {
+  uint32_t first, last;
+};
+// Returns the texels from coordinate `low` to `high`, or more.
+Range texel_range(double low, double high, uint32_t size, Wrap wrap) {
+  const double edge = size, first = std::floor(low / edge), last = std::floor(high / edge);
+  const auto clamped = [&](double at) {
+    return static_cast<uint32_t>(std::clamp(std::floor(at), 0.0, edge - 1));
+  };
+  if (wrap == Wrap::kClampToEdge) return {clamped(low), clamped(high)};
+  if (first != last) return {0, size - 1};
+  const double a = in_image(low, first, edge, wrap), b = in_image(high, first, edge, wrap);
+  return {clamped(std::min(a, b)), clamped(std::max(a, b))};
+}
+
+}  // namespace
+
+VisiblePart::VisiblePart(const FixedSurface& surface, const Cutouts& cutouts, uint32_t grid_levels)
+    : triangle_(surface.position),
+      mask_(cutouts.mask(surface.material)),
+      wrap_(cutouts.materials[surface.material].wrap),
+      grid_levels_(grid_levels),
+      is_hidden_(color::is_hidden(cutouts.materials[surface.material], surface)) {
+  if (!mask_) return;
+  const double size[2] = {static_cast<double>(mask_->width()),
+                          static_cast<double>(mask_->height())};
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t a = 0; a < 2; ++a)
+      texels_[i][a] = static_cast<double>(surface.corners[i].texture[a]) * (size[a] * 0x1p-24);
+}
+
+// Returns the part of the triangle in a cube, which is enlarged by `margin` on all sides.
+VisiblePart::Polygon VisiblePart::part_in(const std::array<int64_t, 3>& low, int64_t edge,
+                                          double margin) const {
+  Polygon part;
+  part.count = 3;
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t a = 0; a < 3; ++a)
+      part.points[i].at[a] = static_cast<double>(triangle_.v[i][a] - low[a]);
+    for (size_t a = 0; a < 2; ++a) part.points[i].texel[a] = texels_[i][a];
+  }
+  for (int side = 0; side < 6 && part.count > 0; ++side) {
+    const int axis = side / 2;
+    const double sign = side % 2 == 0 ? 1 : -1;
+    const double bound = side % 2 == 0 ? -margin : static_cast<double>(edge) + margin;
+    Polygon inside;
+    for (int i = 0; i < part.count && inside.count + 2 <= Polygon::kMaxPoints; ++i) {
+      const Point& from = part.points[i];
+      const Point& to = part.points[(i + 1) % part.count];
+      const double before = sign * (from.at[axis] - bound), after = sign * (to.at[axis] - bound);
+      if (before >= 0) inside.points[inside.count++] = from;
+      if ((before >= 0) == (after >= 0)) continue;
+      const double share = before / (before - after);
+      Point& crossing = inside.points[inside.count++];
+      for (int a = 0; a < 3; ++a) crossing.at[a] = from.at[a] + share * (to.at[a] - from.at[a]);
+      for (int a = 0; a < 2; ++a)
+        crossing.texel[a] = from.texel[a] + share * (to.texel[a] - from.texel[a]);
+      crossing.at[axis] = bound;
+    }
+    part = inside;
+  }
+  return part;
+}
+
+VisiblePart::Sight VisiblePart::sight(const Cube& cube) const {
+  if (is_hidden_) return Sight::kHidden;
+  if (!mask_) return Sight::kVisible;
+  const int64_t edge = cube.edge_voxels(grid_levels_) * kUnitsPerVoxel;
+  return sight_of(part_in(low_corner(cube, grid_levels_), edge, kCubeMargin));
+}
+
+// Tests the texels in a box around the polygon, in blocks.
+VisiblePart::Sight VisiblePart::sight_of(const Polygon& polygon) const {
+  if (polygon.count == 0) return Sight::kMixed;
+  Range range[2];
+  for (int a = 0; a < 2; ++a) {
+    double low = polygon.points[0].texel[a], high = low;
+    for (int i = 1; i < polygon.count; ++i) {
+      low = std::min(low, polygon.points[i].texel[a]);
+      high = std::max(high, polygon.points[i].texel[a]);
+    }
+    const uint32_t size = a == 0 ? mask_->width() : mask_->height();
+    range[a] =
+        texel_range(low - kBoxMargin, high + kBoxMargin, size, wrap_[static_cast<size_t>(a)]);
+  }
+  constexpr uint32_t kBlocks = 4;
+  uint32_t level = 0;
+  while (((range[0].last - range[0].first) >> level) >= kBlocks ||
+         ((range[1].last - range[1].first) >> level) >= kBlocks)
+    ++level;
+  bool any = false, all = true;
+  for (uint32_t y = range[1].first >> level; y <= range[1].last >> level; ++y)
+    for (uint32_t x = range[0].first >> level; x <= range[0].last >> level; ++x) {
+      any |= mask_->any_visible(level, x, y);
+      all &= mask_->all_visible(level, x, y);
+    }
+  return all ? Sight::kVisible : any ? Sight::kMixed : Sight::kHidden;
+}
+
+bool VisiblePart::is_visible(const std::array<int64_t, 3>& voxel) const {
+  if (is_hidden_) return false;
+  if (!mask_) return true;
+  const std::array<int64_t, 3> low{voxel[0] * kUnitsPerVoxel, voxel[1] * kUnitsPerVoxel,
+                                   voxel[2] * kUnitsPerVoxel};
+  Polygon polygon = part_in(low, kUnitsPerVoxel, 0);
+  if (polygon.count == 0) polygon = part_in(low, kUnitsPerVoxel, kVoxelMargin);
+  if (covers(polygon, true, kDepth)) return true;
+  return !covers(polygon, false, kDepth) && covers(polygon, true, -kDepth);
+}
+
+bool VisiblePart::is_visible_in(const Cube& cube) const {
+  const Sight here = sight(cube);
+  if (here != Sight::kMixed) return here == Sight::kVisible;
+  if (cube.level == grid_levels_)
+    return is_visible({cube.position[0], cube.position[1], cube.position[2]});
+  const int64_t units = cube.edge_voxels(grid_levels_) * kUnitsPerVoxel;
+  for (uint32_t mask = touched_children(triangle_, cube, units); mask; mask &= mask - 1)
+    if (is_visible_in(cube.child(lowest_bit(mask)))) return true;
+  return false;
+}
+
+bool VisiblePart::covers(const Polygon& polygon, bool visible, double depth) const {
+  const uint32_t top = mask_->levels() - 1;
+  double first[2] = {}, last[2] = {};
+  const double size[2] = {static_cast<double>(mask_->width()),
+                          static_cast<double>(mask_->height())};
+  for (int a = 0; a < 2 && polygon.count > 0; ++a) {
+    if (wrap_[static_cast<size_t>(a)] == Wrap::kClampToEdge) continue;
+    double low = polygon.points[0].texel[a], high = low;
+    for (int i = 1; i < polygon.count; ++i) {
+      low = std::min(low, polygon.points[i].texel[a]);
+      high = std::max(high, polygon.points[i].texel[a]);
+    }
+    first[a] = std::floor((low - 2 * kDepth) / size[a]);
+    last[a] = std::floor((high + 2 * kDepth) / size[a]);
+    if (last[a] - first[a] >= kMaxPeriods)
+      return visible ? mask_->any_visible(top, 0, 0) : !mask_->all_visible(top, 0, 0);
+  }
+  for (double v = first[1]; v <= last[1]; ++v)
+    for (double u = first[0]; u <= last[0]; ++u) {
+      Polygon moved = polygon;
+      for (int i = 0; i < moved.count; ++i) {
+        moved.points[i].texel[0] = in_image(polygon.points[i].texel[0], u, size[0], wrap_[0]);
+        moved.points[i].texel[1] = in_image(polygon.points[i].texel[1], v, size[1], wrap_[1]);
+      }
+      if (covers(moved, visible, depth, top, 0, 0)) return true;
+    }
+  return false;
+}
+
+// Returns the square of a block, made smaller by `depth` on all sides.
+VisiblePart::Box VisiblePart::square_of(uint32_t level, uint32_t x, uint32_t y,
+                                        double depth) const {
+  const uint32_t at[2] = {x, y}, size[2] = {mask_->width(), mask_->height()};
+  Box box;
+  for (size_t a = 0; a < 2; ++a) {
+    const uint64_t begin = uint64_t{at[a]} << level, end = uint64_t{at[a] + 1} << level;
+    box.low[a] = static_cast<double>(begin) + depth;
+    box.high[a] = static_cast<double>(std::min<uint64_t>(end, size[a])) - depth;
+    if (wrap_[a] != Wrap::kClampToEdge) continue;
+    if (begin == 0) box.low[a] = -kEndless;
+    if (end >= size[a]) box.high[a] = kEndless;
+  }
+  return box;
+}
+
+bool VisiblePart::covers(const Polygon& polygon, bool visible, double depth, uint32_t level,
+                         uint32_t x, uint32_t y) const {
+  const bool any = visible ? mask_->any_visible(level, x, y) : !mask_->all_visible(level, x, y);
+  const bool all = visible ? mask_->all_visible(level, x, y) : !mask_->any_visible(level, x, y);
+  if (!any || polygon.count == 0) return false;
+  const Box box = square_of(level, x, y, depth);
+  for (int a = 0; a < 2; ++a) {
+    bool is_below = true, is_above = true;
+    for (int i = 0; i < polygon.count; ++i) {
+      is_below &= polygon.points[i].texel[a] < box.low[a];
+      is_above &= polygon.points[i].texel[a] > box.high[a];
+    }
+    if (is_below || is_above) return false;
+  }
+  // An edge of the polygon separates the two if the box is on one side of the edge and all corners
+  // of the polygon are on the other side.
+  for (int i = 0; i < polygon.count; ++i) {
+    const double* const from = polygon.points[i].texel;
+    const double* const to = polygon.points[(i + 1) % polygon.count].texel;
+    const double nu = to[1] - from[1], nv = from[0] - to[0];
+    const double low = nu * ((nu > 0 ? box.low[0] : box.high[0]) - from[0]) +
+                       nv * ((nv > 0 ? box.low[1] : box.high[1]) - from[1]);
+    const double high = nu * ((nu > 0 ? box.high[0] : box.low[0]) - from[0]) +
+                        nv * ((nv > 0 ? box.high[1] : box.low[1]) - from[1]);
+    double least = 0, most = 0;  // over the corners
+    for (int k = 0; k < polygon.count; ++k) {
+      const double side =
+          nu * (polygon.points[k].texel[0] - from[0]) + nv * (polygon.points[k].texel[1] - from[1]);
+      least = std::min(least, side);
+      most = std::max(most, side);
+    }
+    if (low > most || high < least) return false;
+  }
+  if (all || level == 0) return true;
+  for (uint32_t j = 2 * y; j < std::min(2 * y + 2, mask_->height(level - 1)); ++j)
+    for (uint32_t i = 2 * x; i < std::min(2 * x + 2, mask_->width(level - 1)); ++i)
+      if (covers(polygon, visible, depth, level - 1, i, j)) return true;
+  return false;
+}
+
+}  // namespace voxdag

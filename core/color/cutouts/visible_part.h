@@ -1,0 +1,74 @@
+// The visible part of a triangle whose material cuts out texels. Decides for each voxel whether the
+// triangle is visible in it. The decision depends on the triangle, the visible texels and the voxel
+// alone.
+//
+// The part of the triangle in the voxel's closed cube is a convex polygon. Mapped to the image, it
+// covers texels, which are squares. The triangle is visible in the voxel if the polygon covers a
+// visible texel. It must reach at least 2^-16 of a texel's edge into the square; so a polygon that
+// ends at the border of a texel does not cover the texel. If it covers no texel at all, it is
+// visible if it touches a visible texel. All values are computed in IEEE doubles, in the order
+// written here.
+//
+// For larger cubes, a box around a polygon that is slightly larger decides quickly whether all of
+// the cube's voxels are visible, or none.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/color/cutouts/cutouts.h"
+#include "core/color/surface.h"
+#include "core/geometry/cube.h"
+
+namespace voxdag {
+
+class VisiblePart {
+ public:
+  // `surface` may touch the voxels of a grid of 2^grid_levels voxels per edge. The cutouts must
+  // outlive this object.
+  VisiblePart(const FixedSurface& surface, const Cutouts& cutouts, uint32_t grid_levels);
+
+  enum class Sight { kHidden, kVisible, kMixed };
+  // Returns kHidden or kVisible if the triangle is hidden or visible in all voxels of the cube that
+  // it touches. kMixed means that this is not known.
+  Sight sight(const Cube& cube) const;
+  // True if the triangle is visible in a voxel, which it must touch.
+  bool is_visible(const std::array<int64_t, 3>& voxel) const;
+  // True if the triangle is visible in a voxel of the cube, which it must touch.
+  bool is_visible_in(const Cube& cube) const;
+
+  const FixedTriangle& triangle() const { return triangle_; }
+
+ private:
+  struct Point {
+    double at[3];     // relative to the cube's low corner, in lattice units
+    double texel[2];  // position in the image, in texels
+  };
+  struct Polygon {
+    // Six planes add at most six corners to a triangle's three. Rounding may add a few more.
+    static constexpr int kMaxPoints = 16;
+    int count = 0;
+    Point points[kMaxPoints];
+  };
+  // A box of texels, or of blocks of texels.
+  struct Box {
+    double low[2], high[2];
+  };
+
+  Polygon part_in(const std::array<int64_t, 3>& low, int64_t edge, double margin) const;
+  Sight sight_of(const Polygon& polygon) const;
+  // True if the polygon reaches `depth` into the square of a visible (or hidden) texel.
+  bool covers(const Polygon& polygon, bool visible, double depth) const;
+  bool covers(const Polygon& polygon, bool visible, double depth, uint32_t level, uint32_t x,
+              uint32_t y) const;
+  Box square_of(uint32_t level, uint32_t x, uint32_t y, double depth) const;
+
+  FixedTriangle triangle_;
+  const AlphaMask* mask_;
+  std::array<Wrap, 2> wrap_;
+  const uint32_t grid_levels_;
+  bool is_hidden_;       // completely
+  double texels_[3][2];  // positions of the corners in the image
+};
+
+}  // namespace voxdag
