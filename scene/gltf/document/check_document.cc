@@ -4,17 +4,13 @@
 
 #include "core/base/error.h"
 #include "core/base/integers.h"
+#include "scene/gltf/document/array_access.h"
 #include "scene/gltf/document/check_meshes.h"
 #include "scene/gltf/document/scene_nodes.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {
-
-template <class Array>
-const auto& at(const Array& a, int i) {
-  return a[static_cast<size_t>(i)];
-}
 
 // Maximum number of elements of an accessor. Indices have 32 bits, so a primitive cannot use more
 // vertices than this. The limit also bounds accessors without bytes (all zeros), which could claim

@@ -3,20 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "scene/gltf/document/array_access.h"
 #include "scene/gltf/document/check_document.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
 namespace {
-
-template <class Array>
-int size_of(const Array& a) {
-  return static_cast<int>(a.size());
-}
-template <class Array>
-const auto& at(const Array& a, int i) {
-  return a[static_cast<size_t>(i)];
-}
 
 // Warns if the view has a byteStride that glTF does not allow.
 void warn_of_stride(Document& d, int view, bool is_vertices) {

@@ -13,10 +13,10 @@ namespace {
 
 constexpr const char* kListedTwice = "is listed twice; it is drawn once";
 
-Node& at(Document& d, int node) { return d.nodes[static_cast<size_t>(node)]; }
-const Node& at(const Document& d, int node) { return d.nodes[static_cast<size_t>(node)]; }
+Node& node_at(Document& d, int node) { return d.nodes[static_cast<size_t>(node)]; }
+const Node& node_at(const Document& d, int node) { return d.nodes[static_cast<size_t>(node)]; }
 int node_count(const Document& d) { return static_cast<int>(d.nodes.size()); }
-bool exists(const Document& d, int node) { return node >= 0 && node < node_count(d); }
+bool node_exists(const Document& d, int node) { return node >= 0 && node < node_count(d); }
 
 void refuse_missing(const Document& d, const std::string& where, const char* what, int index,
                     size_t count) {
@@ -27,8 +27,8 @@ void refuse_missing(const Document& d, const std::string& where, const char* wha
 // Sets the parent of every node: the first node that lists it as a child.
 void link_parents(Document& d) {
   for (int i = 0; i < node_count(d); ++i)
-    for (const int child : at(d, i).children)
-      if (exists(d, child) && at(d, child).parent < 0) at(d, child).parent = i;
+    for (const int child : node_at(d, i).children)
+      if (node_exists(d, child) && node_at(d, child).parent < 0) node_at(d, child).parent = i;
 }
 
 // Refuses a node that is its own ancestor. Follows the chain of parents of every node; a node that
@@ -40,7 +40,7 @@ void check_for_cycles(const Document& d) {
     int node = start;
     while (node >= 0 && chain_of[static_cast<size_t>(node)] < 0) {
       chain_of[static_cast<size_t>(node)] = start;
-      node = at(d, node).parent;
+      node = node_at(d, node).parent;
     }
     if (node >= 0 && chain_of[static_cast<size_t>(node)] == start)
       refuse(d.path, d.name_node(node) + " is its own ancestor, expected no cycles");
@@ -54,9 +54,9 @@ std::vector<bool> mark_subtrees(const Document& d, const IsMarked& is_marked) {
   const auto index = [](int node) { return static_cast<size_t>(node); };
   for (int start = 0; start < node_count(d); ++start) {
     int top = start;
-    while (top >= 0 && !is_known[index(top)] && !is_marked(top)) top = at(d, top).parent;
+    while (top >= 0 && !is_known[index(top)] && !is_marked(top)) top = node_at(d, top).parent;
     const bool mark = top >= 0 && (!is_known[index(top)] || marks[index(top)]);
-    for (int node = start;; node = at(d, node).parent) {
+    for (int node = start;; node = node_at(d, node).parent) {
       if (node < 0 || is_known[index(node)]) break;
       is_known[index(node)] = true;
       marks[index(node)] = mark;
@@ -72,7 +72,7 @@ std::vector<int> listed_nodes(Document& d) {
   if (d.scenes.empty()) {
     std::vector<int> roots;
     for (int i = 0; i < node_count(d); ++i)
-      if (at(d, i).parent < 0) roots.push_back(i);
+      if (node_at(d, i).parent < 0) roots.push_back(i);
     return roots;
   }
   const int scene = std::max(d.scene, 0);
@@ -81,7 +81,7 @@ std::vector<int> listed_nodes(Document& d) {
   std::vector<int> listed = std::move(d.scenes[static_cast<size_t>(scene)]);
   d.scenes.clear();
   for (const int node : listed)
-    if (!exists(d, node))
+    if (!node_exists(d, node))
       refuse_missing(d, "scene " + std::to_string(scene), "node", node, d.nodes.size());
   return listed;
 }
@@ -101,7 +101,7 @@ void choose_roots(Document& d) {
   const std::vector<bool> in_scene =
       mark_subtrees(d, [&](int node) { return is_listed[static_cast<size_t>(node)]; });
   std::erase_if(d.roots, [&](int node) {
-    const int parent = at(d, node).parent;
+    const int parent = node_at(d, node).parent;
     if (parent < 0) return false;
     const bool is_below_root = in_scene[static_cast<size_t>(parent)];
     d.warn("root-with-parent", where + d.name_node(node),
@@ -118,10 +118,10 @@ class AncestorTransforms {
 
   const Transform& of(int node) {
     std::vector<int> chain;  // the node and its ancestors whose transform is unknown
-    for (int i = node; i >= 0 && !known_.contains(i); i = at(document_, i).parent)
+    for (int i = node; i >= 0 && !known_.contains(i); i = node_at(document_, i).parent)
       chain.push_back(i);
     for (size_t k = chain.size(); k-- > 0;) {
-      const Node& link = at(document_, chain[k]);
+      const Node& link = node_at(document_, chain[k]);
       document_.charge.add(sizeof(Transform) + kMapBytes);
       known_[chain[k]] =
           link.parent >= 0 ? multiply(known_.at(link.parent), link.local) : link.local;
@@ -139,7 +139,7 @@ class AncestorTransforms {
 void set_transforms_above_roots(Document& d) {
   AncestorTransforms transforms(d);
   for (const int root : d.roots)
-    if (const int parent = at(d, root).parent; parent >= 0)
+    if (const int parent = node_at(d, root).parent; parent >= 0)
       d.above_roots[root] = transforms.of(parent);
 }
 
@@ -166,7 +166,7 @@ std::vector<bool> drawn_nodes(Document& d) {
   for (const int root : d.roots) is_root[static_cast<size_t>(root)] = true;
   const std::vector<bool> in_scene =
       mark_subtrees(d, [&](int node) { return is_root[static_cast<size_t>(node)]; });
-  std::vector<bool> drawn = mark_subtrees(d, [&](int node) { return at(d, node).is_hidden; });
+  std::vector<bool> drawn = mark_subtrees(d, [&](int node) { return node_at(d, node).is_hidden; });
   for (size_t i = 0; i < drawn.size(); ++i) drawn[i] = in_scene[i] && !drawn[i];
   warn_of_missing_meshes(d, in_scene, drawn);
   return drawn;
@@ -175,16 +175,16 @@ std::vector<bool> drawn_nodes(Document& d) {
 // Checks the children of node `i`, and removes children that are not drawn below it.
 void check_children(Document& d, int i, const std::vector<bool>& drawn, std::vector<bool>& seen) {
   const bool is_drawn = drawn[static_cast<size_t>(i)];
-  std::erase_if(at(d, i).children, [&](int child) {
-    if (!exists(d, child)) {
+  std::erase_if(node_at(d, i).children, [&](int child) {
+    if (!node_exists(d, child)) {
       if (is_drawn) refuse_missing(d, d.name_node(i), "child node", child, d.nodes.size());
       return true;
     }
     const auto index = static_cast<size_t>(child);
-    if (at(d, child).parent != i) {
+    if (node_at(d, child).parent != i) {
       if (is_drawn || drawn[index])
         refuse(d.path, d.name_node(child) + " has two parents, " +
-                           d.name_node(at(d, child).parent) + " and " + d.name_node(i) +
+                           d.name_node(node_at(d, child).parent) + " and " + d.name_node(i) +
                            ", expected one at most");
       return true;
     }

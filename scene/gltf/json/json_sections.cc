@@ -24,7 +24,7 @@ constexpr uint64_t kBytesPerArrayElement = 3 * sizeof(Json);
 constexpr uint64_t kBytesPerObjectMember = 112;
 constexpr uint64_t kBytesPerContainer = 64;
 // A growing string needs its memory twice.
-constexpr uint64_t kTextCopies = 2;
+constexpr uint64_t kGrowingCopies = 2;
 
 // Receives the parser's events. Makes a Json value, or the filtered text, of each element of a
 // section.
@@ -136,7 +136,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
       return;
     }
     writer_.add_scalar(key_, value);
-    charge_.grow_to(kTextCopies * writer_.written().text.size());
+    charge_.grow_to(kGrowingCopies * writer_.written().text.size());
   }
   void start_container(Place place, Json value) {
     if (section_->is_read_as_text()) {

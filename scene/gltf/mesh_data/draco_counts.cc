@@ -14,7 +14,7 @@ namespace voxdag::gltf {
 namespace {
 
 // Enough for a header without metadata.
-constexpr uint64_t kHeaderBytes = 64;
+constexpr uint64_t kCountedHeaderBytes = 64;
 
 // Faces per document whose connectivity is decoded although the header does not contradict the
 // accessors. More would take a noticeable time.
@@ -35,7 +35,7 @@ std::vector<std::byte> read_bytes(BufferReader& buffers, const CompressedBytes& 
 
 DracoHeader read_header(BufferReader& buffers, const CompressedBytes& from) {
   try {
-    std::vector<std::byte> bytes = read_bytes(buffers, from, kHeaderBytes);
+    std::vector<std::byte> bytes = read_bytes(buffers, from, kCountedHeaderBytes);
     return read_draco_header(bytes);
   } catch (const BrokenData&) {
     std::vector<std::byte> bytes = read_bytes(buffers, from, BufferReader::kWindowBytes);

@@ -10,7 +10,7 @@
 namespace voxdag::gltf {
 namespace {
 
-constexpr size_t kWindow = 4096;
+constexpr size_t kRestartWindow = 4096;
 
 uint32_t restart_of(const Accessor& indices) {
   return UINT32_MAX >> (32 - 8 * component_bytes(indices.component_type));
@@ -22,9 +22,10 @@ std::shared_ptr<const RestartIndex> find_triangles(Document& document, BufferRea
   const Accessor& indices = document.accessors[static_cast<size_t>(primitive.indices)];
   auto found = std::make_shared<RestartIndex>();
   StripWalk walk(primitive.mode == kTriangleFan, restart_of(indices));
-  std::array<uint32_t, kWindow> window;
-  for (uint64_t first = 0; first < indices.count; first += kWindow) {
-    const auto count = static_cast<size_t>(std::min<uint64_t>(kWindow, indices.count - first));
+  std::array<uint32_t, kRestartWindow> window;
+  for (uint64_t first = 0; first < indices.count; first += kRestartWindow) {
+    const auto count =
+        static_cast<size_t>(std::min<uint64_t>(kRestartWindow, indices.count - first));
     reader.read(first, count, window.data());
     for (size_t i = 0; i < count; ++i) {
       const StripWalk before = walk;

@@ -10,7 +10,7 @@
 namespace voxdag::gltf {
 namespace {
 
-constexpr uint64_t kWindow = 1024;
+constexpr uint64_t kWeightWindow = 1024;
 
 // Numbers of vertices.
 struct Faults {
@@ -25,8 +25,8 @@ Faults find_faults(const Document& document, BufferReader& buffers, const Primit
   Faults faults;
   std::vector<double> sums, weights;
   const uint64_t vertices = document.accessors[static_cast<size_t>(primitive.position)].count;
-  for (uint64_t first = 0; first < vertices; first += kWindow) {
-    const auto count = static_cast<size_t>(std::min(kWindow, vertices - first));
+  for (uint64_t first = 0; first < vertices; first += kWeightWindow) {
+    const auto count = static_cast<size_t>(std::min(kWeightWindow, vertices - first));
     sums.assign(count, 0);
     weights.resize(kInfluencesOfSet * count);
     for (AccessorReader& set : sets) {
