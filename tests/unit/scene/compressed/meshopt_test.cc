@@ -156,7 +156,8 @@ TEST(GltfMeshopt, ColorFilter) {
                                                                  {"type", "VEC4"}});
     std::vector<std::array<uint32_t, 4>> colors;
     OpenScene open(file == "KHR" ? khr_meshopt_glb(scene) : meshopt_glb(scene));
-    for (const SurfaceCorner& corner : surfaces_of(*open.source)[0].corners)
+    const SurfaceTriangle triangle = surfaces_of(*open.source)[0];
+    for (const SurfaceCorner& corner : triangle.corners)
       colors.push_back({corner.color[0], corner.color[1], corner.color[2], corner.color[3]});
     EXPECT_TRUE(open.source->materials().warnings.list().empty());
     return colors;
