@@ -66,7 +66,8 @@ class Preparation {
 
  private:
   void open() {
-    find_cutouts();
+    WarningList warnings;
+    find_cutouts(warnings);
     if (cutouts_) {
       // A checkpoint does not notice changes of images.
       checkpoint_.disable();
@@ -79,26 +80,30 @@ class Preparation {
     state_.declared_triangles = scene.declared_triangles();
     if (state_.position == 0) checkpoint_.check_disk_space(scene);
     for (const Warning& warning : scene.warnings()) context_.progress.warn_of_input(warning);
+    // The lines above can start over, which removes all recorded warnings.
+    for (const Warning& warning : warnings.list()) context_.progress.warn_of_input(warning);
   }
 
-  // Finds the cutouts that the build leaves out, and warns if it keeps cutouts.
-  void find_cutouts() {
+  // Finds the cutouts that the build leaves out. Adds a warning if it keeps cutouts.
+  void find_cutouts(WarningList& warnings) {
     const CutoutRule rule = spec_.geometry.cutouts;
     if (rule == CutoutRule::kDefault) return;
     const SceneMaterials materials = scene_.open().materials();
     if (!may_have_cutouts(materials)) return;
-    if (rule == CutoutRule::kKeep) return warn_of_kept_cutouts(count_cutout_materials(materials));
+    if (rule == CutoutRule::kKeep) {
+      warn_of_kept_cutouts(count_cutout_materials(materials), warnings);
+      return;
+    }
     WarningList problems;
     Cutouts found = voxdag::find_cutouts(context_.files, materials, spec_.run.threads, budget_,
                                          context_.cancel, problems);
     // With colors, the color stage reports unreadable images.
-    if (!spec_.geometry.attributes.use_images())
-      for (const Warning& warning : problems.list()) context_.progress.warn_of_input(warning);
+    if (!spec_.geometry.attributes.use_images()) warnings = std::move(problems);
     cutouts_.emplace(std::move(found));
   }
-  void warn_of_kept_cutouts(uint64_t materials) {
+  void warn_of_kept_cutouts(uint64_t materials, WarningList& warnings) const {
     if (materials == 0) return;
-    context_.progress.warn_of_input(
+    warnings.add(
         {"kept-cutouts", spec_.geometry.scenes.front(),
          std::to_string(materials) + (materials == 1 ? " material has" : " materials have") +
              " an alpha mode that may cut out parts of surfaces, which are kept; --cutouts skip "
