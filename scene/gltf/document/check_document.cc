@@ -4,9 +4,9 @@
 
 #include "core/base/error.h"
 #include "core/base/integers.h"
-#include "scene/gltf/document/array_access.h"
 #include "scene/gltf/document/check_meshes.h"
 #include "scene/gltf/document/scene_nodes.h"
+#include "scene/gltf/json/array_access.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {

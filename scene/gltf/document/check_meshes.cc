@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "scene/gltf/document/array_access.h"
 #include "scene/gltf/document/check_document.h"
+#include "scene/gltf/json/array_access.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
