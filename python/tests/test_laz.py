@@ -58,6 +58,8 @@ def test_plan(folder):
 
 
 def test_interrupted_build_resumes(folder, tmp_path):
+    # Large cubes make the stage long enough for calls of stop().
+    options = {"resolution": 4096, "point_radius": 20}
     output = tmp_path / "a.vdag"
 
     def stop(stage, *_):
@@ -65,10 +67,10 @@ def test_interrupted_build_resumes(folder, tmp_path):
             raise KeyError("stop")
 
     with pytest.raises(KeyError):
-        voxdag.build(folder / "a.laz", resolution=512, output=output, progress=stop)
+        voxdag.build(folder / "a.laz", output=output, progress=stop, **options)
     assert not [name for name in os.listdir(tmp_path) if name.endswith(".las")]
-    resumed = voxdag.build(folder / "a.laz", resolution=512, output=output)
-    whole = voxdag.build(folder / "a.las", resolution=512, output=tmp_path / "b.vdag")
+    resumed = voxdag.build(folder / "a.laz", output=output, **options)
+    whole = voxdag.build(folder / "a.las", output=tmp_path / "b.vdag", **options)
     assert resumed["sha256"] == whole["sha256"]
 
 
