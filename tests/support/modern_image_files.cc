@@ -18,7 +18,7 @@ namespace {
   if (!condition) throw std::runtime_error("an image cannot be encoded");
 }
 
-[[maybe_unused]] std::string little_endian(uint32_t value, int bytes) {
+[[maybe_unused]] std::string little_endian(uint64_t value, int bytes) {
   std::string text;
   for (int i = 0; i < bytes; ++i) text += static_cast<char>(value >> 8 * i);
   return text;

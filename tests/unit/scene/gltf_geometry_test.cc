@@ -282,9 +282,9 @@ SceneBuilder joined_rows(const std::vector<std::vector<uint32_t>>& rows, int mod
   SceneBuilder scene;
   scene.root["extensionsUsed"] = {"KHR_mesh_primitive_restart"};
   const int position = scene.add_positions(positions);
-  return scene_of(scene, {{"attributes", {{"POSITION", position}}},
-                          {"indices", scene.add_accessor("SCALAR", component_type, indices)},
-                          {"mode", mode}});
+  const int accessor = scene.add_accessor("SCALAR", component_type, indices);
+  return scene_of(
+      scene, {{"attributes", {{"POSITION", position}}}, {"indices", accessor}, {"mode", mode}});
 }
 
 // Sorts the corners of each triangle, because restarts correct the winding of strips.

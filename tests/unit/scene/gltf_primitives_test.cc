@@ -114,7 +114,7 @@ TEST(GltfPrimitives, WithoutJointsBesideSkinnedOnes) {
   const Json skinned_primitive = primitives_of(scene)[0];
   primitives_of(scene) = {skinned_primitive, plain, skinned_primitive, plain};
   expect_scene(scene.glb(), {by_joint, by_node, by_joint, by_node}, "unskinned-primitives", 2);
-  primitives_of(scene) = {plain};
+  primitives_of(scene) = Json::array({plain});
   expect_scene(scene.glb(), {by_node}, "unskinned-primitives");
 }
 
