@@ -121,8 +121,10 @@ uint32_t read_cache_bits(BitReader& bits) {
 }
 uint32_t cache_size(uint32_t cache_bits) { return cache_bits > 0 ? 1u << cache_bits : 0; }
 
-// Reads the rest of a length or a distance.
+// Reads the rest of a length or a distance. A code of one or two symbols can name symbols that do
+// not exist.
 uint32_t read_copy_value(BitReader& bits, uint32_t symbol) {
+  if (symbol >= kDistanceCodes) throw BrokenStream{};
   if (symbol < 4) return symbol + 1;
   const uint32_t extra = (symbol - 2) >> 1;
   return ((2 + (symbol & 1)) << extra) + bits.read(extra) + 1;
