@@ -7,6 +7,7 @@
 #include "core/base/error.h"
 #include "core/color/blocks/attribute_encoder.h"
 #include "core/color/rule/bake_region.h"
+#include "core/color/snap_surface.h"
 #include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
@@ -72,10 +73,7 @@ void find_surfaces(TriangleSource& scene, const Grid& snap, const ColorGrid& gri
   progress.begin_stage("surfaces", scene.declared_triangles(), "triangles");
   const auto add = [&](const SurfaceTriangle& triangle) {
     FixedSurface surface;
-    if (snap_triangle(snap, triangle.position, surface.position) != SnapResult::kInside) return;
-    surface.corners = triangle.corners;
-    surface.material = triangle.material;
-    surface.is_flipped = triangle.is_flipped;
+    if (snap_surface(snap, triangle, surface) != SnapResult::kInside) return;
     const CellBox box(surface.position, grid.levels, grid.region_level());
     for (SampledRegion& region : regions) {
       if (!may_touch(box, region.cube)) continue;

@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/color/cutouts/visible_part.h"
+#include "core/color/snap_surface.h"
 #include "core/geometry/overlap.h"
 
 namespace voxdag::query {
@@ -68,34 +69,41 @@ double area(const FixedTriangle& t) {
   return std::sqrt(sum);
 }
 
-// Calls visit(triangle, surface) with every triangle that may touch the grid. `surface` is null
-// without cutouts.
+// The triangles of the scene that may touch the grid. Each function calls visit() with all of them,
+// in the order of the scene.
 class SnappedScene {
  public:
-  SnappedScene(TriangleSource& scene, const Grid& grid, bool has_cutouts, Progress& progress,
+  SnappedScene(TriangleSource& scene, const Grid& grid, Progress& progress,
                const CancelToken& cancel)
-      : scene_(scene),
-        grid_(grid),
-        has_cutouts_(has_cutouts),
-        progress_(progress),
-        cancel_(cancel) {}
+      : scene_(scene), grid_(grid), progress_(progress), cancel_(cancel) {}
 
   template <class Visit>
-  void for_each(const Visit& visit) const {
-    const auto for_batch = [&](const auto& batch) {
-      cancel_.check();
-      progress_.advance(batch.size());
-      for (const auto& triangle : batch) add(triangle, visit);
-    };
-    if (has_cutouts_)
-      scene_.open(1)->read_surfaces(0, scene_.declared_triangles(), for_batch);
-    else
-      scene_.for_each_batch(for_batch);
+  void for_each_triangle(const Visit& visit) const {
+    scene_.for_each_batch([&](std::span<const WorldTriangle> batch) {
+      begin(batch.size());
+      FixedTriangle triangle;
+      for (const WorldTriangle& world : batch)
+        if (is_inside(snap_triangle(grid_, world, triangle))) visit(triangle);
+    });
+  }
+  template <class Visit>
+  void for_each_surface(const Visit& visit) const {
+    const auto cursor = scene_.open(1);
+    cursor->read_surfaces(0, scene_.declared_triangles(),
+                          [&](std::span<const SurfaceTriangle> batch) {
+                            begin(batch.size());
+                            FixedSurface surface;
+                            for (const SurfaceTriangle& world : batch)
+                              if (is_inside(snap_surface(grid_, world, surface))) visit(surface);
+                          });
   }
 
  private:
-  bool snap(const WorldTriangle& world, FixedTriangle& triangle) const {
-    const SnapResult result = snap_triangle(grid_, world, triangle);
+  void begin(size_t triangles) const {
+    cancel_.check();
+    progress_.advance(triangles);
+  }
+  static bool is_inside(SnapResult result) {
     if (result == SnapResult::kTooFar)
       throw Error(
           ErrorCode::kLimit,
@@ -103,30 +111,16 @@ class SnappedScene {
           "voxels away from the grid's low corner: expected a scene that voxdag can build");
     return result == SnapResult::kInside;
   }
-  template <class Visit>
-  void add(const WorldTriangle& world, const Visit& visit) const {
-    FixedTriangle triangle;
-    if (snap(world, triangle)) visit(triangle, nullptr);
-  }
-  template <class Visit>
-  void add(const SurfaceTriangle& world, const Visit& visit) const {
-    FixedSurface surface;
-    if (!snap(world.position, surface.position)) return;
-    surface.corners = world.corners;
-    surface.material = world.material;
-    visit(surface.position, &surface);
-  }
 
   TriangleSource& scene_;
   const Grid& grid_;
-  const bool has_cutouts_;
   Progress& progress_;
   const CancelToken& cancel_;
 };
 
 std::vector<FixedTriangle> draw_triangles(const SnappedScene& scene, Random& random) {
   Reservoir uniform(kSampleBoxes / 2), by_area(kSampleBoxes / 2);
-  scene.for_each([&](const FixedTriangle& triangle, const FixedSurface*) {
+  scene.for_each_triangle([&](const FixedTriangle& triangle) {
     uniform.offer(triangle, 1.0, random);
     by_area.offer(triangle, area(triangle), random);
   });
@@ -189,7 +183,7 @@ void mark(const FixedTriangle& t, const VisiblePart* part, SampleBox& box) {
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
                                       Progress& progress, const CancelToken& cancel,
                                       const Cutouts* cutouts) {
-  const SnappedScene snapped(scene, grid, cutouts != nullptr, progress, cancel);
+  const SnappedScene snapped(scene, grid, progress, cancel);
   progress.begin_stage("sample", 2 * scene.declared_triangles(), "triangles");
   Random random(seed);
   std::vector<SampleBox> boxes;
@@ -203,17 +197,24 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
   }
   std::sort(boxes.begin(), boxes.end(),
             [](const SampleBox& a, const SampleBox& b) { return a.low[0] < b.low[0]; });
-  snapped.for_each([&](const FixedTriangle& triangle, const FixedSurface* surface) {
-    std::optional<VisiblePart> part;
-    if (surface && cutouts->may_cut(surface->material))
-      part.emplace(*surface, *cutouts, grid.levels);
+  // `surface` is null if the triangle cannot be cut out.
+  const auto mark_boxes = [&](const FixedTriangle& triangle, const FixedSurface* surface) {
     const int64_t first = (triangle.low(0) >> kUnitBits) - kBoxEdge + 1;
     const int64_t last = triangle.high(0) >> kUnitBits;
     auto box = std::lower_bound(boxes.begin(), boxes.end(), first,
                                 [](const SampleBox& b, int64_t x) { return b.low[0] < x; });
+    if (box == boxes.end() || box->low[0] > last) return;
+    std::optional<VisiblePart> part;
+    if (surface) part.emplace(*surface, *cutouts, grid.levels);
     for (; box != boxes.end() && box->low[0] <= last; ++box)
       mark(triangle, part ? &*part : nullptr, *box);
-  });
+  };
+  if (cutouts)
+    snapped.for_each_surface([&](const FixedSurface& surface) {
+      mark_boxes(surface.position, cutouts->may_cut(surface.material) ? &surface : nullptr);
+    });
+  else
+    snapped.for_each_triangle([&](const FixedTriangle& t) { mark_boxes(t, nullptr); });
   progress.end_stage();
   return boxes;
 }

@@ -1,5 +1,6 @@
 #include "scheduler/stages/attributes/bin_surfaces.h"
 
+#include "core/color/snap_surface.h"
 #include "core/format/checksum.h"
 #include "scheduler/stages/ingest/ingest.h"
 #include "scheduler/stages/ingest/read_pieces.h"
@@ -78,11 +79,7 @@ class SurfacePiece {
 
   void add(const SurfaceTriangle& triangle) {
     FixedSurface surface;
-    if (snap_triangle(binning_.grid, triangle.position, surface.position) != SnapResult::kInside)
-      return;
-    surface.corners = triangle.corners;
-    surface.material = triangle.material;
-    surface.is_flipped = triangle.is_flipped;
+    if (snap_surface(binning_.grid, triangle, surface) != SnapResult::kInside) return;
     const size_t begin = bytes_.size(), record = records_.size();
     append_identity(surface, binning_.cutouts, binning_.record_bytes, triangles_);
     append_surface(surface, has_image(surface.material), bytes_);

@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/page_buffer.h"
 #include "core/color/cutouts/visible_voxels.h"
+#include "core/color/snap_surface.h"
 #include "scene/textures/find_cutouts.h"
 #include "scheduler/stages/ingest/read_pieces.h"
 #include "scheduler/triangles/chunk.h"
@@ -132,9 +133,7 @@ class SnappedPiece {
     FixedSurface surface;
     if (!is_inside(to_fixed(grid_, snapped, surface.position))) return;
     ++counts_.triangles;
-    surface.corners = world.corners;
-    surface.material = world.material;
-    surface.is_flipped = world.is_flipped;
+    copy_appearance(world, surface);
     append_identity(surface, cutouts_, record_bytes_, identity_);
     if (!cutouts_->may_cut(surface.material))
       return store(surface.position, expected_work(snapped));
