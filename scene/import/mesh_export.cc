@@ -106,31 +106,23 @@ void MeshExport::write_indices(GlbFile& file, MemoryBudget& budget, WarningList&
   polygon::Triangulator triangulator(budget, "a polygon of " + where_);
   std::vector<double> xyz;
   uint64_t doubtful = 0;
-  const auto put = [&](const aiFace& face, size_t a, size_t b, size_t c) {
-    const uint32_t triangle[] = {face.mIndices[a], face.mIndices[b], face.mIndices[c]};
-    file.put(triangle, sizeof triangle);
-  };
   for (const aiFace& face : faces_of(mesh_)) {
-    bool is_split = false;
+    std::span<const uint32_t> split;
     if (face.mNumIndices > 3) {
       xyz.clear();
       for (const unsigned index : std::span(face.mIndices, face.mNumIndices))
         for (unsigned axis = 0; axis < 3; ++axis) xyz.push_back(mesh_.mVertices[index][axis]);
-      is_split = triangulator.triangulate(xyz);
+      if (triangulator.triangulate(xyz)) split = triangulator.triangles();
       doubtful += triangulator.is_doubtful();
     }
-    const auto triangles = triangulator.triangles();
-    for (size_t k = 0; k + 2 < face.mNumIndices; ++k)
-      if (is_split)
-        put(face, triangles[3 * k], triangles[3 * k + 1], triangles[3 * k + 2]);
-      else
-        put(face, 0, k + 1, k + 2);
+    for (size_t t = 0; t + 2 < face.mNumIndices; ++t) {
+      uint32_t triangle[3];
+      for (size_t k = 0; k < 3; ++k)
+        triangle[k] = face.mIndices[polygon::position_of_corner(split, t, k)];
+      file.put(triangle, sizeof triangle);
+    }
   }
-  if (doubtful > 0)
-    warnings.add({"crossing-edges", where_,
-                  "the edges of a face cross each other, so its area is doubtful; it is read as a "
-                  "fan",
-                  doubtful});
+  if (doubtful > 0) warnings.add(polygon::crossing_edges(where_, "the edges of a face", doubtful));
 }
 
 }  // namespace voxdag

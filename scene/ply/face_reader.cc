@@ -90,9 +90,7 @@ uint64_t FaceReader::face_end() const {
 
 // Returns the position in the face of a corner of a triangle.
 size_t FaceReader::corner_of(uint64_t triangle, size_t k) const {
-  const auto number = static_cast<size_t>(triangle - first_triangle_);
-  if (!split_.empty()) return split_[3 * number + k];
-  return k == 0 ? 0 : number + k;
+  return polygon::position_of_corner(split_, static_cast<size_t>(triangle - first_triangle_), k);
 }
 
 }  // namespace voxdag::ply

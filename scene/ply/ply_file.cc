@@ -173,8 +173,8 @@ void PlyFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
     }
   }
   if (doubtful > 0)
-    warn("crossing-edges", "face " + std::to_string(first_doubtful),
-         "its edges cross each other, so its area is doubtful; it is read as a fan", doubtful);
+    warnings_.add(polygon::crossing_edges(
+        file_->path() + ": face " + std::to_string(first_doubtful), "its edges", doubtful));
 }
 
 void PlyFile::warn(const char* code, const std::string& place, const std::string& message,

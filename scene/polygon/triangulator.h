@@ -17,16 +17,33 @@
 // up to kBytesPerCorner of memory per corner. Not thread-safe.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/memory_budget.h"
+#include "core/base/warning.h"
 #include "scene/growing_charge.h"
 #include "scene/polygon/sweep.h"
 
 namespace voxdag::polygon {
+
+// Returns the position in a polygon of corner `k` of a triangle. `split` has three positions for
+// each triangle. If it is empty, the triangles are the fan of the polygon.
+inline size_t position_of_corner(std::span<const uint32_t> split, size_t triangle, size_t k) {
+  if (!split.empty()) return split[3 * triangle + k];
+  return k == 0 ? 0 : triangle + k;
+}
+
+// Returns the warning that `count` polygons are doubtful. `edges` is the subject of its message,
+// such as "its edges".
+inline Warning crossing_edges(std::string place, const std::string& edges, uint64_t count) {
+  return {"crossing-edges", std::move(place),
+          edges + " cross each other, so its area is doubtful; it is read as a fan", count};
+}
 
 class Triangulator {
  public:

@@ -26,7 +26,7 @@ void PolygonReader::seek(uint64_t offset, uint64_t line) {
 
 bool PolygonReader::next() {
   if (!read_vertices()) return false;
-  is_split_ = false;
+  split_ = {};
   if (vertices_.size() > 3) triangulate();
   return true;
 }
@@ -34,12 +34,11 @@ bool PolygonReader::next() {
 void PolygonReader::triangulate() {
   xyz_.clear();
   for (const auto& vertex : vertices_) xyz_.insert(xyz_.end(), vertex.begin(), vertex.end());
-  is_split_ = triangulator_.triangulate(xyz_);
+  if (triangulator_.triangulate(xyz_)) split_ = triangulator_.triangles();
 }
 
 const std::array<double, 3>& PolygonReader::vertex(size_t triangle, size_t k) const {
-  if (is_split_) return vertices_[triangulator_.triangles()[3 * triangle + k]];
-  return vertices_[k == 0 ? 0 : triangle + k];
+  return vertices_[polygon::position_of_corner(split_, triangle, k)];
 }
 
 // Reads the vertices of the next polygon. Returns false if the file has no other polygon.

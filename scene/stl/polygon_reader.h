@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -66,8 +67,8 @@ class PolygonReader {
   bool is_cut_off_ = false;
   std::vector<std::array<double, 3>> vertices_;
   polygon::Triangulator triangulator_;
-  std::vector<double> xyz_;  // a copy of the vertices, for triangulator_
-  bool is_split_ = false;    // false if the triangles are the fan of the polygon
+  std::vector<double> xyz_;          // a copy of the vertices, for triangulator_
+  std::span<const uint32_t> split_;  // the triangles; empty if they are the fan of the polygon
   uint64_t offset_ = 0, line_ = 0;
   uint64_t unknown_words_ = 0, first_unknown_line_ = 0;
 };

@@ -76,10 +76,7 @@ void StlFile::scan_text(MemoryBudget& budget, const CancelToken& cancel) {
                    "a facet of fewer than three vertices makes no voxels", too_small});
   if (doubtful > 0)
     warnings_.add(
-        {"crossing-edges", place(first_doubtful_line),
-         "the edges of a facet cross each other, so its area is doubtful; it is read as a "
-         "fan",
-         doubtful});
+        polygon::crossing_edges(place(first_doubtful_line), "the edges of a facet", doubtful));
   if (polygons.unknown_words() > 0)
     warnings_.add({"unknown-statements", place(polygons.first_unknown_line()),
                    "words that are not part of STL are ignored", polygons.unknown_words()});

@@ -187,9 +187,8 @@ void ObjFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
     if (splitter.is_doubtful() && doubtful++ == 0) first_doubtful = polygons.place();
   }
   if (doubtful > 0)
-    warnings_.add({"crossing-edges", file_->path() + ": " + first_doubtful,
-                   "its edges cross each other, so its area is doubtful; it is read as a fan",
-                   doubtful});
+    warnings_.add(
+        polygon::crossing_edges(file_->path() + ": " + first_doubtful, "its edges", doubtful));
 }
 
 }  // namespace voxdag::obj
