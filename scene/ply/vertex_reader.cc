@@ -13,7 +13,7 @@ template <class T, bool kBigEndian>
 void decode_property(const std::byte* bytes, size_t row_bytes, size_t count, size_t stride,
                      double* out) {
   for (size_t i = 0; i < count; ++i)
-    out[stride * i] = static_cast<double>(load<T>(bytes + i * row_bytes, kBigEndian));
+    out[stride * i] = static_cast<double>(load_number<T>(bytes + i * row_bytes, kBigEndian));
 }
 
 }  // namespace

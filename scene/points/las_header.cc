@@ -54,7 +54,7 @@ class LasHeaderParser {
  private:
   template <class T>
   T at(size_t offset) const {
-    return load_little<T>(&bytes_[offset]);
+    return load_little_endian<T>(&bytes_[offset]);
   }
 
   uint8_t read_version() const {

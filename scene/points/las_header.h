@@ -3,25 +3,14 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <type_traits>
 
 #include "core/io/file_system.h"
+#include "scene/load_number.h"
 
 namespace voxdag::points {
-
-// Returns the little-endian number at `bytes`, which need not be aligned.
-template <class T>
-T load_little(const std::byte* bytes) {
-  std::array<std::byte, sizeof(T)> own;
-  std::memcpy(own.data(), bytes, sizeof(T));
-  if constexpr (std::endian::native == std::endian::big)
-    for (size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(own[i], own[sizeof(T) - 1 - i]);
-  return std::bit_cast<T>(own);
-}
 
 struct LasHeader {
   static constexpr size_t kNoColor = 0;

@@ -95,7 +95,7 @@ void LasFile::pass_over(MemoryBudget& budget, const CancelToken& cancel) {
     ++kept;
     if (has_colors())
       for (size_t c = 0; c < 3; ++c)
-        all_colors |= load_little<uint16_t>(record + las_.color_offset + 2 * c);
+        all_colors |= load_little_endian<uint16_t>(record + las_.color_offset + 2 * c);
   });
   count_ = kept;
   max_color_ = all_colors > 255 ? 65535 : 255;
@@ -109,7 +109,7 @@ class LasReader : public PointReader {
   void read(uint64_t first, size_t count, double* xyz) override {
     for_each_point(first, count, [&](const std::byte* record) {
       for (size_t a = 0; a < 3; ++a)
-        *xyz++ = static_cast<double>(load_little<int32_t>(record + 4 * a)) * las_.scale[a] +
+        *xyz++ = static_cast<double>(load_little_endian<int32_t>(record + 4 * a)) * las_.scale[a] +
                  las_.offset[a];
     });
   }
@@ -118,7 +118,7 @@ class LasReader : public PointReader {
     if (!light_) light_.emplace(file_.max_color());
     for_each_point(first, count, [&](const std::byte* record) {
       for (size_t c = 0; c < 3; ++c)
-        (*out)[c] = light_->of(load_little<uint16_t>(record + las_.color_offset + 2 * c));
+        (*out)[c] = light_->of(load_little_endian<uint16_t>(record + las_.color_offset + 2 * c));
       (*out++)[3] = kFullIntensity;
     });
   }

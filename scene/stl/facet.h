@@ -2,22 +2,13 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 
-namespace voxdag::stl {
+#include "scene/load_number.h"
 
-template <class T>
-T load_little_endian(const std::byte* bytes) {
-  std::array<std::byte, sizeof(T)> own;
-  std::memcpy(own.data(), bytes, sizeof(T));
-  if constexpr (std::endian::native == std::endian::big)
-    for (size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(own[i], own[sizeof(T) - 1 - i]);
-  return std::bit_cast<T>(own);
-}
+namespace voxdag::stl {
 
 struct Facet {
   std::array<double, 3> normal;

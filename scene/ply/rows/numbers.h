@@ -1,16 +1,15 @@
 // Numbers as PLY files store them: bytes in either order, or text.
 #pragma once
 
-#include <bit>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <optional>
 #include <string_view>
 #include <utility>
 
+#include "scene/load_number.h"
 #include "scene/ply/rows/header.h"
 
 namespace voxdag::ply {
@@ -43,16 +42,6 @@ decltype(auto) with_type(Type type, const Body& body) {
     default:
       return body(double{});
   }
-}
-
-// Returns the number at `bytes`, which need not be aligned.
-template <class T>
-T load(const std::byte* bytes, bool is_big_endian) {
-  std::byte own[sizeof(T)];
-  std::memcpy(own, bytes, sizeof(T));
-  if (is_big_endian != (std::endian::native == std::endian::big))
-    for (size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(own[i], own[sizeof(T) - 1 - i]);
-  return std::bit_cast<T>(own);
 }
 
 template <std::integral T>

@@ -20,13 +20,13 @@ template <class T, bool kBigEndian>
 void decode_indices(const std::byte* bytes, size_t count, uint32_t* out) {
   if constexpr (std::is_integral_v<T>)
     for (size_t i = 0; i < count; ++i)
-      out[i] = as_index(load<T>(bytes + i * sizeof(T), kBigEndian));
+      out[i] = as_index(load_number<T>(bytes + i * sizeof(T), kBigEndian));
 }
 
 template <class T, bool kBigEndian>
 void decode_reals(const std::byte* bytes, size_t count, double* out) {
   for (size_t i = 0; i < count; ++i)
-    out[i] = static_cast<double>(load<T>(bytes + i * sizeof(T), kBigEndian));
+    out[i] = static_cast<double>(load_number<T>(bytes + i * sizeof(T), kBigEndian));
 }
 
 DecodeIndices indices_decoder(Type type, bool is_big_endian) {
@@ -138,8 +138,9 @@ class BinaryRows : public Rows {
   }
 
   int64_t count_at(const std::byte* bytes, Type type) const {
-    return with_type(
-        type, [&]<class T>(T) { return static_cast<int64_t>(load<T>(bytes, is_big_endian_)); });
+    return with_type(type, [&]<class T>(T) {
+      return static_cast<int64_t>(load_number<T>(bytes, is_big_endian_));
+    });
   }
 
   const std::byte* bytes_at(uint64_t row, uint64_t offset, size_t size) {

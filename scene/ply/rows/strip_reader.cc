@@ -99,7 +99,7 @@ int64_t StripReader::integer(Type type) {
   if (!text_)
     return with_type(type, [&]<class T>(T) {
       const bool is_big_endian = format_ == Format::kBigEndian;
-      return static_cast<int64_t>(load<T>(bytes(sizeof(T)), is_big_endian));
+      return static_cast<int64_t>(load_number<T>(bytes(sizeof(T)), is_big_endian));
     });
   const std::string_view text = word();
   if (const auto value = parse_whole_number(text)) return *value;
