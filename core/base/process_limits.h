@@ -6,6 +6,20 @@
 #include <cstdint>
 #include <string>
 
+// VOXDAG_SANITIZED is 1 if the address or thread sanitizer instruments this code, and 0 otherwise.
+// Sanitizers reserve terabytes of address space, retain freed memory and handle signals. g++
+// defines macros for them; clang has __has_feature.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define VOXDAG_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define VOXDAG_SANITIZED 1
+#endif
+#endif
+#ifndef VOXDAG_SANITIZED
+#define VOXDAG_SANITIZED 0
+#endif
+
 namespace voxdag {
 
 // The smallest accepted value of --memory, in bytes.

@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 #include "core/base/text.h"
 
 namespace voxdag {
@@ -26,15 +27,6 @@ using nlohmann::json;
 constexpr int kTickMs = 100;
 // Exit statuses of the child. A child that fails otherwise sends its error before it exits.
 constexpr int kDone = 0, kFailed = 1, kNoMemory = 2;
-
-// Sanitizers reserve terabytes of address space, so it cannot be limited.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kIsSanitized = true;
-#elif defined(__has_feature)
-constexpr bool kIsSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
-#else
-constexpr bool kIsSanitized = false;
-#endif
 
 std::string text_of_errno() { return std::strerror(errno); }
 
@@ -63,7 +55,7 @@ void confine(uint64_t memory_bytes, pid_t parent) {
   for (int stream = 0; stream < 3; ++stream) dup2(null, stream);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
-  if (kIsSanitized) return;
+  if (VOXDAG_SANITIZED) return;  // the sanitizer needs the address space
   rlimit limit{};
   getrlimit(RLIMIT_AS, &limit);
   limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, address_space_bytes() + memory_bytes);

@@ -9,6 +9,8 @@
 #include <memory>
 #include <vector>
 
+#include "core/base/process_limits.h"
+
 namespace voxdag {
 namespace {
 
@@ -69,17 +71,8 @@ TEST(WatchedMapping, DamageEndsWithTheWatch) {
   EXPECT_FALSE(WatchedMapping(next.data(), next.bytes()).is_damaged());
 }
 
-// Detects sanitizers: g++ defines macros, clang has __has_feature. With a sanitizer, the process
-// ends with another status.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define VOXDAG_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define VOXDAG_SANITIZED 1
-#endif
-#endif
-
-#ifndef VOXDAG_SANITIZED
+// With a sanitizer, the process ends with another status.
+#if !VOXDAG_SANITIZED
 TEST(WatchedMapping, OthersStillEndTheProcess) {
   const Mapped watched_file(1), file(1);
   const WatchedMapping watched(watched_file.data(), watched_file.bytes());

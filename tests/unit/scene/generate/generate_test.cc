@@ -8,6 +8,7 @@
 #include <fstream>
 #include <set>
 
+#include "core/base/process_limits.h"
 #include "scene/generate/glb_layout.h"
 #include "tests/unit/scene/generate/glb.h"
 #include "tests/unit/scene/generate/memory_files.h"
@@ -46,15 +47,6 @@ GenerateOptions small(SceneKind kind, bool instances = false) {
   options.instances = instances;
   return options;
 }
-
-// g++ has macros for sanitizers, clang a test.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#elif defined(__has_feature)
-constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
-#else
-constexpr bool kSanitized = false;
-#endif
 
 // Kilobytes of a line of /proc/self/status.
 uint64_t status_kb(const std::string& name) {
@@ -259,7 +251,7 @@ TEST(GenerateSize, IsAboutWhatWasAsked) {
 
 // A scene of 50 MB is written through a buffer of 1 MB, so memory does not grow with the scene.
 TEST(GenerateMemory, StaysSmallForALargeScene) {
-  if (kSanitized) GTEST_SKIP() << "sanitizers retain freed memory";
+  if (VOXDAG_SANITIZED) GTEST_SKIP() << "sanitizers retain freed memory";
   MemoryFiles files;
   files.keep = false;
   NoProgress progress;

@@ -7,21 +7,13 @@
 #include <csignal>
 #include <fstream>
 
+#include "core/base/process_limits.h"
 #include "core/image/png_writer.h"
 #include "scene/import/confined_process.h"
 #include "scene/textures/linear_light.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/scene/import/scene_texts.h"
 #include "tests/unit/scene/scene_files.h"
-
-// A sanitizer reserves terabytes of address space.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define VOXDAG_IS_SANITIZED
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define VOXDAG_IS_SANITIZED
-#endif
-#endif
 
 namespace voxdag::test {
 namespace {
@@ -198,7 +190,7 @@ TEST_F(Import, WarningsCanEndTheImport) {
   EXPECT_FALSE(system_files().exists(glb_ + ".partial"));
 }
 
-#ifndef VOXDAG_IS_SANITIZED
+#if !VOXDAG_SANITIZED
 TEST_F(Import, MemoryIsLimited) {
   std::string file = "OFF\n3 300000 0\n0 0 0\n1 0 0\n0 1 0\n";
   for (int i = 0; i < 300000; ++i) file += "3 0 1 2\n";
