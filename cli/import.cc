@@ -9,6 +9,7 @@
 #include "core/base/clock.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/fields/json_fields.h"
 #include "scheduler/state/job_progress.h"
 
 namespace voxdag::cli {
@@ -28,13 +29,6 @@ void print(const ImportCommand& command, const ImportReport& r, double wall_s) {
               size_text(r.bytes).c_str(), duration_text(wall_s).c_str());
 }
 
-nlohmann::ordered_json json_of(const Warning& warning) {
-  return {{"code", warning.code},
-          {"place", warning.place},
-          {"message", warning.message},
-          {"count", warning.count}};
-}
-
 void run(const ImportCommand& command, CommandContext& context) {
   command.output.check(context.files, command.input, is_imported_scene);
   const uint64_t memory_bytes = memory_limit(command.memory);
@@ -43,7 +37,7 @@ void run(const ImportCommand& command, CommandContext& context) {
   const auto warn = [&](const Warning& warning) {
     if (command.strict) refuse_warning(warning);
     progress->warn_of_input(warning);
-    warnings.push_back(json_of(warning));
+    warnings.push_back(record_json(warning));
   };
   const double start_s = wall_seconds();
   const ImportReport report = import_scene(context.files, command.input, command.output.path,

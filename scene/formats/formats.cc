@@ -13,6 +13,7 @@
 #include "scene/points/las_points.h"
 #include "scene/points/text_points.h"
 #include "scene/stl/stl_scene.h"
+#include "scene/text/characters.h"
 
 namespace voxdag {
 namespace {
@@ -52,12 +53,9 @@ std::vector<std::string_view> all_endings() {
 std::span<const SceneFormat> scene_formats() { return kFormats; }
 
 bool has_scene_ending(std::string_view name) {
-  const auto is_same_letter = [](char a, char b) {
-    return (a >= 'A' && a <= 'Z' ? a + 32 : a) == b;
-  };
   return std::ranges::any_of(all_endings(), [&](std::string_view ending) {
     return name.size() >= ending.size() &&
-           std::ranges::equal(name.substr(name.size() - ending.size()), ending, is_same_letter);
+           equals_in_any_case(name.substr(name.size() - ending.size()), ending);
   });
 }
 

@@ -8,6 +8,7 @@
 #include "scene/formats/formats.h"
 #include "scene/lfs_pointer.h"
 #include "scene/messages.h"
+#include "scene/text/characters.h"
 
 namespace voxdag {
 namespace {
@@ -94,15 +95,9 @@ constexpr KnownFormat kKnown[] = {
      "a program"},
 };
 
-std::string lower(std::string_view text) {
-  std::string copy(text);
-  for (char& c : copy)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return copy;
-}
-
 std::string contents_of_markup(std::string_view text) {
-  const std::string small = lower(text);
+  std::string small(text);
+  for (char& c : small) c = lower(c);
   if (small.find("<collada") != small.npos) return std::string("a COLLADA file: ") + kImport;
   if (small.find("<x3d") != small.npos) return std::string("an X3D file: ") + kImport;
   if (small.find("<html") != small.npos || small.starts_with("<!doctype html"))

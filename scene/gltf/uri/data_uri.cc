@@ -4,17 +4,12 @@
 
 #include "scene/base64.h"
 #include "scene/gltf/uri/percent.h"
+#include "scene/text/characters.h"
 
 namespace voxdag::gltf {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r\n\f\v";
-
-bool equals_in_any_case(std::string_view text, std::string_view lower) {
-  return std::ranges::equal(text, lower, [](char a, char b) {
-    return (a >= 'A' && a <= 'Z' ? static_cast<char>(a - 'A' + 'a') : a) == b;
-  });
-}
 
 std::string_view trimmed(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
