@@ -10,7 +10,7 @@ namespace voxdag {
 namespace {
 
 // Weights of red and blue in luma, for each value of MatrixCoefficients (H.273, table 4). Files
-// without a value, and files that derive the weights from primaries, use those of BT.601.
+// without a value, and files that derive the weights from primaries, use BT.601.
 struct Weights {
   int matrix;
   double red, blue;

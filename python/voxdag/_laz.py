@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from ._error import Error
 
-# Points that are in memory at once.
+# Maximum number of points in memory.
 _CHUNK_POINTS = 1_000_000
 # The header of a LAS file has its point format at this offset. LASzip sets the high bits.
 _POINT_FORMAT = 104

@@ -27,7 +27,7 @@ class MeshExport {
   // Adds the arrays in the order in which write() writes them. Returns the primitive without its
   // material.
   nlohmann::json add_to(GlbArrays& arrays) const;
-  // Divides polygons of more than three corners like those of PLY files (scene/polygon).
+  // Triangulates polygons as for PLY files (scene/polygon).
   void write(GlbFile& file, MemoryBudget& budget, WarningList& warnings) const;
 
  private:

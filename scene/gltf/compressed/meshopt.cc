@@ -1,6 +1,6 @@
 // The only file that calls meshoptimizer. Its decoders allocate no memory and check their input.
-// Vertex streams of version 1 and the filter COLOR, which most versions of the library lack, have
-// decoders of their own.
+// Vertex streams of version 1 and the filter COLOR, which most versions of the library lack, are
+// decoded by voxdag.
 #include "scene/gltf/compressed/codecs.h"
 #include "scene/gltf/compressed/color_filter.h"
 #include "scene/gltf/compressed/vertex_stream.h"

@@ -83,7 +83,7 @@ struct DracoPart {
 std::optional<std::pair<JsonElement, const char*>> find_meshopt(const JsonElement& extensions);
 
 // Throw Violation for a member that is missing or of a wrong type, or for a layout that the
-// extension does not allow. `extensions` are those of a buffer view. read_meshopt() returns null if
+// extension does not allow. `extensions` belong to a buffer view. read_meshopt() returns null if
 // it has no meshopt extension.
 std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extensions);
 std::shared_ptr<const DracoExtension> read_draco(const JsonElement& extension);
