@@ -177,7 +177,10 @@ void run_confined(const std::string& what, uint64_t memory_bytes,
                                              size_text(memory_bytes) +
                                              ": expected a higher --memory");
   if (WEXITSTATUS(status) == kDone) return;
-  if (error.is_null()) throw Error(ErrorCode::kIo, what + ": the process ended without a message");
+  if (error.is_null())
+    throw Error(ErrorCode::kIo, what + ": the process that converts the file ended with status " +
+                                    std::to_string(WEXITSTATUS(status)) +
+                                    " and no message: please report this defect with the file");
   throw Error(error_code_named(error["error"].get<std::string>()).value_or(ErrorCode::kIo),
               error["message"].get<std::string>());
 }

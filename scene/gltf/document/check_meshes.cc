@@ -69,9 +69,13 @@ void check_joint_sets(Document& d, const Primitive& primitive, const std::string
                             4,
                             {kFloat, kUnsignedByte, kUnsignedShort},
                             {kUnsignedByte, kUnsignedShort}};
-  for (const JointSet& set : primitive.joint_sets) {
-    if (set.joints < 0 || set.weights < 0)
-      refuse(d.path, where + " has JOINTS_n without WEIGHTS_n of the same n, or the reverse");
+  for (size_t i = 0; i < primitive.joint_sets.size(); ++i) {
+    const JointSet& set = primitive.joint_sets[i];
+    const std::string n = "_" + std::to_string(i);
+    if (set.weights < 0)
+      refuse(d.path, where + " has JOINTS" + n + " without WEIGHTS" + n + ": expected both");
+    if (set.joints < 0)
+      refuse(d.path, where + " has WEIGHTS" + n + " without JOINTS" + n + ": expected both");
     check_geometry(d, set.joints, joints);
     check_geometry(d, set.weights, weights);
   }

@@ -26,8 +26,9 @@ constexpr uint64_t kBytesPerContainer = 64;
 // A growing string needs its memory twice.
 constexpr uint64_t kGrowingCopies = 2;
 
-// Receives the parser's events. Makes a Json value, or the filtered text, of each element of a
-// section.
+// Receives the parser's events. Builds each element of the requested sections: its JSON text if the
+// section is read as text, otherwise a Json value. Skips the members "extras", and values that are
+// nested more deeply than kMaxNesting.
 class SectionParser : public nlohmann::json_sax<Json> {
  public:
   SectionParser(const std::string& path, const JsonWindow& window,

@@ -85,9 +85,10 @@ std::optional<ClusterState> read_cluster_state(FileSystem& files, const std::str
   } catch (const Error& error) {
     // A build that has just ended removed the file.
     if (error.code() == ErrorCode::kNotFound) return std::nullopt;
-    throw Error(error.code(), path + ": " + error.message() +
-                                  ": expected the state of the tasks; without that file the "
-                                  "subvolumes that no run has accepted are built again");
+    throw Error(error.code(), "the state of the cluster build " + path +
+                                  " cannot be read: " + error.message() +
+                                  "; if the file is damaged, remove it: the next run then repeats "
+                                  "all batches that no earlier run has accepted");
   }
 }
 

@@ -154,7 +154,9 @@ int run_job(FileSystem& files, const std::string& path, const CancelToken& cance
     return fail(ErrorCode::kOutOfMemory, "the system has no threads or memory left");
   } catch (const std::exception&) {
     // The exception's text is not sent, because messages of libraries may contain paths.
-    pipe.fail("internal", "the job's process stopped because of an unexpected exception");
+    pipe.fail("internal",
+              "internal error in the process of the job: retry the job, and report the defect if "
+              "it fails again");
     return kInternalExitStatus;
   }
 }

@@ -257,8 +257,8 @@ TEST(MergeDamage, DamageStartsOver) {
   }
 }
 
-// A merge resumes with inputs of the same content at different places. With different inputs, it
-// starts over.
+// A merge resumes if its input artifacts have the same content, even if they moved to other offsets
+// or segments. With different inputs, it starts over.
 TEST(MergeDamage, IdentifiesItsInputsByTheirContent) {
   const oracle::Voxels voxels = noise_voxels(34, 64);
   MergeHarness harness(6, 64);

@@ -27,7 +27,7 @@ struct OneOption {
 
   template <class T>
   void operator()(const Field& field, T& value) {
-    // Flags and scenes have no text form on the command line.
+    // parse_text() parses neither flags nor lists.
     if constexpr (!IsVector<T>::value && !std::is_same_v<T, bool>)
       if (name == field.name) is_valid = parse_text(field, text, value);
   }
