@@ -3,9 +3,9 @@
 //   1. A voxel is set iff triangle_touches_cube() (core/geometry/overlap.h) holds for the voxel's
 //      closed cube and at least one triangle. Triangles that miss the subvolume's cube have no
 //      effect.
-//   2. The sub-DAG is unique: no nodes are equal, and level arrays are in the total order
+//   2. The sub-DAG is unique: no two nodes are equal, and level arrays are in the total order
 //      (core/dag/level_array.h). The sub-DAG does not depend on the order of the triangles, the
-//      memory, the method or the backend's caches.
+//      size of the budget, the backend's method, or its caches.
 //   3. All large buffers are charged to the given budget. If the budget cannot hold the subvolume,
 //      build() returns kNeedsSplit without calling the sink, and the caller splits the cube and
 //      tries again. A cube with an edge of kSmallestEdge never needs more than kSmallestBudget.

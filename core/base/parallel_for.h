@@ -94,7 +94,7 @@ class Turns {
 
 // Calls prepare(worker, item) for the items 0 to count - 1 on several threads, like parallel_for().
 // Calls commit(worker, item) sequentially, in the order of the items. If prepare() or commit()
-// throws for some items, the items before the first of them are still committed, and no others.
+// throws for an item, the items before the first such item are still committed, and no others.
 template <class Prepare, class Commit>
 void parallel_for_in_order(unsigned workers, size_t count, Prepare&& prepare, Commit&& commit) {
   Turns turns;

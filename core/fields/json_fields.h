@@ -20,7 +20,7 @@ using FieldJson = nlohmann::ordered_json;
 namespace json_fields {
 
 [[noreturn]] void refuse(const std::string& name, const std::string& expected);
-// Like the function above, but the message also shows the refused value, shortened.
+// Like the other refuse(), but the message also shows the refused value, shortened.
 [[noreturn]] void refuse(const std::string& name, const std::string& expected,
                          const FieldJson& found);
 // Reads a whole number, which may be written as 64.0. Calls `take_unsigned` or `take_signed` with

@@ -48,8 +48,8 @@ double largest_extent(const WorldBounds& bounds) {
 using Pair = double __attribute__((vector_size(16)));
 
 // Returns floor(x) for |x| <= 2^51, and otherwise a number near x, which may have a fraction.
-// Rounds to the nearest integer, and subtracts 1 if this has rounded up. A branch would be
-// predicted wrong for half of all numbers.
+// Rounds to the nearest integer, and subtracts 1 if this has rounded up. There is no branch,
+// because the CPU would mispredict it for half of all numbers.
 Pair floor_of(Pair x) {
   constexpr Pair kNoFraction = {0x1.8p52, 0x1.8p52};
   const Pair nearest = (x + kNoFraction) - kNoFraction;

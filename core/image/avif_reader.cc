@@ -17,11 +17,11 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kAvifStateBytes = uint64_t{16} << 20;
-// The decoder's planes of 8 or 16 bits, its state per block, and a second set of planes for images
-// that consist of several tiles.
+// Bytes of memory per pixel, for channels of up to 8 bits and of more bits: the decoder's planes,
+// its state per block, and a second set of planes for images that consist of several tiles.
 constexpr uint64_t kBytesPerPixel = 16, kBytesPerWidePixel = 28;
-// Largest number of pixels that a damaged file can make the AV1 decoder allocate, if the image is
-// smaller.
+// The decoder's limit of pixels is the image's size, but at least this number. A damaged file can
+// make the decoder allocate memory for as many pixels as the limit allows.
 constexpr uint32_t kMinSizeLimit = 1 << 16;
 
 struct DestroyDecoder {
@@ -52,7 +52,7 @@ class AvifReader : public ImageReader {
   void parse(uint32_t size_limit) {
     decoder_ = Decoder(avifDecoderCreate());
     if (!decoder_) fail(AVIF_RESULT_OUT_OF_MEMORY);
-    // dav1d is the only decoder that obeys the limit.
+    // dav1d is the only decoder that obeys imageSizeLimit.
     if (avifCodecName(AVIF_CODEC_CHOICE_DAV1D, AVIF_CODEC_FLAG_CAN_DECODE))
       decoder_->codecChoice = AVIF_CODEC_CHOICE_DAV1D;
     decoder_->maxThreads = 1;

@@ -7,7 +7,7 @@
 namespace voxdag {
 namespace {
 
-// Conversions of images inside a glTF file, and of image files.
+// Advice in messages: how to convert the images of a glTF file, and an image file.
 constexpr const char* kConvertScene =
     "convert the scene with: gltf-transform png IN.glb OUT.glb --formats '*'";
 constexpr const char* kConvertImage = "convert it to PNG with: magick IN OUT.png";
@@ -21,7 +21,7 @@ struct Signature {
   ImageFormat format;
 };
 
-// More specific formats come first.
+// If several signatures match, the first one counts. So more specific formats come first.
 constexpr Signature kSignatures[] = {
     {0, "\x89PNG\r\n\x1a\n", {"a PNG image", "", ImageDecoder::kPng}},
     {0, "\xff\xd8\xff", {"a JPEG image", "", ImageDecoder::kJpeg}},

@@ -72,8 +72,8 @@ class WebpReader : public ImageReader {
     check(WebPDecode(file_.bytes().data(), file_.bytes().size(), &config));
   }
 
-  // Returns an upper bound of the memory that libwebp allocates: rows of blocks, and for lossless
-  // images and alpha all pixels, images of transforms and tables.
+  // Returns an upper bound of the memory that libwebp allocates: rows of blocks and, for lossless
+  // images and alpha, all pixels, the images of the transforms, and decoding tables.
   uint64_t decoder_bytes() const {
     const uint64_t pixels = uint64_t{width_} * height_;
     uint64_t bytes = kWebpStateBytes + uint64_t{256} * width_;
@@ -92,8 +92,8 @@ class WebpReader : public ImageReader {
   uint64_t lossless_bytes(std::span<const uint8_t> stream) const {
     const auto tables = webp_table_bytes(stream, width_, height_);
     if (!tables) throw BrokenImage{"is a broken WebP image (its lossless data are damaged)"};
-    // Four bytes per pixel, at most one byte for three transforms and one byte for the numbers of
-    // tables.
+    // Bytes per pixel: four for the pixel, at most one for the images of the transforms, and one
+    // for the image that selects tables.
     return uint64_t{6} * width_ * height_ + *tables;
   }
 

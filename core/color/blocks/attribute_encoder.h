@@ -22,7 +22,7 @@ class AttributeEncoder {
         colors_(levels) {}
 
   // Adds baked cells in increasing order of their codes. The code of a cell in the region is
-  // `first_code` + cell.code. If the attribute is in the list of AttributeSums (attribute_sums.h),
+  // `first_code` + cell.code. For attributes that AttributeSums computes (normals and materials),
   // `values` must have an element for each cell. Otherwise `values` may be empty.
   void add(std::span<const ColoredCell> cells, std::span<const CellValues> values,
            uint32_t first_code);

@@ -177,7 +177,7 @@ class BlockEncoder {
       k[i] = static_cast<int16_t>(weight);
       sum += weight;
     }
-    // The sums of the squares of k, of the squares of top - k, and of the products of both.
+    // Sums over the cells' weights k: of k^2, of k (top - k), and of (top - k)^2.
     const auto n = static_cast<int32_t>(count);
     const int32_t second_squares = product_of(k, k, count);
     const int32_t mixed = top * sum - second_squares;

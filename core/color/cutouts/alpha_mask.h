@@ -14,7 +14,7 @@ namespace voxdag {
 
 class AlphaMask {
  public:
-  // Charges the bits to `budget`. All texels are hidden.
+  // Creates a mask whose texels are all hidden. Charges the bits to `budget`.
   AlphaMask(uint32_t width, uint32_t height, MemoryBudget& budget);
 
   uint32_t width() const { return levels_[0].width; }
@@ -44,7 +44,7 @@ class AlphaMask {
  private:
   struct Level {
     uint32_t width, height, row_words;
-    size_t any, all;  // first words
+    size_t any, all;  // where the two sets of bits begin in words_; equal in the finest level
   };
 
   bool bit(size_t first, uint32_t level, uint32_t x, uint32_t y) const {

@@ -9,16 +9,16 @@
 namespace voxdag {
 namespace {
 
-// The least depth, in texels, to which a polygon must reach into a texel.
+// A polygon covers a texel if it reaches at least this deep into the texel, in texels.
 constexpr double kDepth = 0x1p-16;
-// Enlargement of the cubes of sight(), in lattice units, and of the boxes around their polygons, in
-// texels. Larger than all rounding errors.
+// sight() enlarges the cube by kCubeMargin lattice units, and the polygon's box by kBoxMargin
+// texels. Both exceed all rounding errors.
 constexpr double kCubeMargin = 0x1p-4, kBoxMargin = 0x1p-10;
-// Enlargement of a voxel whose polygon is lost by rounding.
+// If rounding leaves no polygon in a voxel, the voxel is enlarged by this many lattice units.
 constexpr double kVoxelMargin = 0x1p-6;
-// A polygon across more periods of the image along an axis covers all texels.
+// A polygon that spans this many repetitions of the image along an axis covers all texels.
 constexpr double kMaxPeriods = 16;
-// Half of the size of squares at the border of a clamped image, which continue without end.
+// Texels at the border of a clamped image extend without end; here, to this coordinate.
 constexpr double kEndless = 0x1p45;
 
 std::array<int64_t, 3> low_corner(const Cube& cube, uint32_t grid_levels) {
@@ -28,7 +28,8 @@ std::array<int64_t, 3> low_corner(const Cube& cube, uint32_t grid_levels) {
   return low;
 }
 
-// Maps a coordinate in texels to the image of its period: period 0 begins at 0.
+// Maps a coordinate in texels to the image. A period is one repetition of the image; period 0
+// begins at coordinate 0.
 double in_image(double texel, double period, double size, Wrap wrap) {
   const double at = texel - period * size;
   const bool is_mirrored = wrap == Wrap::kMirroredRepeat && std::fmod(period, 2) != 0;
@@ -39,7 +40,7 @@ double in_image(double texel, double period, double size, Wrap wrap) {
 struct Range {
   uint32_t first, last;
 };
-// Returns the texels from coordinate `low` to `high`, or more.
+// Returns a range that contains all texels from coordinate `low` to `high`.
 Range texel_range(double low, double high, uint32_t size, Wrap wrap) {
   const double edge = size, first = std::floor(low / edge), last = std::floor(high / edge);
   const auto clamped = [&](double at) {
@@ -107,7 +108,8 @@ VisiblePart::Sight VisiblePart::sight(const Cube& cube) const {
   return sight_of(part_in(low_corner(cube, grid_levels_), edge, kCubeMargin));
 }
 
-// Tests the texels in a box around the polygon, in blocks.
+// Tests all texels in the polygon's box, by blocks of the level at which the box is at most five
+// blocks wide.
 VisiblePart::Sight VisiblePart::sight_of(const Polygon& polygon) const {
   if (polygon.count == 0) return Sight::kMixed;
   Range range[2];
@@ -186,7 +188,7 @@ bool VisiblePart::covers(const Polygon& polygon, bool visible, double depth) con
   return false;
 }
 
-// Returns the square of a block, made smaller by `depth` on all sides.
+// Returns the square of a block of texels, made smaller by `depth` on all sides.
 VisiblePart::Box VisiblePart::square_of(uint32_t level, uint32_t x, uint32_t y,
                                         double depth) const {
   const uint32_t at[2] = {x, y}, size[2] = {mask_->width(), mask_->height()};
@@ -216,8 +218,8 @@ bool VisiblePart::covers(const Polygon& polygon, bool visible, double depth, uin
     }
     if (is_below || is_above) return false;
   }
-  // An edge of the polygon separates the two if the box is on one side of the edge and all corners
-  // of the polygon are on the other side.
+  // The polygon misses the box if an edge of the polygon separates them: the box is on one side of
+  // the edge, and all corners of the polygon are on the other side.
   for (int i = 0; i < polygon.count; ++i) {
     const double* const from = polygon.points[i].texel;
     const double* const to = polygon.points[(i + 1) % polygon.count].texel;

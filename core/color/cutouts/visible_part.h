@@ -4,13 +4,14 @@
 //
 // The part of the triangle in the voxel's closed cube is a convex polygon. Mapped to the image, it
 // covers texels, which are squares. The triangle is visible in the voxel if the polygon covers a
-// visible texel. It must reach at least 2^-16 of a texel's edge into the square; so a polygon that
-// ends at the border of a texel does not cover the texel. If it covers no texel at all, it is
-// visible if it touches a visible texel. All values are computed in IEEE doubles, in the order
-// written here.
+// visible texel. To cover a texel, the polygon must reach at least 2^-16 of a texel's edge into the
+// square. So a polygon that ends at the border of a texel does not cover the texel. If the polygon
+// covers no texel at all, the triangle is visible in the voxel if the polygon touches a visible
+// texel. All values are computed in IEEE doubles, in the order written here.
 //
-// For larger cubes, a box around a polygon that is slightly larger decides quickly whether all of
-// the cube's voxels are visible, or none.
+// For a larger cube, the texels in a box around the cube's polygon, slightly enlarged, are a quick
+// test: if all are visible (or none), the triangle is visible in all of the cube's voxels (or
+// none).
 #pragma once
 
 #include <array>
@@ -24,8 +25,7 @@ namespace voxdag {
 
 class VisiblePart {
  public:
-  // `surface` may touch the voxels of a grid of 2^grid_levels voxels per edge. The cutouts must
-  // outlive this object.
+  // The grid of `surface` has 2^grid_levels voxels per edge. The cutouts must outlive this object.
   VisiblePart(const FixedSurface& surface, const Cutouts& cutouts, uint32_t grid_levels);
 
   enum class Sight { kHidden, kVisible, kMixed };
@@ -45,7 +45,8 @@ class VisiblePart {
     double texel[2];  // position in the image, in texels
   };
   struct Polygon {
-    // Six planes add at most six corners to a triangle's three. Rounding may add a few more.
+    // Cutting by a cube's six planes adds at most six corners to a triangle's three. Rounding may
+    // add a few more.
     static constexpr int kMaxPoints = 16;
     int count = 0;
     Point points[kMaxPoints];
@@ -57,7 +58,7 @@ class VisiblePart {
 
   Polygon part_in(const std::array<int64_t, 3>& low, int64_t edge, double margin) const;
   Sight sight_of(const Polygon& polygon) const;
-  // True if the polygon reaches `depth` into the square of a visible (or hidden) texel.
+  // True if the polygon reaches `depth` into a visible texel or, without `visible`, a hidden texel.
   bool covers(const Polygon& polygon, bool visible, double depth) const;
   bool covers(const Polygon& polygon, bool visible, double depth, uint32_t level, uint32_t x,
               uint32_t y) const;

@@ -46,7 +46,8 @@ bool VisibleVoxels::for_each_segment(const Visit& visit) {
   return !triangle_touches_cube(part_.triangle(), low, edge) || descend(start, false, visit);
 }
 
-// `is_visible`: the triangle is visible in all voxels of the cube that it touches.
+// Visits the segments in a cube. `is_visible`: the triangle is known to be visible in all voxels of
+// the cube that it touches.
 bool VisibleVoxels::descend(const Cube& cube, bool is_visible, const Visit& visit) {
   if (!is_visible) {
     const Sight sight = part_.sight(cube);
@@ -67,7 +68,7 @@ bool VisibleVoxels::descend(const Cube& cube, bool is_visible, const Visit& visi
   return true;
 }
 
-// Sets the bits of the visible voxels in a cube, which is in a block or is one.
+// Sets the bits of the visible voxels in a cube. The cube is a block or a part of a block.
 void VisibleVoxels::mark(const Cube& cube, bool is_visible) {
   if (!is_visible) {
     const Sight sight = part_.sight(cube);

@@ -19,8 +19,8 @@ class VisibleVoxels {
 
   // The part must outlive this object.
   VisibleVoxels(const VisiblePart& part, uint32_t grid_levels);
-  // Visits the segments in an order that depends only on the triangle. Returns false if `visit`
-  // did.
+  // Visits the segments in an order that depends only on the triangle. Returns false as soon as
+  // `visit` returns false.
   bool for_each_segment(const Visit& visit);
 
  private:
@@ -35,7 +35,8 @@ class VisibleVoxels {
   const VisiblePart& part_;
   const uint32_t grid_levels_, block_level_;
   size_t along_ = 0;  // axis of the segments
-  // A row of a block along this axis for each position along the other two.
+  // The current block: for each position along the other two axes, a row of 16 bits along this
+  // axis.
   std::array<uint16_t, kBlockEdge * kBlockEdge> rows_{};
 };
 

@@ -10,9 +10,10 @@ namespace voxdag {
 
 struct ConsingMemory {
   // Maximum size of the free pages that are retained for the next sub-DAG. Retained pages are not
-  // charged to the budget. They are freed before an allocation that would not fit in the budget
-  // next to them. A budget of less than eight times kMinPageBytes can be exceeded by kMinPageBytes;
-  // the division of the memory among workers allows for this (scheduler/spec/memory_plan.h).
+  // charged to the budget. If the budget cannot hold the retained pages and a new allocation
+  // together, the retained pages are freed first. A budget of less than eight times kMinPageBytes
+  // can be exceeded by kMinPageBytes; the division of the memory among workers allows for this
+  // (scheduler/spec/memory_plan.h).
   static constexpr uint64_t kMinPageBytes = uint64_t{8} << 20;
   static constexpr uint64_t kMaxPageBytes = uint64_t{128} << 20;
   static constexpr uint64_t page_bytes(uint64_t budget_bytes) {

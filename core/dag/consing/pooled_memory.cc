@@ -91,8 +91,8 @@ PagePool::Pages PooledMemory::allocate(size_t bytes, bool zero) {
 
 void PooledMemory::grow(PagePool::Pages& pages, size_t bytes) {
   const size_t new_bytes = PagePool::range_bytes(bytes), more = new_bytes - pages.bytes;
-  // Where grow_pages() copies the pages (under ThreadSanitizer), old and new pages exist for a
-  // moment. Only the new pages are charged.
+  // Charges only the difference. With ThreadSanitizer, grow_pages() copies the pages, so for a
+  // moment the old pages also exist and are not charged.
   charge(more);
   try {
     pages.data = grow_pages(pages.data, pages.bytes, new_bytes, kWhat);

@@ -137,8 +137,9 @@ class Differ {
 
  private:
   // The first level with at least this many pairs, or else the level of the bricks, is divided
-  // among the threads. So many pairs are enough for any number of threads. The level does not
-  // depend on the number of threads, so the first error found does not depend on it either.
+  // among the threads. This many pairs are enough for any number of threads. The choice of the
+  // level does not depend on the number of threads, so the error that is reported does not depend
+  // on it either.
   static constexpr size_t kPairsToDivide = 16384;
 
   // Returns the pairs of children, by child index. Both offsets of a pair are kAbsent if neither
@@ -186,7 +187,8 @@ class Differ {
   }
   static uint64_t child(const voxdag_reader::Node& node, int index) {
     if (!(node.child_mask >> index & 1)) return kAbsent;
-    // In a damaged file a pointer may equal kAbsent. It must not count as an absent child.
+    // In a damaged file a pointer may equal kAbsent. Such a pointer must not count as an absent
+    // child.
     return std::min(voxdag_reader::File::child(node, index), kAbsent - 1);
   }
 

@@ -8,8 +8,8 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMaxNodeWords = 17;
-// A guessed beginning is accepted if this many consecutive nodes could follow from it. Other words
-// practically never look like such a long chain. If they do, join() corrects the guess.
+// A guessed beginning is accepted if this many consecutive nodes could follow from it. From a wrong
+// beginning there is practically never such a long chain. If there is, join() corrects the guess.
 constexpr int kConvincingNodes = 32;
 
 }  // namespace

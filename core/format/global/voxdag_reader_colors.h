@@ -355,7 +355,7 @@ class BasicColorCursor {
     any |= any >> 1;
     return static_cast<uint32_t>((any & 0x0101010101010101u) * 0x0102040810204080u >> 56);
   }
-  // The child must exist.
+  // Returns the place of child `index`, which must exist.
   uint64_t child(uint32_t level, uint64_t place, unsigned index) const {
     if (level < brick_level()) return Dag::child(dag_->node(level, place), static_cast<int>(index));
     return level == brick_level() ? dag_->brick(place) >> 8 * index & 255 : 0;

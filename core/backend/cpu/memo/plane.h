@@ -34,7 +34,8 @@ struct Plane {
   //
   // True if all values n.k + f within a cube that the plane crosses fit in 62 bits.
   bool fits(int size_log2) const;
-  // True if the plane touches a cube from which it has the offset f. Requires fits().
+  // True if a plane with this normal and with the offset f from a cube touches the cube. Requires
+  // fits().
   bool crosses(int64_t f, int size_log2) const;
   // Sets `f` to the plane's offset from the cube. Returns false if the plane misses the cube; `f`
   // is then unchanged. Requires fits().

@@ -32,8 +32,8 @@ class PlaneDirection {
     return n_[0] == plane.n[0] && n_[1] == plane.n[1] && n_[2] == plane.n[2];
   }
 
-  // Returns n.k for the 512 voxels k of a node, in Morton order. Multiplied by 8, these are the
-  // values of n.k at the low corners k of the 512 nodes in a tile of 64^3 voxels.
+  // Returns the values of n.k for the 512 voxels k of a node, in Morton order. The same values,
+  // multiplied by 8, are n.k for the low corners k of the 512 nodes in a tile of 64^3 voxels.
   const int64_t* offsets() const { return offsets_; }
   // A plane crosses a node iff its offset f is within [min_offset(), max_offset()].
   int64_t min_offset() const { return values_[0]; }

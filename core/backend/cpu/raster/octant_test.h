@@ -5,10 +5,10 @@
 // The test need not be exact, because the rasterizers are exact. It may report a child that the
 // triangle does not touch. Two errors must never happen: to omit a touched child, and to report a
 // child as inside (see Entry in triangle_set.h) although the triangle does not cover it. So bounds
-// for touched children are widened by more than the rounding error, and others narrowed. Vertices
-// and edges are exact in doubles (below 2^42). Normals are computed in integers and rounded once.
-// All other values are sums of at most eight products, each with an error of at most 3 * 2^-53 of
-// |coefficient| * |distance|.
+// for touched children are widened, and bounds for inside children narrowed, by more than the
+// rounding error. Vertices and edges are exact in doubles (below 2^42). Normals are computed in
+// integers and rounded once. All other values are sums of at most eight products, each with an
+// error of at most 3 * 2^-53 of |coefficient| * |distance|.
 //
 // Quad is a vector of four doubles with arithmetic operators. load(coordinates, origin) returns the
 // coordinates relative to the origin. The other functions of a Quad are
@@ -143,8 +143,9 @@ struct OctantTest {
 
   Octants run(bool whole_cube_inside) {
     Octants out{box_test(), 0};
-    // Other tests are not worth their cost here. A triangle shorter than a child along two axes
-    // covers no child, and if its box touches two children, it most likely touches both.
+    // The plane and edge tests would cost more than they save here. A triangle shorter than a child
+    // along two axes covers no child, and if its box touches two children, it most likely touches
+    // both.
     if (!whole_cube_inside && kPopcount8[out.touched] <= (long_axes < 2 ? 2 : 1)) return out;
     set_normal();
     out.touched &= plane_test();

@@ -10,8 +10,8 @@
 //           not negative                                       <=>   a k_p + b k_q + c >= 0
 //
 // set_up() computes the integers lowest, width, a, b and c once per tile. The tests do not need the
-// eight bits of a coordinate within a voxel, because for an integer i and any x,
-// 256 i + x >= 0 <=> i + floor(x / 256) >= 0.
+// lowest eight bits of a coordinate, its position within a voxel, because for an integer i and any
+// x, 256 i + x >= 0 <=> i + floor(x / 256) >= 0.
 //
 // Bounds for narrow triangles: half-edges are <= 2^27, so |n_a| <= 2^54 (the triangle's projection
 // is in its box), and the sum of |n_a| is <= 3 * 2^54. If the plane misses the tile, there is

@@ -50,8 +50,8 @@ struct EmitCandidates {
   }
 };
 
-// Copies the survivors of a level: the first candidate with each hash. For every candidate, also
-// sets its entry in its parent's child list to the position of its survivor. The candidate at
+// Copies the survivors of a level: the first candidate with each hash. Also replaces every
+// candidate, in the child list of its parent, by the position of its survivor. The candidate at
 // sorted index i has the original index items[i]. Its survivor has the position marked[i + 1] - 1.
 struct RemoveDuplicates {
   const uint32_t* marked;  // prefix sums of the marks of MarkFirstOfEquals

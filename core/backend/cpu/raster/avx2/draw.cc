@@ -29,7 +29,8 @@ struct ByteOrder {
 template <int D>
 inline constexpr ByteOrder<D> kByteOrder;
 
-// The HeightBounds of a column of bricks, copied to one byte for each of the 64 voxels of a brick.
+// The HeightBounds (sides.h) of a column of bricks, copied to a byte for each of a brick's 64
+// voxels.
 template <int D>
 class Spread {
  public:

@@ -1,8 +1,8 @@
 // The edge tests in one projection, as bounds of one coordinate in each row of voxels: edges are
 // tested once per row of the tile, not once per column of bricks.
 //
-// Let k be the coordinate of a row and x the coordinate of a voxel in the row. The inner side of an
-// edge has the voxels with across k + up x + c >= 0. This is the test of tile_triangle.h: across
+// Let k be the coordinate of a row and x the coordinate of a voxel in the row. The voxel is on the
+// inner side of an edge iff across k + up x + c >= 0. This is the test of tile_triangle.h: across
 // and up are the edge's factors a and b, in this or the reverse order. All values are integers. So
 // with t = -(across k + c) and y = (t - 1/2) / |up|, the voxels on the inner side are:
 //     up > 0:  x > floor(y)
@@ -67,12 +67,12 @@ struct EdgeLanes {
   }
 };
 
-// lane[set] is the permutation that sorts the lanes of three edges into bounds of x, if `set` is
-// the set of edges with up < 0. Its first two 64-bit lanes are edges that bound x from below, the
-// other two are edges that bound x from above. Each lane is given as two 32-bit lanes. A bound
-// without an edge gets lane 3, which excludes nothing. The values of `up` of the three edges sum to
-// 0. So one or two edges have up < 0, unless up = 0 for all three. An edge with up = 0 may be a
-// bound on either side.
+// lane[set] is a permutation of the lanes of three edges; bit i of `set` means that edge i has up <
+// 0. The permutation moves edges that bound x from below to the first two 64-bit lanes, and edges
+// that bound x from above to the other two. Each lane is given as two 32-bit lanes. A bound without
+// an edge gets lane 3, which excludes nothing. The values of `up` of the three edges sum to 0. So
+// one or two edges have up < 0, unless up = 0 for all three. An edge with up = 0 may be a bound on
+// either side.
 struct BoundOrder {
   alignas(32) int32_t lane[8][8] = {};
   constexpr BoundOrder() {

@@ -109,9 +109,9 @@ class Heights {
  private:
   static constexpr int P = kP<D>, Q = kQ<D>;
 
-  // Offsets in units of a lane, including 0.02 for the rounding of floats. They make `below` and
-  // `top` in bounds() safe although a column's base is truncated to a whole unit, below_lanes_ are
-  // rounded, and top_lanes_ are truncated:
+  // Safety margins in units of a lane. With them, `below` and `top` in bounds() never exclude a
+  // touched voxel. They allow for three roundings (a column's base is truncated to a whole unit,
+  // below_lanes_ are rounded, top_lanes_ are truncated) and for 0.02 units of rounding in floats:
   //   below   is in (y - 2.02, y - 0.02]. It may be on the wrong side of a whole number of voxels
   //           that is 1 or 2 units above it.
   //   top     is in (y + width / n_D + 0.02, y + width / n_D + 2.02]. It may be on the wrong side
@@ -120,9 +120,9 @@ class Heights {
   static constexpr float kTopRaised = 2.54f;
   static constexpr int16_t kBelowDoubt = 2, kTopDoubt = 3;
 
-  // Sets below_lanes_ and top_lanes_ to the heights of the 16 voxel columns above the lowest of
-  // them. sp and sq are the magnitudes of the plane's slopes along p and q, and p_falls and q_falls
-  // are true if the height falls along the axis.
+  // Sets below_lanes_ and top_lanes_ to the heights of the 16 voxel columns, relative to the lowest
+  // of these columns. sp and sq are the magnitudes of the plane's slopes along p and q, and p_falls
+  // and q_falls are true if the height falls along the axis.
   VOXDAG_INLINE void set_lanes(bool p_falls, float sp, bool q_falls, float sq, float width) {
     const __m256 p_low =
         p_falls ? _mm256_setr_ps(3, 2, 3, 2, 3, 2, 3, 2) : _mm256_setr_ps(0, 1, 0, 1, 0, 1, 0, 1);

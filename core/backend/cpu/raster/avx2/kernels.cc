@@ -54,8 +54,8 @@ int list_blocks(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbe
   return list_blocks_with(tile, groups, existing, numbers, keys, summarize);
 }
 
-// For each subset of four bricks: the 32-bit lanes that move the bricks of the subset to the front
-// without gaps.
+// For each subset of four bricks: the permutation of 32-bit lanes that moves the bricks of the
+// subset to the front without gaps.
 struct Packing {
   alignas(32) int32_t lanes[16][8] = {};
   constexpr Packing() {

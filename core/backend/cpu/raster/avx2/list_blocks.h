@@ -1,4 +1,5 @@
-// list_blocks() of the kernels for AVX2 and AVX-512, which differ in how they read a voxel block.
+// Implements Kernels::list_blocks for AVX2 and AVX-512. The two differ only in how they summarize a
+// voxel block.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once

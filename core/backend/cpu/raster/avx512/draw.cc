@@ -11,7 +11,7 @@ namespace {
 // Tables indexed by the voxel of a brick.
 template <int D>
 struct VoxelBytes {
-  // Indexes in HeightBounds of the bounds of the voxel's column.
+  // Positions in HeightBounds (sides.h) of the two bounds that apply to the voxel's column.
   alignas(64) uint8_t below[64] = {};
   alignas(64) uint8_t over[64] = {};
   alignas(64) uint8_t height[4][64] = {};  // voxels above the floor of the first of four bricks
@@ -35,7 +35,8 @@ inline constexpr VoxelBytes<D> kVoxelBytes;
 
 VOXDAG_INLINE __m512i load512(const void* at) { return _mm512_load_si512(at); }
 
-// The HeightBounds of a column of bricks, copied to one byte for each of the 64 voxels of a brick.
+// The HeightBounds (sides.h) of a column of bricks, copied to a byte for each of a brick's 64
+// voxels.
 template <int D>
 class Spread512 {
  public:
