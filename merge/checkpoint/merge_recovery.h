@@ -35,13 +35,14 @@ class MergeRecovery {
 
   // True if it is time to save a state. Rethrows the last save's error.
   bool is_due() { return saver_.is_due(); }
-  // Call it within a pass: `merged`, in `segment`, replace the pending artifacts before
-  // index `next`.
+  // Saves a state within a pass: the artifacts `merged`, in `segment`, replace the pending
+  // artifacts before index `next`.
   void save_in_pass(PassSegment& segment, std::vector<ArtifactRef> merged, size_t next);
-  // Call it after a pass: `merged`, in `segment`, have replaced all artifacts of `before`.
+  // Saves the state after a pass: the artifacts `merged`, in `segment`, have replaced all artifacts
+  // of `before`.
   void save_pass(const PassSegment& segment, std::vector<ArtifactRef> merged,
                  std::span<const SurveyedArtifact> before);
-  // Call it after a level of the final pass. `readers` read the pending artifacts.
+  // Saves the state after a level of the final pass. `readers` read the pending artifacts.
   void save_level(const PassProgress& progress, std::span<const ArtifactReader> readers,
                   GlobalFileWriter& out);
   // Waits for the running save and rethrows its error.
@@ -55,8 +56,8 @@ class MergeRecovery {
   // Returns the intermediates (outputs of earlier passes) among the pending artifacts from index
   // `begin` on.
   std::vector<ArtifactRef> intermediates_from(size_t begin) const;
-  // Returns the inputs' frames of all levels from the bricks up to `level`, except frames returned
-  // earlier.
+  // Returns the inputs' frames of all levels from the bricks up to `level`, except frames that
+  // earlier calls returned.
   std::vector<SegmentRange> newly_merged(std::span<const ArtifactReader> readers, uint32_t level);
 
   const MergeContext& context_;

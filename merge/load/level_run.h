@@ -69,7 +69,7 @@ class LevelRun {
   uint64_t children_ = 0;
 };
 
-// A level of an artifact. It has no rows if the artifact has no such level.
+// The run of one level of an artifact. The run has no rows if the artifact has no such level.
 class ArtifactRun : public LevelRun {
  public:
   // `wide`: positions in the merged level below take two words.

@@ -13,8 +13,8 @@
 // half first. A brick is represented as a node of mask 3 whose two words are the high and the low
 // half of its voxel mask. So (hash, mask, words lexicographically) is the total order of both.
 //
-// kMaxRowWords words are readable from the first word of any row, also of a shorter row. So a row
-// is copied without a branch on its number of words, which would be mispredicted.
+// kMaxRowWords words are readable from the first word of any row, even if the row has fewer words.
+// So a row is copied without a branch on its number of words, which would be mispredicted.
 #pragma once
 
 #include <algorithm>

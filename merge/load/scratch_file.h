@@ -31,8 +31,8 @@ class ScratchFolder {
   // Bytes that this merge has written to files in the folder, including removed files.
   uint64_t bytes_written() const { return bytes_written_; }
   void count_written(uint64_t bytes) { bytes_written_ += bytes; }
-  // Returns a new id for a file. The const function returns the same id as the next call would, but
-  // does not use it up.
+  // Returns a new id for a file. The const overload returns the id that the other overload will
+  // return next.
   uint32_t next_id() { return next_id_++; }
   uint32_t next_id() const { return next_id_; }
   void set_next_id(uint32_t id) { next_id_ = id; }

@@ -44,12 +44,12 @@ class PendingArtifacts {
   PassSegment& add_segment(std::unique_ptr<PassSegment> segment);
   // Returns the scratch files of all segments.
   std::vector<std::shared_ptr<ScratchPath>> segment_paths() const;
-  // Call it after a pass: `merged`, all in `segment`, replace all artifacts. Returns the replaced
-  // artifacts.
+  // Replaces all artifacts by `merged`, the artifacts that a pass has written to `segment`. Returns
+  // the replaced artifacts.
   std::vector<SurveyedArtifact> replace_all(const std::vector<ArtifactRef>& merged,
                                             const PassSegment& segment);
-  // Call it when a merge is resumed: `intermediates`, whose segments were added, replace the inputs
-  // that have the same roots.
+  // For a merge that is resumed: replaces inputs by the `intermediates` with the same roots. The
+  // segments of the intermediates must have been added before.
   void replace_inputs(const std::vector<ArtifactRef>& intermediates);
   // Goes back to all inputs, without intermediates.
   void reset();
