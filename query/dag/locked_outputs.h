@@ -18,8 +18,8 @@ struct Outputs {
   bool replace = false;            // replace existing files
 };
 
-// Holds the OutputLock of the first output. A lock file that no process holds was left by a killed
-// process. In this case, the constructor removes that process's temporary files.
+// Holds the OutputLock of the first output. If the lock file already exists but no process holds
+// the lock, a killed process left it. The constructor then removes that process's temporary files.
 class LockedOutputs {
  public:
   // Throws Error: kIo if another process holds the lock; kInvalidInput if an output has no name, is

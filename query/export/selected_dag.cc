@@ -137,9 +137,10 @@ class DagBuilder {
   BuiltNode build(uint32_t depth, uint64_t content, const Position& corner) {
     const int64_t edge = int64_t{1} << (job_.selection.grid_levels - depth);
     if (!job_.selection.region.intersects(corner, edge)) return {};
-    // Results are remembered only for nodes completely inside the region, because only for such
-    // nodes the result is the same wherever they occur. Bricks of the file are not remembered:
-    // `content` is their mask, not an offset, and they are as easy to build again.
+    // Results are remembered only for nodes completely inside the region: a node that the region
+    // cuts can give a different result at each place. Bricks of the file are not remembered:
+    // `content` is their mask, not an offset, and building a brick again costs no more than finding
+    // it.
     const bool is_brick = depth + kBrickLevels == job_.dag.grid_levels();
     if (is_brick || !job_.selection.region.contains(corner, edge))
       return build_node(depth, content, corner, edge);

@@ -75,8 +75,8 @@ class NodeReader {
     for_each(
         level, wanted, [](std::span<const uint32_t>) {}, visit);
   }
-  // Like the function above, but also calls ahead(words) for most nodes, eight nodes before the
-  // call of visit(), so that ahead() can prefetch what visit() needs.
+  // Like the other for_each(), but also calls ahead(words) for most nodes, eight nodes before the
+  // call of visit(), so that ahead() can prefetch memory that visit() will read.
   template <class Ahead, class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Ahead&& ahead, Visit&& visit);
 

@@ -41,7 +41,7 @@ class RayCaster {
   // Finds the first occupied cell between t_min and t_max. Returns false if none exists. Throws
   // Error{kCorrupt} for a damaged DAG.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit) const;
-  // Like the function above, but reads at most `steps_left` nodes and bricks, and subtracts the
+  // Like the other cast(), but reads at most `steps_left` nodes and bricks, and subtracts the
   // number of reads from `steps_left`. If `steps_left` is then 0, the search ended early, and a
   // result of false does not mean that there is no hit.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit,

@@ -4,7 +4,6 @@
 // the triangles are drawn uniformly, and half with a probability proportional to their area. So the
 // sample covers both a floor of two large triangles and the leaves of a tree, a million small
 // triangles. Takes two passes over the scene. Memory depends only on the size of the sample.
-// the sample.
 #pragma once
 
 #include <bitset>
