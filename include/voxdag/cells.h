@@ -10,7 +10,7 @@
 
 namespace voxdag::query {
 
-// x, y and z in cells of a grid. An array of positions is a table of three int64 columns.
+// x, y and z in cells of a grid. In memory, an array of positions is a dense n x 3 array of int64.
 using Position = std::array<int64_t, 3>;
 
 // The half-open box low <= p < high of cells of a grid. A region may extend beyond the grid.
