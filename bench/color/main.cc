@@ -33,7 +33,7 @@ double cpu_seconds() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-// The pyramid of one image of noise on waves.
+// An image of waves with noise, as a pyramid of levels.
 struct Image {
   MemoryBudget budget{uint64_t{1} << 30};
   TextureLayout layout;

@@ -1,6 +1,6 @@
-// Measures how close the colors of a file are to the scene's colors. Over a sample of the file's
-// cells, it compares the colors by the rule, and the colors in the file, with the oracle
-// (tests/oracle/surface_color.h), and prints peak signal-to-noise ratios.
+// Measures how close the colors of a file are to the scene's colors. For a sample of the file's
+// cells, it compares both the color by voxdag's color rule and the color stored in the file with
+// the oracle's color (tests/oracle/surface_color.h). Prints peak signal-to-noise ratios.
 //
 //     bench_color_quality [--cells N] [--points N] SCENE FILE.vdag
 //

@@ -31,7 +31,7 @@ uint64_t count_colored(const voxdag_reader::File& file) {
 template <class Visit>
 struct CellVisitor {
   uint32_t level;  // of the cells
-  uint32_t shift;  // from voxels to cells
+  uint32_t shift;  // log2 of a cell's edge in voxels
   Visit visit;
 
   bool node(uint32_t l, int64_t x, int64_t y, int64_t z, uint64_t) {

@@ -55,7 +55,7 @@ std::optional<Timings> measure_octomap(const DagFile& dag, uint32_t grid_levels,
     }
     return found;
   });
-  // Leaves are cells: nothing was pruned.
+  // Each leaf is one cell, because the tree was not pruned.
   const auto for_each_cell = [&](size_t i, const auto& visit) {
     const Region box = box_around(queries, i);
     const auto end = tree.end_leafs_bbx();

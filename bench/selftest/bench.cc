@@ -30,7 +30,7 @@ bool touches(const FixedTriangle& t, const Cube& cube, uint32_t grid_levels) {
   return triangle_touches_cube(t, low, edge);
 }
 
-// Partitions triangles to cubes of the subvolumes' edge.
+// Divides a subvolume's triangles among subvolumes with an edge of options.subvolume_edge.
 void divide(Subvolume whole, const BenchOptions& options, std::vector<Subvolume>& out) {
   if (whole.triangles.empty()) return;
   if (whole.cube.edge_voxels(options.grid_levels) <= options.subvolume_edge) {

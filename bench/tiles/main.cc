@@ -3,8 +3,8 @@
 //
 //     bench_tiles [--size WxH] [--pixels P --views VIEWS] FILE.vdag
 //
-// For each depth, it prints the number of tiles and their bytes (uncompressed, and with gzip, tile
-// by tile) that are needed
+// For each depth, it prints the number of tiles that a viewer must load, and their bytes
+// (uncompressed, and with gzip, tile by tile),
 //   - until no cell of the view `auto` is wider than 16 pixels,
 //   - until no cell is wider than one pixel, for each of five views and for all five together.
 //

@@ -105,7 +105,7 @@ class NeededTiles {
   double inverse_[3] = {};
   int nearest_ = 0;                  // the child that a ray of this direction meets first
   std::array<uint64_t, 24> path_{};  // contents of the cells on the current path, by level
-  std::array<std::array<uint64_t, 24>, kMaxTileLevels + 1> marked_{};  // recorded last, + 1
+  std::array<std::array<uint64_t, 24>, kMaxTileLevels + 1> marked_{};  // content + 1, by depth
   std::vector<Addresses> tiles_;
 };
 
