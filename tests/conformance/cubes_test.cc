@@ -24,8 +24,8 @@ oracle::Region region_around(const Cube& cube, uint32_t grid_levels, int edge) {
   return region;
 }
 
-// Builds all cubes of all levels of a small grid, down to single bricks. Each build gets all
-// triangles of the scene, because triangles that miss the cube must have no effect.
+// All cubes of all levels of a small grid, down to single bricks, equal the oracle's. Each build
+// gets all triangles of the scene, because triangles that miss the cube must have no effect.
 TEST_P(Cubes, EveryCubeOfASmallGrid) {
   constexpr uint32_t kLevels = 5;
   const auto backend = open();
@@ -44,8 +44,8 @@ TEST_P(Cubes, EveryCubeOfASmallGrid) {
   }
 }
 
-// Builds small cubes at random positions in grids of up to 2^20 voxels per edge. Triangles are in
-// the cubes, around them and through them.
+// Small cubes at random positions in grids of up to 2^20 voxels per edge equal the oracle's.
+// Triangles are in the cubes, around them and through them.
 TEST_P(Cubes, SmallCubesOfLargeGrids) {
   const auto backend = open();
   oracle::Random random(21);

@@ -29,8 +29,8 @@ void expect_same(const Built& a, const Built& b) {
   EXPECT_EQ(a.summary.root_hash, b.summary.root_hash);
 }
 
-// The triangles are shuffled and duplicated, and their vertices are rotated. They are read one by
-// one or in one batch.
+// The sub-DAG is the same if the triangles are shuffled and duplicated, if their vertices are
+// rotated, and if they are read one by one or in one batch.
 TEST_P(Streams, OrderAndRepetitionDoNotShow) {
   const auto backend = open();
   oracle::Triangles scene = mixed_scene(1);

@@ -9,8 +9,8 @@ VOXDAG_FOR_ALL_BACKENDS(WholeGrid);
 
 constexpr uint32_t kHashBits[] = {4, 16, 64};
 
-// Scenes of every kind, in grids of 4 to 64, with few and many triangles, truncated and full
-// hashes.
+// The build equals the oracle for scenes of every kind, in grids of 4 to 64 voxels per edge, with
+// few and many triangles, and with truncated and full hashes.
 TEST_P(WholeGrid, EqualsTheOracle) {
   const auto backend = open();
   for (const oracle::SceneKind kind : oracle::kAllKinds)
@@ -27,7 +27,7 @@ TEST_P(WholeGrid, EqualsTheOracle) {
       }
 }
 
-// The same in a grid of 128, with all kinds of triangles in one scene.
+// Like EqualsTheOracle, in a grid of 128 voxels per edge, with all kinds of triangles in one scene.
 TEST_P(WholeGrid, EqualsTheOracleOnMixedScenes) {
   const auto backend = open();
   for (const uint32_t hash_bits : {4u, 5u, 33u, 64u}) {

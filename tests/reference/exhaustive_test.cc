@@ -12,7 +12,8 @@ oracle::Triangle dot(int64_t x, int64_t y, int64_t z) {
   return {p, {p[0] + 20, p[1], p[2]}, {p[0], p[1] + 20, p[2] + 20}};
 }
 
-// In a grid of 4^3 voxels, the root is a brick. Sets each voxel, alone or with the first voxel.
+// In a grid of 4^3 voxels, the root is a brick. The file is right for each single voxel, alone or
+// with the first voxel.
 TEST_F(Exhaustive, EveryVoxelOfABrick) {
   for (int v = 0; v < 64; ++v) {
     SCOPED_TRACE(v);

@@ -15,8 +15,8 @@ std::vector<oracle::SceneKind> exact_kinds() {
   return kinds;
 }
 
-// Scenes of every kind, in grids of 4 to 128 voxels per edge, with one or many subvolumes, and with
-// truncated and full hashes.
+// Files equal the oracle for scenes of every kind, in grids of 4 to 128 voxels per edge, with one
+// or many subvolumes, and with truncated and full hashes.
 TEST_F(RandomScenes, EqualTheOracle) {
   for (const oracle::SceneKind kind : exact_kinds())
     for (int levels = 2; levels <= 7; ++levels) {
@@ -36,8 +36,8 @@ TEST_F(RandomScenes, EqualTheOracle) {
     }
 }
 
-// The grid is a cube inside the scene. Triangles cross its boundary or miss it, and some vertices
-// are far outside.
+// The file equals the oracle if the grid is a cube inside the scene. Triangles cross the grid's
+// boundary or miss the grid, and some vertices are far outside.
 TEST_F(RandomScenes, GivenCubeInsideTheScene) {
   const Triangles scene =
       oracle::make_scene(oracle::SceneKind::kSoup, 5, {{-200, -100, -300}, 512}, 150);
@@ -53,8 +53,8 @@ TEST_F(RandomScenes, GivenCubeInsideTheScene) {
   EXPECT_EQ(report.dropped_outside + report.triangles, all.size());
 }
 
-// Vertices are arbitrary floats, and the build computes the default cube. The oracle computes the
-// cube and snaps the vertices with its own code.
+// Vertices are arbitrary floats, and the build computes the default cube. The oracle, which
+// computes the cube and snaps the vertices with its own code, gives the same DAG.
 TEST_F(RandomScenes, DefaultCube) {
   oracle::Random random(6);
   for (int round = 0; round < 12; ++round) {

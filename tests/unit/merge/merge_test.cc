@@ -27,8 +27,8 @@ TEST(Merge, EqualSubvolumesGiveTheDagOfTheWhole) {
     }
 }
 
-// Subvolumes have different sizes, so a level has roots of some subvolumes, inner nodes of others,
-// and nodes of the top tree.
+// A merge gives the complete DAG if subvolumes have different sizes. A level then has roots of some
+// subvolumes, inner nodes of others, and nodes of the top tree.
 TEST(Merge, SubvolumesOfDifferentSizesGiveTheDagOfTheWhole) {
   for (const uint32_t hash_bits : {4u, 16u, 64u})
     for (uint64_t seed = 10; seed < 16; ++seed) {
@@ -53,7 +53,7 @@ TEST(Merge, AnyOrderOfArtifactsGivesTheSameBytes) {
   }
 }
 
-// In a grid of one brick, the root is a brick, and there is nothing above it.
+// A merge also gives the complete DAG in a grid of one brick, where this brick is the root.
 TEST(Merge, TheSmallestGridIsOneBrick) {
   const oracle::Voxels voxels = mixed_voxels(21, 4);
   MergeHarness harness(2, 64);
@@ -72,9 +72,10 @@ TEST(Merge, NoArtifactsGiveAFileWithoutNodes) {
   EXPECT_EQ(merged.file.sha256, harness.expected({}).sha256);
 }
 
-// The published merge of the tutorial omitted the child mask from the hash. So two equal sub-DAGs
-// in different octants of different parents became one parent, and voxels moved. In this test, two
-// such pairs of sub-DAGs must keep their positions over two levels of the merge.
+// The merge that Sintorn's tutorial "DAG Construction" (2018) published omitted the child mask from
+// the hash. So two equal sub-DAGs in different octants of different parents became one parent, and
+// voxels moved. In this test, two such pairs of sub-DAGs must keep their positions over two levels
+// of the merge.
 TEST(Merge, EqualSubDagsInDifferentOctantsKeepTheirPlaces) {
   oracle::Voxels voxels(32);
   const auto blob = [&](int x, int y, int z) {

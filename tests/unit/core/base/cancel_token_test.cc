@@ -24,7 +24,7 @@ TEST(CancelToken, ThrowsOnceSet) {
   }
 }
 
-// Work on one thread stops when another one asks it to.
+// A loop on one thread ends after another thread has called cancel().
 TEST(CancelToken, IsSeenByOtherThreads) {
   CancelToken token;
   bool stopped = false;

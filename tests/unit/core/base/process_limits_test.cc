@@ -58,7 +58,8 @@ TEST_F(CgroupTest, CpuQuotas) {
   EXPECT_GE(default_threads(), 1u);
 }
 
-// cgroup version 1, alone or together with version 2, and texts that do not describe a membership.
+// The limits of cgroup version 1 are found, alone or together with version 2. A text that does not
+// describe a membership gives no limit.
 TEST_F(CgroupTest, WalksUpInVersion1) {
   write("memory/pool/job/memory.limit_in_bytes", "9223372036854771712\n");
   write("memory/pool/memory.limit_in_bytes", "700000000\n");

@@ -22,7 +22,7 @@ TEST(WarningList, CountsEqualWarnings) {
   EXPECT_EQ(list.list(), expected);
 }
 
-// A file with a million different faults has a list of limited length.
+// The list has a limited length, however many different faults a file has.
 TEST(WarningList, IsLimited) {
   WarningList list;
   for (int i = 0; i < 1000; ++i) list.add({"a", "place", "fault " + std::to_string(i), 2});

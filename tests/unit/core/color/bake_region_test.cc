@@ -145,8 +145,8 @@ TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   EXPECT_LT(in_others, 115000u);
 }
 
-// The same triangle is baked with 64-bit and with 128-bit integers: a vertex far away in the
-// triangle's plane makes it need 128 bits.
+// Sums from 64-bit and from 128-bit integers are equal. A triangle is baked twice; the second time,
+// a vertex is moved far away in the triangle's plane, so 128 bits are necessary.
 TEST(BakeRegion, WideTrianglesCoverWhatNarrowOnesDo) {
   TestLooks looks;
   looks.materials.assign(1, Material{});
@@ -170,7 +170,7 @@ TEST(BakeRegion, WideTrianglesCoverWhatNarrowOnesDo) {
   }
 }
 
-// The example of docs/color.md.
+// The baked color equals the worked example in docs/color.md.
 TEST(BakeRegion, WorkedExample) {
   TestLooks looks;
   looks.materials.assign(1, Material{});

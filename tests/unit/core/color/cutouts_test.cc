@@ -25,7 +25,8 @@ MemoryBudget& budget() {
   return all;
 }
 
-// A material with alpha mode MASK, and an image whose visible texels is_visible(x, y) gives.
+// Returns the cutouts of one material with alpha mode MASK. Texel (x, y) of its image is visible if
+// is_visible(x, y) is true.
 template <class IsVisible>
 Cutouts cutouts_of(uint32_t width, uint32_t height, std::array<Wrap, 2> wrap,
                    const IsVisible& is_visible) {
@@ -93,7 +94,7 @@ Voxels visible_voxels(const VisiblePart& part) {
   return all;
 }
 
-// The voxels that the segments touch, with gaps between segments kept.
+// Returns the voxels that the segments touch. Checks that no voxel is touched by two segments.
 Voxels voxels_of_segments(const VisiblePart& part) {
   Voxels all;
   VisibleVoxels(part, kLevels).for_each_segment([&](const FixedTriangle& segment) {
@@ -105,7 +106,7 @@ Voxels voxels_of_segments(const VisiblePart& part) {
   return all;
 }
 
-// The texel at a point of the triangle, by an independent rule.
+// Returns the texel at a point of the triangle, computed without the tested code.
 std::array<uint32_t, 2> texel_at(const FixedSurface& surface, const Cutouts& cutouts, double second,
                                  double third) {
   std::array<uint32_t, 2> texel;
@@ -235,7 +236,7 @@ TEST(Cutouts, BordersOfTexelsAtBordersOfVoxels) {
         << voxel[0] << " " << voxel[1];
 }
 
-// Points and segments are visible where the texels at them are.
+// A triangle that is a point or a segment is visible where the texels at it are visible.
 TEST(Cutouts, TrianglesWithoutArea) {
   const Cutouts cutouts =
       cutouts_of(2, 1, {Wrap::kRepeat, Wrap::kRepeat}, [](uint32_t x, uint32_t) { return x == 1; });
@@ -253,7 +254,7 @@ TEST(Cutouts, TrianglesWithoutArea) {
   }
 }
 
-// A triangle whose vertex colors alone hide it is cut out, also without an image.
+// A triangle that its vertex colors hide is cut out, even without an image.
 TEST(Cutouts, AlphaOfVertices) {
   for (const AlphaMode mode : {AlphaMode::kMask, AlphaMode::kBlend, AlphaMode::kOpaque})
     for (const uint16_t alpha : {0, 1000, 65535}) {

@@ -233,7 +233,7 @@ TEST_F(ColorOracle, HasNoColorWithoutArea) {
 
 constexpr ColorGrid kFine{5, 5}, kCoarse{11, 5};
 
-// The textures have from 0.2 to 10 texels along the edge of a cell.
+// Colors are near the oracle's for textures with 0.2 to 10 texels along the edge of a cell.
 TEST_F(ColorQuality, OfTextures) {
   for (const ColorGrid grid : {kFine, kCoarse}) {
     SCOPED_TRACE(grid.levels);

@@ -89,7 +89,8 @@ Color plain_color(const ColorSum& sum) {
   return color;
 }
 
-// Means at and next to every threshold, including exact halves, with small and large weights.
+// The vector code gives the color of the definition for means at and next to every threshold,
+// including exact halves, with small and large weights.
 TEST(ColorVectors, StoredColorsAreThoseOfTheDefinition) {
   oracle::Random random(4);
   constexpr color::SrgbThresholds kThresholds{};

@@ -49,7 +49,8 @@ TEST(Jpeg, CmykIsRefused) {
   EXPECT_THAT(problem_of(jpeg_file(16, 16, 4, gradient(16, 16, 4))), HasSubstr("CMYK"));
 }
 
-// A scan of a few hundred bytes costs a pass over all coefficients, so the number is limited.
+// A scan of a few hundred bytes costs a pass over all coefficients, so the number of scans is
+// limited.
 TEST(Jpeg, ManyScans) {
   const std::string pixels = gradient(48, 40, 3);
   expect_gradient(jpeg_of_scans(48, 40, pixels, 1), 48, 40, 3);
@@ -209,7 +210,7 @@ TEST(Png, DecompressionBombs) {
             (Pixel{'a', 'b', 'c', 'd'}));
 }
 
-// Formats without decoder are named, with a command that converts them.
+// The error for a format without a decoder names the format and a command that converts it.
 TEST(Images, OtherFormats) {
   const std::string start(12, '.');
   const std::pair<std::string, const char*> kFormats[] = {

@@ -108,7 +108,7 @@ TEST(Webp, IsNamed) {
 #endif
 
 #ifdef VOXDAG_HAS_AVIF
-// The planes of these images are green, blue and red.
+// Images whose planes are green, blue and red, instead of luma and chroma, decode exactly.
 TEST(Avif, PlanesOfColorsAreExact) {
   const std::string pixels = noise(4 * 75 * 66);
   const Decoded image = decode(avif_file({.width = 75, .height = 66}, pixels), 64 << 20);

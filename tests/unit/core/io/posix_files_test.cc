@@ -115,7 +115,7 @@ TEST_F(PosixFiles, MissingThingsAreNotFound) {
   EXPECT_FALSE(files_.exists(gone));
 }
 
-// A file in the place of a folder is an error, and a folder in the place of a file.
+// A file where a folder is expected is an error, and so is a folder where a file is expected.
 TEST_F(PosixFiles, FilesAreNotFolders) {
   put(path_, "x");
   EXPECT_FALSE(files_.exists(path_ + "/below"));

@@ -130,7 +130,8 @@ TEST_F(ExportLimits, HashDagCountsVoxelsWith24Bits) {
   EXPECT_NE(message.find("--level 17 (131072 voxels per edge) fits"), std::string::npos) << message;
 }
 
-// vdb and nvdb files are built completely in memory.
+// Exports to vdb and nvdb, which build the file in memory, are refused if it does not fit. The
+// message names the level that fits.
 TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
   const auto file = full_grid(9);
   for (const ExportFormat& format : export_formats()) {
@@ -146,7 +147,7 @@ TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
   EXPECT_NE(message.find("a smaller --region or a coarser --level"), std::string::npos) << message;
 }
 
-// A chunk of a MagicaVoxel file has at most 2 GiB.
+// A chunk of a MagicaVoxel file has at most 2 GiB. A larger export is refused.
 TEST_F(ExportLimits, VoxNamesTheLevelThatFits) {
   const auto file = full_grid(17);
   const std::string message = refusal(*file, "vox", "a.vox", ErrorCode::kLimit, kMemory);

@@ -64,7 +64,7 @@ TEST_F(ExportSharing, PlayCanvasVoxelsHaveOneWordForEachPointer) {
   EXPECT_EQ(json["leafDataCount"], 2);
 }
 
-// Both files have the words of the DAG's levels, with the same nodes as the file.
+// The exported files have as many words as the nodes of the input's DAG take in each format.
 TEST_F(ExportSharing, HashDagAndSvdagHaveTheNodesOfTheFile) {
   const uint64_t words = 9 * kTileLevels + 2 * (kLevels - 2 - kTileLevels);
   run("hashdag");

@@ -215,7 +215,8 @@ TEST_F(ExtractColors, OfNothing) {
   EXPECT_EQ(open_global_file(path("out.vdag"))->version(), 1u);
 }
 
-// Damages a copied color, a color that is encoded again, and the directory of color regions.
+// Damage is reported in a copied color, in a color that is encoded again, and in the directory of
+// color regions.
 TEST_F(ExtractColors, DamageIsFound) {
   write(8, 8);
   const std::string intact = bytes("in.vdag");

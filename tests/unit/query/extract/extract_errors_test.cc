@@ -78,7 +78,7 @@ TEST_F(ExtractErrors, OffsetsThatLeadNowhere) {
   }
 }
 
-// The disk is full from the n-th write on.
+// If the disk is full from the n-th write on, the extract fails with kNoSpace.
 TEST_F(ExtractErrors, FullDisk) {
   uint64_t failed = 0;
   for (uint64_t at = 1;; ++at) {
@@ -93,7 +93,7 @@ TEST_F(ExtractErrors, FullDisk) {
   EXPECT_GT(failed, 5u);
 }
 
-// The n-th read fails, of the input or of a temporary file.
+// If the n-th read fails, of the input or of a temporary file, the extract fails with kIo.
 TEST_F(ExtractErrors, FailingReads) {
   uint64_t failed = 0;
   for (uint64_t at = 1;; at += 1 + at / 8) {

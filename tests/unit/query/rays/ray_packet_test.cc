@@ -163,7 +163,7 @@ TEST_F(DagRays, RefusesWhatIsNoRay) {
   EXPECT_EQ(code_of({0, 0, 0}, {0, 0, 1}, {1, -1}), ErrorCode::kInvalidInput);
 }
 
-// Casts more rays than a thread takes per batch.
+// One thread and four threads find the same hits for more rays than a batch has.
 TEST_F(DagRays, ThreadsDoNotChangeTheHits) {
   std::vector<Coordinates> origins, directions;
   for (const Ray& ray : many_rays(16, 9))

@@ -28,8 +28,8 @@ class Blocks : public testing::Test {
   }
 };
 
-// list_blocks() lists the non-empty blocks in order, each with its block_key(). It clears all
-// marks, also of empty blocks.
+// list_blocks() lists the non-empty blocks in order, each with its block_key(). It clears the marks
+// (TileBricks::touched) of all blocks, including empty ones.
 TEST_F(Blocks, KernelsListThem) {
   for (const Kernels* kernels : all_kernels())
     for (int round = 0; round < 50; ++round) {

@@ -34,8 +34,8 @@ TEST(Draw, KernelsEqualOracle) {
   });
 }
 
-// The path with 128-bit integers sets the same voxels, both for triangles that need it and for
-// others.
+// draw_wide(), which uses 128-bit integers, sets exactly the oracle's voxels, both for wide
+// triangles and for narrow ones.
 TEST(Draw, WideEqualsOracle) {
   int wide_ones = 0;
   for_many_triangles(40, [&](const oracle::Triangle& t, const oracle::Region& region) {

@@ -53,7 +53,7 @@ TEST(Octants, NoTouchedChildIsLeftOut) {
       if (HasFailure()) return;
     }
   for (const Tally& tally : {portable, avx2, wide}) {
-    if (tally.touched == 0) continue;  // no AVX2
+    if (tally.touched == 0) continue;  // this machine has no AVX2
     EXPECT_GT(tally.inside, 20);
     EXPECT_LT(tally.reported, tally.touched * 1.3);
   }

@@ -117,7 +117,7 @@ TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
   EXPECT_GT(compared, 500);
 }
 
-// A plane is not used for large cubes in which its coefficients exceed 64 bits.
+// The memo does not use a plane for large cubes in which values of the plane exceed 62 bits.
 TEST(Planes, HugeNormalsAreNotUsedForLargeCubes) {
   const oracle::Triangle t{
       {{1, 1, 100000001}, {(1 << 28) - 1, 3, 7}, {5, (1 << 28) - 3, 100000007}}};

@@ -69,7 +69,8 @@ TEST_P(HostSpaceTest, SelectKeepsFlaggedPositionsInOrder) {
   }
 }
 
-// Runs of equal keys have all lengths; one run is longer than any thread's part.
+// Each run of equal keys becomes one key and the OR of its masks, even if the run is longer than a
+// thread's part of the keys.
 TEST_P(HostSpaceTest, MergeRunsOrsEqualKeys) {
   for (const uint32_t n : kSizes)
     for (const uint64_t longest : {1, 7, 30000}) {

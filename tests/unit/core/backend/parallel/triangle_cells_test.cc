@@ -56,8 +56,8 @@ TEST(TouchedCells, EqualsTheDefinitionOnAllKinds) {
   }
 }
 
-// Triangles at, just below and just above the largest size for which 64-bit products are used.
-// Their normals are as long as possible at this size.
+// touched_cells() is right for triangles at, just below and just above the largest size for which
+// it uses 64-bit products. The triangles' normals are as long as possible at this size.
 TEST(TouchedCells, EqualsTheDefinitionAtTheLimitOfNarrow) {
   oracle::Random random(4);
   Tally tally;
@@ -79,8 +79,8 @@ TEST(TouchedCells, EqualsTheDefinitionAtTheLimitOfNarrow) {
   EXPECT_GT(tally.cells, tally.blocks / 10);
 }
 
-// Small and large triangles with vertices a few units from the cells' corners, so that a plane or
-// an edge just touches or just misses a cell.
+// touched_cells() is right for triangles with vertices a few units from the cells' corners, whose
+// plane or edges just touch or just miss a cell.
 TEST(TouchedCells, EqualsTheDefinitionNearCorners) {
   oracle::Random random(5);
   Tally tally;

@@ -129,7 +129,8 @@ TEST_F(ArtifactTest, PiecesMakeTheSameArtifactAsAWhole) {
   EXPECT_EQ(pieces.checksum, whole.checksum);
 }
 
-// A segment contains many artifacts, and between them the bytes of abandoned artifacts.
+// Each of many artifacts in a segment is read back, although bytes of abandoned artifacts are
+// between them.
 TEST_F(ArtifactTest, ManyArtifactsShareASegment) {
   SegmentWriter segment(system_files(), folder_.path(), 3, budget_);
   std::vector<ArtifactRef> refs;

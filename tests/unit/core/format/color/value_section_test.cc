@@ -206,7 +206,7 @@ TEST_F(ValueSectionTest, DamageIsAnError) {
   EXPECT_GT(found, 100u);
 }
 
-// The entries of the attribute table must match the sections and the DAG.
+// A file is refused if an entry of its attribute table does not match the sections or the DAG.
 TEST_F(ValueSectionTest, SectionsThatDoNotFitAreRefused) {
   const ColoredScene scene{3, 3, random_codes(2, 3, 60), smooth_colors(3, 60)};
   write_valued(path_, scene, kValues, 3);

@@ -47,7 +47,7 @@ TEST_F(DiffTest, CountsTheVoxelsThatDiffer) {
     }
 }
 
-// The second file has one voxel more, in a large scene of shared parts.
+// One additional voxel in the second file is counted, in a large scene with shared nodes.
 TEST_F(DiffTest, FindsASingleVoxel) {
   oracle::Voxels voxels = random_voxels(1, 128);
   write_global(a_, voxels);

@@ -73,7 +73,7 @@ TEST_F(VerifyTest, RightFilesPass) {
   EXPECT_NO_THROW(verify(path_));
 }
 
-// Each bit of a file of 8^3 voxels is flipped and then restored.
+// `verify` detects each single flipped bit of a file of 8^3 voxels.
 TEST_F(VerifyTest, EveryBitFlipIsCaught) {
   write_global(path_, random_voxels(5, 8));
   const ByteString bytes = read_bytes(path_);

@@ -125,7 +125,7 @@ TEST(WideNodeTest, HasPointersOfTwoWords) {
 TEST_F(WideFileTest, VersionAndFeaturesBelongTogether) {
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{0}).message(),
               HasSubstr("pointers of 64 bits, expected 32"));
-  // The file has bytes other than 0 that are reserved in version 1.
+  // Version 1 reserves bytes that are not 0 in this file.
   EXPECT_EQ(error_with(kVersionAt, uint32_t{1}).code(), ErrorCode::kCorrupt);
   make_narrow();
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{1}).message(), HasSubstr("reserved"));
