@@ -8,8 +8,9 @@
 namespace voxdag {
 namespace {
 
-// Decodes complete groups of four characters. Returns false for invalid characters. libcrypto skips
-// spaces at both ends instead of refusing them, but then it decodes too few bytes.
+// Decodes complete groups of four characters. Returns false for invalid characters. libcrypto
+// accepts spaces at both ends, but skips them, so it decodes too few bytes. The return value checks
+// this.
 bool decode_groups(std::span<const std::byte> characters, std::byte* out) {
   const int bytes = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(out),
                                     reinterpret_cast<const unsigned char*>(characters.data()),

@@ -9,7 +9,7 @@ namespace voxdag {
 
 // Returns the number of bytes that `character_count` base64 characters encode. The characters may
 // end with padding ("=") or without it. `tail` holds the last two characters, or all if there are
-// fewer. It shows how many of them are padding.
+// fewer. Only these can be padding.
 uint64_t base64_bytes(uint64_t character_count, std::span<const std::byte> tail);
 
 // Decodes fewer than 2^31 characters. The last group may have fewer than four characters if the

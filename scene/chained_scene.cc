@@ -44,8 +44,8 @@ TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
   };
 }
 
-// Reads the parts one after another. Only the cursor of the current part is open, so it can use all
-// memory of this cursor.
+// Reads the parts one after another. Only the current part's cursor is open, so that cursor can use
+// all memory of the ChainedCursor.
 class ChainedCursor : public TriangleCursor {
  public:
   ChainedCursor(const std::vector<Part>& parts, unsigned cursors)

@@ -43,7 +43,7 @@ GlbFile::~GlbFile() {
     file_.reset();
     files_.remove(path_ + ".partial");
   } catch (const Error&) {
-    // Ignored, because the error that ended the writing is reported.
+    // Another error ended the writing, and the caller reports that one.
   }
 }
 

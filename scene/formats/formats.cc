@@ -31,7 +31,8 @@ constexpr SceneFormat kFormats[] = {
     {"LAS", kLasEndings, points::is_las, points::open_las},
     {"OBJ", kObjEndings, obj::is_obj, obj::open_obj},
     {"STL", kStlEndings, stl::is_stl, stl::open_stl},
-    // Last, because its sniff() accepts almost any text whose file name has one of the endings.
+    // This row is last, because its sniff() accepts almost any text in a file with one of the
+    // endings.
     {"text points", kTextPointEndings, points::is_text_points, points::open_text_points},
 };
 

@@ -13,7 +13,7 @@ constexpr double kPitch = 64;         // distance between streets
 constexpr double kBlock = 52;         // edge of a block, including the pavement
 constexpr double kPavement = 0.1875;  // height of the pavement
 constexpr double kBuilt = 48;         // edge of the area for lots
-// Measured triangles of an average block, from which the number of blocks is estimated.
+// Average number of triangles per block, as measured. The number of blocks is estimated from it.
 constexpr uint64_t kTrianglesPerBlock = 9900;
 
 constexpr Rgba8 kStreet{90, 92, 96, 255}, kPavementColor{190, 186, 178, 255},
@@ -48,13 +48,14 @@ class City {
  private:
   void make_block(uint64_t column, uint64_t row) {
     Random random(seed_, {column, row});
-    // A separate generator, so that colors do not change the triangles.
+    // Colors have their own random numbers, so that the triangles are the same with and without
+    // colors.
     paint_ = Random(seed_, {column, row, 1});
     const Vec3 center{
         kPitch * (static_cast<double>(2 * column) - static_cast<double>(columns_ - 1)) / 2, 0,
         kPitch * (static_cast<double>(2 * row) - static_cast<double>(rows_ - 1)) / 2};
-    // make_street() draws its random numbers before the block becomes a park or not. With colors,
-    // the ground's color depends on this decision, so the ground is then added after the street.
+    // The draw that decides whether the block becomes a park comes after make_street(). The
+    // ground's color depends on this decision, so with colors the ground is added after it.
     if (!scene_.has_colors()) make_ground(center, false);
     make_street(center, random);
     const bool is_park = random.chance(10);

@@ -13,8 +13,8 @@ namespace voxdag {
 // Indices into kCityMaterials.
 enum CityMaterial : uint32_t { kGround, kBuildings, kPlants, kCars };
 
-// Parts stored once: a piece of wall with a window for each of four directions, a tree, and a car
-// along x and one along z.
+// Parts stored once: a piece of wall with a window (one for each of four directions), a tree, a car
+// along x, and a car along z.
 struct CityParts {
   explicit CityParts(SceneBuilder& scene);
   uint32_t window[4];  // facing +z, +x, -z, -x; unit size; the pane is set back by 1

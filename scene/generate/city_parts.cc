@@ -41,7 +41,7 @@ MeshBuilder window_wall(const Vec3& u, const Vec3& w) {
   return mesh;
 }
 
-// A trunk and two crowns, each two pyramids base to base.
+// A trunk and two crowns. Each crown consists of two pyramids that share their base.
 MeshBuilder tree_mesh() {
   MeshBuilder mesh;
   mesh.color = kTrunk;

@@ -26,11 +26,11 @@ constexpr SceneKindInfo kKinds[] = {
 
 constexpr const char* kGenerator = "voxdag generate ";
 constexpr uint32_t kMaxMengerLevel = 5;
-// Bytes per triangle in a file of kind terrain, the most compact kind.
+// Bytes per triangle of a terrain. No other kind of scene needs fewer.
 constexpr uint64_t kMinBytesPerTriangle = 12;
 
-// Refuses, without counting, sizes that are obviously too large. GlbLayout refuses all other sizes
-// that are too large.
+// Refuses sizes that are obviously too large, before the scene is generated. GlbLayout counts the
+// bytes of all other scenes, and refuses the ones that are too large.
 void check_size(const GenerateOptions& options) {
   const bool is_menger = options.kind == SceneKind::kMenger;
   const bool fits =

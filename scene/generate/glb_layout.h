@@ -22,7 +22,7 @@ namespace voxdag {
 
 class GlbLayout : public BlockSink {
  public:
-  // Advances `progress` by the triangles of meshes.
+  // Advances `progress` by the number of triangles of each mesh, but not of parts.
   GlbLayout(Progress& progress, const CancelToken& cancel) : progress_(progress), cancel_(cancel) {}
   void mesh(const MeshBuilder& mesh) override;
   void part(const MeshBuilder& mesh) override;

@@ -67,7 +67,8 @@ struct MeshBuilder {
   // vertices, 10 triangles. In `half_and_height`, x and z are half of the edges, and y is the
   // height.
   void turned_box(const Vec3& base, const Vec3& half_and_height, const Turn& turn);
-  // Adds a pyramid on a turned rectangle, with the same parameters: 5 new vertices, 4 triangles.
+  // Adds a pyramid on a turned rectangle, with turned_box()'s parameters: 5 new vertices, 4
+  // triangles.
   void pyramid(const Vec3& base, const Vec3& half_and_height, const Turn& turn);
 };
 

@@ -1,5 +1,5 @@
 // Spheres of many sizes in a ball. They are octahedra with n^2 triangles per face, whose vertices
-// are moved out to the sphere. Larger spheres are finer.
+// are moved out to the sphere. Larger spheres have a larger n.
 #include <cmath>
 
 #include "scene/generate/random.h"

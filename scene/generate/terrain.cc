@@ -1,7 +1,7 @@
 // A fractal heightfield on a square of 1024 x 1024: octaves of gradient noise, ridged on high land
 // and smooth on low land. Two more octaves shift the coordinates at which the noise is evaluated,
-// so that valleys wind. Each octave has half the wavelength of the previous one, down to four cells
-// of the field.
+// so that valleys wind. Each octave has half the wavelength of the previous one. The shortest
+// wavelength is four cells of the field.
 #include <cmath>
 
 #include "scene/generate/random.h"

@@ -110,7 +110,8 @@ class GltfScene : public TriangleSource {
   SceneMaterials materials() const override {
     const DocumentMaterials& listed = *document_.materials;
     SceneMaterials out{listed.materials, {}, listed.warnings, {}};
-    // The first materials are the ones listed in the file.
+    // The file's materials come first, numbered from 0. The other entries repeat one of these
+    // numbers or have none.
     for (const Material& material : listed.materials)
       if (material.number == out.names.size()) out.names.push_back(material.name);
     for (int image : listed.images)

@@ -19,7 +19,7 @@ uint64_t largest_vertex_count(const Document& document) {
   return largest;
 }
 
-// If a vertex is not finite, all its coordinates are NaN.
+// If a vertex is not finite, all its coordinates are NaN. So one coordinate of each is tested.
 bool is_finite(const RealTriangle& triangle) {
   return !std::isnan(triangle.v[0][0]) && !std::isnan(triangle.v[1][0]) &&
          !std::isnan(triangle.v[2][0]);

@@ -51,7 +51,7 @@ int wrap_mode(int mode) {
   return mode == aiTextureMapMode_Clamp || mode == aiTextureMapMode_Decal ? 33071 : 10497;
 }
 
-// Returns the pixels of an embedded image that is not encoded.
+// Encodes an embedded image that stores plain pixels as PNG.
 std::string encode(const aiTexture& texture) {
   std::vector<uint8_t> rgb;
   const size_t pixels = size_t{texture.mWidth} * texture.mHeight;

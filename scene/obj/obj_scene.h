@@ -10,10 +10,10 @@
 
 namespace voxdag::obj {
 
-// True if the file begins with statements of OBJ. The format has no magic number: the first lines
-// that are not blank or comments must be OBJ statements, up to one with the arguments of its kind
-// (numbers after v, vt and vn, indices after f, l and p, a name after mtllib and usemtl). At
-// most the first MiB is read.
+// True if the file begins with statements of OBJ. The format has no magic number, so the lines are
+// tested until one has the arguments of its kind (numbers after v, vt and vn, indices after f, l
+// and p, a name after mtllib and usemtl). All lines before it must be blank, comments or OBJ
+// statements. At most the first MiB is read.
 bool is_obj(const ReadableFile& file);
 
 // Opens the triangles of an open file, with axes and units unchanged. See open_scene() for memory,

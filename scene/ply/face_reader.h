@@ -17,7 +17,7 @@ namespace voxdag::ply {
 
 class FaceReader {
  public:
-  // The values of the faces of some triangles.
+  // The values of the faces that contain the triangles of a read().
   struct Surfaces {
     std::vector<double> numbers;                   // the requested numbers, for each triangle
     std::vector<std::array<double, 6>> texcoords;  // three pairs; NaN if the face does not have

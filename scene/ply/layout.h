@@ -1,5 +1,5 @@
 // The elements and properties of a PLY file that make its triangles and their surfaces, found by
-// their names. Names match in any case.
+// their names. Upper and lower case are the same.
 #pragma once
 
 #include <array>

@@ -35,9 +35,9 @@ class Columns {
       "commas between them, such as x,y,z,_,r,g,b";
   using Values = std::array<double, kValues>;
 
-  // Parses a list such as "x,y,z,_,r,g,b". The names are the same as in a header line, in any case;
-  // "_" is a column that is not used. Returns nullopt unless x, y and z each occur once, and the
-  // colors all occur once or not at all.
+  // Parses a list such as "x,y,z,_,r,g,b". The names are the same as in a header line, in upper or
+  // lower case; "_" is a column that is not used. Returns nullopt unless x, y and z each occur
+  // once, and the colors all occur once or not at all.
   static std::optional<Columns> parse(std::string_view list);
   // Like parse(), but throws Error{kInvalidInput} for an invalid list.
   static Columns given(std::string_view list);

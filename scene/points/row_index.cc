@@ -32,8 +32,9 @@ void RowIndex::set_columns(std::string_view first_row, const std::string& names)
   }
 }
 
-// Sets full_color_ from the first rows. If the colors are only assumed, and one of these rows has a
-// number that is not a color, the columns get no colors.
+// Sets full_color_ from the first rows. If the columns have no names, the last three of six are
+// only assumed to be colors. If one of these rows has a number there that is not a color, they are
+// not used.
 void RowIndex::check_colors(RowReader& rows) {
   double low = 0, high = 0;
   bool has_fraction = false;

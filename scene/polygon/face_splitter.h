@@ -37,7 +37,7 @@ class FaceSplitter {
     is_doubtful_ = triangulator_.is_doubtful();
     return is_split ? triangulator_.triangles() : std::span<const uint32_t>();
   }
-  // True if the last face was doubtful (Triangulator).
+  // True if the last face was doubtful (triangulator.h).
   bool is_doubtful() const { return is_doubtful_; }
 
  private:

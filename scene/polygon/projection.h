@@ -9,9 +9,9 @@
 
 namespace voxdag::polygon {
 
-// It is the coordinate plane in which the triangles (c0, c(k), c(k+1)) of the polygon's fan have
-// the largest sum of areas. Of planes with equal sums, it is the first in the order yz, zx, xy. In
-// the plane, the signed area of the polygon is positive or 0.
+// The chosen plane: the coordinate plane in which the triangles (c0, c(k), c(k+1)) of the polygon's
+// fan have the largest sum of areas. Of planes with equal sums, it is the first in the order yz,
+// zx, xy. In the plane, the signed area of the polygon is positive or 0.
 struct Projection {
   int axis = 0;              // the axis that the projection drops
   bool is_mirrored = false;  // the other two axes are exchanged

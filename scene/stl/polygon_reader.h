@@ -1,7 +1,7 @@
 // Reads the polygons of an ASCII STL file one after another, and triangulates them. A polygon is a
 // sequence of "vertex x y z" without another keyword in between; it usually has three vertices. All
-// other words (normals, names, loops) do not affect the triangles. Keywords may be in any case, and
-// several may be in one line. Not thread-safe.
+// other words (normals, names, loops) do not affect the triangles. Keywords may be in upper or
+// lower case, and several may be in one line. Not thread-safe.
 #pragma once
 
 #include <array>

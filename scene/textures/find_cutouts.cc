@@ -17,7 +17,7 @@
 namespace voxdag {
 namespace {
 
-// What a mask depends on.
+// The properties of a material that determine its mask.
 using MaskKey = std::tuple<uint32_t, AlphaMode, uint16_t, uint16_t>;
 MaskKey key_of(const Material& m) { return {m.image, m.alpha_mode, m.alpha_cutoff, m.factor[3]}; }
 

@@ -16,8 +16,8 @@ struct BrokenData {
   std::string message;
 };
 
-// Maximum number of a strip's declared triangles per Draco face. A strip declares more triangles,
-// because degenerate triangles join its pieces.
+// Maximum number of triangles that a strip may declare per Draco face. A strip declares more
+// triangles than it has faces, because it counts the degenerate triangles that join its pieces.
 constexpr uint64_t kMaxStripTrianglesPerFace = 8;
 
 // Decodes `compressed` into `out`, whose size is view.decoded_bytes(). Throws BrokenData.
@@ -31,7 +31,8 @@ void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compress
 void decode_draco(const DracoPart& part, std::span<std::byte> compressed, MemoryCharge& charge,
                   const std::function<void(std::span<const std::byte>)>& write);
 
-// Decodes the connectivity and returns the number of vertices. Otherwise like decode_draco().
+// Decodes only the connectivity and returns the number of vertices. Errors, memory and `compressed`
+// are as in decode_draco().
 uint64_t count_draco_vertices(std::span<std::byte> compressed, MemoryCharge& charge);
 
 }  // namespace voxdag::gltf

@@ -115,7 +115,7 @@ class BoundedDecoder : public Decoder {
                           sizeof(int32_t) * static_cast<uint64_t>(a.num_components());
     }
     charge_more(charge_, mesh.num_points() * bytes_per_vertex);
-    // Called after the charge, because the charge limits the number of values to walk over.
+    // The charge above bounds the number of values that this check has to read.
     check_attribute_tables(attributes_, *this, admit_table_);
   }
 

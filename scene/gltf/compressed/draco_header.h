@@ -12,11 +12,11 @@ struct DracoHeader {
   bool is_edgebreaker = false;  // false: the faces are stored one after another
   bool has_valences = false;    // edgebreaker with one context per vertex valence
   uint64_t faces = 0;
-  // Number of vertices. Edgebreaker does not count a position twice if its other attributes differ
-  // from face to face, so the decoded mesh can have more.
+  // Number of vertices. Edgebreaker counts a position once, even if faces give it different other
+  // attributes. The decoded mesh then has several vertices at this position.
   uint64_t vertices = 0;
-  // Number of attributes with a separate connectivity table, because fewer corners share a value
-  // than share a position. Edgebreaker only.
+  // Number of attributes that have their own connectivity table. An attribute needs one if corners
+  // with the same position can have different values of it. Edgebreaker only.
   uint64_t attribute_tables = 0;
   // Offset at which the header begins. If there are metadata, read_draco_header() overwrites their
   // end with a copy of the header.

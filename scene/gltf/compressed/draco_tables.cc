@@ -109,10 +109,9 @@ class Walker {
   const AdmitTable& admit_;
 };
 
-// Returns the number of vertices that the faces have, which is the number of values that Draco
-// decodes: Draco's traversal of the faces visits each vertex once. The traversal could miss
-// vertices if two neighboring faces did not share both vertices of their common edge, so such
-// tables are refused.
+// Returns the number of vertices of the faces. Draco decodes one value per vertex, because its
+// traversal of the faces visits each vertex once. The traversal could miss vertices if two
+// neighboring faces did not share both vertices of their common edge, so such tables are refused.
 template <class CornerTable>
 uint64_t count_vertices(const CornerTable& table) {
   std::vector<bool> is_counted(static_cast<size_t>(table.num_vertices()));

@@ -22,7 +22,8 @@ enum Control : unsigned { kFewBits, kMoreBits, kZeros, kLiteral };
 using Block = std::array<uint8_t, kMaxBlockBytes>;
 using Element = std::array<uint8_t, kMaxStride>;
 
-// The rest of a stream. After a read beyond the end, it has failed and only returns zeros.
+// The unread rest of a stream. After a read beyond the end, has_failed() is true and next() returns
+// 0.
 class Input {
  public:
   explicit Input(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -66,7 +67,7 @@ void read_group(Input& in, unsigned bits, uint8_t* deltas) {
     if (deltas[i] == sentinel) deltas[i] = in.next();
 }
 
-// Reads the deltas of one byte of `count` elements, rounded up to groups.
+// Reads the deltas of one byte position for `count` elements. Fills the last group of 16 deltas.
 void read_deltas(Input& in, unsigned control, size_t count, uint8_t* deltas) {
   if (control == kZeros) return void(std::fill_n(deltas, count, uint8_t{0}));
   if (control == kLiteral) return in.read(deltas, count);
@@ -83,7 +84,7 @@ T without_zigzag(T value) {
   return static_cast<T>(value & 1 ? ~(value >> 1) : value >> 1);
 }
 
-// Adds the deltas of the four bytes of a channel to the element before.
+// Adds the deltas of one channel to its four bytes, which hold the values of the previous element.
 void add_deltas(unsigned mode, const std::array<uint8_t, 4>& delta, uint8_t* element) {
   const auto pair = [](const uint8_t* bytes) {
     return static_cast<uint16_t>(bytes[0] | bytes[1] << 8);
@@ -106,7 +107,7 @@ void add_deltas(unsigned mode, const std::array<uint8_t, 4>& delta, uint8_t* ele
 
 bool is_channel_mode(uint8_t mode) { return (mode & 15) == 2 || mode < 2; }
 
-// Reads `count` elements, which are one block.
+// Reads a block of `count` elements. `last` is the element before the block, then its last element.
 void read_block(Input& in, size_t stride, std::span<const uint8_t> channel_modes, size_t count,
                 Element& last, std::byte* out) {
   Block deltas;
@@ -136,7 +137,8 @@ bool decode_vertex_stream_1(std::span<const std::byte> stream, size_t stride,
                             std::span<std::byte> out) {
   const size_t tail_bytes = std::max(stride + stride / 4, kMinTailBytes);
   if (!is_vertex_stream_1(stream) || stream.size() < 1 + tail_bytes) return false;
-  // The tail, without its padding: the element before the first one, and the channel modes.
+  // The tail without its padding: the element to which the first deltas are added, and the channel
+  // modes.
   Input tail(stream.last(stride + stride / 4));
   Element last;
   std::array<uint8_t, kMaxStride / 4> channel_modes;

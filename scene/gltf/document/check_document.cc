@@ -17,7 +17,7 @@ namespace {
 // any count.
 constexpr uint64_t kMaxElements = uint64_t{1} << 32;
 
-// `count` elements of `bytes` bytes each; the first is at `offset` of a view.
+// `count` elements of `bytes` bytes each. The first one begins at byte `offset` of a view.
 struct Extent {
   int view;
   uint64_t offset;

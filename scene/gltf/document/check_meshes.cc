@@ -20,7 +20,7 @@ void warn_of_stride(Document& d, int view, bool is_vertices) {
                           : " is used, expected none because it is not for vertices"));
 }
 
-// Warns of integers where glTF without KHR_mesh_quantization has floats.
+// Warns if an accessor has integers that glTF allows only with KHR_mesh_quantization.
 void warn_of_quantization(Document& d, int index, const std::string& where) {
   if (index < 0 || d.quantized || at(d.accessors, index).component_type == kFloat) return;
   d.warn("undeclared-quantization", where + ": " + d.name_accessor(index),

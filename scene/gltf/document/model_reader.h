@@ -1,6 +1,6 @@
-// The part of a scene file that tinygltf reads: materials, textures and samplers. Their text is
-// collected, and tinygltf parses it once. ModelReader itself puts the images into tinygltf's model,
-// because tinygltf would load them.
+// The part of a scene file that tinygltf reads: materials, textures and samplers. ModelReader
+// collects their text, and tinygltf parses it once. ModelReader itself puts the images into
+// tinygltf's model, because tinygltf would load them.
 #pragma once
 
 #include <memory>
@@ -17,8 +17,8 @@ class ModelReader {
  public:
   ModelReader(const std::string& scene_path, MemoryBudget& budget);
 
-  // Each appends an element to the JSON text that parse() passes to tinygltf, or to the images.
-  // Throws Error{kOutOfMemory} if the model would not fit the budget.
+  // Each function appends an element to the JSON text that parse() passes to tinygltf, or to the
+  // images. Throws Error{kOutOfMemory} if the model would not fit the budget.
   void add_material(const ElementText& element);
   void add_texture(const ElementText& element);
   void add_sampler(const ElementText& element);

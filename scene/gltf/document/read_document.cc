@@ -57,7 +57,8 @@ void place_bin_chunk(const Container& container, Document& d) {
 // Memory per node of check_document(), which follows the parents of all nodes.
 constexpr uint64_t kCheckBytesPerNode = 2 * sizeof(int);
 
-// Returns read(element), or T() if the element breaks a rule, which is an error only if it is used.
+// Returns read(element). If the element breaks a rule, records the message and returns T(), because
+// this is an error only if the element is used.
 template <class T, class Read>
 T read_or_note(Document& document, size_t index, const JsonElement& element, const Read& read) {
   try {

@@ -174,8 +174,8 @@ std::string unescape(const ReadableFile& file, const RawString& uri) {
                         : quoted.substr(1, quoted.size() - 2);
 }
 
-// True if the positions of base64 characters do not determine their bytes, so that all must be
-// decoded together.
+// True if the data contain escapes, blanks or other characters that are not base64. Then the
+// position of a character does not give the position of its byte, so all must be decoded together.
 bool is_irregular(const ReadableFile& file, FileRange base64, const RawString& uri) {
   if (uri.is_escaped) return true;
   std::array<char, size_t{16} << 10> window;

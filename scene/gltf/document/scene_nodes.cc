@@ -143,7 +143,7 @@ void set_transforms_above_roots(Document& d) {
       d.above_roots[root] = transforms.of(parent);
 }
 
-// Warns if no node with a mesh is drawn, although there are such nodes.
+// Warns if no node with a mesh is drawn, although the file has nodes with meshes.
 void warn_of_missing_meshes(Document& d, const std::vector<bool>& in_scene,
                             const std::vector<bool>& drawn) {
   uint64_t hidden = 0, others = 0;

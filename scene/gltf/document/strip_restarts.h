@@ -40,10 +40,10 @@ class StripWalk {
   uint64_t length_ = 0;    // number of indices since the last restart
 };
 
-// The places of triangles in the indices of such a strip or fan.
+// Finds the triangles in the indices of a strip or fan that restarts.
 struct RestartIndex {
   static constexpr uint64_t kTriangles = 1024;
-  // The walk before it takes index `at`, which completes a triangle.
+  // The state of the walk just before it takes index `at`, which completes a triangle.
   struct Entry {
     uint64_t at;
     StripWalk walk;

@@ -9,7 +9,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// tinygltf accepts integers only without a decimal point.
+// Writes 36.0 as 36, because tinygltf does not accept a decimal point where it expects an integer.
 std::string text_of(const Json& value) {
   constexpr double kExact = 0x1p53;
   const double number = value.is_number_float() ? value.get<double>() : 0.5;

@@ -20,9 +20,9 @@ struct ElementText {
 
 class ElementTextWriter {
  public:
-  // Both add a value. `key` is its name if the value is a member of an object; otherwise it is
-  // ignored. `value` of start() is an empty object or array; the following values are inside of it
-  // until end().
+  // add_scalar() and start() add a value. `key` is its name if the value is a member of an object;
+  // otherwise it is ignored. start() takes an empty object or array. The values that follow are
+  // inside it until end().
   void add_scalar(std::string_view key, const nlohmann::json& value);
   void start(std::string_view key, const nlohmann::json& value);
   void end();

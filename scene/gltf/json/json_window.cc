@@ -147,7 +147,7 @@ size_t JsonWindow::non_finite_length() const {
   const std::string_view text = peek(space);
   const size_t sign = text.front() == '-' || text.front() == '+' ? 1 : 0;
   const std::string_view word = text.substr(sign);
-  // Nearly all words end here.
+  // Nearly all words are neither NaN nor infinity, so this test comes first.
   const bool begins_with_letter =
       !word.empty() && std::string_view("NnIi").find(word.front()) != std::string_view::npos;
   if (!begins_with_letter && !word.starts_with("1.#")) return 0;
@@ -164,7 +164,7 @@ size_t JsonWindow::non_finite_length() const {
 }
 
 // True if the parser does not receive the character. Escapes and multi-byte characters always reach
-// the parser, which would refuse a part of one.
+// the parser, because it would refuse an incomplete one.
 bool JsonWindow::is_withheld(char c) {
   if (!in_string_) return is_second_blank_;
   if (string_.characters.size <= kMaxShownCharacters || in_escape_ || !is_plain(c)) return false;

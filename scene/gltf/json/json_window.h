@@ -47,8 +47,8 @@ class JsonWindow : public std::streambuf {
   bool is_withheld(char c);
   // Returns the length of NaN or an infinity that begins with the last character; 0 if none does.
   size_t non_finite_length() const;
-  // Returns the next characters of the file, beginning with the last character. `space` may hold
-  // them.
+  // Returns the next characters of the file, beginning with the last character that was read. They
+  // may be copied to `space`.
   std::string_view peek(std::span<char, kPeekCharacters> space) const;
 
   const ReadableFile& file_;

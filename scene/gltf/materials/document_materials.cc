@@ -109,7 +109,7 @@ class MaterialResolver {
             {kFloat, kUnsignedByte, kUnsignedShort},
             {kUnsignedByte, kUnsignedShort}};
   }
-  // Signed numbers are allowed by KHR_mesh_quantization.
+  // KHR_mesh_quantization also allows signed numbers.
   AccessorUse texture_coordinate_use(int set) const {
     return {where_ + ": TEXCOORD_" + std::to_string(set),
             2,

@@ -77,8 +77,8 @@ bool exists(const std::vector<T>& all, int index) {
   return index >= 0 && static_cast<size_t>(index) < all.size();
 }
 
-// Returns the texture's image. If it has none, returns the first image that an extension gives in
-// another file format, or an index that does not exist.
+// Returns the texture's image. If that index is not an image of the model, returns the index that
+// the first of four extensions gives for another file format. The result may also not be an image.
 int image_of(const tinygltf::Model& model, const tinygltf::Texture& texture) {
   int image = texture.source;
   for (const char* name :

@@ -13,7 +13,7 @@
 namespace voxdag::gltf {
 namespace {
 
-// Enough for a header without metadata.
+// Number of bytes that read_header() reads first. A header without metadata is not larger.
 constexpr uint64_t kCountedHeaderBytes = 64;
 
 // Faces per document whose connectivity is decoded although the header does not contradict the
@@ -54,14 +54,16 @@ bool contradicts(const DracoHeader& header, uint64_t vertices) {
   return vertices < header.vertices || vertices > 3 * header.faces;
 }
 
-// Triangles that join the parts of a strip are not faces.
+// True if a strip may declare part.corners for this number of faces. It also counts the degenerate
+// triangles that join its pieces, but these are not faces.
 bool fits_strip(const DracoPart& part, uint64_t faces) {
   const uint64_t triangles = part.corners / 3;
   return part.is_strip && faces <= triangles && triangles <= kMaxStripTrianglesPerFace * faces;
 }
 
-// Returns the part with the counts of its data. Subtracts the faces that are decoded without need
-// from `checked_faces`, and decodes no more than that.
+// Returns the part with the counts of its data. If the header neither gives nor contradicts the
+// number of vertices, decodes the faces to count them, but at most `checked_faces`, which it
+// reduces.
 DracoPart correct(const DracoPart& part, BufferReader& buffers, uint64_t& checked_faces) {
   DracoPart out = part;
   buffers.check_length(part.from.buffer);

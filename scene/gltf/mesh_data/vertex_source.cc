@@ -137,7 +137,8 @@ void VertexSource::add(uint32_t joint, double weight, Transform& sum) const {
                                    : std::numeric_limits<double>::quiet_NaN();
 }
 
-// Divides the sum by the weights. Without weights, the first joint of the vertex moves it.
+// Divides the sum by the weights. If the weights add up to 0, the first joint of the vertex moves
+// it.
 void VertexSource::normalize(Blend& blend) const {
   if (blend.weights == 0) {
     blend.sum = Blend{}.sum;

@@ -170,7 +170,7 @@ void ObjFile::add_warnings(const Scan& scan) {
   add("unknown-statements", scan.unknown, unknown.c_str());
 }
 
-// Sets has_splits of the blocks with faces that are not fans, and counts doubtful faces.
+// Sets has_splits of the blocks with faces that are not fans. Warns about faces whose edges cross.
 void ObjFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
   PolygonReader polygons(*this, budget);
   Positions vertices(*this, budget);

@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::string_view kEnding = ".mtl";
 
-// Divides the arguments of mtllib into names. A name ends with ".mtl" before a blank, so that names
-// may have blanks. If no word ends with ".mtl", each word is a name.
+// Divides the arguments of mtllib into file names, which may contain blanks. A name ends at a word
+// that ends with ".mtl". If no word does, each word is a name.
 std::vector<std::string> names_of(std::string_view arguments) {
   std::vector<std::string> names;
   std::string_view rest = trimmed(arguments), name_begin = rest;

@@ -101,7 +101,7 @@ class MaterialList {
     return out;
   }
 
-  // Returns the index of the image of a material, which is added if it is new.
+  // Returns the index of a material's image. Adds the image if it is new.
   uint32_t image_of(const LibraryEntry& entry) {
     const std::string& library = listed_.files[entry.library].path;
     const std::string& name = entry.material.diffuse_map.file;

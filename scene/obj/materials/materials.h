@@ -19,7 +19,7 @@ struct ObjMaterials {
   struct Use {
     uint32_t material = 0;  // index into SceneMaterials::materials
     // If the material has an image: the same material without image, for triangles without texture
-    // coordinates, and the lookup (ImageMap).
+    // coordinates, and the scale and offset of the texture coordinates (ImageMap).
     bool has_image = false;
     uint32_t without_image = 0;
     std::array<double, 2> scale{1, 1}, offset{0, 0};

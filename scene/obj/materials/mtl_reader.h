@@ -37,8 +37,8 @@ struct LibraryMaterial {
 std::vector<LibraryMaterial> read_library(const ReadableFile& file, MemoryBudget& budget,
                                           GrowingCharge& charge, WarningList& warnings);
 
-// Reads the arguments of a map_... statement. Adds options that it does not support, but that
-// change the lookup, to `unsupported`.
+// Reads the arguments of a map_... statement. Appends the names of unsupported options that would
+// change the lookup to `unsupported`.
 ImageMap parse_image_map(std::string_view arguments, std::string& unsupported);
 
 }  // namespace voxdag::obj
