@@ -89,8 +89,8 @@ void report_scene(BuildJob& job, const IngestState& state) {
   if (report.triangles == 0) check_empty(job, state.declared_triangles);
 }
 
-// Plan: records the subvolumes in the job store. Resume rule: a stored job keeps its subvolumes; a
-// scene with another digest is refused.
+// The plan stage: records the subvolumes in the job store. Resume rule: a stored job keeps its
+// subvolumes, unless the scene's digest differs from the job's. Then the build is refused.
 void plan(BuildJob& job, const PreparedScene& scene) {
   if (const auto stored = job.start_over ? std::nullopt : job.store->job()) {
     if (stored->scene_digest != scene.digest())
@@ -140,7 +140,7 @@ void refuse_stored_warnings(BuildJob& job) {
   for (const Warning& warning : job.store->warnings()) refuse_warning(warning);
 }
 
-// Scan, ingest, plan, partition and build: from the scene to artifacts of all subvolumes.
+// Runs the stages scan, ingest, plan, partition and build, from the scene to all artifacts.
 void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
   PreparedScene scene =
       prepare_scene(job.spec, job.scene, job.budget, job.clock, job.context, job.checkpoint);
@@ -200,9 +200,9 @@ bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
   return true;
 }
 
-// Merge, attributes and publish: from the artifacts to the output file. Returns false if it found
-// damage and recover() succeeded. The caller must then build the planned subvolumes and call it
-// again.
+// Runs the stages merge, attributes and publish, from the artifacts to the output file. Returns
+// false if it found damage and recover() succeeded. Then the caller must build the planned
+// subvolumes and call this function again.
 bool merge_and_publish(BuildJob& job, bool& has_restarted) {
   AttributeSections attributes(job);
   if (is_published(job, attributes)) return true;
@@ -262,7 +262,7 @@ void remove_finished_work(BuildJob& job) {
   if (!job.spec.run.keep_work) remove_work(job);
 }
 
-// All stages of a build.
+// Runs all stages of a build.
 void run_stages(BuildJob& job, SubvolumeBuilder& builder, double start_s) {
   prepare_work_folder(job);
   build_artifacts(job, builder);

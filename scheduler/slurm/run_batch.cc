@@ -36,7 +36,7 @@ uint64_t environment_number(const char* name) {
   return text ? std::strtoull(text, nullptr, 10) : 0;
 }
 
-// Minimum of the allocation that is reserved for the program itself, buffers and page tables.
+// Minimum part of the allocation that is kept for the program itself, buffers and page tables.
 constexpr uint64_t kProgramBytes = uint64_t{96} << 20;
 constexpr std::string_view kTemporaryName = "voxdag-batch-";
 constexpr const char* kTemporaryLock = "/lock";

@@ -25,7 +25,7 @@ class JsonVisitor {
 };
 
 // Checks the options that differ from their defaults. Throws FieldError if such an option breaks a
-// limit, or excludes such an option that was visited before it.
+// limit, or if it excludes another such option that was visited before.
 class LimitChecker {
  public:
   explicit LimitChecker(const FieldJson& defaults) : defaults_(defaults) {}

@@ -6,8 +6,8 @@
 // previous link, and the extent of the previous link. checkpoint() appends a link. A caller that
 // syncs the file and records the returned state can open the store at that point again.
 //
-// Thread-safe as documented at TriangleStore. The thread that fills the durable bins must be the
-// one that calls checkpoint().
+// Thread-safe as documented at TriangleStore. Only the thread that fills the durable bins may call
+// checkpoint().
 #pragma once
 
 #include <memory>

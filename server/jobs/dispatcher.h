@@ -129,8 +129,8 @@ class Dispatcher {
   Steps steps_;
   ClockGuard clock_;  // used by the thread that starts jobs
 
-  // Guards the members below, up to live_mutex_. The thread that changes a job's state together
-  // with its process holds this mutex. It is not held while files are removed.
+  // Guards the members below, up to live_mutex_. A thread also holds this mutex while it changes a
+  // job's state together with its process, but not while it removes files.
   mutable std::mutex mutex_;
   JobFolders folders_;
   // Keyed by job id. The worker with the key "preview" renders the preview of a finished job.

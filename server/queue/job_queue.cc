@@ -69,7 +69,7 @@ CREATE TABLE idempotency (
 CREATE INDEX idempotency_by_job ON idempotency (job);
 )sql";
 
-// In version 3 a warning was a text.
+// Upgrades a database of version 3, in which a warning was a text.
 constexpr const char* kUpgrade = R"sql(
 UPDATE job SET warnings = (
   SELECT json_group_array(

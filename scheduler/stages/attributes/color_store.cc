@@ -19,7 +19,7 @@ constexpr size_t kHeaderBytes = 56;
 constexpr size_t kReadBytes = 256 << 10;
 // Flag in `part` of a header: this part is the last part of its artifact.
 constexpr uint64_t kLastPart = uint64_t{1} << 63;
-// keep_only() tolerates garbage up to this size plus the size of the artifacts in use.
+// keep_only() does nothing while unused artifacts take at most this much more than used ones.
 constexpr uint64_t kTolerableBytes = 64 << 10;
 
 struct Header {
@@ -38,7 +38,7 @@ void append_header(const Header& header, std::vector<std::byte>& out) {
   sink.put(checksum64(std::span(out).subspan(at)));
 }
 
-// False if `bytes` are not a header.
+// Parses a header. Returns false if `bytes` are not a header.
 bool parse_header(std::span<const std::byte> bytes, Header& header) {
   ByteSource in(bytes);
   const bool is_ours =
@@ -96,7 +96,7 @@ ColorStore::~ColorStore() {
   try {
     if (pending_.valid()) pending_.get();
   } catch (const std::exception&) {
-    // Cubes that are not durable are baked again.
+    // A later run bakes the cubes that are not durable again.
   }
 }
 
@@ -137,8 +137,8 @@ ColorStore::Place ColorStore::add(const Checksum128& key, uint64_t number, bool 
     reader_ = files_.open_read(path_);
   }
   const Place place{end_ + kHeaderBytes, part.size(), checksum};
-  // The header is written after its data, so that the data of every header exists unless the power
-  // was cut.
+  // The part is written before its header. So the bytes of every header's part exist, unless the
+  // power was cut.
   writer_->write_at(place.offset, part);
   writer_->write_at(end_, header);
   end_ = place.offset + place.bytes;

@@ -90,7 +90,8 @@ void CubeBaker::divide(const Cube& cube, ChunkList& bin, const Sink& sink) {
     for_each_surface(store_, bin, [&](const FixedSurface& surface) {
       record.clear();
       // Passes true for has_image, so that texture coordinates are never dropped. A surface that
-      // was stored without them is stored again with zeros, which no image uses.
+      // was stored without them, because its material has no image, gets zeros, which have no
+      // effect.
       append_surface(surface, true, record);
       for (uint32_t mask = touched_children(surface.position, cube, units); mask; mask &= mask - 1)
         writer.append(static_cast<size_t>(lowest_bit(mask)), record, 1);

@@ -54,8 +54,8 @@ class SnappedPiece {
     checksum_ = checksum128(records());
   }
 
-  // Adds the segments of the triangles that have too many of them for the piece. Calls flush()
-  // whenever the buffer of records() is full, and at the end.
+  // Adds the segments of the triangles in late_, which have too many segments for the piece. Calls
+  // flush() whenever the buffer of records() is full, and at the end.
   template <class Flush>
   void add_late(const Flush& flush) {
     for (const FixedSurface& surface : late_) {
@@ -81,7 +81,7 @@ class SnappedPiece {
   TopTree::Tally& tally() { return tally_; }
 
  private:
-  // Max number of segments of a piece, and of one triangle, that are found when the piece is read.
+  // Maximum number of segments of a piece, and of one triangle. add_late() adds further segments.
   static constexpr size_t kMaxSegments = kPieceTriangles;
   static constexpr uint64_t kCutoutBytes =
       kPieceTriangles * (kMaxSurfaceRecordBytes + 2 * sizeof(FixedSurface)) +

@@ -69,7 +69,7 @@ class Preparation {
     WarningList warnings;
     find_cutouts(warnings);
     if (cutouts_) {
-      // A checkpoint does not notice changes of images.
+      // The cutouts depend on images, whose changes a checkpoint does not detect.
       checkpoint_.disable();
       state_ = {};
     } else if (!checkpoint_.matches(scene_.open().files())) {
@@ -80,7 +80,8 @@ class Preparation {
     state_.declared_triangles = scene.declared_triangles();
     if (state_.position == 0) checkpoint_.check_disk_space(scene);
     for (const Warning& warning : scene.warnings()) context_.progress.warn_of_input(warning);
-    // The lines above can start over, which removes all recorded warnings.
+    // These come last, because enabling checkpoints can start over, which removes recorded
+    // warnings.
     for (const Warning& warning : warnings.list()) context_.progress.warn_of_input(warning);
   }
 

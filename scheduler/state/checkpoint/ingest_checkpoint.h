@@ -109,8 +109,8 @@ class IngestCheckpoint {
 // Returns the maximum disk space of the durable triangles of a scene, reached at the end of the
 // partition; 0 if the scene is too small for checkpoints.
 double max_durable_bytes(const BuildSpec& spec, uint64_t triangles);
-// Returns the earliest Unix time at which a change of these files is certain to change their
-// identities; INT64_MAX if an identity is unknown.
+// Returns the earliest Unix time, in nanoseconds, from which any change of these files is certain
+// to change their identities; INT64_MAX if an identity is unknown.
 int64_t trusted_from_ns(const std::vector<SourceFile>& files);
 
 }  // namespace voxdag

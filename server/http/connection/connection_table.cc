@@ -51,9 +51,8 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
 }
 
 // Closes the connection that has waited longest. Returns false if no connection may be closed. The
-// connection's thread then finds the end of the
-// stream and removes the entry. Until then the entry remains, in addition to the entry of the new
-// connection.
+// connection's thread then finds the end of the stream and removes the entry. Until then the table
+// has both this entry and the entry of the new connection.
 bool ConnectionTable::evict_one() {
   const double now = wall_seconds();
   Entry* longest = nullptr;
