@@ -152,7 +152,7 @@ TEST_F(BuildCommand, RefusesWrongFiles) {
   expect_error(2, "truncated.glb", {"build", "truncated.glb", "-r", "64", "-o", "x.vdag"});
   EXPECT_FALSE(exists("x.vdag"));
   EXPECT_FALSE(exists("x.vdag.work"));
-  // If the output's name is a folder's name, this is an error before the build starts.
+  // An output path that leads to a folder is refused before the build starts.
   ASSERT_EQ(mkdir(folder_.file("taken").c_str(), 0777), 0);
   expect_error(2, "taken", {"build", "m.glb", "-r", "64", "-o", "taken"});
   EXPECT_FALSE(exists("taken.work"));

@@ -39,7 +39,7 @@ class Client : public CommandLine {
     args.insert(args.end(), more.begin(), more.end());
     return run_json(args).at("id");
   }
-  // A job that runs for minutes on any machine.
+  // Submits a job that runs for minutes on any machine, and returns its id.
   std::string submit_long() {
     EXPECT_EQ(run({"generate", "soup", "long.glb", "--triangles", "50000"}).status, 0);
     return run_json({"submit", "long.glb", "-r", "32768", "--threads", "1"}).at("id");
@@ -50,13 +50,13 @@ class Client : public CommandLine {
       if (job.at("id") == id) return job.at("state");
     return "";
   }
-  // A running job takes a moment to stop.
+  // Waits up to a minute for the state, because a running job takes a moment to stop.
   void expect_state_eventually(const std::string& id, const std::string& expected) {
     for (int i = 0; i < 1200 && state(id) != expected; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     EXPECT_EQ(state(id), expected);
   }
-  // A metric without labels.
+  // Returns the value of a metric without labels; -1 if it is missing.
   double metric(const std::string& name) {
     const std::string text = http().get("/metrics").body;
     const size_t at = text.find("\n" + name + " ");
@@ -189,7 +189,7 @@ TEST_F(Client, WatchesAcrossARestart) {
   EXPECT_EQ(Json::parse(answer.out)["state"], "succeeded");
 }
 
-// The server decides which formats it reads, so the client sends every format.
+// The client uploads files of every scene format. The server reads them, and the jobs succeed.
 TEST_F(Client, SubmitsEverySceneFormat) {
   put("square.ply",
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
@@ -225,8 +225,8 @@ TEST_F(Client, ReportsErrors) {
   expect_error(2, "--server", {"jobs"});
 }
 
-// The service has a token file. The client sends no token, a token with the role read, and one with
-// the role submit.
+// The service has a token file, so a request without a token is refused. A token with the role read
+// may list jobs but not submit them. A token with the role submit may submit.
 TEST_F(Client, SendsAToken) {
   std::string lines;
   for (const std::string role : {"read", "submit"}) {
@@ -247,8 +247,8 @@ TEST_F(Client, SendsAToken) {
   EXPECT_EQ(answer.status, 0) << answer.err;
 }
 
-// The exit status gives the health of a service. The command does not wait if there is no service,
-// or if the server is not voxdag.
+// The exit status of health is 0 if the service is ready, and 6 if it is not. Without a service the
+// command fails within three seconds.
 TEST_F(Client, Health) {
   const Answer answer = run({"health"});
   EXPECT_EQ(answer.status, 0) << answer.err;

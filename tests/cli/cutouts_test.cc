@@ -41,7 +41,8 @@ class Cutouts : public CommandLine {
   }
 };
 
-// Half of the quad is left out. The bytes are the same for any threads, memory and subvolumes.
+// The hidden half of the quad sets no voxels. Threads, memory and subvolumes do not change the
+// bytes.
 TEST_F(Cutouts, SkipLeavesOutHiddenVoxels) {
   for (const char* mode : {"MASK", "BLEND"}) {
     put("a.glb", half_quad(mode).glb());

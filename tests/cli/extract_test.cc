@@ -33,7 +33,7 @@ TEST_F(Extract, EqualsBuilds) {
   EXPECT_EQ(world["sha256"], cube["sha256"]);
 }
 
-// --memory is kept even if the result is larger than the limit plus its tolerance.
+// The process uses at most --memory plus 64 MiB, even if the resulting file is larger than this.
 TEST_F(Extract, LargeResultsWithinLittleMemory) {
   constexpr uint64_t kMemory = 64 << 20, kAllowed = kMemory + (64 << 20);
   ASSERT_EQ(run({"generate", "soup", "large.glb", "--triangles", "45000"}).status, 0);
@@ -44,7 +44,7 @@ TEST_F(Extract, LargeResultsWithinLittleMemory) {
   EXPECT_LE(part["peak_rss_bytes"], kAllowed);
 }
 
-// The report has what info and verify find.
+// The report has the same values as the outputs of info and verify.
 TEST_F(Extract, Report) {
   const Json report = run_json({"extract", "s.vdag", "-o", "c.vdag", "--resolution", "32"});
   const Json info = run_json({"info", "c.vdag", "--digest"});
@@ -89,7 +89,7 @@ TEST_F(Extract, Refusals) {
   EXPECT_EQ(others, 0u);
 }
 
-// The options that extract and export share mean the same.
+// Options that extract and export share select the same number of voxels.
 TEST_F(Extract, SelectionsOfExports) {
   const std::vector<std::vector<std::string>> selections = {
       {"--resolution", "32"},

@@ -52,15 +52,15 @@ TEST_F(FileCommands, Verify) {
   expect_error(4, "short.vdag", {"verify", "short.vdag"});
 }
 
-// A file of another scene differs from the sample.
+// verify --against fails if the file was built from another scene.
 TEST_F(FileCommands, VerifyAgainstAnotherScene) {
   ASSERT_EQ(run({"generate", "menger", "other.glb", "--level", "1"}).status, 0);
   const Answer answer = run({"verify", "m.vdag", "--against", "other.glb"});
   EXPECT_EQ(answer.status, 4) << answer.err;
 }
 
-// `verify` bakes the colors of some regions again. They are equal for the same scene; another scene
-// is an error.
+// verify --against bakes the colors of some regions again. With the file's scene they are equal.
+// With another scene the command fails.
 TEST_F(FileCommands, VerifyComparesColors) {
   for (const char* colors : {"--colors", "--json"}) {
     const std::string name = colors == std::string("--json") ? "plain.glb" : "city.glb";
@@ -104,8 +104,8 @@ TEST_F(FileCommands, Diff) {
   expect_error(2, "", {"diff", "m.vdag", "a.vdag"});
 }
 
-// Compares a file with a file of the same voxels but other colors, and with a part that has the
-// same colors.
+// With --color, diff compares colors: two files with the same voxels but different colors are
+// different, and a file is equal to its complete extract.
 TEST_F(FileCommands, DiffOfColors) {
   const std::string head =
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
@@ -178,7 +178,7 @@ TEST_F(FileCommands, RenderRefusesWhatTakesTooMuchMemory) {
          "16384x16384", "1GiB");
   expect(8, "or a higher --memory", "1100x1000", "64MiB");
   expect(3, "none.vdag", "1000x1000", "64MiB");
-  // Distances take less.
+  // Distances need less memory than a picture.
   expect(8, "2900x2900 takes 64.", "2900x2900", "64MiB", "--depth");
   expect(3, "none.vdag", "2800x2900", "64MiB", "--depth");
   expect(2, "at least 64MiB", "64x64", "63MiB");
@@ -189,7 +189,7 @@ TEST_F(FileCommands, RenderRefusesWhatTakesTooMuchMemory) {
       64);
 }
 
-// Distances need no picture; both are of the same camera.
+// --depth works without -o. With both options, the distances and the picture have the same camera.
 TEST_F(FileCommands, RenderMeasuresDistances) {
   const Json depth = run_json({"render", "m.vdag", "--depth", "d.npy", "--size", "64x48"});
   EXPECT_EQ(depth["depth"], "d.npy");
@@ -223,7 +223,7 @@ TEST_F(FileCommands, PlanNames) {
   EXPECT_FALSE(exists("m.glb.work"));
 }
 
-// status reads a work folder; a folder that does not exist, or has no job, is not found.
+// status reads a work folder. A folder that does not exist or has no job is an error.
 TEST_F(FileCommands, StatusNames) {
   run_json({"build", "m.glb", "-r", "128", "-o", "m.vdag", "--keep-work"});
   const Json status = run_json({"status", "m.vdag.work"});

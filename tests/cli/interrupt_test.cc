@@ -106,7 +106,7 @@ TEST_F(InterruptExport, LeavesNothing) {
         EXPECT_EQ(outputs(), 0u);
       } else {
         EXPECT_GT(outputs(), 0u);
-        // The same command has to succeed, and removes the killed one's files.
+        // The same command must then succeed, and remove the files of the killed run.
         const Answer again = run(args);
         EXPECT_EQ(again.status, 0) << again.err;
         EXPECT_EQ(outputs(), 1u);

@@ -46,7 +46,7 @@ std::string stl_text() {
   return text + "endsolid pyramid\n";
 }
 
-// Its header begins with "solid", like a text.
+// The header begins with "solid", like an ASCII file.
 std::string stl_binary() {
   std::string file = "solid but binary";
   file.resize(80);
@@ -115,7 +115,7 @@ constexpr Faulty kFaulty[] = {
     {"no.obj", "mtllib no.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "missing-file", 1},
 };
 
-// A warning has a code, a count and its first place. With --strict it is the error of the build.
+// A warning has a code, a count and its first place. With --strict the build fails instead.
 TEST_F(MeshFormats, ReportWarnings) {
   for (const Faulty& file : kFaulty) {
     SCOPED_TRACE(file.name);

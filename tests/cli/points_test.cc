@@ -55,7 +55,7 @@ TEST_F(Points, EveryFormatGivesTheSameBytes) {
   }
 }
 
-// The cube has 11 voxels along each edge, and is hollow.
+// With --point-radius 5, the point becomes the surface of a cube with 11 voxels along each edge.
 TEST_F(Points, RadiusMakesCubes) {
   put("a.xyz", "1 2 3\n");
   const Json one = run_json({"build", "a.xyz", "-r", "64", "--voxel-size", "1", "-o", "one.vdag"});

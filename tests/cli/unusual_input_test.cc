@@ -59,7 +59,7 @@ TEST_F(UnusualInput, ClientsRefuseNamesThatAreNotUtf8) {
   const Json report = run_json(client({"download", id, "-o", "d\xff.vdag"}));
   EXPECT_EQ(report.at("output"), "d" + std::string(kReplacement) + ".vdag");
   EXPECT_TRUE(exists("d\xff.vdag"));
-  // L6: download replaces results only.
+  // download overwrites an existing file only if it is an earlier result.
   put("notes.txt", "mine");
   expect_refused("notes.txt", client({"download", id, "-o", "notes.txt"}));
   run_json(client({"download", id, "-o", "notes.txt", "--force"}));
@@ -101,7 +101,7 @@ TEST_F(UnusualInput, ForeignFilesAreNotOverwritten) {
   expect_refused("same.partial", {"render", "m.vdag", "-o", "same", "--force"});
 }
 
-// The files next to the result are as safe as the result.
+// A build also refuses to overwrite other files that have the name of its partial file or report.
 TEST_F(UnusualInput, ABuildRefusesToOverwriteItsNeighbors) {
   for (const char* name : {"q", "q.partial", "q.report.json", "q.report.json.partial"}) {
     put(name, "mine");

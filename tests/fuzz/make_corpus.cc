@@ -76,8 +76,8 @@ void add_text_scenes(const Corpus& corpus) {
   corpus.add("stl_file", "trailing_bytes", '\2' + header + little_endian(1) + facets);
 }
 
-// Adds the index without the rest of its file, and the frames after the prefix that the target
-// expects.
+// Adds the index of an artifact without the rest of the file, and frames with the prefix of five
+// bytes that the target artifact_frame expects.
 void add_artifacts(const Corpus& corpus) {
   TemporaryFolder folder;
   constexpr uint32_t kGridLevels = 6, kHashBits = 64;
@@ -127,7 +127,7 @@ void add_global_file(const Corpus& corpus, const char* name, const std::string& 
              file.substr(0, header_bytes) + file.substr(page, table_at - page));
 }
 
-// The inputs have the used part of the header page and the levels, but no checksum table.
+// Adds files without attributes. An input has the used part of the header page and the levels.
 void add_global_files(const Corpus& corpus) {
   TemporaryFolder folder;
   struct Input {
@@ -146,7 +146,7 @@ void add_global_files(const Corpus& corpus) {
   }
 }
 
-// The same for files with colors and other attributes; their headers end with the attribute table.
+// Adds files with attributes. The header's part of an input ends after the attribute table.
 void add_colored_files(const Corpus& corpus) {
   TemporaryFolder folder;
   struct Input {

@@ -429,7 +429,7 @@ TEST_F(Api, DescribesItself) {
   EXPECT_EQ(method.header("Allow"), "POST, GET, HEAD");
 }
 
-// A second service with the same data folder would start the same jobs.
+// A second service with the same data folder is refused, because it would start the same jobs.
 TEST_F(Api, LocksItsDataFolder) {
   start();
   EXPECT_THROW(Service(config_, system_files(), [](const std::string&) {}), Error);

@@ -105,7 +105,8 @@ TEST_F(ServiceFailures, StepsMayFailForEver) {
   EXPECT_NE(log().find("failed to dispatch jobs: injected"), std::string::npos) << log();
 }
 
-// A client deletes a job while the retention rule removes it.
+// A client deletes a job while the retention rule removes it. This is no error, and the job is
+// removed.
 TEST_F(ServiceFailures, RetentionMeetsADeletion) {
   config_.retention.finished_jobs = 0;
   std::atomic<bool> deleted = false;

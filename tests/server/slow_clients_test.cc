@@ -94,8 +94,8 @@ TEST_F(SlowClients, SlowBodiesDoNotBlockOthers) {
   EXPECT_EQ(answered(), 20);
 }
 
-// Connections whose answers are not read are also closed then, and the kernel buffers only little
-// of each answer.
+// Connections whose answers are not read are closed when other clients want to connect. The kernel
+// buffers only little of each answer.
 TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   start();
   std::string requests;

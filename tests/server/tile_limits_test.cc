@@ -68,8 +68,8 @@ class TileLimits : public RunningService {
     HttpClient client(ClientOptions{url(), tokens_[name], "", 300});
     return client.get(base_ + path);
   }
-  // Requests the largest answer and reads only its beginning. The request then holds a
-  // permit.
+  // Requests the largest answer and reads only its beginning, so that the request holds a permit.
+  // Returns the socket.
   int ask_and_read_nothing(const std::string& name) {
     const std::string text = "GET " + base_ + largest_batch(version_) +
                              " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" +

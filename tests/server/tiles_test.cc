@@ -93,8 +93,8 @@ TEST_F(Tiles, HaveAManifest) {
   EXPECT_EQ(http_->get(base_).header("Cache-Control"), "no-store");
 }
 
-// The contents of a URL with a digest never change, so a client that has them is not sent them
-// again.
+// The contents of a URL with a digest never change. A client that has them is not sent them again:
+// it gets the status 304.
 TEST_F(Tiles, AreSentOnce) {
   finish_job();
   const std::string path = base_ + "/0/0" + version_, root = tile_bytes(result_, levels_, 0, 0);
@@ -333,7 +333,7 @@ TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   try {
     query::encode_tile(file.dag(), kTileLevels, {0, 0});
   } catch (const Error&) {
-    // Or encode_tile() makes a tile from the zeros that it reads instead.
+    // If encode_tile() throws nothing, it has made a tile from the zeros that it read.
   }
   EXPECT_THROW(file.expect_readable(), Error);
 }

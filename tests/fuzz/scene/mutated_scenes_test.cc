@@ -114,7 +114,7 @@ TEST(FuzzScene, MutatedGltfWithDataUri) {
   EXPECT_GT(outcomes.refused, 100);
 }
 
-// Materials, images and their buffers.
+// Mutates a scene with materials, images and their buffers.
 TEST(FuzzScene, MutatedMaterials) {
   const SceneBuilder scene = rich_painted_scene();
   OpenScene open(scene.glb());
@@ -126,7 +126,8 @@ TEST(FuzzScene, MutatedMaterials) {
   EXPECT_GT(outcomes.refused, 100);
 }
 
-// Changes only numbers of the JSON, so that most mutations reach the checks after the parser.
+// Changes only numbers in the JSON, so that the parser accepts most mutations and the later checks
+// are reached.
 void run_with_numbers(SceneBuilder scene, uint32_t seed, Outcomes& outcomes) {
   const std::vector<uint64_t> kNumbers{0,
                                        1,

@@ -1,7 +1,7 @@
-// Global files: the reader, lookups, colors, rays, tiles and the verifier. The input is the used
-// part of the header page, up to the attribute table or, if attributes are counted, up to its end,
-// and the bytes after that page. Feature bits, sizes, checksums and the checksum table are
-// corrected, so that a mutation reaches the code behind them.
+// Global files: the reader, lookups, colors, rays, tiles and the verifier. The input is the
+// beginning of the header page, with the attribute table only if attributes are counted, and then
+// the bytes after this page. Feature bits, sizes, checksums and the checksum table are corrected,
+// so that a mutation reaches the code behind them.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -29,7 +29,7 @@ namespace {
 namespace layout = global_layout;
 constexpr uint64_t kMaxVisits = 4096;
 constexpr uint64_t kBudgetBytes = uint64_t{16} << 20;
-// Threshold of wide levels, which are small here.
+// A level with more words than this is wide. Files of this size have no wide levels otherwise.
 constexpr uint64_t kNarrowWords = 2;
 
 void put(std::vector<std::byte>& file, size_t at, uint64_t value) {
@@ -164,8 +164,8 @@ void encode_tiles(const voxdag_reader::File& file) {
   }
 }
 
-// Queries of a client without knowledge of the file, which uses its words as addresses. In a sound
-// file an address need not have a node.
+// Sends queries with arbitrary words of the file as addresses. Even in a valid file, an address may
+// not have a node, so an error about corruption is allowed.
 void answer_strangers(const voxdag_reader::File& file) {
   const query::DagView view(file);
   const CheckedBlocks blocks(file);

@@ -13,7 +13,7 @@
 namespace voxdag::test {
 namespace {
 
-// Opens folder/scene among other files.
+// Opens folder/scene in a file system with these files, and reads its triangles.
 std::vector<Corners> triangles_among(const std::map<std::string, std::string>& contents) {
   MemoryFiles files;
   files.contents = contents;
@@ -53,7 +53,7 @@ TEST(GltfBuffers, ExternalThatIsMissingOrShort) {
       << cut.message();
 }
 
-// Triangles of two files of the same name are not mixed.
+// A buffer file that is replaced while the scene is read is an error, so two files are never mixed.
 TEST(GltfBuffers, ExternalThatIsReplacedWhileTheSceneIsRead) {
   const SceneBuilder builder = one_triangle();
   const TemporaryFolder folder;
@@ -98,7 +98,7 @@ TEST(GltfBuffers, UrisThatAreNotFollowed) {
   }
 }
 
-// Files whose names other programs write without the encoding that RFC 3986 requires.
+// File names without the encoding that RFC 3986 requires are found.
 TEST(GltfBuffers, UrisOfOtherPrograms) {
   const std::pair<const char*, const char*> names[] = {{"mesh.bin?v=3", "mesh.bin"},
                                                        {"mesh.bin#part", "mesh.bin"},
@@ -125,7 +125,7 @@ TEST(GltfBuffers, UrisOfOtherPrograms) {
         << uri;
 }
 
-// The file with exactly this name comes before others.
+// A file whose name has the URI's "?b" is preferred to a file without it, and named in the error.
 TEST(GltfBuffers, TheExactNameComesFirst) {
   const SceneBuilder scene = one_triangle();
   EXPECT_EQ(triangles_among({{"folder/scene", scene.gltf("a.bin?b")},
@@ -138,7 +138,7 @@ TEST(GltfBuffers, TheExactNameComesFirst) {
   EXPECT_NE(missing.message().find("sub\\a.bin?b"), std::string::npos) << missing.message();
 }
 
-// Backslashes at the beginning do not make a path absolute.
+// A path that begins with backslashes is relative to the scene's folder, not absolute.
 TEST(GltfBuffers, BackslashesDoNotMakeAbsolutePaths) {
   const SceneBuilder scene = one_triangle();
   for (const char* uri : {"\\etc\\a.bin", "\\\\host\\a.bin", "%5Cetc%5Ca.bin"})
@@ -151,7 +151,7 @@ TEST(GltfBuffers, BackslashesDoNotMakeAbsolutePaths) {
         << uri;
 }
 
-// A Git LFS pointer in place of a buffer is named, whatever length the buffer has.
+// If a Git LFS pointer replaces a buffer's file, the error mentions this, for any declared length.
 TEST(GltfBuffers, LfsPointers) {
   const std::string pointer =
       "version https://git-lfs.github.com/spec/v1\noid sha256:0123456789abcdef0123456789abcdef"
@@ -204,7 +204,7 @@ TEST(GltfBuffers, LargeStructure) {
   for (int i = 0; i < kCount; ++i) ASSERT_EQ(triangles[static_cast<size_t>(i)][0][0], i + 1.0);
 }
 
-// A buffer without uri is the GLB's own or nobody's.
+// A buffer without a uri is an error, unless it is the first buffer of a GLB.
 TEST(GltfBuffers, WithoutUri) {
   SceneBuilder scene = one_triangle();
   scene.root["buffers"] = {{{"byteLength", scene.bin.size()}}};
@@ -212,7 +212,8 @@ TEST(GltfBuffers, WithoutUri) {
   EXPECT_NE(error.message().find("buffer 0 has no uri and is not in the file"), std::string::npos);
 }
 
-// A data: URI longer than any window, read in pieces that begin at every remainder modulo three.
+// Reads a data: URI that is longer than any window, in pieces that begin at every remainder modulo
+// 3.
 TEST(GltfBuffers, LongDataUri) {
   constexpr size_t kTriangles = 40000;
   std::vector<float> positions;
@@ -244,7 +245,7 @@ TEST(GltfBuffers, DataUriWithJsonEscapes) {
   EXPECT_EQ(triangles_of_file(file).size(), 1u);
 }
 
-// Data URIs in forms that RFC 2397 does not allow, and percent-encoded ones.
+// Reads data: URIs in forms that RFC 2397 does not allow, and percent-encoded ones.
 TEST(GltfBuffers, DataUrisOfOtherPrograms) {
   SceneBuilder scene = one_triangle();
   for (int i = 0; i < 300; ++i) scene.bin += static_cast<char>(i);

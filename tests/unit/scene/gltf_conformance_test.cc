@@ -62,7 +62,7 @@ void expect_refused(const fs::path& path, const std::string& word = "") {
   }
 }
 
-// The largest coordinate, for tolerances relative to it.
+// Returns the largest magnitude of all coordinates. Tolerances are relative to it.
 double magnitude(const std::vector<Corners>& triangles) {
   double largest = 0;
   for (const Corners& t : triangles)
@@ -146,7 +146,7 @@ void expect_same_triangles(const std::vector<Corners>& found,
   EXPECT_EQ(missing, 0u) << "of " << expected.size();
 }
 
-// Six numbers of six digits, as the manifests have them.
+// Compares the bounds with the six numbers in the manifest, which have six digits.
 void expect_bounds(const std::vector<Corners>& triangles, const std::string& bounds) {
   std::array<double, 6> expected{}, found{};
   std::istringstream words(bounds);
@@ -215,7 +215,7 @@ TEST_F(GltfConformance, WithoutScenes) {
                         read_obj(kScenes / "conformance" / "expected" / "c23_base64.obj"));
 }
 
-// Real scenes: compares the counts, and the bounds if the manifest has them.
+// In real scenes, the counts are as expected, and also the bounds if the manifest has them.
 TEST_F(GltfConformance, RealScenes) {
   size_t read = 0;
   for (const Entry& entry : read_manifest(kScenes / "MANIFEST.tsv", 0, 11)) {

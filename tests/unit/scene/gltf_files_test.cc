@@ -24,7 +24,7 @@ TEST(GltfContainer, EveryTruncationIsRefused) {
   }
 }
 
-// Lengths in the headers that do not fit each other.
+// Headers whose lengths do not fit each other are refused.
 TEST(GltfContainer, LyingHeaders) {
   const std::string whole = one_triangle().glb();
   const auto with = [&](size_t offset, uint32_t value) {
@@ -50,7 +50,7 @@ TEST(GltfContainer, TrailingBytes) {
   EXPECT_EQ(triangles_of_file(scene.glb()).size(), 1u);
 }
 
-// A GLB with these chunks after its JSON.
+// Returns a GLB with these chunks after its JSON.
 std::string glb_with_chunks(std::string json,
                             const std::vector<std::pair<std::string, std::string>>& chunks) {
   std::string body = little_endian(static_cast<uint32_t>(json.size())) + "JSON" + json;
@@ -119,7 +119,7 @@ TEST(GltfNumbers, NotFinite) {
     for (const std::string& member : {"\"max\":[" + text + ",2,3]", "\"min\":[0," + text + "]",
                                       "\"max\": [ " + text + " ]", "\"extras\":" + text}) {
       EXPECT_EQ(triangles_of_file(with(member)).size(), 1u) << member;
-      // Across the end of a window.
+      // The spelling crosses the end of a window.
       for (const size_t blanks : {size_t{65536} - 400, size_t{65536} - 300})
         EXPECT_EQ(
             triangles_of_file(with("\"extras\":\"" + std::string(blanks, 'x') + "\"," + member))
@@ -138,7 +138,7 @@ TEST(GltfNumbers, NotFinite) {
   EXPECT_EQ(error_of_file(R"({"asset":{"version":"2.0"}} NaN)").message().empty(), false);
 }
 
-// NaN at every position relative to the end of a window of the file.
+// NaN is recognized at every position relative to the end of a window.
 TEST(GltfNumbers, NotFiniteAcrossWindows) {
   for (size_t shift = 0; shift < 24; ++shift) {
     const std::string begin = R"({"asset":{"version":"2.0"},"extras":")";
@@ -241,7 +241,7 @@ TEST(GltfWindows, LargerThanTheBudget) {
   std::vector<float> positions(3 * kVertices);
   for (float& p : positions) p = static_cast<float>(random() % 100000);
   std::vector<uint32_t> corners(3 * kTriangles);
-  // Neighbors, with a jump to anywhere now and then.
+  // Each corner is the next vertex or, in one of 50 cases, a random vertex.
   for (size_t i = 0; i < corners.size(); ++i)
     corners[i] = random() % 50 ? static_cast<uint32_t>(i % kVertices) : random() % kVertices;
   SceneBuilder scene;
@@ -331,7 +331,7 @@ TEST(GltfMemory, ElementsAreCharged) {
   }
 }
 
-// The parser collects strings, and the digits of a number. Both are limited.
+// Values in skipped members still take memory of the parser, and a number has at most 1024 digits.
 TEST(GltfMemory, WhatTheParserCollectsIsBounded) {
   const std::string rest = R"("asset":{"version":"2.0"}})", blanks(4 << 20, ' ');
   EXPECT_EQ(out_of_memory_message("{" + blanks + rest, uint64_t{2} << 20), "");

@@ -120,7 +120,7 @@ TEST(GltfGeometry, UnusualStrides) {
   }
 }
 
-// The same for the indices and the values of sparse accessors.
+// The indices and values of sparse accessors may also have such strides.
 TEST(GltfGeometry, SparseStrides) {
   SceneBuilder scene = one_triangle();
   scene.root["accessors"][0]["sparse"] = {
@@ -154,7 +154,8 @@ TEST(GltfGeometry, UndeclaredQuantization) {
   }
 }
 
-// Sparse elements replace base elements, or zeros without a base; vertices and indices.
+// Sparse elements replace elements of the base view, or zeros without a base view. This holds for
+// vertices and for indices.
 TEST(GltfGeometry, SparseAccessors) {
   const auto sparse = [](SceneBuilder& scene, std::vector<uint16_t> at, auto values) {
     return Json{{"count", at.size()},
@@ -179,7 +180,7 @@ TEST(GltfGeometry, SparseAccessors) {
               (std::vector<Corners>{kLower}));
 }
 
-// Thousands of sparse vertices over many blocks: each arrives at its own index.
+// Thousands of sparse vertices, spread over many blocks, get the right positions.
 TEST(GltfGeometry, ManySparseVertices) {
   constexpr uint32_t kVertices = 30000;
   SceneBuilder scene;
@@ -300,8 +301,8 @@ std::vector<float> bumpy_line(size_t vertices) {
   return xyz;
 }
 
-// KHR_mesh_primitive_restart: rows of strips and fans that end with the largest index. The rows
-// include empty ones, and rows too short for a triangle.
+// With KHR_mesh_primitive_restart, the largest index ends a row of a strip or fan. Empty rows, and
+// rows that are too short for a triangle, are allowed.
 TEST(GltfGeometry, RestartsOfEveryWidth) {
   const std::vector<std::vector<uint32_t>> rows = {
       {}, {0, 1, 2, 3, 4}, {5, 6}, {}, {9, 8, 7}, {3}, {10, 3, 5, 4, 4, 6, 200}};
@@ -330,7 +331,8 @@ TEST(GltfGeometry, RestartsKeepOneWinding) {
   for (const SurfaceTriangle& surface : surfaces_of(*open.source)) EXPECT_FALSE(surface.is_flipped);
 }
 
-// Rows longer than the windows, and thousands of short rows. A cursor can begin at any triangle.
+// Rows may be longer than the windows, and there may be thousands. A cursor can begin at any
+// triangle.
 TEST(GltfGeometry, RestartsCanBeReadFromAnyTriangle) {
   std::vector<std::vector<uint32_t>> rows(3);
   for (uint32_t i = 0; i < 9000; ++i) rows[1].push_back(i);

@@ -23,7 +23,7 @@ std::vector<Point> corners_of(const SceneBuilder& scene) {
   return corners;
 }
 
-// First scale, then rotate (a quarter turn about z here), then translate.
+// A node scales first, then rotates (here a quarter turn about z), then translates.
 TEST(GltfNodes, ScaleThenRotateThenTranslate) {
   SceneBuilder scene = corner_scene();
   scene.add_root({{"mesh", 0},
@@ -226,7 +226,7 @@ TEST(GltfNodes, HiddenNodesAreNotChecked) {
   EXPECT_EQ(corners_of(scene), (std::vector<Point>{{1, 2, 3}}));
 }
 
-// A scene without triangles says why.
+// If a scene draws no mesh, a warning gives the reason.
 TEST(GltfNodes, ScenesThatDrawNoMesh) {
   SceneBuilder scene = corner_scene();
   for (int i = 0; i < 2; ++i)
@@ -252,7 +252,7 @@ TEST(GltfNodes, RotationsThatAreNone) {
   EXPECT_EQ(warnings[0].count, 1000u);
 }
 
-// A file with nothing to draw is a scene of no triangles, not an error.
+// A file in which nothing is drawn is a scene without triangles, not an error.
 TEST(GltfNodes, NothingToDraw) {
   SceneBuilder scene;
   EXPECT_TRUE(corners_of(scene).empty());
@@ -260,7 +260,7 @@ TEST(GltfNodes, NothingToDraw) {
   EXPECT_TRUE(corners_of(scene).empty());
 }
 
-// Several files make one scene, one after the other, again and again in the same order.
+// Several files make one scene, in the given order. Reading it again gives the same order.
 TEST(GltfNodes, SeveralFiles) {
   SceneBuilder first = corner_scene(), second = corner_scene();
   first.add_root({{"mesh", 0}});

@@ -118,7 +118,7 @@ TEST(GltfPrimitives, WithoutJointsBesideSkinnedOnes) {
   expect_scene(scene.glb(), {by_node}, "unskinned-primitives");
 }
 
-// Replaces the weights of skinned().
+// Returns skinned() with other weights.
 template <class T>
 SceneBuilder weighted(int type, const std::vector<T>& weights, bool is_normalized) {
   SceneBuilder scene = skinned();
@@ -149,7 +149,7 @@ TEST(GltfPrimitives, WeightsAreDividedByTheirSum) {
   expect(weighted<uint16_t>(kU16, per_vertex<uint16_t>(32767, 32767), true),
          "unnormalized-weights");
   expect(weighted<uint16_t>(kU16, per_vertex<uint16_t>(65535, 0), true), "");
-  // Integers that lack "normalized".
+  // Integer weights without the flag "normalized".
   expect(weighted<uint8_t>(kU8, per_vertex<uint8_t>(255, 0), false), "unnormalized-weights");
   expect(weighted<uint16_t>(kU16, per_vertex<uint16_t>(128, 128), false), "unnormalized-weights");
 }
@@ -166,7 +166,7 @@ TEST(GltfPrimitives, WeightsOfSeveralSetsAreOneSum) {
   expect_scene(scene.glb(), expected, "unnormalized-weights", 3);
 }
 
-// Sums that differ from 1 by rounding change nothing: the matrix is the plain sum.
+// If a sum differs from 1 only by rounding, the matrices are not divided by it.
 TEST(GltfPrimitives, RoundedWeightsAreUsedUnchanged) {
   const float third = 1.f / 3;
   const double sum = 3 * static_cast<double>(third);
@@ -196,7 +196,7 @@ TEST(GltfPrimitives, WeightsWithoutASkinAreIgnored) {
   expect_scene(scene.glb(), {moved(kAtRest, 0, 0, 7)}, "");
 }
 
-// Meshes, skins and nodes that the scene does not draw may have any fault.
+// Faults of meshes, skins and nodes that the scene does not draw are not errors.
 TEST(GltfPrimitives, UnusedOnesMayBeBroken) {
   const Json kBroken[] = {{{"attributes", {{"POSITION", 77}}}},
                           {{"attributes", {{"POSITION", 1}}}, {"indices", 0}},

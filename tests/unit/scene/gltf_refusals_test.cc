@@ -188,7 +188,7 @@ TEST(GltfMessages, ControlCharactersOfASceneAreNotShown) {
   }
 }
 
-// Garbage is not called broken JSON, and no message names a class of the JSON library.
+// A file that is not JSON is not called broken JSON. No message names a class of the JSON library.
 TEST(GltfMessages, GarbageIsNotCalledJson) {
   for (const char* text : {"\xef\x01\x02\x03", "\xef\xbb\xbf garbage", "\xef", "{broken", "[1,",
                            "\xef\xbb\xbf{\"a\":}"}) {
@@ -202,7 +202,7 @@ TEST(GltfMessages, GarbageIsNotCalledJson) {
   }
 }
 
-// Two parents require two edits.
+// A drawn node with two parents is refused.
 TEST(GltfRefusals, TwoParents) {
   SceneBuilder scene = valid_scene();
   scene.add("nodes", Json::object());
@@ -246,26 +246,27 @@ TEST(GltfRefusals, SparseIndicesWithoutBase) {
   EXPECT_EQ(triangles_of_file(scene.glb()), triangles_of_file(one_triangle().glb()));
 }
 
-// JSON that is not glTF at all.
+// JSON without the member "asset", or whose root is not an object, is refused.
 TEST(GltfRefusals, NoAsset) {
   EXPECT_NE(error_of_file("{}").message().find("asset is missing"), std::string::npos);
   EXPECT_NE(error_of_file("[]").message().find("the root is an array, expected an object"),
             std::string::npos);
 }
 
-// A member given twice could mean either; it is refused.
+// A member that is given twice is ambiguous, so it is refused.
 TEST(GltfRefusals, DuplicateMembers) {
   const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":1}]})";
   EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
 }
 
-// The same where the first value is a number and the second an object, which cannot be put into it.
+// A repeated member is also refused if its first value is a number and its second an object.
 TEST(GltfMessages, MemberThatIsANumberAndThenAnObjectIsRefused) {
   const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":{"a":1}}]})";
   EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
 }
 
-// JSON nested deeper than any stack, in members that are read and in members that are not.
+// JSON that is nested deeper than any stack is skipped in members that are not read, and otherwise
+// refused.
 TEST(GltfRefusals, DeeplyNestedJson) {
   const std::string deep = std::string(1000000, '[') + std::string(1000000, ']');
   EXPECT_EQ(error_of_file(R"({"asset":{"version":"2.0"},"extras":)" + deep + "}").message(), "");

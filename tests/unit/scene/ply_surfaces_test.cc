@@ -82,7 +82,8 @@ TEST(PlySurfaces, AlphaOfEveryFamily) {
             (Color{kRed[0], kRed[1], kRed[2], 32768}));
 }
 
-// The largest number determines the number for full intensity.
+// For types other than uchar, the largest number in the file decides which number is full
+// intensity.
 TEST(PlySurfaces, RangesOfColors) {
   const auto color = [](const std::string& type, const std::string& values) {
     return color_of(triangle(properties(type, {"red", "green", "blue"}), values));
@@ -108,7 +109,7 @@ TEST(PlySurfaces, ColorsOfVerticesComeBeforeColorsOfFaces) {
   ASSERT_EQ(open.source->materials().warnings.list().size(), 1u);
 }
 
-// Triangles of one polygon share its color. Strips have the colors of their vertices.
+// All triangles of a polygon have its color. Strips have the colors of their vertices.
 TEST(PlySurfaces, ColorsOfPolygonsAndStrips) {
   for (const PlyFormat format : kFormats) {
     PlyWriter ply(format);
@@ -204,7 +205,7 @@ TEST(PlySurfaces, TexturesOfFaces) {
             std::string::npos);
 }
 
-// Without its image, a triangle has the colors of its vertices.
+// If its image is missing, a triangle has the colors of its vertices.
 TEST(PlySurfaces, MissingTextures) {
   const std::string values =
       properties("uchar", {"red", "green", "blue"}) + properties("float", {"s", "t"});

@@ -111,7 +111,7 @@ TEST(Ply, PolygonsAreFansFromAnyTriangleOn) {
   }
 }
 
-// The same mesh as glTF gives the same snapped triangles.
+// A PLY file and a glTF file with the same mesh have the same snapped triangles.
 TEST(Ply, SnapsAsTheSameMeshInGltf) {
   std::vector<float> xyz;
   for (uint32_t i = 0; i < 3000; ++i)
@@ -145,7 +145,7 @@ TEST(Ply, SnapsAsTheSameMeshInGltf) {
   EXPECT_EQ(snapped(ply.text()), expected);
 }
 
-// Three vertices and a face; T the type of the colors.
+// Returns a file with three colored vertices and a face. T is the type of the colors.
 template <class T>
 std::string colored_triangle(PlyFormat format, const std::string& type, bool has_alpha,
                              const std::vector<T>& colors) {
@@ -165,7 +165,7 @@ std::string colored_triangle(PlyFormat format, const std::string& type, bool has
   return ply.put<uint8_t>(3).put_all<int32_t>({0, 1, 2}).end_row().text();
 }
 
-// The nearest 16-bit number to the linear light of an sRGB value.
+// Returns the linear light of an sRGB value, from 0 to 65535, rounded to nearest.
 uint16_t light(double v) {
   const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
   return static_cast<uint16_t>(std::lround(linear * 65535));
@@ -207,8 +207,8 @@ TEST(Ply, ColorsOfVertices) {
   EXPECT_EQ(colors_of(file)[1], (Color{65535, 65535, 65535, 65535}));
 }
 
-// Colors take all 256 values. Blocks of vertices displace each other in a cache that is too small
-// for them.
+// Colors take all 256 values. The file has more vertices than the cache can hold, so blocks replace
+// each other.
 TEST(Ply, ColorsOfManyVertices) {
   constexpr uint32_t kVertices = 50000;
   PlyWriter ply(PlyFormat::kLittle);
@@ -296,7 +296,7 @@ TEST(Ply, InvalidTrianglesAreNamedOrSkipped) {
   }
 }
 
-// Counts beyond the end of the file, and invalid headers.
+// Headers that are invalid, or that declare more rows than the file has, are refused.
 TEST(Ply, HostileHeadersAreRefused) {
   const std::string begin = "ply\nformat binary_little_endian 1.0\n";
   const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
@@ -383,7 +383,7 @@ TEST(Ply, HostileTextIsRefused) {
             (std::vector<Corners>{{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}}));
 }
 
-// What does not fit the budget is refused, not read.
+// If the windows do not fit the budget, the file is refused.
 TEST(Ply, WindowsAreChargedToTheBudget) {
   const std::string file = plain_triangle(PlyFormat::kLittle);
   EXPECT_THROW(OpenScene(file, {}, 64 << 10), Error);

@@ -72,7 +72,7 @@ TEST(PlyVariants, StripsAfterFaces) {
   }
 }
 
-// Triangles with two equal corners only join parts of a strip.
+// Triangles with two equal corners only join parts of a strip, so they are left out.
 TEST(PlyVariants, JoinsOfStripsAreLeftOut) {
   EXPECT_EQ((numbers_of(
                 strips<int32_t, int32_t>(PlyFormat::kBig, "int int", {{0, 1, 2, 2, 3, 3, 4, 5}}))),
@@ -165,7 +165,7 @@ TEST(PlyVariants, ListsOfVertices) {
   }
 }
 
-// Comments, blank lines, unknown lines and any case of keywords and types in the header.
+// A header may have comments, blank lines, unknown lines, and keywords in upper or lower case.
 TEST(PlyVariants, TolerantHeaders) {
   const std::string plain = ascii_header(kList) + kRows;
   const std::string formats = "format ascii 1.0";

@@ -56,7 +56,7 @@ TEST(Surfaces, FlippedInStripsAndMirrors) {
   EXPECT_EQ(flips_of(4, mirror), std::vector<bool>(2, true));
 }
 
-// The example of the extension: the lower left quarter of the image.
+// The transform in the example of the extension selects the lower left quarter of the image.
 TEST(Surfaces, TextureTransform) {
   SceneBuilder scene = textured("");
   scene.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = {
@@ -177,8 +177,8 @@ TEST(Materials, FactorsAndAlphaModes) {
   EXPECT_EQ(surfaces_of(*open.source).at(0).material, 1u);
 }
 
-// The first material of textured(), with these members, and the color of a corner whose vertex
-// color is half red.
+// Members of the first material of textured(), and the expected material. `vertex_red` is the
+// expected red of a corner whose vertex color is half red.
 struct EmissiveCase {
   Json members;
   std::array<uint16_t, 4> factor;
@@ -308,7 +308,7 @@ TEST(Materials, DiffuseTextureOfSpecularGlossiness) {
   EXPECT_EQ(surfaces_of(*open.source).at(0).corners[1].texture[0], 2 * kOneImage);
 }
 
-// The materials and images of each file follow the preceding files'.
+// The materials and images of a later file are listed after the ones of the earlier files.
 TEST(Materials, OfSeveralFiles) {
   MemoryFiles files;
   SceneBuilder plain = one_triangle();

@@ -100,7 +100,7 @@ TEST(Textures, PyramidOfOddSizes) {
     for (uint32_t x = 0; x < width; ++x) ASSERT_EQ(a->texel(0, 0, x, y), b->texel(0, 0, x, y));
 }
 
-// A changed page of the scratch file gives no color.
+// A page of the scratch file that was damaged is an error, not a wrong color.
 TEST(Textures, DamagedPages) {
   const uint32_t width = 300, height = 200;
   const std::string glb = textured(png_of(width, height, noise(4 * width * height))).glb();
@@ -127,7 +127,7 @@ TEST(Textures, DamagedPages) {
   }
 }
 
-// sRGB becomes linear light; alpha is linear.
+// sRGB channels are converted to linear light. Alpha is already linear.
 TEST(Textures, LinearLight) {
   Textures t(textured(png_of(2, 1, std::string("\x00\xff\xbc\x80\x0a\x80\x01\xff", 8))).glb());
   const auto reader = t.set->open(0);
@@ -161,7 +161,7 @@ TEST(Textures, InBase64Buffers) {
   }
 }
 
-// The data: URI of an image, in forms that RFC 2397 does not allow.
+// Reads images in data: URIs in forms that RFC 2397 does not allow.
 TEST(Textures, InDataUrisOfOtherPrograms) {
   const std::string png = png_of(5, 5, noise(4 * 25)), text = base64(png);
   std::string lines, url_safe, percent;

@@ -41,7 +41,7 @@ TEST(UnknownFile, IsNamedByItsFirstBytes) {
   }
 }
 
-// JSON after white space or a byte order mark is read as glTF.
+// A file that begins with JSON, even after white space or a byte order mark, is read as glTF.
 TEST(UnknownFile, JsonIsGltf) {
   for (const char* text : {"{", "[", "\n\t {", "\xef\xbb\xbf{", "glTF"})
     EXPECT_THAT(error_of_file(text).message(), testing::Not(HasSubstr("expected a scene")));

@@ -248,7 +248,7 @@ TEST_F(BuildProtection, ABuildNoticesMissingRows) {
   EXPECT_EQ(run_build(again, context()).sha256, expected);
 }
 
-// If the row of the job is damaged, --restart works.
+// A build refuses a damaged row of the job. With --restart it starts over.
 TEST_F(BuildProtection, ADamagedJobStartsOver) {
   build_until(spec(), "build", 5);
   SqlDatabase(output() + ".work/job.db", SqlDatabase::Mode::kReadWrite)

@@ -112,7 +112,7 @@ TEST(GltfDraco, MetadataArePassedOver) {
             triangles_of_file(plain_scene(*decode_draco(data)).glb()));
 }
 
-// Texture coordinates and colors as Draco's own decoder gives them.
+// Texture coordinates and colors are equal to the output of Draco's own decoder.
 TEST(GltfDraco, SurfacesAreCompressed) {
   auto mesh = bumpy_grid(6, false);
   const uint32_t points = mesh->num_points();
@@ -213,8 +213,8 @@ TEST(GltfDraco, SkinsAreCompressed) {
   EXPECT_EQ(triangles_of_file(compressed.glb()), triangles_of_file(plain.glb()));
 }
 
-// The triangles of a strip are faces in the Draco data, except for triangles that only connect two
-// strips.
+// The triangles of a strip are the faces in the Draco data, and some repetitions of the last face,
+// because the data do not have the triangles that join two strips.
 TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   SceneBuilder scene = compressed_scene(data, 25, 4 * 10 + 3 * 2);
@@ -235,8 +235,8 @@ std::string message_of(const SceneBuilder& scene, ErrorCode code = ErrorCode::kI
   return error.message();
 }
 
-// The counts of the data win: more and fewer vertices and faces, for both methods of Draco, and for
-// data whose other attributes divide vertices.
+// If the counts in the data differ from the accessors' counts, the counts in the data are used.
+// Tests more and fewer vertices and faces, both methods of Draco, and data with normals per face.
 TEST(GltfDraco, CountsOfTheDataAreRead) {
   for (const bool with_normals : {false, true})
     for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {

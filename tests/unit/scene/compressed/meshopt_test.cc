@@ -46,7 +46,7 @@ std::vector<uint32_t> grid_triangles() {
   return all;
 }
 
-// `extra` more components follow each position.
+// Each position is followed by `extra` more components.
 template <class T>
 std::vector<T> grid_positions(size_t extra) {
   std::vector<T> all;
@@ -243,7 +243,7 @@ TEST(GltfMeshopt, WhatDoesNotFitIsRefusedByName) {
   EXPECT_THAT(with(same, {{"mode", "INDICES"}}), HasSubstr("do not hold 20886 elements"));
 }
 
-// Whatever is cut off or changed, the scene has triangles or an error.
+// Truncated or changed data give either triangles or an error.
 TEST(GltfMeshopt, DamagedDataAreErrors) {
   const auto positions = encode_vertices(grid_positions<float>(0), 12);
   const auto triangles = encode_triangles(grid_triangles());
@@ -302,7 +302,7 @@ TEST(GltfMeshopt, IsRefusedWithoutTheLibrary) {
 
 #endif
 
-// Views that are not used may have any fault.
+// Compressed views that no drawn mesh uses may have any fault.
 TEST(GltfMeshopt, UnusedViewsMayBeBroken) {
   SceneBuilder scene = one_triangle();
   const auto expected = triangles_of_file(scene.glb());

@@ -61,7 +61,8 @@ TEST(VertexStream, ExampleOfTheSpecification) {
   }
 }
 
-// Every cut and every surplus byte is noticed, and no byte is read beyond the stream.
+// A truncated stream and a stream with surplus bytes are refused. No byte beyond the stream is
+// read.
 TEST(VertexStream, DamagedStreams) {
   std::mt19937 random(2);
   const std::string bytes = smooth_bytes(300 * 12, random);

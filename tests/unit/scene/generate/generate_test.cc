@@ -48,7 +48,7 @@ GenerateOptions small(SceneKind kind, bool instances = false) {
   return options;
 }
 
-// Kilobytes of a line of /proc/self/status.
+// Returns the value of a line of /proc/self/status, in kilobytes.
 uint64_t status_kb(const std::string& name) {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);)

@@ -74,7 +74,7 @@ TEST_F(Import, Off) {
   EXPECT_EQ(report.meshes, 1u);
   EXPECT_THAT(warnings_, IsEmpty());
   EXPECT_TRUE(is_imported_scene(*system_files().open_read(glb_)));
-  // The concave face is divided inside, as in a PLY file.
+  // Both triangles of the concave face use its inner corner, as in a PLY file.
   const std::array<double, 3> inner{1, 1, 0};
   const auto all = triangles();
   ASSERT_EQ(all.size(), 3u);

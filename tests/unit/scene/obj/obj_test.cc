@@ -51,8 +51,8 @@ TEST(Obj, LineEndsAndByteOrderMark) {
             std::vector<Corners>{kLower});
 }
 
-// Indices count all vertices of the file, also those after the face. Negative indices count back
-// from the face.
+// A positive index counts all vertices of the file, including vertices after the face. A negative
+// index counts back from the face.
 TEST(Obj, IndicesBeforeAndAfterTheFace) {
   const std::string file = "f 1 2 3\n" + kVertices + "o second\nv 9 9 9\nf -4 -2 5\nv -1 1 0\n";
   EXPECT_EQ(triangles_of_file(file), (std::vector<Corners>{kLower, kUpper}));
@@ -118,8 +118,8 @@ TEST(Obj, LongLines) {
   EXPECT_THAT(error.message(), HasSubstr("line 4 has over 1048576 bytes"));
 }
 
-// Thousands of convex faces of 0 to 9 corners, with vertices between them. The triangles are the
-// same from any first triangle on.
+// Reads thousands of convex faces of 0 to 9 corners, with vertices between them. The triangles are
+// the same if reading begins at any triangle.
 TEST(Obj, TrianglesFromAnyNumberOn) {
   std::string file;
   std::vector<Corners> expected;

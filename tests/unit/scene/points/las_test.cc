@@ -163,7 +163,7 @@ TEST(Las, BrokenHeadersAreNamed) {
   EXPECT_THAT(message_with<double>(155, HUGE_VAL), HasSubstr("offset of X"));
 }
 
-// Only points whose coordinates the scale makes infinite are invalid.
+// A point is invalid if the scale makes a coordinate infinite. The error contains its number.
 TEST(Las, PointsThatAreNotFiniteAreNamedOrSkipped) {
   LasBuilder las;
   las.scale[1] = std::numeric_limits<double>::max();

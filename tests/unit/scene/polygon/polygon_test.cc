@@ -27,8 +27,9 @@ std::vector<double> in_space(const Outline& outline) {
   return xyz;
 }
 
-// Triangulates the outline. Checks that all triangles run like the outline, and that their areas
-// sum up to its area. So they do not overlap outside of it. Returns false if it is doubtful.
+// Triangulates the outline. Checks that all triangles run in the outline's direction, and that the
+// sum of their areas is its area. So they cover the outline without overlap. Returns false if it is
+// doubtful.
 bool is_covered(const Outline& outline) {
   MemoryBudget budget(uint64_t{64} << 20);
   polygon::Triangulator triangulator(budget, "a test");
@@ -74,7 +75,7 @@ TEST(Polygon, ConcaveShapesAreCovered) {
   check_all_ways({{0, 0}, {1, 3}, {2, 0}, {3, 3}, {4, 0}, {4, 5}, {0, 5}});
 }
 
-// Corners on straight edges, equal corners one after another, and spikes.
+// Outlines with corners on straight edges, repeated corners and spikes are covered.
 TEST(Polygon, CollinearCornersAreCovered) {
   check_all_ways({{0, 0}, {2, 0}, {4, 0}, {4, 1}, {2, 1}, {1, 1}, {1, 4}, {0, 4}, {0, 2}});
   check_all_ways({{0, 0}, {4, 0}, {4, 0}, {4, 1}, {1, 1}, {1, 1}, {1, 1}, {1, 4}, {0, 4}});
@@ -101,7 +102,7 @@ TEST(Polygon, HolesWithBridgesAreCovered) {
   EXPECT_TRUE(is_covered(plate));
 }
 
-// Parts of the outline that touch each other at corners and along edges.
+// Outlines whose parts touch at corners and along edges are covered.
 TEST(Polygon, TouchingPartsAreCovered) {
   check_all_ways({{0, 0}, {4, 0}, {4, 4}, {2, 2}, {0, 4}, {0, 3}, {2, 2}, {0, 1}});
   check_all_ways({{0, 0}, {6, 0}, {6, 4}, {4, 4}, {4, 2}, {2, 2}, {2, 4}, {4, 4}, {4, 5}, {0, 5}});
@@ -121,7 +122,7 @@ TEST(Polygon, RandomStarsAreCovered) {
   }
 }
 
-// Shapes of 30,000 corners that are slow for methods of quadratic cost.
+// Outlines of 30,000 corners, for which a method of quadratic cost would be slow, are covered.
 TEST(Polygon, LargeShapesAreCovered) {
   const auto begin = std::chrono::steady_clock::now();
   Outline spiral, comb, slanted;
@@ -174,7 +175,7 @@ TEST(Polygon, CrossingEdgesAreDoubtful) {
   EXPECT_FALSE(is_covered({{0, 5}, {3, -4}, {-5, 2}, {5, 2}, {-3, -4}}));
 }
 
-// The result is defined for any numbers.
+// Very small and very large coordinates give a defined result.
 TEST(Polygon, ExtremeCoordinates) {
   MemoryBudget budget(uint64_t{64} << 20);
   polygon::Triangulator triangulator(budget, "a test");

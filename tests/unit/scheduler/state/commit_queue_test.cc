@@ -119,7 +119,7 @@ class CommitQueueTest : public testing::Test {
     for (const uint64_t before = segment_.size(); segment_.size() - before < kGroup;) build_one();
     disk_.wait_for_syncs(1);
   }
-  // Subvolumes in rows that other processes see.
+  // Returns the number of built subvolumes that other processes see.
   size_t recorded() {
     return built_in(JobStore(folder_.file("job.db"), JobStore::Access::kRead).leaves());
   }
@@ -129,7 +129,7 @@ class CommitQueueTest : public testing::Test {
     for (const StoredSubvolume& s : leaves) {
       if (s.state != SubvolumeState::kBuilt) continue;
       ++built;
-      // Readable: its bytes are in the file.
+      // Throws if the artifact's bytes are not in the file.
       ArtifactReader(system_files().open_read(segment_path(folder_.path(), s.artifact.segment)),
                      s.artifact);
     }
@@ -177,7 +177,7 @@ TEST_F(CommitQueueTest, WaitsForADiskThatFallsBehind) {
   EXPECT_EQ(recorded(), next_);
 }
 
-// A failed sync is not repeated: the second sync would succeed although bytes are lost.
+// If a sync fails, its group is never recorded. Another sync would succeed although bytes are lost.
 TEST_F(CommitQueueTest, WhatAFailedSyncLostIsNotRecorded) {
   disk_.fail_next_sync();
   bool reported = false;

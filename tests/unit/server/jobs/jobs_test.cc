@@ -435,7 +435,8 @@ TEST_F(JobOutcome, ACrashIsReported) {
   EXPECT_EQ(job_.error->code, "out_of_memory");
 }
 
-// The stop signal may end the process before the process handles signals, or a second signal may.
+// A stop can end the process before it reports anything. The job then counts as stopped, not as
+// failed.
 TEST_F(JobOutcome, AProcessThatWasStoppedAtOnceRunsAgain) {
   live_.stop();
   for (const ChildProcess::End& end :

@@ -84,7 +84,7 @@ TEST_F(Attributes, AreThoseOfTheScene) {
         ++cells;
         sheet += *material == 0;
         plain += *material == 1;
-        // All front faces point down. Those of the bumpy sheet do so at many angles.
+        // Front faces point down: exactly in material 1, and at many angles in the bumpy sheet.
         EXPECT_LT(normal->y, *material == 1 ? -0.999 : -0.1);
       }
   EXPECT_EQ(cells, report.colors->cells);

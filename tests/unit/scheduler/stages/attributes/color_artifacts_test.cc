@@ -75,7 +75,7 @@ TEST_F(ColorArtifacts, WithoutAnythingToBakeNoImageIsDecoded) {
   EXPECT_EQ(report.colors->image_bytes, 0u);
 }
 
-// The image is a separate file, so the glTF file and its buffer do not change.
+// Only the image file changes, not the glTF file. The cubes that show the image are baked again.
 TEST_F(ColorArtifacts, AChangedImageRepeatsTheCubesThatShowIt) {
   PaintedScene::write(folder_.path(), 128);
   const std::string changed = build(spec()).sha256;

@@ -120,7 +120,7 @@ TEST_F(ColorStage, AreTheSameAfterAnInterruption) {
   }
 }
 
-// PLY and npz files have the colors in the order of the cells.
+// Exported PLY and npz files have the colors of the cells, in the order of the cells.
 TEST_F(ColorStage, AreExported) {
   build(spec(64));
   const auto file = open_global_file(output());

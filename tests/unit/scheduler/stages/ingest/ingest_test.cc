@@ -142,7 +142,7 @@ TEST_P(IngestTest, ATriangleFromTooFarIsNamed) {
   scene_.too_far_at = 5 * kPiece + 7;
   const Error error = error_of_ingest([] {});
   EXPECT_EQ(error.code(), ErrorCode::kLimit);
-  // 820 of 81927 triangles are invalid.
+  // Triangle 81927 is too far away. The error counts without the 820 invalid triangles before it.
   EXPECT_NE(error.message().find("triangle 81107 of the scene"), std::string::npos)
       << error.message();
 }
@@ -177,7 +177,7 @@ TEST_P(IngestTest, IsCanceled) {
   EXPECT_EQ(state_.position, kPiece);
 }
 
-// The bounds of the triangles, invalid ones not counted.
+// The scan finds the bounds of the valid triangles.
 TEST_P(IngestTest, ScanFindsTheBounds) {
   const BuildContext build{system_files(), progress_, cancel_};
   uint64_t pieces = 0;

@@ -280,7 +280,7 @@ TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
   EXPECT_FALSE(files_.bytes_written.contains(durable()));
 }
 
-// The times of a file count only once the clock of the file system has advanced beyond them.
+// A file's times are trusted only after the clock for file times has advanced beyond them.
 TEST(TrustedFiles, AreOlderThanATickOfTheirClock) {
   constexpr int64_t kSecond = 1'000'000'000;
   const auto file = [](int64_t modified_ns, int64_t changed_ns) {

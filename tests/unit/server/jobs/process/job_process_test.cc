@@ -181,7 +181,8 @@ TEST_F(JobProcess, NamesNoFolderOfABrokenJob) {
   expect_failure("the job's folder", run());
 }
 
-// The disk is full, or fails, from the n-th operation on.
+// A job whose disk is full or fails from any operation on reports a failure. run() checks that no
+// message contains a folder of the machine.
 TEST_F(JobProcess, NamesNoFolderOfABrokenDisk) {
   for (const Fault fault : {Fault::kNoSpace, Fault::kIoError, Fault::kReadError}) {
     for (const JobTask::Kind kind : {JobTask::Kind::kBuild, JobTask::Kind::kPlan}) {
