@@ -24,6 +24,7 @@
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
 #include "core/geometry/fixed_triangle.h"
+#include "core/geometry/solid_rule.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag {
@@ -50,6 +51,9 @@ struct SubvolumeTask {
   uint32_t grid_levels = 2;  // L: the grid has 2^L voxels per edge
   Cube cube;                 // its level is at most L-2
   uint32_t hash_bits = 64;   // 4 to 64
+  // Null for the shell. Otherwise also fills the interior (core/geometry/solid_rule.h); the entry
+  // has the views from the cube's low faces. Only the CPU backend fills solids.
+  const SolidEntry* solid = nullptr;
 
   SubDagShape shape() const { return {cube.level, grid_levels, hash_bits}; }
 };

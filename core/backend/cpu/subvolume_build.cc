@@ -9,12 +9,7 @@ constexpr size_t kBatch = 256;  // triangles per read
 // Max triangles of a tile for which the plane memo may be faster than drawing.
 constexpr size_t kFewTriangles = 4;
 
-LatticeCube box_of(const SubvolumeTask& task) {
-  LatticeCube box;
-  box.edge = task.cube.edge_voxels(task.grid_levels) * kUnitsPerVoxel;
-  for (int a = 0; a < 3; ++a) box.low[a] = task.cube.position[a] * box.edge;
-  return box;
-}
+LatticeCube box_of(const SubvolumeTask& task) { return lattice_cube(task.cube, task.grid_levels); }
 
 int size_log2_of(const SubvolumeTask& task) {
   return static_cast<int>(task.grid_levels - task.cube.level);
@@ -32,35 +27,55 @@ SubvolumeBuild::SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels
       triangles_(memory),
       tables_(memory, size_log2_of(task), expected),
       reducer_(tables_, kernels),
-      planes_(memory, tables_, reducer_, kernels) {}
+      planes_(memory, tables_, reducer_, kernels) {
+  if (task_.solid != nullptr) solid_.emplace(task_, memory, tables_);
+}
 
 SubDagSummary SubvolumeBuild::run(TriangleStream& stream, SubDagSink& sink) {
-  stream.rewind();
   if (size_log2_of(task_) <= kTileLog2) {
     build_streamed(stream);
   } else {
     read(stream);
-    build(size_log2_of(task_), box_of(task_), 0, entries_used_);
+    if (solid_)
+      finish_solid_root(build_solid(size_log2_of(task_), box_of(task_), 0, entries_used_));
+    else
+      build(size_log2_of(task_), box_of(task_), 0, entries_used_);
     triangles_.clear();
     entries_ = {};
     octants_ = {};
   }
-  return emit_levels(tables_, task_.shape(), sink);
+  SubDagSummary summary = emit_levels(tables_, task_.shape(), sink);
+  if (solid_) {
+    summary.interior = solid_->filled().filled;
+    summary.disputed = solid_->filled().disputed;
+  }
+  return summary;
 }
 
 NodeRef SubvolumeBuild::build_streamed(TriangleStream& stream) {
   const LatticeCube box = box_of(task_);
   std::vector<FixedTriangle> batch(kBatch);
-  while (const size_t count = stream.read(batch)) {
-    cancel_.check();
-    for (size_t i = 0; i < count; ++i) draw(axis_major(batch[i]), box);
-  }
+  const auto for_each_triangle = [&](const auto& visit) {
+    stream.rewind();
+    while (const size_t count = stream.read(batch)) {
+      cancel_.check();
+      for (size_t i = 0; i < count; ++i) visit(batch[i]);
+    }
+  };
+  if (solid_) solid_->begin_tile(box);
+  for_each_triangle([&](const FixedTriangle& triangle) {
+    draw(axis_major(triangle), box);
+    if (solid_) solid_->add(triangle);
+  });
+  if (solid_ && !solid_->fill_tile(tile_, size_log2_of(task_), for_each_triangle))
+    return finish_solid_root({{}, true});
   return reducer_.reduce_bricks(tile_, size_log2_of(task_));
 }
 
 void SubvolumeBuild::read(TriangleStream& stream) {
   const LatticeCube box = box_of(task_);
   std::vector<FixedTriangle> batch(kBatch);
+  stream.rewind();
   while (const size_t count = stream.read(batch)) {
     cancel_.check();
     for (size_t i = 0; i < count; ++i)
@@ -85,18 +100,75 @@ NodeRef SubvolumeBuild::build(int size_log2, const LatticeCube& cube, size_t fir
     return node;
   if (size_log2 <= kTileLog2 && !is_worth_splitting(size_log2, first, count))
     return build_tile(size_log2, cube, first, count);
+  const size_t below = entries_used_;
+  const ChildEntries entries = push_children(cube, first, count);
+  NodeRef children[8];
+  for (int c = 0; c < 8; ++c)
+    children[c] = build(size_log2 - 1, cube.child(c), entries.first[c], entries.counts[c]);
+  entries_used_ = below;
+  return tables_.add_node(size_log2, children);
+}
+
+SubvolumeBuild::SolidNode SubvolumeBuild::build_solid(int size_log2, const LatticeCube& cube,
+                                                      size_t first, size_t count) {
+  if (count == 0) return {{}, true};
+  if (size_log2 <= kTileLog2) return build_solid_tile(size_log2, cube, first, count);
+  const size_t below = entries_used_;
+  const ChildEntries entries = push_children(cube, first, count);
+  SolidNode children[8];
+  UnitViews views[8];
+  bool is_empty = true;
+  for (int c = 0; c < 8; ++c) {
+    const LatticeCube child = cube.child(c);
+    children[c] = build_solid(size_log2 - 1, child, entries.first[c], entries.counts[c]);
+    is_empty &= children[c].is_empty;
+    // Later children advance the rows, so the views are read now.
+    if (children[c].is_empty) views[c] = solid_->empty_cube(child);
+  }
+  entries_used_ = below;
+  if (is_empty) return {{}, true};
+  NodeRef nodes[8];
+  for (int c = 0; c < 8; ++c)
+    nodes[c] = children[c].is_empty ? solid_->decide(views[c], size_log2 - 1) : children[c].node;
+  return {tables_.add_node(size_log2, nodes), false};
+}
+
+SubvolumeBuild::SolidNode SubvolumeBuild::build_solid_tile(int size_log2, const LatticeCube& cube,
+                                                           size_t first, size_t count) {
+  cancel_.check();
+  const auto for_each_triangle = [&](const auto& visit) {
+    for (size_t i = first; i < first + count; ++i) {
+      const Entry entry = entries_[i];
+      visit(entry.wide() ? vertex_major(triangles_.wide(entry))
+                         : vertex_major(triangles_.narrow(entry)));
+    }
+  };
+  solid_->begin_tile(cube);
+  for (size_t i = first; i < first + count; ++i) draw(entries_[i], cube);
+  for_each_triangle([&](const FixedTriangle& triangle) { solid_->add(triangle); });
+  if (!solid_->fill_tile(tile_, size_log2, for_each_triangle)) return {{}, true};
+  return {reducer_.reduce_bricks(tile_, size_log2), false};
+}
+
+NodeRef SubvolumeBuild::finish_solid_root(const SolidNode& root) {
+  if (!root.is_empty) return root.node;
+  return solid_->decide(solid_->empty_cube(box_of(task_)), size_log2_of(task_));
+}
+
+SubvolumeBuild::ChildEntries SubvolumeBuild::push_children(const LatticeCube& cube, size_t first,
+                                                           size_t count) {
   if (count > octants_.size()) octants_.grow(memory_, count);
-  size_t counts[8] = {};
+  ChildEntries out;
   for (size_t i = 0; i < count; ++i) {
     const Octants octants = test_octants(entries_[first + i], cube);
     octants_[i] = static_cast<uint16_t>(octants.touched | octants.inside << 8);
-    for (uint32_t rest = octants.touched; rest != 0; rest &= rest - 1) ++counts[lowest_bit(rest)];
+    for (uint32_t rest = octants.touched; rest != 0; rest &= rest - 1)
+      ++out.counts[lowest_bit(rest)];
   }
-  const size_t below = entries_used_;
   size_t next[8];
   for (int c = 0; c < 8; ++c) {
-    next[c] = entries_used_;
-    entries_used_ += counts[c];
+    out.first[c] = next[c] = entries_used_;
+    entries_used_ += out.counts[c];
   }
   reserve_entries(entries_used_);
   for (size_t i = 0; i < count; ++i) {
@@ -106,11 +178,7 @@ NodeRef SubvolumeBuild::build(int size_log2, const LatticeCube& cube, size_t fir
       entries_[next[c]++] = {bits | (octants_[i] >> (8 + c) & 1 ? Entry::kInside : 0)};
     }
   }
-  NodeRef children[8];
-  for (int c = 0; c < 8; ++c)
-    children[c] = build(size_log2 - 1, cube.child(c), next[c] - counts[c], counts[c]);
-  entries_used_ = below;
-  return tables_.add_node(size_log2, children);
+  return out;
 }
 
 bool SubvolumeBuild::is_worth_splitting(int size_log2, size_t first, size_t count) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/backend/backend.h"
@@ -12,6 +13,7 @@
 #include "core/backend/cpu/memo/tile_reducer.h"
 #include "core/backend/cpu/raster/kernels.h"
 #include "core/backend/cpu/raster/triangle_set.h"
+#include "core/backend/cpu/solid/solid_fill.h"
 #include "core/dag/consing/sub_dag_tables.h"
 
 namespace voxdag::cpu {
@@ -32,6 +34,24 @@ class SubvolumeBuild {
   // Returns the node of a cube with an edge of 2^size_log2 voxels. The triangles that may touch the
   // cube are entries_[first, first + count).
   NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);
+  // The node of a cube of a solid. If the cube has no voxel of the shell, it has no node yet: its
+  // views decide, unless the cube around it has no voxel of the shell either.
+  struct SolidNode {
+    NodeRef node;
+    bool is_empty = false;
+  };
+  // build() for a solid.
+  SolidNode build_solid(int size_log2, const LatticeCube& cube, size_t first, size_t count);
+  SolidNode build_solid_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
+  NodeRef finish_solid_root(const SolidNode& root);
+
+  // A cube's entries, divided among its children: the child's entries begin at first[c].
+  struct ChildEntries {
+    size_t first[8];
+    size_t counts[8] = {};
+  };
+  // Adds the entries of the children of a cube to the stack.
+  ChildEntries push_children(const LatticeCube& cube, size_t first, size_t count);
   // True if splitting a cube of at most tile size is likely to be faster than drawing it, because
   // the nodes of its parts may be in the plane memo.
   bool is_worth_splitting(int size_log2, size_t first, size_t count);
@@ -56,6 +76,7 @@ class SubvolumeBuild {
   TileReducer reducer_;
   PlaneMemo planes_;
   TileBricks tile_;
+  std::optional<SolidFill> solid_;
 };
 
 }  // namespace voxdag::cpu

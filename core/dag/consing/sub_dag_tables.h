@@ -37,6 +37,13 @@ struct OctreeCounts {
   }
 };
 
+// Returns the counts of a cube with an edge of 2^size_log2 voxels, all of them set; size_log2 >= 2.
+constexpr OctreeCounts full_counts(int size_log2) {
+  OctreeCounts counts{0, uint64_t{1} << 3 * size_log2};
+  for (int s = kBrickLevels; s <= size_log2; ++s) counts.nodes = 8 * counts.nodes + 1;
+  return counts;
+}
+
 // The numbers of entries in the tables of one cube. entries[s] is for the table of the nodes whose
 // cubes have an edge of 2^s voxels. The numbers for one cube are used as an estimate for the next
 // cube.

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "core/dag/consing/pooled_memory.h"
+#include "core/geometry/cube.h"
 #include "core/geometry/fixed_triangle.h"
 
 namespace voxdag::cpu {
@@ -47,6 +48,22 @@ struct LatticeCube {
             half};
   }
 };
+
+inline LatticeCube lattice_cube(const Cube& cube, uint32_t grid_levels) {
+  LatticeCube out;
+  out.edge = cube.edge_voxels(grid_levels) * kUnitsPerVoxel;
+  for (int a = 0; a < 3; ++a) out.low[a] = cube.position[a] * out.edge;
+  return out;
+}
+
+// The inverse of axis_major().
+template <class Int>
+FixedTriangle vertex_major(const Triangle<Int>& t) {
+  FixedTriangle out;
+  for (int a = 0; a < 3; ++a)
+    for (int i = 0; i < 3; ++i) out.v[i][a] = t.v[a][i];
+  return out;
+}
 
 inline WideTriangle axis_major(const FixedTriangle& t) {
   WideTriangle out;

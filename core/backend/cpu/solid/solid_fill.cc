@@ -1,0 +1,75 @@
+#include "core/backend/cpu/solid/solid_fill.h"
+
+#include <algorithm>
+
+namespace voxdag::cpu {
+namespace {
+
+int tile_log2_of(const SubvolumeTask& task) {
+  return std::min(static_cast<int>(task.grid_levels - task.cube.level), kTileLog2);
+}
+int tiles_of(const SubvolumeTask& task) {
+  return 1 << (static_cast<int>(task.grid_levels - task.cube.level) - tile_log2_of(task));
+}
+int blocks_of(const SubvolumeTask& task) {
+  return 1 << (tile_log2_of(task) - solid_block_log2(task.grid_levels));
+}
+
+}  // namespace
+
+SolidFill::SolidFill(const SubvolumeTask& task, PooledMemory& memory, SubDagTables& tables)
+    : rule_(task.solid->rule),
+      tables_(tables),
+      box_(lattice_cube(task.cube, task.grid_levels)),
+      tile_edge_(kUnitsPerVoxel << tile_log2_of(task)),
+      running_(memory, *task.solid, tiles_of(task), blocks_of(task)),
+      filler_(rule_, task.grid_levels),
+      rows_{{0, 0, 0}, sample_pitch_log2(task.grid_levels), blocks_of(task)} {}
+
+void SolidFill::begin_tile(const LatticeCube& tile) {
+  tile_ = tile;
+  std::copy(tile.low, tile.low + 3, rows_.low);
+  views_.begin(rows_);
+}
+
+bool SolidFill::fill_tile(TileBricks& bricks, int size_log2,
+                          const TileFiller::ForEachTriangle& for_each_triangle) {
+  int tile[3];
+  position_of(tile_, tile);
+  views_.finish(rule_, running_, tile);
+  return filler_.fill(bricks, size_log2, tile_.low, views_, for_each_triangle, filled_);
+}
+
+UnitViews SolidFill::empty_cube(const LatticeCube& cube) {
+  int low[3];
+  position_of(cube, low);
+  return running_.corners_of(low, static_cast<int>(cube.edge / tile_edge_));
+}
+
+NodeRef SolidFill::decide(const UnitViews& unit, int size_log2) {
+  if (!unit.is_inside()) return {};
+  filled_.add(unit, uint64_t{1} << 3 * size_log2);
+  tables_.counts() += full_counts(size_log2);
+  return full_node(size_log2);
+}
+
+NodeRef SolidFill::full_node(int size_log2) {
+  NodeRef& full = full_[size_log2];
+  if (full.exists) return full;
+  const OctreeCounts before = tables_.counts();
+  if (size_log2 == kBrickLevels) {
+    full = tables_.add_brick(~uint64_t{0});
+  } else {
+    NodeRef children[8];
+    std::fill(std::begin(children), std::end(children), full_node(size_log2 - 1));
+    full = tables_.add_node(size_log2, children);
+  }
+  tables_.counts() = before;
+  return full;
+}
+
+void SolidFill::position_of(const LatticeCube& cube, int (&tile)[3]) const {
+  for (int a = 0; a < 3; ++a) tile[a] = static_cast<int>((cube.low[a] - box_.low[a]) / tile_edge_);
+}
+
+}  // namespace voxdag::cpu

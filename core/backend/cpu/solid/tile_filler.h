@@ -1,0 +1,72 @@
+// Fills the voxels of a tile that are inside a solid (core/geometry/solid_rule.h). The tile has the
+// voxels of the shell. Units of the tile: its maximal empty cubes, and the components of the empty
+// voxels of its other blocks. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "core/backend/cpu/raster/tile_bricks.h"
+#include "core/backend/cpu/solid/block_components.h"
+#include "core/backend/cpu/solid/tile_views.h"
+#include "core/geometry/fixed_triangle.h"
+
+namespace voxdag::cpu {
+
+// Voxels of units that are inside.
+struct FilledVoxels {
+  uint64_t filled = 0;
+  uint64_t disputed = 0;  // those whose directions disagree
+
+  void add(const UnitViews& unit, uint64_t voxels) {
+    filled += voxels;
+    if (unit.is_disputed()) disputed += voxels;
+  }
+};
+
+class TileFiller {
+ public:
+  // Calls its argument for each triangle of the tile.
+  using ForEachTriangle = std::function<void(const std::function<void(const FixedTriangle&)>&)>;
+
+  TileFiller(SolidRule rule, uint32_t grid_levels)
+      : rule_(rule), block_log2_(solid_block_log2(grid_levels)) {}
+
+  // Fills a tile with an edge of 2^size_log2 voxels, whose low corner in lattice units is `low`.
+  // Returns false, without filling, if the tile has no voxel of the shell.
+  bool fill(TileBricks& tile, int size_log2, const int64_t (&low)[3], const TileViews& views,
+            const ForEachTriangle& for_each_triangle, FilledVoxels& filled);
+
+ private:
+  // A component without a corner, and the walk to it: along z, y and x, from the block's low corner
+  // to the center of the component's first voxel in Morton order.
+  struct BlindComponent {
+    int block;  // index in TileBricks
+    Slices voxels;
+    int64_t from[3], to[3];
+    int64_t views;      // of the block's low corner
+    int64_t crossings;  // sum of the signs of the walk's crossings
+  };
+
+  void list_occupied(const TileBricks& tile, int size_log2);
+  bool is_occupied(int size_log2, int index) const;
+  void fill_cube(int size_log2, int index, const int (&low)[3]);
+  void fill_block(int index, const int (&low)[3]);
+  void fill_blind();
+  void add_voxels(int index, const Slices& voxels, const UnitViews& unit);
+
+  const SolidRule rule_;
+  const int block_log2_;
+  // Bit sets of the cubes with voxels, in Morton order, by the log2 of their edges in blocks.
+  uint64_t occupied_[4][kTileBlocks / 64];
+  std::vector<BlindComponent> blind_;
+  // Arguments of fill().
+  TileBricks* tile_ = nullptr;
+  const int64_t* tile_low_ = nullptr;
+  const TileViews* views_ = nullptr;
+  const ForEachTriangle* for_each_triangle_ = nullptr;
+  FilledVoxels* filled_ = nullptr;
+};
+
+}  // namespace voxdag::cpu

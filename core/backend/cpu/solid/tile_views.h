@@ -1,0 +1,36 @@
+// The views from the corners of a tile's blocks (core/geometry/solid_rule.h). Not thread-safe.
+#pragma once
+
+#include <cstdint>
+
+#include "core/backend/cpu/solid/running_rows.h"
+#include "core/geometry/row_crossings.h"
+
+namespace voxdag::cpu {
+
+class TileViews {
+ public:
+  static constexpr int kCorners = RunningRows::kRows;  // corners along an edge, at most
+
+  // Starts a tile.
+  void begin(const SampleRows& rows);
+  // Adds the crossings of a triangle.
+  void add(const FixedTriangle& triangle);
+  // Sets the views of all corners from the views at the tile's low faces, and advances these to the
+  // high faces. `tile`: the tile's position in the subvolume, in tiles.
+  void finish(SolidRule rule, RunningRows& running, const int (&tile)[3]);
+
+  // Returns the sum of the three views from a corner; coordinates are in blocks.
+  int32_t at(int x, int y, int z) const { return views_[x][y][z]; }
+  // Returns the views from the corners of a cube; `low` and `edge` are in blocks.
+  UnitViews corners_of(const int (&low)[3], int edge) const;
+
+ private:
+  SampleRows rows_;
+  bool has_crossings_[3] = {};
+  // Sums of the signs of the crossings between corners k and k + 1 of a row: [axis][k][row].
+  int32_t crossings_[3][8][RunningRows::kSquare] = {};
+  int32_t views_[kCorners][kCorners][kCorners];
+};
+
+}  // namespace voxdag::cpu

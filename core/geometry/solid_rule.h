@@ -1,0 +1,83 @@
+// The rules that decide which empty voxels are inside a surface (docs/solid.md).
+//
+// All rules decide per unit, a connected set of empty voxels. Let B be the edge of a block, 8
+// voxels or less in a tiny grid. The units are
+//
+//   1. the maximal empty cubes of the octree with an edge of at least B;
+//   2. in every aligned block of B^3 voxels that has a voxel of the shell, each 6-connected
+//      component of the block's other voxels.
+//
+// Corners are the corners of blocks. A sample row is a line along an axis through corners. From a
+// corner, the view along an axis sums the crossings (crossing.h) of the row in both directions:
+//
+//   left     sum of the signs of the row's crossings that the corner is beyond
+//   total    sum of the signs of all crossings of the row
+//   winding  view = left - (total - left)
+//   parity   view = (left mod 2) + ((total - left) mod 2)
+//
+// A corner has the sum of its three views. A unit with k corners is inside iff the absolute sum
+// over its corners is > 3 k: if most of the six directions see the same side of the surface.
+//
+// A component without a corner of its block is blind. Its view comes from a walk to the component
+// from the block's low corner (BlindWalk in core/backend/cpu/solid).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/host_device.h"
+#include "core/geometry/fixed_triangle.h"
+
+namespace voxdag {
+
+enum class SolidRule { kNone, kWinding, kParity };
+
+// Returns log2 of the edge of a block, in voxels.
+VOXDAG_HD constexpr int solid_block_log2(uint32_t grid_levels) { return grid_levels < 3 ? 2 : 3; }
+// Returns log2 of the distance between sample rows, in lattice units.
+VOXDAG_HD constexpr int sample_pitch_log2(uint32_t grid_levels) {
+  return kUnitBits + solid_block_log2(grid_levels);
+}
+
+// Returns the view along one axis from a corner.
+VOXDAG_HD constexpr int32_t view_of(SolidRule rule, int32_t left, int32_t total) {
+  if (rule == SolidRule::kWinding) return 2 * left - total;
+  return (left & 1) + ((total - left) & 1);
+}
+// Returns the view behind crossings whose signs sum to `crossings`. `view` is the view before them.
+VOXDAG_HD constexpr int32_t view_after(SolidRule rule, int32_t view, int32_t crossings) {
+  if (rule == SolidRule::kWinding) return view + 2 * crossings;
+  return (crossings & 1) != 0 ? 2 - view : view;
+}
+// Returns the sum of the three views behind crossings of a walk along any axes.
+VOXDAG_HD constexpr int64_t views_after(SolidRule rule, int64_t views, int64_t crossings) {
+  if (rule == SolidRule::kWinding) return views + 6 * crossings;
+  return (crossings & 1) != 0 ? 6 - views : views;
+}
+
+// The views from the corners of a unit.
+struct UnitViews {
+  int64_t sum = 0;
+  int corners = 0;
+
+  VOXDAG_HD void add(int64_t views) {
+    sum += views;
+    ++corners;
+  }
+  VOXDAG_HD bool is_inside() const { return (sum < 0 ? -sum : sum) > 3 * corners; }
+  // True if not all directions of all corners agree.
+  VOXDAG_HD bool is_disputed() const { return sum % (6 * corners) != 0; }
+};
+
+// The two axes of a row's position, in the order x, y, z. The rows of a square of m^2 blocks are
+// stored as (m + 1)^2 numbers; the second axis varies fastest.
+VOXDAG_HD constexpr int first_row_axis(int axis) { return axis == 0 ? 1 : 0; }
+VOXDAG_HD constexpr int second_row_axis(int axis) { return axis == 2 ? 1 : 2; }
+
+// A solid's rule, and the views along each axis from the low face of a cube.
+struct SolidEntry {
+  SolidRule rule = SolidRule::kNone;
+  std::vector<int32_t> views[3];  // one for each sample row of the closed cube
+};
+
+}  // namespace voxdag

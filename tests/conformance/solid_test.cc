@@ -1,0 +1,135 @@
+// Solids: the CPU backends fill the same voxels as the oracle, also if the grid is built in parts.
+#include "core/geometry/row_crossings.h"
+#include "tests/conformance/harness.h"
+#include "tests/oracle/solid/rules.h"
+#include "tests/oracle/solid/solids.h"
+
+namespace voxdag {
+namespace {
+
+class Solids : public Conformance {
+ protected:
+  void SetUp() override {
+    Conformance::SetUp();
+    if (!GetParam().name.starts_with("cpu")) GTEST_SKIP() << "only the CPU backend fills solids";
+  }
+};
+VOXDAG_FOR_ALL_BACKENDS(Solids);
+
+constexpr SolidRule kRules[] = {SolidRule::kWinding, SolidRule::kParity};
+
+oracle::SolidRule oracle_rule(SolidRule rule) {
+  return rule == SolidRule::kWinding ? oracle::SolidRule::kWinding : oracle::SolidRule::kParity;
+}
+
+// Returns the views from the low faces of a cube, from all triangles of the scene.
+SolidEntry entry_of(const oracle::Triangles& scene, const Cube& cube, uint32_t levels,
+                    SolidRule rule) {
+  const int64_t edge = cube.edge_voxels(levels);
+  SampleRows rows{
+      {0, 0, 0}, sample_pitch_log2(levels), static_cast<int>(edge >> solid_block_log2(levels))};
+  for (int a = 0; a < 3; ++a) rows.low[a] = cube.position[a] * edge * kUnitsPerVoxel;
+  const int stride = rows.blocks + 1;
+  SolidEntry entry{rule, {}};
+  for (int a = 0; a < 3; ++a) {
+    std::vector<int32_t> left(static_cast<size_t>(stride * stride)), total = left;
+    for (const FixedTriangle& t : oracle::fixed(scene))
+      rows.for_each_crossing(t, a, [&](int i, int j, int64_t block, int sign) {
+        const int row = stride * i + j;
+        total[static_cast<size_t>(row)] += sign;
+        if (block < 0) left[static_cast<size_t>(row)] += sign;
+      });
+    for (size_t i = 0; i < total.size(); ++i)
+      entry.views[a].push_back(view_of(rule, left[i], total[i]));
+  }
+  return entry;
+}
+
+void expect_solid(Backend& backend, const oracle::Triangles& scene, uint32_t levels,
+                  SolidRule rule) {
+  const oracle::Solid truth = oracle::voxelize_solid(scene, 1 << levels, oracle_rule(rule));
+  const SolidEntry entry = entry_of(scene, Cube{}, levels, rule);
+  const SubvolumeTask task{levels, Cube{}, 64, &entry};
+  const Built built = build(backend, task, scene);
+  EXPECT_EQ(built.summary.interior, truth.interior);
+  EXPECT_EQ(built.summary.disputed, truth.disputed);
+  expect_equals(built, oracle::build_dag(truth.voxels, 64), task);
+}
+
+template <class Visit>
+void for_each_solid(Visit visit) {
+  for (const oracle::SolidKind kind : oracle::kClosedSolids) visit(kind);
+  for (const oracle::SolidKind kind : oracle::kOpenSolids) visit(kind);
+}
+
+TEST_P(Solids, EqualTheOracle) {
+  const auto backend = open();
+  for_each_solid([&](oracle::SolidKind kind) {
+    for (uint32_t levels = 2; levels <= 6; ++levels)
+      for (uint64_t seed = 0; seed < 2; ++seed)
+        for (const SolidRule rule : kRules) {
+          if (levels == 6 && seed > 0) continue;
+          SCOPED_TRACE(testing::Message() << oracle::kind_name(kind) << ", R " << (1 << levels)
+                                          << ", seed " << seed << ", rule " << (int)rule);
+          expect_solid(*backend, oracle::make_solid(kind, seed, 1 << levels), levels, rule);
+          if (HasFailure()) return;
+        }
+  });
+}
+
+// Random scenes with slivers, degenerate triangles and edges through corners.
+TEST_P(Solids, EqualTheOracleOnAnyTriangles) {
+  const auto backend = open();
+  for (const oracle::SceneKind kind : oracle::kAllKinds)
+    for (uint32_t levels = 2; levels <= 5; ++levels)
+      for (const SolidRule rule : kRules) {
+        SCOPED_TRACE(testing::Message() << oracle::kind_name(kind) << ", R " << (1 << levels)
+                                        << ", rule " << (int)rule);
+        const oracle::Region grid = oracle::region_of(Cube{}, levels);
+        expect_solid(*backend, oracle::make_scene(kind, levels, grid, 30), levels, rule);
+        if (HasFailure()) return;
+      }
+}
+
+// A grid of several tiles, as one subvolume.
+TEST_P(Solids, EqualTheOracleInSeveralTiles) {
+  const auto backend = open();
+  for (const oracle::SolidKind kind :
+       {oracle::SolidKind::kTorus, oracle::SolidKind::kOneInverted, oracle::SolidKind::kHoles,
+        oracle::SolidKind::kSoup, oracle::SolidKind::kCrossing}) {
+    SCOPED_TRACE(oracle::kind_name(kind));
+    expect_solid(*backend, oracle::make_solid(kind, 7, 128), 7, SolidRule::kWinding);
+  }
+}
+
+// The octants of a grid, each as its own subvolume, set the same voxels as the whole grid.
+TEST_P(Solids, EqualTheirParts) {
+  const auto backend = open();
+  for_each_solid([&](oracle::SolidKind kind) {
+    for (const SolidRule rule : kRules) {
+      SCOPED_TRACE(testing::Message() << oracle::kind_name(kind) << ", rule " << (int)rule);
+      const oracle::Triangles scene = oracle::make_solid(kind, 3, 128);
+      const SolidEntry whole_entry = entry_of(scene, Cube{}, 7, rule);
+      const Built whole = build(*backend, {7, Cube{}, 64, &whole_entry}, scene);
+      uint64_t voxels = 0, interior = 0, disputed = 0;
+      for (int c = 0; c < 8; ++c) {
+        const Cube part = Cube{}.child(c);
+        const SolidEntry entry = entry_of(scene, part, 7, rule);
+        const SubvolumeTask task{7, part, 64, &entry};
+        const Built built = build(*backend, task, scene);
+        voxels += built.summary.voxels;
+        interior += built.summary.interior;
+        disputed += built.summary.disputed;
+        const oracle::Region region = oracle::region_of(part, 7);
+        EXPECT_TRUE(voxels_of(built.dag, part, 7, region) ==
+                    voxels_of(whole.dag, Cube{}, 7, region));
+      }
+      EXPECT_EQ(voxels, whole.summary.voxels);
+      EXPECT_EQ(interior, whole.summary.interior);
+      EXPECT_EQ(disputed, whole.summary.disputed);
+    }
+  });
+}
+
+}  // namespace
+}  // namespace voxdag
