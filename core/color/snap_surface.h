@@ -13,7 +13,7 @@ inline void copy_appearance(const SurfaceTriangle& from, FixedSurface& to) {
   to.is_flipped = from.is_flipped;
 }
 
-// Sets `out` if the result is kInside, as snap_triangle() does.
+// Snaps a triangle and copies its appearance. Sets `out` only if the result is kInside.
 inline SnapResult snap_surface(const Grid& grid, const SurfaceTriangle& world, FixedSurface& out) {
   const SnapResult result = snap_triangle(grid, world.position, out.position);
   if (result == SnapResult::kInside) copy_appearance(world, out);

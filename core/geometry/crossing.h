@@ -4,7 +4,8 @@
 // Row points have even coordinates and vertices odd ones, so no row meets a vertex. Each point is
 // thought of as moved by (e, e^2, e^3), where e > 0 is infinitely small. Then no row meets an edge
 // and no point is on a triangle's plane: ties have an exact answer. If several triangles share an
-// edge, a row near the edge crosses the surface neither twice nor between them.
+// edge, a row through the edge crosses the surface as a row next to the edge would: it neither
+// crosses twice nor slips between the triangles.
 //
 // Let a be the axis of the row, (a, b, c) the axes in cyclic order, n the triangle's normal, u and
 // w the ends of an edge, v a vertex, and p a point:
@@ -47,9 +48,9 @@ inline constexpr int64_t kRowExtent = int64_t{1} << 20;
 //                      less than kRowExtent away from its first vertex along every axis
 //   128 bits           coordinates are at most kCoordinateLimit
 //
-// crosses() may be called with any row. first_beyond(), is_beyond() and crosses_leg() have a
-// meaning only for a row that the triangle crosses; with it, 64-bit PlaneInt allows first_beyond()
-// at any step.
+// crosses() may be called with any row. The results of first_beyond(), is_beyond() and
+// crosses_leg() have a meaning only for a row that the triangle crosses. For such a row, a 64-bit
+// PlaneInt is enough for first_beyond() with any step.
 template <class EdgeInt, class PlaneInt>
 class RowTest {
  public:
@@ -72,7 +73,8 @@ class RowTest {
 
   // True if the triangle crosses the row through p, whose coordinate along the axis is ignored.
   VOXDAG_HD bool crosses(const int64_t (&p)[3]) const { return crosses(p[b_], p[c_]); }
-  // The same for the row with the coordinates `at_b` and `at_c`, along the axes after `axis`.
+  // True if the triangle crosses the row with the coordinates `at_b` and `at_c` on the next two
+  // axes after `axis`.
   VOXDAG_HD bool crosses(int64_t at_b, int64_t at_c) const {
     if (sign_ == 0) return false;
     bool inside = true;
@@ -141,7 +143,7 @@ class RowTest {
   Edge edges_[3];
 };
 
-// The widths for triangles with the extents of a few tiles, for triangles in the grid, and for all
+// RowTest for triangles with the extents of a few tiles, for triangles in the grid, and for all
 // triangles.
 using NarrowRowTest = RowTest<int64_t, int64_t>;
 using GridRowTest = RowTest<int64_t, int128>;

@@ -44,7 +44,7 @@ double largest_extent(const WorldBounds& bounds) {
   return extent;
 }
 
-// Two numbers per vector register, available on every supported processor.
+// Two doubles in a vector register, which every supported processor has.
 using Pair = double __attribute__((vector_size(16)));
 
 // Returns floor(x) for |x| <= 2^51, and otherwise a number near x, which may have a fraction.

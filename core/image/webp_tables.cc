@@ -121,8 +121,8 @@ uint32_t read_cache_bits(BitReader& bits) {
 }
 uint32_t cache_size(uint32_t cache_bits) { return cache_bits > 0 ? 1u << cache_bits : 0; }
 
-// Reads the rest of a length or a distance. Throws BrokenStream if no such symbol exists, which a
-// code of one or two symbols does not exclude.
+// Reads the rest of a length or a distance. Throws BrokenStream for symbols that do not exist; a
+// code of one or two symbols can contain them.
 uint32_t read_copy_value(BitReader& bits, uint32_t symbol) {
   if (symbol >= kDistanceCodes) throw BrokenStream{};
   if (symbol < 4) return symbol + 1;

@@ -156,8 +156,8 @@ class BlockEncoder {
     normalize(next, axis);
     project(colors, count, axis, out);
     if (out.range > 0) return;
-    // The rounded axis is orthogonal to all differences of colors. Uses the channel with the
-    // largest variance as the axis instead.
+    // All colors have the same position, because the rounded axis is orthogonal to all differences
+    // of colors. Uses the channel with the largest variance as the axis instead.
     for (int c = 0; c < 3; ++c) axis[c] = c == widest;
     project(colors, count, axis, out);
   }

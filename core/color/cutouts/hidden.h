@@ -21,8 +21,8 @@ inline bool is_hidden(const Material& material, uint32_t texel_alpha) {
   return alpha_by_mode(material, scaled(texel_alpha, material.factor[3])) == 0;
 }
 
-// True if the material cuts out the complete triangle: with the largest alpha of its corners, even
-// opaque texels are hidden.
+// True if the material cuts out the complete triangle: even an opaque texel would be hidden at the
+// corner with the largest alpha.
 inline bool is_hidden(const Material& material, const FixedSurface& surface) {
   if (material.alpha_mode == AlphaMode::kOpaque) return false;
   uint32_t alpha = 0;

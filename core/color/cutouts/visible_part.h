@@ -32,9 +32,9 @@ class VisiblePart {
   // Returns kHidden or kVisible if the triangle is hidden or visible in all voxels of the cube that
   // it touches. kMixed means that this is not known.
   Sight sight(const Cube& cube) const;
-  // True if the triangle is visible in a voxel, which it must touch.
+  // True if the triangle is visible in a voxel. The triangle must touch the voxel.
   bool is_visible(const std::array<int64_t, 3>& voxel) const;
-  // True if the triangle is visible in a voxel of the cube, which it must touch.
+  // True if the triangle is visible in a voxel of the cube. The triangle must touch the cube.
   bool is_visible_in(const Cube& cube) const;
 
   const FixedTriangle& triangle() const { return triangle_; }

@@ -12,7 +12,7 @@
 
 namespace voxdag::color {
 
-// The class of AttributeSums for materials.
+// The class for materials in the list of attribute_sums.h.
 class MaterialSums {
  public:
   static constexpr Attribute kAttribute = Attribute::kMaterial;

@@ -40,7 +40,7 @@ VOXDAG_HD inline NormalCode normal_of_sum(const NormalSum& sum) {
   return (rest | turned) == 0 ? kNoNormal : encode_normal(v[0], v[1], v[2]);
 }
 
-// The class of AttributeSums for normals.
+// The class for normals in the list of attribute_sums.h.
 class NormalSums {
  public:
   static constexpr Attribute kAttribute = Attribute::kNormal;

@@ -178,8 +178,8 @@ class SurfaceLook {
   }
 
  private:
-  // Returns the color of the visible texels around a spot, in the finest level that has any, and
-  // their mean alpha.
+  // Returns the mean color of the visible texels around a spot, and the mean alpha of all texels
+  // around it. Uses the finest level that has visible texels there.
   VOXDAG_HD Texel visible_texel(const Spot& spot) {
     Texel texel = look_up(*view_, spot.texels);
     for (uint32_t level = level_ + 1;

@@ -90,8 +90,9 @@ class TouchedCells {
   // Updates first_, last_, highest_ and lowest_ from the previous column of cells in the row.
   VOXDAG_HD void climb() {
     if (t_.degenerate) return;
-    // The plane rises or falls by at most one cell, so one step of correct() is enough. This step
-    // is done without branches, which the CPU would often mispredict.
+    // From one column of cells to the next, the plane rises or falls by at most one cell, so one
+    // step of correct() is enough. The step has no branches, because the CPU would often mispredict
+    // them.
     const Int n = t_.normal[2];
     highest_ += t_.normal[1];
     lowest_ += t_.normal[1];

@@ -146,7 +146,7 @@ GlobalFileWriter::~GlobalFileWriter() {
   try {
     state_->files.remove(state_->partial_path);
   } catch (const Error&) {
-    // The next writer empties the remaining partial file.
+    // An error here is ignored: the next writer empties the remaining partial file.
   }
 }
 

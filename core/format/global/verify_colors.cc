@@ -37,8 +37,8 @@ class CellWalk {
              finest, visit);
   }
   // Returns the number of set cells of level `target` in a cube. If there are more than `limit`
-  // cells, stops early and returns a number above `limit`. Otherwise counting could take forever: a
-  // few nodes, shared often, can represent 8^20 cells.
+  // cells, stops early and returns a number above `limit`. Without the limit, counting could take
+  // forever: a few nodes, shared often, can represent 8^20 cells.
   uint64_t count(uint32_t level, uint64_t place, uint32_t target, uint64_t limit) const {
     if (level == target) return 1;
     uint64_t cells = 0;

@@ -143,9 +143,9 @@ struct OctantTest {
 
   Octants run(bool whole_cube_inside) {
     Octants out{box_test(), 0};
-    // The plane and edge tests would cost more than they save here. A triangle shorter than a child
-    // along two axes covers no child, and if its box touches two children, it most likely touches
-    // both.
+    // If so few children remain, the plane and edge tests would cost more than they save. A
+    // triangle shorter than a child along two axes covers no child, and if its box touches two
+    // children, it most likely touches both.
     if (!whole_cube_inside && kPopcount8[out.touched] <= (long_axes < 2 ? 2 : 1)) return out;
     set_normal();
     out.touched &= plane_test();
