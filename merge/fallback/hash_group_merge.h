@@ -10,8 +10,8 @@
 
 namespace voxdag {
 
-// Merges all rows of hash `hash`. The first unique row gets the position `first_position`. Uses at
-// most `bytes` of the budget.
+// Merges all rows whose hash is `hash`. The first unique row gets the position `first_position`.
+// Uses at most `bytes` of the budget.
 LevelExtent merge_hash_group(const MergeContext& context, const LevelTask& task, uint64_t hash,
                              uint64_t first_position, uint64_t bytes);
 

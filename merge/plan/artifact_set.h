@@ -22,8 +22,8 @@ struct SurveyedArtifact {
   // any two neighboring frames of it.
   uint64_t min_bytes = 0;
   uint64_t rows = 0;  // rows of all levels of the artifact
-  // Checksum of its roots and of the row counts of its levels, independent of its position in a
-  // file.
+  // Checksum of the artifact's roots and of its levels' row counts. Does not depend on the
+  // artifact's position in a file.
   uint64_t content_checksum = 0;
   std::vector<Cube> cubes;  // cubes of its roots
 };
