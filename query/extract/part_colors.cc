@@ -65,7 +65,8 @@ class ResidentPages {
  public:
   ResidentPages(const voxdag_reader::File& file, uint64_t limit_bytes, unsigned threads)
       : file_(file), limit_bytes_(limit_bytes), threads_(threads) {}
-  // Must be called for each node that is read. Calls check() often enough to keep the budget.
+  // Must be called for each node that is read. Calls check() often enough that the process remains
+  // within its budget.
   void visit() const {
     thread_local uint64_t visits_left = 0;
     if (visits_left-- == 0) visits_left = check();

@@ -125,7 +125,7 @@ uint64_t largest_square(double distance) {
 
 }  // namespace
 
-// The file, and tables that make queries faster but pay off only for many queries.
+// The file, and tables that make queries faster but are worth their cost only for many queries.
 struct DagFile::State {
   State(const std::string& path, uint64_t memory_bytes)
       : file(open_global_file(path)), view(*file), budget(memory_bytes) {}

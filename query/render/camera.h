@@ -18,7 +18,7 @@ class Camera {
  public:
   // `width` and `height` are the picture's size in pixels. Throws Error{kInvalidInput} if the eye
   // is at the target, if their distance exceeds the range of a double, or if the field of view is
-  // not more than 0 and less than 180 degrees.
+  // not between 0 and 180 degrees (exclusive).
   Camera(const Placement& placement, int width, int height);
 
   // Returns the ray through a point of the picture, in pixels from its upper left corner.

@@ -264,7 +264,7 @@ ExportReport write_vdb(const ExportJob& job) {
     }
     const uint64_t min_bytes = grid->tree().leafCount() * kVdbLeafBytes;
     return write_grid_file(job, voxels, min_bytes, [&](std::ostream& stream) {
-      // Writes without a codec, because some readers may lack it. Compression would gain little
+      // Does not compress, because some readers may lack the codec. Compression would gain little
       // for the grid of voxels, whose leaves consist of bits.
       openvdb::io::Stream out(stream);
       out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
