@@ -62,7 +62,7 @@ Neighborhood find_surfaces(TriangleSource& scene, const Grid& grid, const Sample
   return found;
 }
 
-// The rule's color of one cell.
+// Computes the color of one cell by voxdag's color rule.
 class RuleColors {
  public:
   RuleColors(const ColorGrid& grid, const TextureSet& textures, TextureReader& reader)

@@ -27,7 +27,7 @@ uint64_t count_colored(const voxdag_reader::File& file) {
   return cells;
 }
 
-// Calls the visitor for the cells of a level: cubes of bricks, bricks or nodes.
+// Calls `visit` for each set cell of a level: nodes, bricks, or octants or voxels of bricks.
 template <class Visit>
 struct CellVisitor {
   uint32_t level;  // of the cells

@@ -45,7 +45,8 @@ void look_up_bricks(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * wanted.size()));
 }
 
-// Node `n` has the four children n, n + 1, n + 2, n + 3 of the level below.
+// Measures lookups of nodes. Node `n` has the four children n, n + 1, n + 2, n + 3 of the level
+// below.
 void look_up_nodes(benchmark::State& state) {
   constexpr uint32_t kMask = 0x0f;
   constexpr int kChildren = 4;

@@ -42,7 +42,7 @@ uint64_t sum(const std::vector<uint8_t>& set) {
   return found;
 }
 
-// A cell of a coarser grid is set if the reader has a node there, or a voxel.
+// True if a cell is set: the file has a voxel at its position or, for a coarser grid, a node.
 bool reader_has(const voxdag_reader::File& file, uint32_t grid_levels, const Position& p) {
   if (grid_levels == file.grid_levels()) return file.voxel(p[0], p[1], p[2]);
   uint64_t offset = 0;

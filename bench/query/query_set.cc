@@ -11,8 +11,8 @@
 namespace voxdag::query {
 namespace {
 
-// Returns a set cell, found by choosing random children from the root down. So every region is
-// equally likely, independent of its number of cells.
+// Returns a set cell, found by choosing random children from the root down. So the set octants of a
+// node are equally likely, however many cells they contain.
 Position random_set_cell(const DagView& dag, uint32_t grid_levels, std::mt19937_64& random) {
   Position p{};
   uint64_t content = dag.root();
