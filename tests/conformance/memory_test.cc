@@ -92,7 +92,7 @@ TEST_P(Memory, SmallestCubeFitsWithAnyTriangles) {
   }
 }
 
-// The worst case of the smallest cube: 4096 bricks that are all different.
+// The smallest cube also fits in its worst case: 4096 bricks that are all different.
 TEST_P(Memory, SmallestCubeFitsWithAllBricksDifferent) {
   const SubvolumeTask task{20, {14, {16383, 0, 5000}}, 64};
   const oracle::Region region = oracle::region_of(task.cube, task.grid_levels);

@@ -24,9 +24,9 @@ TEST_F(Exhaustive, EveryVoxelOfABrick) {
   }
 }
 
-// Sets the same voxels in each octant of a mask, for many masks, in a build of eight subvolumes. So
-// the root, a node of the top tree, has different masks over equal children. A merge that ignored
-// masks would move voxels to other octants.
+// For many masks of octants, builds eight subvolumes with the same voxels in each octant of the
+// mask. So the root, a node of the top tree, has different masks over equal children. A merge that
+// ignored masks would move voxels to other octants.
 TEST_F(Exhaustive, EveryMaskOfTheTopTree) {
   for (int mask = 1; mask < 256; mask += mask < 32 ? 1 : 7) {
     SCOPED_TRACE(mask);

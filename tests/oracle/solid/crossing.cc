@@ -58,7 +58,7 @@ int side_of_plane(const Triangle& t, const Point& p) {
   return volume.sign();
 }
 
-// True if all vertices are on one side of p. No vertex has a coordinate of p.
+// True if all vertices are on the same side of p along `axis`. No vertex has p's coordinate.
 bool is_beside(const Triangle& t, const Point& p, int axis) {
   const bool above = t[0][axis] > p[axis];
   return (t[1][axis] > p[axis]) == above && (t[2][axis] > p[axis]) == above;

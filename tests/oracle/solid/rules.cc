@@ -12,7 +12,7 @@ namespace {
 
 using Cell = std::array<int, 3>;
 
-// A connected set of empty voxels, and its sample points: the sum of their views, and their number.
+// A connected set of empty voxels, the sum of view() over its sample points, and their number.
 struct Unit {
   std::vector<Cell> cells;
   int views = 0, points = 0;
@@ -134,7 +134,8 @@ class Filler {
     return cells;
   }
 
-  // Returns the sum of the views along the three axes, from a corner of voxels.
+  // Returns the sum of six views from a corner of voxels: a ray in each direction of each axis
+  // gives the winding number or, for kParity, 1 if it has an odd number of crossings.
   int view(const Cell& at) {
     const auto [known, is_new] = views_.try_emplace(at, 0);
     if (!is_new) return known->second;
@@ -156,8 +157,8 @@ class Filler {
     return known->second = sum;
   }
 
-  // Returns the view of a component without a corner: the view of the block's low corner, changed
-  // by the crossings on the way along z, y and x to the center of its first voxel.
+  // Returns view() for a component that touches no corner of the block: view() of the block's low
+  // corner, changed by the crossings on a path along z, y and x to the center of the voxel `first`.
   int view_of_blind(const Cell& low, const Cell& first) {
     Point p = {low[0] * kUnits, low[1] * kUnits, low[2] * kUnits};
     int change = 0, crossings = 0;

@@ -1,5 +1,5 @@
-// The voxels that each rule sets, by brute force: `thin` asks every row through a voxel's center,
-// the solid rules ask every sample row of the grid. For grids of 4 to 32 voxels per edge.
+// The voxels that each rule sets, by brute force: `thin` tests every row through a voxel's center,
+// and the solid rules test every sample row of the grid. For grids of 4 to 32 voxels per edge.
 #pragma once
 
 #include "tests/oracle/triangle.h"
@@ -15,8 +15,9 @@ enum class SolidRule { kWinding, kParity, kEnclosed };
 struct Solid {
   Voxels voxels;          // the shell and the interior
   uint64_t interior = 0;  // voxels that are not in the shell
-  // 0 for kEnclosed. Sample rows with a crossing, those whose signs do not sum to 0, those with an
-  // odd number of crossings, and interior voxels of units on which the directions disagree.
+  // Numbers of sample rows that have a crossing (rows), whose signs do not sum to 0 (open_rows),
+  // and that have an odd number of crossings (odd_rows). `disputed` counts the interior voxels of
+  // units whose views differ. All are 0 for kEnclosed.
   uint64_t rows = 0, open_rows = 0, odd_rows = 0, disputed = 0;
 };
 

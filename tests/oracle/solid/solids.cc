@@ -196,8 +196,8 @@ class SolidMaker {
     add_box(out, middle_low, high);
   }
 
-  // Adds tetrahedra with two opposite edges whose middles are corners, or centers, of voxels, or
-  // centers of their faces and edges.
+  // Adds tetrahedra. The midpoints of two opposite edges are corners or centers of voxels, or
+  // centers of voxels' faces or edges.
   void add_ties(Triangles& out) {
     for (int i = 0; i < 6; ++i) {
       std::array<Point, 4> p;
@@ -212,7 +212,7 @@ class SolidMaker {
       add_tetrahedron(out, p);
     }
   }
-  // Often the same few numbers, so that edges have slopes of 1 and -1.
+  // Returns an offset that is often one of few numbers, so that edges have slopes of 1 and -1.
   int64_t tie_offset() {
     const int64_t offset = random_.coin() ? size_ / 4 - 1 : random_.odd(1, size_ / 4);
     return random_.coin() ? offset : -offset;

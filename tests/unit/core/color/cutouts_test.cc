@@ -45,7 +45,8 @@ Cutouts cutouts_of(uint32_t width, uint32_t height, std::array<Wrap, 2> wrap,
   return cutouts;
 }
 
-// The triangle with these corners in voxels, and texture coordinates in images.
+// Returns the triangle with these corners, in voxels, and texture coordinates, where 1 is the size
+// of the image.
 FixedSurface surface_of(const double (&at)[3][3], const double (&texture)[3][2]) {
   FixedSurface surface;
   for (size_t i = 0; i < 3; ++i) {

@@ -111,7 +111,7 @@ bool is_on_plane(const Triangle& t, const Point& p) {
   return volume == 0;
 }
 
-// Rows through the small numbers of tiny triangles meet edges and planes all the time.
+// Coordinates are small numbers, so rows often pass exactly through edges and planes of triangles.
 TEST(Crossing, EqualsTheOracleForTies) {
   Random random(8);
   Counts counts;
@@ -167,7 +167,8 @@ int winding_at(const oracle::Triangles& mesh, const Point& p, int axis, int* tot
   return sum;
 }
 
-// On closed meshes, all rows sum to 0, and the three rows through a point agree, also in ties.
+// On closed meshes, the signs on each row sum to 0, and the three rows through a point give the
+// same winding number, also in ties.
 TEST(Crossing, ClosesClosedMeshes) {
   for (const oracle::SolidKind kind : oracle::kClosedSolids) {
     SCOPED_TRACE(oracle::kind_name(kind));
@@ -191,7 +192,7 @@ TEST(Crossing, ClosesClosedMeshes) {
   }
 }
 
-// Neither the first vertex nor a mirror image changes which rows are crossed.
+// Which rows a triangle crosses does not depend on its first vertex or on its orientation.
 TEST(Crossing, DependsOnOrientationOnlyInTheSign) {
   Random random(10);
   for (int i = 0; i < 20000; ++i) {

@@ -130,7 +130,7 @@ TEST(Png, EveryColorTypeOf8And16Bits) {
 TEST(Png, PaletteWithTransparency) {
   const std::string palette = png_chunk("PLTE", std::string("\xff\0\0\0\x80\0\x01\x02\x03", 9));
   const std::string alpha = png_chunk("tRNS", "\x10\x20");
-  // Two bits each: 0, 1, 2, 0.
+  // The four pixels have two bits each: 0, 1, 2, 0.
   const Decoded image = decode(png_file({4, 1, 2, 3, palette + alpha}, "\x18"));
   EXPECT_EQ(image.bits, 8);
   EXPECT_EQ(image.at(0, 0), (Pixel{255, 0, 0, 16}));
@@ -156,7 +156,7 @@ TEST(Png, TransparentColor) {
       {2, 1, 8, 2, png_chunk("tRNS", std::string("\0\1\0\2\0\3", 6))}, "\x01\x02\x03\x01\x02\x04"));
   EXPECT_EQ(rgb.at(0, 0), (Pixel{1, 2, 3, 0}));
   EXPECT_EQ(rgb.at(1, 0), (Pixel{1, 2, 4, 255}));
-  // One bit each: 1 is transparent white.
+  // The two pixels have one bit each. The first is 0, black; the second is 1, transparent white.
   const Decoded gray =
       decode(png_file({2, 1, 1, 0, png_chunk("tRNS", std::string("\0\1", 2))}, "\x40"));
   EXPECT_EQ(gray.at(0, 0), (Pixel{0, 0, 0, 255}));

@@ -41,8 +41,8 @@ TEST_F(CApiTest, Facts) {
   EXPECT_EQ(facts.origin[1], dag_.origin()[1]);
 }
 
-// A program may be compiled with a newer header, whose structs have additional members. Outputs in
-// them are set to 0, and inputs in them must be 0. A struct_size of 0 or SIZE_MAX is refused.
+// A program may be compiled with a newer header, whose structs have additional members. Additional
+// outputs are set to 0, and additional inputs must be 0. A struct_size of 0 or SIZE_MAX is refused.
 TEST_F(CApiTest, StructsOfOtherSizes) {
   EXPECT_STREQ(voxdag_version(), VOXDAG_VERSION);
   voxdag_facts facts{};

@@ -141,7 +141,8 @@ TEST_F(ExtractColors, OfLevels) {
   EXPECT_EQ(cut_, 0u);
 }
 
-// Extracts boxes that cut cells and color regions, with the complete grid and cropped.
+// Colors are right in extracts of boxes that cut cells and color regions, with the complete grid
+// and cropped.
 TEST_F(ExtractColors, OfRegions) {
   for (const auto& [levels, color_levels] : {std::pair{8u, 8u}, {9u, 7u}, {8u, 3u}}) {
     write(levels, color_levels);

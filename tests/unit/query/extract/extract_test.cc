@@ -31,7 +31,8 @@ Region any_region(oracle::Random& random, uint32_t levels) {
   return region;
 }
 
-// Extracts all levels, from the root brick to the level of the file, for several hash bits.
+// Extracts of all levels have the right bytes, from the root brick to the level of the file, for
+// several hash bits.
 TEST_F(Extract, Levels) {
   const oracle::Voxels voxels = random_voxels(1, 128);
   for (const uint32_t hash_bits : {64u, 4u}) {
@@ -51,7 +52,7 @@ TEST_F(Extract, Levels) {
   EXPECT_EQ(warnings_.texts, std::vector<std::string>());
 }
 
-// Extracts boxes at any position, with the complete grid and cropped.
+// Extracts of boxes at any position have the right bytes, with the complete grid and cropped.
 TEST_F(Extract, Regions) {
   const oracle::Voxels voxels = random_voxels(2, 64);
   write_global(path("in.vdag"), voxels);

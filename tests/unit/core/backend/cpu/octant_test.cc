@@ -27,8 +27,8 @@ void check(const Octants& octants, const oracle::Triangle& t, const oracle::Regi
   EXPECT_EQ(octants.inside & ~octants.touched, 0u);
 }
 
-// Cubes of every size, up to the largest grid. The octant test reports every touched child, and few
-// children that are not touched.
+// The octant test reports every touched child, and few children that are not touched, for cubes of
+// every size up to the largest grid.
 TEST(Octants, NoTouchedChildIsLeftOut) {
   oracle::Random random(4);
   Tally portable, avx2, wide;

@@ -85,7 +85,7 @@ TEST_F(Voxelize, TinyWindowsChangeNothing) {
   EXPECT_GT(first.size(), 500u);
 }
 
-// The brick list merges many small parts in which the same codes occur again.
+// The brick list combines bricks with equal codes, also from different parts that were added.
 TEST_F(Voxelize, BrickListMergesWhatComesAgain) {
   oracle::Random random(5);
   BrickList<HostSpace> list(space, 15);

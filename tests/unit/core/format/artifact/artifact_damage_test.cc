@@ -70,7 +70,7 @@ TEST(ArtifactDamageTest, EveryTruncationIsCaught) {
     EXPECT_THROW(read_all(small.bytes.substr(0, size), small.ref), Error) << size << " bytes";
 }
 
-// References to artifacts come from a damaged job store, so any field may have any value.
+// A reference to an artifact with any wrong field, as from a damaged job store, gives an error.
 TEST(ArtifactDamageTest, WildReferencesAreCaught) {
   const SmallSegment small;
   oracle::Random random(1);

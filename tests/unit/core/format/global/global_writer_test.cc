@@ -259,7 +259,7 @@ TEST_F(GlobalWriterTest, LevelsOverTheLimitAreRefused) {
   EXPECT_THAT(on_end.message(), HasSubstr("level 2"));
 }
 
-// Levels must be written in order from the bricks to the root, and all of them.
+// A file whose levels are out of order (from the bricks to the root) or incomplete is refused.
 TEST_F(GlobalWriterTest, LevelsOutOfTurnAreRefused) {
   GlobalFileWriter writer(system_files(), path_, grid_of(16), 64);
   EXPECT_THROW(writer.begin_level(1), Error);
