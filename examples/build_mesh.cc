@@ -60,8 +60,7 @@ int main(int argc, char** argv) {
                 static_cast<unsigned long long>(result.dag_nodes),
                 static_cast<unsigned long long>(result.bytes));
 
-    // There is no voxel at the hole in the middle, and there is one at the outermost point of the
-    // ring.
+    // The hole in the middle has no voxel, and the outermost point of the ring has one.
     const voxdag::query::DagFile dag(argv[1]);
     const std::vector<voxdag::query::Position> cells = {
         dag.world_to_cell({0, 0, 0}, dag.grid_levels()),
