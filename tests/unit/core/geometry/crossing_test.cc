@@ -192,7 +192,7 @@ TEST(Crossing, ClosesClosedMeshes) {
   }
 }
 
-// Which rows a triangle crosses does not depend on its first vertex or on its orientation.
+// The rows that a triangle crosses depend neither on its first vertex nor on its orientation.
 TEST(Crossing, DependsOnOrientationOnlyInTheSign) {
   Random random(10);
   for (int i = 0; i < 20000; ++i) {
