@@ -17,8 +17,9 @@ struct SelectionOptions {
   std::optional<uint64_t> level, resolution;
 
   void declare(Command& command);
-  // Returns the selected cells of `file`. Throws Error{kInvalidInput} if the grid is finer than the
-  // file's grid or coarser than 4 cells per edge, or if the region contains no cell of the grid.
+  // Returns the selected cells of `file`. The grid may not be finer than the file's grid or coarser
+  // than 4 cells per edge, and the region must contain a cell. Otherwise throws
+  // Error{kInvalidInput}.
   query::Selection selection(const voxdag_reader::File& file) const;
 };
 

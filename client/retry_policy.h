@@ -24,9 +24,9 @@ class RetryPolicy {
   double waited_s_ = 0, pause_s_ = kFirstPauseS;
 };
 
-// If the response has the status of a busy server (408, 429, 502 to 504), returns the number of
-// seconds to wait before the next request: the value of the header Retry-After, or 0 without this
-// header. Returns -1 for any other status, because a retry would give the same answer.
+// If the status means that the server is busy (408, 429, 502 to 504), returns the number of seconds
+// to wait before the next request: the value of the header Retry-After, or 0 without this header.
+// Returns -1 for any other status, because a retry would give the same answer.
 double retry_after_s(const ClientResponse& response);
 
 // Sleeps. Throws Error{kCanceled} within about 50 ms of a cancellation.

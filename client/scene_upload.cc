@@ -87,11 +87,11 @@ class Upload {
     return false;
   }
 
-  // Sends the missing bytes in parts, one request each, so that a crash of the server loses at most
-  // one part. The first part is small, because a server that rejects the scene can still answer
-  // after a small part, but closes the connection within a large one. If no bytes are missing, an
-  // empty part finishes the upload. Returns true if the upload is complete; false if a retry is
-  // needed, whose reason is then in failure_.
+  // Sends the missing bytes in parts, one request each. So a crash of the server loses at most one
+  // part. The first part is small: a server that rejects the scene can answer after a small part,
+  // but closes the connection within a large one. If no bytes are missing, an empty part finishes
+  // the upload. Returns true if the upload is complete. Otherwise a retry is needed for the reason
+  // in failure_.
   bool send_rest() {
     progress_.begin_stage("upload", size_, "bytes");
     progress_.resume_at(offset_);

@@ -7,10 +7,10 @@
 
 namespace voxdag {
 
-// Returns a text from the file for use in a message. Quotes, control characters (below U+0020, and
-// U+007F to U+009F, which terminals also obey) and bytes that are not UTF-8 become question marks,
-// so that the text cannot forge a line of a log. A text of over `max_bytes` is cut and ends with
-// "...".
+// Returns a text from the file for use in a message. Quotes, control characters and bytes that are
+// not UTF-8 become question marks, so that the text cannot forge a line of a log. Control
+// characters are below U+0020, or from U+007F to U+009F, because terminals also obey these. A text
+// of over `max_bytes` is cut and ends with "...".
 std::string printable(std::string_view text, size_t max_bytes = 64);
 
 // Returns the message of an exception of the JSON library without its prefix "[json.exception...]

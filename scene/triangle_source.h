@@ -38,7 +38,7 @@ class TriangleCursor {
   // read() throws an Error that names the scene file and the node, mesh, primitive, accessor or
   // face. So all visited vertices are finite. Increasing ranges are the fastest to read.
   virtual void read(uint64_t first, uint64_t count, const Visitor& visit) = 0;
-  // Like read(), but with each vertex snapped to `grid`.
+  // Like read(), but the vertices are snapped to `grid`.
   virtual void read_snapped(uint64_t first, uint64_t count, const Grid& grid, const Visitor& visit);
   // Like read(), but each triangle has its material, texture coordinates and colors. The default
   // implementation makes all triangles white, with material 0.

@@ -27,9 +27,9 @@ class ServiceOptions {
   std::string url_, token_file_, ca_file_;
 };
 
-// Like add_command(), for a client command. `State` has a member `service` of the type
-// ServiceOptions. The function to define is run(state, client, context); `client` is connected to
-// the server that the options name.
+// Adds a client command, as add_command() adds other commands. `State` has a member `service` of
+// the type ServiceOptions. The caller's file must define run(state, client, context). `client` is
+// connected to the server that the options name.
 template <class State>
 State& add_service_command(CommandLine& line, const char* name, const char* description) {
   Command command = line.add(name, description);

@@ -1,8 +1,7 @@
-// Scenes generated from a seed. They can have any size, are streamed to a .glb in a few MB of
-// memory, and have the same bytes on every machine. For this purpose, the generators use only
-// integers, + - * / and sqrt of IEEE doubles (compiled without fused multiply-add) and their own
-// random numbers, never the math library. docs/generate.md describes the kinds; tests pin a digest
-// of each.
+// Scenes generated from a seed. They can have any size, and are streamed to a .glb in a few MB of
+// memory. They have the same bytes on every machine, because the generators use only integers,
+// their own random numbers, and + - * / and sqrt of IEEE doubles, compiled without fused
+// multiply-add. docs/generate.md describes the kinds. Tests compare each kind with a stored digest.
 #pragma once
 
 #include <cstdint>

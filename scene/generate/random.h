@@ -1,6 +1,6 @@
 // Random numbers for generated scenes: splitmix64, which is the same everywhere (std::
-// distributions are not). Each object of a scene has its own generator, made from the seed and the
-// object's coordinates, so that objects do not depend on each other's number of draws.
+// distributions are not). Each object of a scene has its own generator, whose seed includes the
+// object's coordinates. So the numbers of an object do not depend on other objects.
 //
 // Never draw twice among the arguments of one call: the order of their evaluation is unspecified.
 // (Within braces the order is fixed.)

@@ -12,7 +12,7 @@
 
 namespace voxdag {
 
-// Receives blocks in the order of the file.
+// Receives the blocks of a scene in the order in which the file stores them.
 class BlockSink {
  public:
   virtual ~BlockSink() = default;

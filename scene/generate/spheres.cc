@@ -64,7 +64,7 @@ void make_spheres(const GenerateOptions& options, SceneBuilder& scene) {
   uint64_t made = 0;
   for (uint64_t i = 0; made < options.triangles || i == 0; ++i) {
     Random random(options.seed, {i});
-    // Each size is twice as frequent as the next larger one; the largest is drawn once in 127
+    // Each size is twice as frequent as the next larger size. The largest size is drawn once in 127
     // draws.
     const uint32_t draw = random.below((1u << kSizes) - 1) + 1;
     uint32_t size = 0;

@@ -20,7 +20,8 @@ class BlockCache {
   // The caches of all readers together take at most 1/kShareOfFree of the free budget.
   static constexpr uint64_t kShareOfFree = 8;
 
-  // Makes one of `readers` caches that divide this share equally, for `count` elements.
+  // Makes one of `readers` caches for `count` elements. They divide 1/kShareOfFree of the free
+  // budget.
   BlockCache(MemoryBudget& budget, uint64_t count, unsigned readers, std::string_view what)
       : count_(count) {
     constexpr uint64_t kBlockBytes = kBlockSize * sizeof(Value);

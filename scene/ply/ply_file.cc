@@ -52,7 +52,8 @@ StripReader PlyFile::open_strips(MemoryBudget& budget) const {
 }
 
 // Reads all elements up to the last one that the layout uses. If a row is not exactly one line,
-// reads all elements, because the file is then valid only if no text follows the last element.
+// also reads the other elements, to check that no text follows the last one. Only then is the file
+// valid.
 void PlyFile::pass_over_elements(MemoryBudget& budget, const CancelToken& cancel) {
   uint64_t begin = header_.data_begin;
   for (size_t i = 0; i < header_.elements.size(); ++i) {

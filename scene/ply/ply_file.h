@@ -32,9 +32,9 @@ class PlyFile {
   // Number of vertices, faces or triangles of strips between two recorded positions.
   static constexpr uint64_t kBlockRows = 1024;
 
-  // Throws Error{kInvalidInput} with the line, element or row of the damage, Error{kLimit} for more
-  // than 2^32 - 2 vertices, Error{kOutOfMemory} if the list of recorded rows does not fit the
-  // budget.
+  // Throws Error{kInvalidInput} with the line, element or row of the damage. Throws Error{kLimit}
+  // for more than 2^32 - 2 vertices, and Error{kOutOfMemory} if the list of recorded rows does not
+  // fit the budget.
   PlyFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
   // A block of kBlockRows faces.

@@ -1,8 +1,8 @@
 // The common data of a PLY file's colors and textures: color scales, materials and texture files.
 //
-// A triangle is textured if a texture file is named and can be opened, and if its face, or else its
-// vertices, have texture coordinates. Other triangles have the colors of their vertices or, if the
-// vertices have none, of their face.
+// A triangle is textured if the file names a texture that can be opened, and its face or its
+// vertices have texture coordinates (the face's are preferred). Other triangles have the colors of
+// their vertices or, if the vertices have none, of their face.
 #pragma once
 
 #include <cmath>

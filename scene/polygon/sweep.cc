@@ -74,7 +74,8 @@ bool Sweep::add(uint32_t corner) {
   return add_between(corner, below, comes_from_left);
 }
 
-// Adds a corner with both edges to the right of it. `below` is the number of lower edges below it.
+// Adds a corner whose two edges are to the right. `below` is the number of lower edges below the
+// corner.
 bool Sweep::add_left_end(uint32_t corner, size_t below) {
   const bool divides_area =
       orientation(corners_[previous(corner)], corners_[corner], corners_[next(corner)]) < 0;
@@ -87,7 +88,7 @@ bool Sweep::add_left_end(uint32_t corner, size_t below) {
   return true;
 }
 
-// Adds a corner with both edges to the left of it.
+// Adds a corner whose two edges are to the left. `below` is as in add_left_end().
 bool Sweep::add_right_end(uint32_t corner, size_t below) {
   if (below == edges_.size() || edges_[below].from != previous(corner)) return false;
   connect(below, corner, true);

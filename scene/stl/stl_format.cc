@@ -33,7 +33,8 @@ std::string next_keyword(std::string_view& text) {
 }
 
 // True if the text begins with "solid", and the next line that is not blank begins with "facet",
-// "endsolid" or "color" or does not exist. The rest of the first line is a name.
+// "endsolid" or "color". Also true if no such next line exists. The rest of the first line is a
+// name.
 bool is_ascii(std::string_view text) {
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   if (next_keyword(text) != "solid") return false;

@@ -19,7 +19,7 @@ namespace voxdag {
 Cutouts find_cutouts(FileSystem& files, const SceneMaterials& materials, unsigned threads,
                      MemoryBudget& budget, const CancelToken& cancel, WarningList& problems);
 
-// True if any material may cut out triangles or parts of them, judging by the alpha modes alone.
+// True if the alpha mode of a material allows it to cut out triangles or parts of triangles.
 bool may_have_cutouts(const SceneMaterials& materials);
 
 // Returns a digest of everything that decides which parts of a scene's triangles are cut out.

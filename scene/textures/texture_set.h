@@ -80,8 +80,8 @@ class TextureSet {
 uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
                        const CancelToken& cancel);
 
-// Returns the SHA-256 of each image's stored bytes, as lower-case hex digits. If an image cannot be
-// read to its end, or this program has no decoder for its format, returns a text that is never such
+// Returns the SHA-256 of each image's stored bytes, as lower-case hex digits. For an image that
+// cannot be read to its end, or whose format has no decoder here, returns a text that is never such
 // a digest. Reads all images, but decodes none. Throws the same errors as TextureSet::prepare().
 std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
                                        unsigned threads, const CancelToken& cancel);

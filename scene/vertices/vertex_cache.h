@@ -25,8 +25,8 @@ class VertexCache {
   // memory budget.
   static constexpr uint64_t kShareOfFree = 4;
 
-  // Makes one of `caches` caches that divide this share equally. It has space for `vertices`
-  // vertices, or for fewer if its part of the share is smaller.
+  // Makes one of `caches` caches that divide 1/kShareOfFree of the free bytes equally. It has space
+  // for `vertices` vertices, or for fewer if its part is smaller.
   VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches);
 
   // Clears the cache and changes to `source`, which must outlive its use. place() must be called

@@ -18,8 +18,8 @@ class RecordCollector {
   RecordCollector(ClusterContext& cluster, BatchTable& batches)
       : cluster_(cluster), batches_(batches) {}
 
-  // Reads the cluster folder: records built batches in `batches`, stores the errors of failed
-  // attempts in their batches, and removes the files of attempts whose batches are no longer open.
+  // Reads the cluster folder. Records built batches in `batches`, and stores the errors of failed
+  // attempts in their batches. Removes the files of attempts whose batches are no longer open.
   void collect();
   // Removes batch files that belong to no open batch.
   void remove_unused_batches();

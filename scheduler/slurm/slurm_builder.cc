@@ -36,8 +36,8 @@ class SlurmBuilder : public ClusterBuilder {
   // written since then are accepted.
   void resume(const std::string& scene_digest) override;
   // Cuts the triangles of `planned` into batches. Then waits until all batches are built, unless a
-  // merge job will be submitted that waits for them. Throws Error with the reason of the last
-  // failure if a batch has failed too often; other tasks continue to run.
+  // merge job will wait for them. Throws Error with the reason of the last failure if a batch has
+  // failed too often; other tasks continue to run.
   void build(PreparedScene& scene, std::span<const StoredSubvolume> planned) override;
   void add_to(BuildReport& report) const override;
   std::string submit_merge_job() override;

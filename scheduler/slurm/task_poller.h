@@ -20,10 +20,10 @@ class TaskPoller {
 
   // Forgets earlier failures. If a task of an earlier run fails, its failure is not counted.
   void begin_run();
-  // Queries Slurm once for all tasks, then submits batches without a task. An attempt has failed if
-  // Slurm no longer lists its task and, after a grace period for the shared file system, its batch
-  // has no record. Throws Error with the reason of the last failure if a batch has failed too
-  // often; other tasks continue to run.
+  // Queries Slurm once for all tasks, then submits batches without a task. If Slurm no longer lists
+  // a task, its batch must have a record after a grace period for the shared file system; otherwise
+  // the attempt has failed. Throws Error with the reason of the last failure if a batch has failed
+  // too often. Other tasks then continue to run.
   void poll();
   // Calls poll() if there are open batches. Then submits the merge job, which starts when all tasks
   // have ended, and returns its id. Returns "" if Slurm does not accept the job now. Also returns

@@ -71,7 +71,7 @@ struct ClusterOptions {
   double slurm_start_s = 15;
   // Options of the merge job (MergeJob). Without them this process merges.
   struct MergeJobOptions {
-    // This program's arguments. The merge job runs the same build with them.
+    // This program's arguments. The merge job gets the same arguments, so it runs the same build.
     std::vector<std::string> arguments;
     std::string folder;  // the merge job's working directory
     std::vector<std::string> submit_options;

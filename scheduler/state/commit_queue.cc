@@ -22,8 +22,8 @@ void CommitQueue::commit() {
 }
 
 void CommitQueue::finish() {
-  // Commits now if bins must be released, because bins are released only after a commit, and the
-  // triangle store is not used after this call.
+  // If bins must be released, commits now: bins are released only after a commit, and finish() is
+  // the last use of the triangle store.
   if (!next_group_.bins.empty()) commit();
   wait();
   segment_->complete();

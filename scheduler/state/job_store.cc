@@ -10,9 +10,9 @@
 namespace voxdag {
 namespace {
 
-// SQLite has no page checksums. So every row that determines the result has a checksum, and the
-// job's row has the number of subvolumes, so that a missing subvolume is noticed. Rows of other
-// kinds can be missing; their contents are computed again.
+// SQLite has no page checksums. So every row that determines the result has a checksum. The job's
+// row also has the number of subvolumes, which shows if a subvolume is missing. Rows of other kinds
+// can be missing; their contents are computed again.
 template <class Record>
 struct Sealed {
   Record record;

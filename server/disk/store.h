@@ -19,10 +19,10 @@ struct StoreFormat {
   const char* upgrade = nullptr;
 };
 
-// Opens a database, creating or upgrading its tables. Throws Error{kInvalidInput} if it is not a
-// database of this kind, or if it is new and `may_create` is false. (If the folders already have
+// Opens a database. Creates or upgrades its tables. Throws Error{kInvalidInput} for a database of
+// another kind, and for a new database unless `may_create` is true. (If the folders already have
 // files, a lost database may have listed them, so no new one may be created.) Throws
-// Error{kUnsupportedVersion} unless its version is format.version, or the previous version and
+// Error{kUnsupportedVersion} unless the version is format.version, or the previous version and
 // format.upgrade is not null.
 SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool may_create);
 

@@ -15,8 +15,8 @@ namespace {
 
 constexpr size_t kMaxNameBytes = 128;
 
-// In the table `upload`, `total` is -1 while the size of the scene is unknown, and `sha256` is ""
-// until publish() is called for the complete upload.
+// In the table `upload`, `total` is -1 while the size of the scene is unknown. `sha256` is "" until
+// publish() is called for the complete upload.
 constexpr const char* kSceneSchema = R"sql(
 CREATE TABLE scene (
   name TEXT PRIMARY KEY, size INTEGER NOT NULL, sha256 TEXT NOT NULL, modified_s REAL NOT NULL

@@ -91,7 +91,7 @@ class SceneStore {
   std::string part_path(const std::string& name) const { return folder_ + "/parts/" + name; }
   std::string marked_path(const std::string& name) const { return path(name) + kDeleted; }
   void record(const std::string& name, const UploadState& state);
-  // Records the digest of a finished upload, then renames it to its final path.
+  // Records the digest of a finished upload, then renames the upload's file to its final path.
   void publish(const std::string& name, uint64_t size, const std::string& sha256);
   // Finishes an interrupted publish() call. Throws Error{kCorrupt} if bytes of the scene are
   // missing.

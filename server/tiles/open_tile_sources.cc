@@ -17,8 +17,8 @@ std::shared_ptr<const FileTileSource> OpenTileSources::open(const std::string& p
   // for this file's disk.
   auto file = std::make_shared<const FileTileSource>(path, identity, manifests_);
   const std::lock_guard lock(mutex_);
-  // If another request has opened the same file in the meantime, uses the object of that request,
-  // so that the manifest is computed and the blocks are verified only once.
+  // If another request has opened the same file in the meantime, uses that request's object. So the
+  // manifest is computed, and the blocks are verified, only once.
   if (const auto found = find(path, identity); found != entries_.end()) return found->file;
   entries_.remove_if([&](const Entry& e) { return e.path == path; });
   entries_.push_front({path, file, wall_seconds()});

@@ -1,7 +1,7 @@
 // Keeps the files that viewers requested last open, so that a request need not open and check them
 // again. A file that was removed or replaced is closed by the next request for it, by close(), or
-// by close_stale(), which the owner must call periodically. A file with an unreadable part is
-// opened again. Manifests remain in memory longer than files remain open. Thread-safe.
+// by close_stale(). The owner must call close_stale() periodically. A file with an unreadable part
+// is opened again. Manifests remain in memory longer than files remain open. Thread-safe.
 #pragma once
 
 #include <list>

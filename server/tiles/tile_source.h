@@ -34,9 +34,9 @@ class TileSource {
   virtual const std::string& digest() const = 0;
   // Returns the data that a viewer needs to begin, as JSON (docs/api.md).
   virtual const std::string& manifest(const CancelToken& cancel) const = 0;
-  // Throws Error{kIo} if, at any time since the file was opened, a part of it could not be read
-  // because the file was truncated or its disk failed. Results that were computed after such a
-  // failure are wrong.
+  // Throws Error{kIo} if a part of the file could not be read at any time since the file was
+  // opened, because the file was truncated or its disk failed. Results that were computed after
+  // such a failure are wrong.
   virtual void expect_readable() const {}
   // True if the file was changed after it was opened. The bytes read from it may then mix both
   // versions.

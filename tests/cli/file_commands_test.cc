@@ -234,7 +234,7 @@ TEST_F(FileCommands, StatusNames) {
   expect_error(3, "none.work", {"status", "none.work"});
 }
 
-// The same seed generates the same bytes, another seed different ones.
+// The same seed generates the same bytes, and another seed generates different bytes.
 TEST_F(FileCommands, GenerateIsSeeded) {
   const auto make = [&](const std::string& kind, const std::string& seed) {
     const Json json = run_json({"generate", kind, "g.glb", "--seed", seed, "--triangles", "500"});

@@ -99,8 +99,8 @@ TEST_P(DamageTest, FirstPageOfThePartialFile) {
   EXPECT_TRUE(expect_healed_or_refused());
 }
 
-// Like BitsFlippedBetweenTwoRuns, but only for the job store, and many times, because SQLite does
-// not store checksums of its pages.
+// One bit flips in the job store while the build is stopped, as in BitsFlippedBetweenTwoRuns. This
+// is tested many times, because SQLite does not store checksums of its pages.
 TEST_P(DamageTest, BitsFlippedInTheJobStore) {
   const uint64_t operations = operations_of_a_build();
   std::mt19937_64 random(3);

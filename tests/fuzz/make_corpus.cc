@@ -76,8 +76,8 @@ void add_text_scenes(const Corpus& corpus) {
   corpus.add("stl_file", "trailing_bytes", '\2' + header + little_endian(1) + facets);
 }
 
-// Adds the index of an artifact without the rest of the file, and frames with the prefix of five
-// bytes that the target artifact_frame expects.
+// Adds the index of an artifact without the rest of the file. Adds frames with the five bytes that
+// the target artifact_frame expects before them.
 void add_artifacts(const Corpus& corpus) {
   TemporaryFolder folder;
   constexpr uint32_t kGridLevels = 6, kHashBits = 64;

@@ -63,7 +63,7 @@ class InterruptedUpload : public RunningService {
   std::string offset(const std::string& name) {
     return http_->head("/api/v1/scenes/" + name).header("Upload-Offset");
   }
-  // Begins an upload of `size` bytes, and sends `bytes` of them. Returns the socket.
+  // Begins an upload that declares `size` bytes, and sends only `bytes`. Returns the socket.
   int begin_upload(const std::string& name, uint64_t size, const std::string& bytes) {
     const int socket = raw_connect(port());
     const std::string head =

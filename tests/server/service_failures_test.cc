@@ -272,7 +272,7 @@ TEST_F(ServiceFailures, AnUploadWhosePartIsLostStartsOver) {
   EXPECT_EQ(part(0, bytes.size()).status, 201);
 }
 
-// One client cannot take all permits. Other clients are served.
+// One client cannot take all permits, so other clients are served.
 TEST_F(ServiceFailures, LimitsOfOneClient) {
   config_.transfers.max_per_client = 1;
   start();

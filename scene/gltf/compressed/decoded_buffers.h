@@ -32,8 +32,8 @@ class DecodedBuffers {
                  MemoryBudget& budget);
 
   // Reads bytes [offset, offset + out.size()) of the decoded contents of buffer `buffer`, which
-  // must contain them. Throws Error{kInvalidInput} if the compressed data do not decode to these
-  // bytes, {kOutOfMemory} if decoding does not fit the budget, {kNoSpace} if the decoded bytes do
+  // must contain them. Throws Error{kInvalidInput} for compressed data that do not decode to these
+  // bytes, {kOutOfMemory} if decoding does not fit the budget, and {kNoSpace} if the result does
   // not fit the disk.
   void read(int buffer, uint64_t offset, std::span<std::byte> out, const ReadFile& read_file);
 

@@ -84,7 +84,7 @@ T without_zigzag(T value) {
   return static_cast<T>(value & 1 ? ~(value >> 1) : value >> 1);
 }
 
-// Adds the deltas of one channel to its four bytes, which hold the values of the previous element.
+// Applies the deltas of one channel to `element`, the channel's bytes in the previous element.
 void add_deltas(unsigned mode, const std::array<uint8_t, 4>& delta, uint8_t* element) {
   const auto pair = [](const uint8_t* bytes) {
     return static_cast<uint16_t>(bytes[0] | bytes[1] << 8);

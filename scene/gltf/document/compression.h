@@ -99,9 +99,9 @@ void place_draco_primitive(Document& document, Primitive& primitive, const std::
 // Adds a buffer for the accessors of the primitive's surface, if place_draco_primitive() placed its
 // positions. `set` is the n of the surface's TEXCOORD_n, if it has one.
 void place_draco_surface(Document& document, Primitive& primitive, int set);
-// Checks a view of a buffer made by one of the functions above. Throws Error{kInvalidInput} if its
-// compressed bytes do not exist or decode to another layout, or if voxdag was built without the
-// library that decodes them. `where` names the view.
+// Checks a view of a buffer that one of the functions above added. `where` names the view. Throws
+// Error{kInvalidInput} if its compressed bytes do not exist or decode to another layout. Also
+// throws it if voxdag was built without the library that decodes them.
 void check_compressed(const Document& document, const BufferView& view, const std::string& where);
 
 }  // namespace voxdag::gltf

@@ -5,9 +5,9 @@
 
 namespace voxdag::gltf {
 
-// Links the nodes to their parents and sets the roots of the scene to draw. Afterwards the nodes
-// that can be reached from the roots form trees, each drawn node is reached once, and
-// `document.above_roots` has the transforms of roots that have a parent.
+// Links the nodes to their parents, and sets the roots of the scene to draw. Afterwards each drawn
+// node can be reached from exactly one root, by one path. `document.above_roots` then has the
+// transforms of roots that have a parent.
 //
 // A node that the scene lists twice, or together with an ancestor, is drawn once, with a warning. A
 // listed node with a parent keeps the transforms of all its ancestors. Throws Error{kInvalidInput}

@@ -13,9 +13,10 @@
 namespace voxdag::gltf {
 
 struct DocumentMaterials {
-  // First the file's materials, in the file's order. Then, in the order of their first use, one
-  // white material for primitives without material, and copies of the file's materials without
-  // image, for primitives without texture coordinates. Material::image is an index into `images`.
+  // The file's materials in the file's order, then additional materials in the order of their first
+  // use. These are one white material for primitives without a material, and copies of materials
+  // without their image for primitives without texture coordinates. Material::image is an index
+  // into `images`.
   std::vector<Material> materials;
   std::vector<TextureTransform> transforms;  // transform of each material's texture coordinates
   std::vector<int> images;                   // indices of used images in the model

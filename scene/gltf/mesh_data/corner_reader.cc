@@ -18,7 +18,7 @@ void CornerReader::read(uint64_t first, size_t count, uint32_t* corners) {
   if (mode_ == kTriangleList) return read_indices(3 * first, 3 * count, corners);
   row_.resize(count + 2);
   read_indices(first, count + 2, row_.data());
-  // Every triangle of a fan shares the first vertex.
+  // The first vertex of a fan belongs to each of its triangles, but may not be in row_.
   uint32_t hub = row_[0];
   if (mode_ == kTriangleFan) read_indices(0, 1, &hub);
   for (size_t i = 0; i < count; ++i) {

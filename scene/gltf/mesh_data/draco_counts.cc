@@ -54,8 +54,8 @@ bool contradicts(const DracoHeader& header, uint64_t vertices) {
   return vertices < header.vertices || vertices > 3 * header.faces;
 }
 
-// True if a strip may declare part.corners for this number of faces. It also counts the degenerate
-// triangles that join its pieces, but these are not faces.
+// True if a strip with this number of faces may declare part.corners. The strip also counts the
+// degenerate triangles that join its pieces, but these are not faces.
 bool fits_strip(const DracoPart& part, uint64_t faces) {
   const uint64_t triangles = part.corners / 3;
   return part.is_strip && faces <= triangles && triangles <= kMaxStripTrianglesPerFace * faces;

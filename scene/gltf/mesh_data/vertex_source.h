@@ -20,10 +20,10 @@
 
 namespace voxdag::gltf {
 
-// Returns the matrices of a skin's joints at rest: global transform of the joint times inverse bind
-// matrix. The transform of the skinned node itself is not used (glTF 2.0, section 3.7.3.3). Throws
-// Error{kInvalidInput} for an inverse bind matrix that is not affine, Error{kOutOfMemory} with the
-// skin if its joints do not fit the budget of `buffers`.
+// Returns the matrices of a skin's joints at rest. A matrix is the joint's global transform times
+// its inverse bind matrix; the transform of the skinned node has no effect (glTF 2.0, section
+// 3.7.3.3). Throws Error{kInvalidInput} for an inverse bind matrix that is not affine, and
+// Error{kOutOfMemory} with the skin's name if its joints do not fit the budget of `buffers`.
 PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buffers, int skin);
 
 class VertexSource : public PositionSource {

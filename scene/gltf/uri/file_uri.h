@@ -1,5 +1,5 @@
-// Opens the files that a scene names by URIs (RFC 3986), also in the forms that other programs
-// write although RFC 3986 does not allow them.
+// Opens the files that a scene names by URIs (RFC 3986). Also accepts names that other programs
+// write, although RFC 3986 does not allow them.
 #pragma once
 
 #include <memory>

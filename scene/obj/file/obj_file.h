@@ -1,5 +1,5 @@
-// An open OBJ file after one pass over it: the number of its vertices, texture coordinates, faces
-// and triangles, the places of every n-th of them (block_index.h), and the names of its materials
+// An open OBJ file after one pass over it. It has the numbers of vertices, texture coordinates,
+// faces and triangles, the places of every n-th of them (block_index.h), and the names of materials
 // and libraries. A face of n corners has n - 2 triangles (scene/polygon); a face with fewer than
 // three corners has none. If there are faces of more than three corners, a second pass finds the
 // blocks of faces with concave polygons.

@@ -24,8 +24,8 @@ StatementReader::StatementReader(const ObjFile& obj, Kind kind, MemoryBudget& bu
       lines_(obj.file(), budget, LineReader::Join::kBackslash),
       next_(count_) {}
 
-// Moves to the statement `first` or before it. Continues from the current one, unless `first` is
-// earlier or in a later block.
+// Moves to the statement `first`, or to an earlier one in the same block. Continues from the
+// current statement, unless `first` is before it or in a later block.
 void StatementReader::seek(uint64_t first) {
   const auto& index = kind_ == Kind::kVertex ? obj_.vertex_index() : obj_.texcoord_index();
   const uint64_t block = index.block_begin(first);

@@ -34,9 +34,9 @@ class Rows {
   static constexpr uint64_t kMaxEntries = 32768;
 
   virtual ~Rows() = default;
-  // Reads the row at `offset` and returns the offset after it. `row` is its number, for messages.
-  // Throws Error{kInvalidInput} with element and row if the row is invalid or ends past the file,
-  // Error{kLimit} if a requested list is too long.
+  // Reads the row at `offset` and returns the offset after it. `row` is the row's number, for
+  // messages. Throws Error{kInvalidInput} with element and row if the row is invalid or ends past
+  // the file. Throws Error{kLimit} if a requested list is too long.
   virtual uint64_t read(uint64_t row, uint64_t offset) = 0;
 
   // Return the requested values of the last row. An index that is negative or needs more than 32

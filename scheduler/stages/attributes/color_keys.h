@@ -18,7 +18,7 @@
 
 namespace voxdag {
 
-// Set of images. Image i is bit i modulo the set's size (256), so in a scene with more images,
+// Set of images. Image i is bit i modulo 256, the set's size. So in a scene with more images,
 // adding one image also adds all images with the same bit.
 using ImageClasses = std::bitset<256>;
 

@@ -13,8 +13,8 @@
 namespace voxdag {
 namespace {
 
-// Memory of a surface: the surface, a copy for its region, and, in the lists of up to 14 nested
-// cubes, its index and the mask of the children that it touches.
+// Memory of a surface: the surface, and a copy for its region. Up to 14 nested cubes also list its
+// index and the mask of the children that it touches.
 constexpr uint64_t kSurfaceBytes =
     2 * sizeof(FixedSurface) + 14 * (sizeof(uint32_t) + sizeof(uint8_t));
 // Bytes of records that are collected for a child cube before they go to the store.

@@ -23,9 +23,9 @@ struct BackendChoice {
 void check_backend(const RunOptions& options);
 
 // Returns the backend for options that passed check_backend() and whose memory_bytes is set. `auto`
-// uses the GPUs if there are any, the budget is large enough for them, and each builds a few
-// subvolumes exactly like the CPU backend. Otherwise it uses the CPU, with a warning if there is a
-// GPU.
+// uses the GPUs if the budget is large enough for them, and if each GPU builds a few test
+// subvolumes exactly like the CPU backend. Otherwise it uses the CPU, with a warning if the machine
+// has a GPU.
 BackendChoice choose_backend(const RunOptions& options, Progress& progress);
 
 // The machine's GPUs. Tests pass simulated GPUs.

@@ -1,7 +1,7 @@
 // Builds subvolumes on worker threads. Each worker repeatedly takes the heaviest remaining
-// subvolume, builds it with its own backend, appends the artifact to its own segment file and
-// passes it to its CommitQueue. If a subvolume needs more memory than the worker's share, the
-// worker splits it into octants, which are queued in its place.
+// subvolume and builds it with its own backend. It appends the artifact to its own segment file and
+// passes it to its CommitQueue. A worker splits a subvolume that needs more memory than its share
+// into octants, which are queued instead.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
-// The dense top tree. It stores for every cell of a coarse level the number of triangles that touch
-// the cell, and the cell's share of their expected work. These counters decide which cubes of the
-// grid become subvolumes. Threads fill separate tallies, which are added to the tree serially.
+// The dense top tree. For every cell of a coarse level it counts the triangles that touch the cell,
+// and sums the cell's share of their expected work. These counters decide which cubes of the grid
+// become subvolumes. Threads fill separate tallies, which are added to the tree one after another.
 #pragma once
 
 #include <array>
@@ -18,10 +18,10 @@
 
 namespace voxdag {
 
-// Expected number of voxels and bricks that a triangle touches. The number of bricks is the volume,
-// in bricks, of the Minkowski sum of the triangle and a brick: area * (|nx| + |ny| + |nz|) + the
-// extents along the axes + 1, where n is the unit normal, and lengths are in bricks. The number of
-// voxels is the same sum with lengths in voxels.
+// Expected number of voxels and bricks that a triangle touches. The number of bricks is the volume
+// of the Minkowski sum of the triangle and a brick: area * (|nx| + |ny| + |nz|) + the extents along
+// the axes + 1. Here n is the unit normal, and lengths are in bricks. The number of voxels is the
+// same sum with lengths in voxels.
 struct ExpectedWork {
   double voxels, bricks;
 };

@@ -30,8 +30,8 @@ class CubeTree {
     if (hint.inside.contains(triangle)) return visit(hint.leaf);
     int32_t node = 0;
     Cube cube = root_;
-    // A triangle inside a cube touches no other cube of that level, so the descent to the smallest
-    // cube around the triangle needs no overlap test.
+    // A triangle inside a cube touches no other cube of the same level. So no overlap test is
+    // needed down to the smallest cube around the triangle.
     const CellBox box(triangle, grid_levels_, deepest_);
     if (const Cube around = box.is_inside_grid() ? box.cube_around() : Cube{};
         contains(root_, around))

@@ -14,10 +14,10 @@ namespace voxdag {
 namespace {
 
 // The growth of a DAG is the factor by which its number of nodes increases when R doubles. The
-// growth's excess over kLateGrowth is multiplied by kGrowthDecay with each doubling. Measured from
-// R = 8192 up: Sponza's growth falls from 2.72 to 2.52 at 524288, the dragon's from 3.17 to 2.75 at
-// 32768 and to 2.65 on average up to 262144. At coarser resolutions the growth falls and rises
-// again while triangles become larger than bricks, so pilots must be fine.
+// growth's excess over kLateGrowth is multiplied by kGrowthDecay with each doubling. Measured
+// growth: Sponza 2.72 at R = 8192, 2.52 at 524288; the dragon 3.17 at 8192, 2.75 at 32768, and 2.65
+// on average up to 262144. At coarser resolutions the growth falls and rises again while triangles
+// become larger than bricks, so pilots must be fine.
 constexpr double kLateGrowth = 2.5;
 constexpr double kGrowthDecay = 0.75;
 // Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
@@ -118,9 +118,9 @@ std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot
   return pilots;
 }
 
-// Extrapolates a count that grows as a R^2 + b R by a number of doublings of R from the finer pilot
-// (halvings if negative). `coarse` and `fine` are the counts of the two pilots, which determine a
-// and b.
+// Extrapolates a count that grows as a R^2 + b R. `coarse` and `fine` are the counts of the two
+// pilots, which determine a and b. `doublings` is the number of doublings of R from the finer
+// pilot, negative for halvings.
 double grow_as_surface(double coarse, double fine, int doublings) {
   const double ratio = std::exp2(doublings);
   const double square = 2 * (fine - 2 * coarse),
@@ -169,9 +169,9 @@ void add_colors(const ColorEstimate& colors, Estimate& estimate) {
 // actual size.
 double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
                       BuildScene& source, const StageContext& context) {
-  // If a triangle touches A + E + 1 cubes (A is computed from its area and E from its extents, see
-  // expected_work()), it touches about A/4 + E/2 + 1 cubes of twice the edge. So over all levels it
-  // touches at most twice its bricks, plus one cube per level.
+  // A triangle touches about A + E + 1 cubes, where A follows from its area and E from its extents
+  // (see expected_work()). So it touches about A/4 + E/2 + 1 cubes of twice the edge. The sum over
+  // all levels is at most twice the number of its bricks, plus one cube per level.
   double bricks = 0;
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.state.counts.triangles);

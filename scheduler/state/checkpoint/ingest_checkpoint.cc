@@ -22,8 +22,8 @@ constexpr int64_t kCoarseTickNs = 2 * kSecondNs;
 // of each cube that the triangle touches.
 constexpr double kDurableCopies = 2.2;
 // Triangles that fit in memory get checkpoints only if the free disk space is at least this many
-// times the size of their records in the file: once for the records, and once for the rest of the
-// build.
+// times the size of their records in the file. The records need this size once, and the rest of the
+// build as much again.
 constexpr double kFreePerCopy = 2;
 
 std::string request_of(const BuildSpec& spec) {

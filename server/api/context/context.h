@@ -42,10 +42,10 @@ struct Context {
   PartialViews partial{files, 16};
   // Canceled when the service stops.
   CancelToken stopping = {};
-  // Protects the scenes of jobs. While a job is added or retried, the request holds this mutex from
-  // the check that the job's scenes exist to the change of the queue. While a scene is replaced or
-  // removed, the request holds it from the check that no job uses the scene to the change of the
-  // store. So no scene disappears between the check and the change of the queue.
+  // Protects the scenes of jobs. A request that adds or retries a job holds this mutex while it
+  // checks that the job's scenes exist and changes the queue. A request that replaces or removes a
+  // scene holds it while it checks that no job uses the scene and changes the store. So no scene
+  // disappears between the check and the change of the queue.
   std::mutex scene_mutex = {};
   // Scenes that dry runs are reading, guarded by scene_mutex. These scenes must not be removed.
   // They may be replaced, because a reader keeps the old file open.

@@ -25,9 +25,9 @@ class Router {
 
   void add(Route route, Handler handler);
   void add(Route route, PlainHandler handler);
-  // Calls the handler of the request's route. Throws Problem: 404 for an unknown path, 405 with
-  // Allow for a wrong method, 400 for an unknown query parameter, and the problems of `access` and
-  // the handler.
+  // Calls the handler of the request's route. Throws Problem: 404 for an unknown path, 405 with the
+  // header Allow for a wrong method, 400 for an unknown query parameter. Also throws the problems
+  // of `access` and of the handler.
   Response route(Request& request, AccessControl& access) const;
 
   std::vector<Route> routes() const;

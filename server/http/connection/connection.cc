@@ -152,8 +152,8 @@ void Connection::allow_large_send_buffer() {
 #endif
 }
 
-// poll() is used instead of a read, because unread bytes may precede the end of the stream, such as
-// the last bytes of a TLS session.
+// Uses poll() instead of a read. Unread bytes, such as the last bytes of a TLS session, may precede
+// the end of the stream, and a read would stop at them.
 bool Connection::peer_disconnected() const {
   pollfd peer{socket_, POLLRDHUP, 0};
   return poll(&peer, 1, 0) > 0;

@@ -44,8 +44,8 @@ class Connection {
   void allow_large_send_buffer();
   // True if the client has closed the connection. Consumes no bytes.
   bool peer_disconnected() const;
-  // Closes the sending side and discards further bytes of the client for up to a second, so that a
-  // reset does not destroy the last answer.
+  // Closes the sending side, then discards the client's bytes for up to a second. Without this, a
+  // reset could destroy the last answer.
   void linger();
 
   // Returns the next bytes, at least one unless in an error state. Valid until the next call.

@@ -25,9 +25,9 @@ struct RangeAnswer {
   std::vector<ByteRange> ranges;  // for kPart, in the requested order
 };
 
-// Resolves a Range header for contents of `size` > 0 bytes. Ignores a header that is malformed, has
-// a unit other than bytes, or requests more than 16 ranges or more than `size` bytes in total.
-// Drops ranges outside the contents; if no range remains, the result is kUnsatisfiable.
+// Resolves a Range header for contents of `size` > 0 bytes. Ignores a malformed header, units other
+// than bytes, and a header that requests more than 16 ranges or more than `size` bytes in total.
+// Drops ranges outside the contents. If no range remains, the result is kUnsatisfiable.
 RangeAnswer parse_ranges(std::string_view header, uint64_t size);
 
 // Parses the Content-Range of an upload, "bytes FIRST-LAST/TOTAL". Returns false unless it is

@@ -1,7 +1,6 @@
 // The head of an HTTP/1.1 request (RFC 9112): request line and header fields. The parser is strict.
-// It refuses text that two parsers could interpret differently (a folded line, a blank before a
-// colon, a lone LF, two lengths), because a proxy in front of the service may interpret the text
-// the other way.
+// It refuses text that a proxy in front of the service could interpret differently: a folded line,
+// a blank before a colon, a lone LF, two lengths.
 #pragma once
 
 #include <cstdint>

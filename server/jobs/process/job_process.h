@@ -2,9 +2,10 @@
 // FOLDER/task.json, builds with run_build(), reports by messages on standard output
 // (job_messages.h), and logs as text on standard error.
 //
-// No message or log line contains a folder of this machine. For this, the process works in FOLDER
-// and uses file names relative to it. It opens an uploaded scene by its public name, a symbolic
-// link in FOLDER, and a scene below a scene root by the path that the client gave.
+// No message or log line contains a folder of this machine. For this purpose, the process works in
+// FOLDER and uses file names relative to it. It opens an uploaded scene by the scene's public name,
+// which is a symbolic link in FOLDER. It opens a scene below a scene root by the path that the
+// client gave.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // The messages from a job's process to the service. Each line of the process's standard output is
-// one message: a JSON object. The JSON object has the name of the message as its member "message",
-// and one member for each member of the message's struct, with the same name.
+// one message, a JSON object. Its member "message" is the name of the message. Its other members
+// are the members of the message's struct.
 //
 //   {"message":"stage_advanced","done":12,"total":64}
 //

@@ -118,8 +118,8 @@ uint64_t PartialDag::add_words(uint32_t level, std::vector<uint32_t> words) {
   if (offset + words.size() > kMaxWords)
     throw Error(ErrorCode::kLimit,
                 "the built subvolumes have more nodes than pointers can address");
-  // The words are appended before their offset is recorded in known_, so that every recorded offset
-  // has its words, even if a later step throws.
+  // The words are appended before their offset is recorded in known_. So every recorded offset has
+  // its words, even if a later step throws.
   all.insert(all.end(), words.begin(), words.end());
   word_count_ += words.size();
   known_[level].emplace(std::move(words), offset);

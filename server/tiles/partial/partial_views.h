@@ -17,7 +17,7 @@ class PartialViews {
       : files_(files), max_jobs_(max_jobs), max_words_(max_words) {}
 
   // Returns the built subvolumes as JSON (docs/api.md). Throws Error{kNotFound} if the subvolumes
-  // are not planned yet or the folder is removed during the call, RequestError{kBusy} if all
+  // are not planned yet or the folder is removed during the call. Throws RequestError{kBusy} if all
   // remembered jobs were requested in the last seconds, and the errors of CoarseCubes::refresh().
   std::string json(const std::string& job, const JobFolder& folder, uint64_t resolution);
   // Returns the built subvolumes as the tiles of a DAG of the job's grid. Throws like json().

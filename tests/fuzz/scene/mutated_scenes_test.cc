@@ -15,7 +15,7 @@
 namespace voxdag::test {
 namespace {
 
-// A mutation may declare a huge number of instances. The test does not read all of them.
+// A mutation may declare a huge number of instances. Scenes with more triangles are not read.
 constexpr uint64_t kMaxTriangles = 200000;
 
 // Truncates the file, or changes one to eight bytes: to a random byte, to a digit, or to another

@@ -34,7 +34,7 @@ inline SceneBuilder rich_scene() {
   return scene;
 }
 
-// The same scene with materials, images, colors and texture coordinates.
+// Returns rich_scene() with materials, images, colors and texture coordinates.
 inline SceneBuilder rich_painted_scene() {
   SceneBuilder scene = rich_scene();
   Json& primitives = scene.root["meshes"][0]["primitives"];

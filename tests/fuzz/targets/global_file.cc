@@ -1,7 +1,7 @@
 // Global files: the reader, lookups, colors, rays, tiles and the verifier. The input is the
-// beginning of the header page, with the attribute table only if attributes are counted, and then
-// the bytes after this page. Feature bits, sizes, checksums and the checksum table are corrected,
-// so that a mutation reaches the code behind them.
+// beginning of the header page, then the bytes after this page. The beginning ends before the
+// attribute table if the header counts no attributes, and otherwise after it. Feature bits, sizes,
+// checksums and the checksum table are corrected, so that a mutation reaches the code behind them.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -29,7 +29,8 @@ namespace {
 namespace layout = global_layout;
 constexpr uint64_t kMaxVisits = 4096;
 constexpr uint64_t kBudgetBytes = uint64_t{16} << 20;
-// A level with more words than this is wide. Files of this size have no wide levels otherwise.
+// Minimum words of a wide level, so that small files can have wide levels. Real files need many
+// more.
 constexpr uint64_t kNarrowWords = 2;
 
 void put(std::vector<std::byte>& file, size_t at, uint64_t value) {
@@ -79,7 +80,7 @@ std::vector<std::byte> make_file(std::span<const std::byte> input) {
   return file;
 }
 
-// A file without a name, for a reader that opens paths.
+// A file in memory for a reader that opens paths. The file has no name in any folder.
 class NamelessFile {
  public:
   explicit NamelessFile(std::span<const std::byte> bytes) : fd_(memfd_create("fuzz", MFD_CLOEXEC)) {

@@ -318,7 +318,7 @@ TEST(GltfMemory, ArraysAreCharged) {
   }
 }
 
-// One element with a large array is charged while it is read.
+// The array within one element is charged while it is read, so a large one can exceed the budget.
 TEST(GltfMemory, ElementsAreCharged) {
   for (const char* section : {R"("nodes":[{"children":[)", R"("scenes":[{"nodes":[)",
                               R"("skins":[{"joints":[)", R"("meshes":[{"primitives":[)"}) {

@@ -31,9 +31,8 @@ TEST(Ply, TriangleInEveryFormatAndLineEnding) {
       EXPECT_EQ(triangles_of_file(plain_triangle(format, line_end)), std::vector<Corners>{kLower});
 }
 
-// Properties are in another order and of other types, other elements come before and between the
-// needed ones, and lists of any width come before and after the indices. Doubles keep all their
-// digits.
+// Properties may have another order and other types. Other elements may come before and between the
+// needed ones, and lists of any width before and after the indices. Doubles keep all their digits.
 TEST(Ply, OtherElementsAndPropertiesAreSkipped) {
   for (const PlyFormat format : kFormats) {
     PlyWriter ply(format);

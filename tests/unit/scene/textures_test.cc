@@ -66,8 +66,8 @@ struct Textures {
 
 uint64_t channel(uint64_t texel, int c) { return texel >> 16 * c & 0xffff; }
 
-// In an image whose sizes are odd, every texel of every level is the mean over the texel's area,
-// both in memory and in pages of the scratch file.
+// In an image of odd width and height, every texel of every level is the mean over the texel's
+// area. This holds in memory and in pages of the scratch file.
 TEST(Textures, PyramidOfOddSizes) {
   const uint32_t width = 67, height = 45;
   const std::string glb = textured(png_of(width, height, noise(4 * width * height))).glb();

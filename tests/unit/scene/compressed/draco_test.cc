@@ -213,8 +213,8 @@ TEST(GltfDraco, SkinsAreCompressed) {
   EXPECT_EQ(triangles_of_file(compressed.glb()), triangles_of_file(plain.glb()));
 }
 
-// The triangles of a strip are the faces in the Draco data, and some repetitions of the last face,
-// because the data do not have the triangles that join two strips.
+// The triangles of a strip are the faces in the Draco data. The data lack the triangles that join
+// two strips, so the last face is repeated for each of them.
 TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   SceneBuilder scene = compressed_scene(data, 25, 4 * 10 + 3 * 2);

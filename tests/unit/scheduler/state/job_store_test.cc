@@ -94,8 +94,8 @@ TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   EXPECT_TRUE(leaves[2].summary.empty());
 }
 
-// Other processes see a subvolume that is built only in memory as planned. A subvolume marked for
-// rebuild is planned again for all.
+// Other processes see a subvolume that is built only in memory as planned. For all processes, a
+// subvolume that is marked for rebuild is planned again.
 TEST_F(JobStoreTest, BuiltInMemoryIsKnownToTheWriterOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(3));

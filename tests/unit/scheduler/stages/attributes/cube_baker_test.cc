@@ -68,7 +68,8 @@ class CubeBaking : public testing::Test {
       EXPECT_EQ(&records, &last);
       const size_t most = append();
       EXPECT_GE(most, CubeBaker::kManyRecordBytes);
-      // A region has at most 600 KiB of normals.
+      // Records are taken at kManyRecordBytes. One more region has at most 600 KiB of normals.
+      // normals.
       EXPECT_LE(most, CubeBaker::kManyRecordBytes + (610 << 10));
       ++baked.parts;
     });

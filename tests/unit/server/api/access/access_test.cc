@@ -135,7 +135,7 @@ TEST(ConcurrencyLimiterTest, ReleasesPermits) {
   EXPECT_TRUE(limiter.acquire("b"));
 }
 
-// One client cannot take all permits.
+// One client cannot take all permits: each client has its own limit.
 TEST(ConcurrencyLimits, EachClientHasALimitOfItsOwn) {
   ConcurrencyLimiter limiter(3, 2);
   const auto first = limiter.acquire("a");

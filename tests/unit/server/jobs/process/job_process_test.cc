@@ -116,7 +116,7 @@ TEST_F(JobProcess, BuildsAndReportsItsResult) {
   EXPECT_NE(contents(job_.subvolumes()).find("\"built\":1,\"total\":1"), std::string::npos)
       << contents(job_.subvolumes());
   EXPECT_FALSE(std::filesystem::exists(job_.work()));
-  // As if the service was killed before it received the result, runs the finished job again.
+  // Runs the finished job again, as if the service had been killed before it received the result.
   const Run again = run();
   EXPECT_EQ(again.exit_status, 0) << again.log;
   EXPECT_EQ(again.output.substr(again.output.rfind("{\"json\"")),
