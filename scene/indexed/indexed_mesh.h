@@ -1,6 +1,5 @@
-// Reads a mesh with vertex indices from a scene file, for one thread. IndexedCursor does all that
-// formats have in common, so that a format implements only the reading of its files. Not
-// thread-safe.
+// Reads a mesh with vertex indices from a scene file, for one thread. A format implements only the
+// reading of its files; IndexedCursor has the code that all formats share. Not thread-safe.
 #pragma once
 
 #include <cstdint>

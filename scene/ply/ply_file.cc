@@ -150,8 +150,8 @@ void PlyFile::check_end(uint64_t offset, MemoryBudget& budget) const {
   if (!word.empty()) refuse("has " + printable(word) + " after its last row");
 }
 
-// Clears has_splits in blocks whose faces are all fans. Warns about faces that are doubtful
-// (triangulator.h).
+// Clears has_splits in blocks whose faces are all fans. Warns about faces whose edges cross each
+// other.
 void PlyFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
   if (std::ranges::none_of(face_blocks_, [](const FaceBlock& block) { return block.has_splits; }))
     return;

@@ -32,9 +32,9 @@ void RowIndex::set_columns(std::string_view first_row, const std::string& names)
   }
 }
 
-// Sets full_color_ from the first rows. If the columns have no names, the last three of six are
-// only assumed to be colors. If one of these rows has a number there that is not a color, they are
-// not used.
+// Sets full_color_ from the first rows. In six columns without names, the last three are only
+// assumed to be colors. If the first rows have a number there that cannot be a color, the file has
+// no colors.
 void RowIndex::check_colors(RowReader& rows) {
   double low = 0, high = 0;
   bool has_fraction = false;

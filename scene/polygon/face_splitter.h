@@ -37,7 +37,8 @@ class FaceSplitter {
     is_doubtful_ = triangulator_.is_doubtful();
     return is_split ? triangulator_.triangles() : std::span<const uint32_t>();
   }
-  // True if the last face was doubtful (triangulator.h).
+  // True if the last face is only read as a fan because its edges cross each other
+  // (triangulator.h).
   bool is_doubtful() const { return is_doubtful_; }
 
  private:

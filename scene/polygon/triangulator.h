@@ -59,7 +59,7 @@ class Triangulator {
 
   // The triangles, three numbers of corners each.
   std::span<const uint32_t> triangles() const { return triangles_; }
-  // True if the last polygon was doubtful.
+  // True if the last polygon was doubtful: its edges cross, or a triangle would be clockwise.
   bool is_doubtful() const { return is_doubtful_; }
 
  private:

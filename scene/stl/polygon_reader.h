@@ -39,7 +39,7 @@ class PolygonReader {
   size_t triangles() const { return vertices_.size() < 3 ? 0 : vertices_.size() - 2; }
   // Returns vertex k of a triangle.
   const std::array<double, 3>& vertex(size_t triangle, size_t k) const;
-  // True if the polygon is doubtful (Triangulator).
+  // True if the polygon is only read as a fan because its edges cross each other (triangulator.h).
   bool is_doubtful() const { return vertices_.size() > 3 && triangulator_.is_doubtful(); }
   // Return the place of the first vertex.
   uint64_t offset() const { return offset_; }

@@ -160,7 +160,7 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
   }
 }
 
-// Tasks that are still running may add files at any time. In this case the folder remains.
+// Running tasks may add files at any time. Then the folder remains.
 void WorkFolder::remove_cluster_files() {
   if (!files_.exists(cluster_path())) return;
   for (const DirectoryEntry& entry : files_.list(cluster_path())) {

@@ -55,7 +55,7 @@ void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
   const bool stopped = asked && (error.code == "canceled" || !live.failure());
   if (!stopped) job.error = error;
   if (job.state == JobState::kCanceling) return finish(job, JobState::kCanceled, now_s);
-  // The job was suspended, and perhaps already resumed.
+  // A client has suspended the job, and perhaps resumed it since. Its state is kept.
   if (job.state != JobState::kRunning) return;
   if (stopped || error.code == "canceled") {
     job.state = JobState::kQueued;

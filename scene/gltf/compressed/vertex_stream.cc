@@ -16,7 +16,7 @@ constexpr size_t kGroup = 16;  // elements whose deltas have the same number of 
 constexpr size_t kMinTailBytes = 24;
 constexpr uint8_t kHeader = 0xa1;
 
-// How the deltas of one byte of the elements are stored in a block.
+// Forms in which a block stores the deltas of one byte of its elements.
 enum Control : unsigned { kFewBits, kMoreBits, kZeros, kLiteral };
 
 using Block = std::array<uint8_t, kMaxBlockBytes>;

@@ -15,7 +15,7 @@ namespace voxdag::gltf {
 // invariant.
 void check_document(Document& document);
 
-// A use of an accessor, which determines the accessor's type.
+// One use of an accessor: its name for messages, and the types that it requires.
 struct AccessorUse {
   std::string where;                        // "mesh 0: primitive 2: POSITION"
   int components;                           // 3 for VEC3

@@ -21,7 +21,7 @@ struct BufferView;
 struct Document;
 struct Primitive;
 
-// Bytes of a buffer stored in the file.
+// A range of bytes in a buffer that the file stores.
 struct CompressedBytes {
   int buffer = -1;
   uint64_t byte_offset = 0;

@@ -13,8 +13,8 @@ constexpr size_t kWindowBytes = size_t{64} << 10;
 // Number of characters of a string that always reach the parser: enough for every name and every
 // path.
 constexpr uint64_t kMaxShownCharacters = 4096;
-// The parser stores a string twice (raw and decoded), in buffers that grow by doubling, and passes
-// a copy.
+// Memory per character of a string: the parser stores the string twice, raw and decoded, in buffers
+// that grow by doubling, and passes a copy.
 constexpr uint64_t kCopies = 6;
 constexpr uint64_t kMaxWordCharacters = 1024;  // max length of a number or literal
 
@@ -164,7 +164,7 @@ size_t JsonWindow::non_finite_length() const {
 }
 
 // True if the parser does not receive the character. Escapes and multi-byte characters always reach
-// the parser, because it would refuse an incomplete one.
+// the parser, because it would refuse a part of them.
 bool JsonWindow::is_withheld(char c) {
   if (!in_string_) return is_second_blank_;
   if (string_.characters.size <= kMaxShownCharacters || in_escape_ || !is_plain(c)) return false;

@@ -10,10 +10,10 @@
 
 namespace voxdag::gltf {
 
-// Returns the paths that `uri` may mean, relative to the folder of the scene file, the most likely
-// one first: the percent-decoded name, then the name with slashes in place of backslashes, without
-// its query ("?...") and fragment ("#..."), or not decoded. Throws Error{kInvalidInput}, beginning
-// with `where`, for a uri that is empty, absolute or has a scheme.
+// Returns the paths that `uri` may mean, relative to the folder of the scene file. The most likely
+// path comes first: the percent-decoded name. Further paths have slashes instead of backslashes,
+// lack the query ("?...") and the fragment ("#..."), or are not decoded. Throws
+// Error{kInvalidInput}, beginning with `where`, for a uri that is empty, absolute or has a scheme.
 std::vector<std::string> candidate_paths(const std::string& uri, const std::string& where);
 
 // Opens the first of these files that can be opened. If none can, throws the error for the

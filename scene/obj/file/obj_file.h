@@ -50,7 +50,7 @@ class ObjFile {
   const BlockIndex<LinePlace>& vertex_index() const { return vertex_index_; }
   const BlockIndex<LinePlace>& texcoord_index() const { return texcoord_index_; }
   const BlockIndex<FacePlace>& face_index() const { return face_index_; }
-  // True if a face is not a fan.
+  // True if some faces have other triangles than their fan.
   bool has_splits() const { return has_splits_; }
   // True if a vertex has a color.
   bool has_colors() const { return has_colors_; }

@@ -6,7 +6,8 @@
 namespace voxdag::obj {
 namespace {
 
-// An option of a map statement, which takes numbers or one word.
+// An option of a map statement, which takes numbers or one word. The lookup is the lookup of a
+// texel.
 struct MapOption {
   std::string_view name;
   size_t max_numbers;             // 0: the option takes a word
@@ -26,7 +27,7 @@ const MapOption* option_named(std::string_view word) {
   return found == std::end(kMapOptions) ? nullptr : found;
 }
 
-// True if numbers of the options -t or -mm change the lookup.
+// True if these numbers of the option -t or -mm change the lookup.
 bool changes_lookup(std::string_view option, const double* numbers, size_t count) {
   if (option == "-t") return std::any_of(numbers, numbers + count, [](double n) { return n != 0; });
   if (option == "-mm") return count > 0 && (numbers[0] != 0 || (count > 1 && numbers[1] != 1));

@@ -53,8 +53,8 @@ uint32_t as_index(T value) {
 // integer, such as "3.0".
 std::optional<int64_t> parse_whole_number(std::string_view text);
 
-// Returns the number of type `type` that the complete text denotes, as parse_whole_number() or
-// parse_real() read it, or nullopt.
+// Parses the complete text as a number of type `type`, with parse_whole_number() or parse_real().
+// Returns nullopt if the text is not such a number.
 std::optional<double> parse_number(std::string_view text, Type type);
 
 }  // namespace voxdag::ply

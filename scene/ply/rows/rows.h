@@ -45,8 +45,8 @@ class Rows {
   std::span<const double> reals() const { return {reals_.data(), real_count_}; }
   std::span<const double> numbers() const { return numbers_; }
 
-  // Returns the first row that is not exactly one line of an ASCII file, for messages. "" if there
-  // is none.
+  // Returns the first row that is not exactly one line of an ASCII file, for messages; "" if all
+  // rows are lines.
   const std::string& first_irregular() const { return first_irregular_; }
 
  protected:

@@ -23,7 +23,7 @@ constexpr double kGrowthDecay = 0.75;
 // Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
 constexpr double kSpreadPerDoubling = 1.12;
 // Bytes of the global file per node. A pilot's file has fewer, because coarse levels repeat more.
-// Each doubling of R multiplies the bytes per node by kBytesGrowthPerDoubling, up to
+// So its number is multiplied by kBytesGrowthPerDoubling with each doubling of R, up to
 // kMaxBytesPerNode.
 constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;

@@ -125,7 +125,7 @@ TEST(GltfBuffers, UrisOfOtherPrograms) {
         << uri;
 }
 
-// A file whose name has the URI's "?b" is preferred to a file without it, and named in the error.
+// A file with the URI's exact name is preferred. If no file exists, the error has the exact name.
 TEST(GltfBuffers, TheExactNameComesFirst) {
   const SceneBuilder scene = one_triangle();
   EXPECT_EQ(triangles_among({{"folder/scene", scene.gltf("a.bin?b")},

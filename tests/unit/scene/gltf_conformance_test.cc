@@ -208,7 +208,7 @@ TEST_F(GltfConformance, Manifest) {
   EXPECT_EQ(refused, 18u);
 }
 
-// A file without scenes draws its root nodes: the mesh of the other files of the set.
+// A file without scenes draws its root nodes, which have the mesh of the set's other files.
 TEST_F(GltfConformance, WithoutScenes) {
   Opened opened(kScenes / "conformance" / "c22_no_scene.glb");
   expect_same_triangles(triangles_of(*opened.source),

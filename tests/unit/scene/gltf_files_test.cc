@@ -296,8 +296,8 @@ std::string repeated(const std::string& text, size_t count) {
   return all;
 }
 
-// Every array whose length the file determines is charged. Earlier, JSON of a few megabytes took
-// many times its size in memory without a charge.
+// Every array whose length the file determines is charged. Otherwise JSON of a few megabytes could
+// take many times its size in memory without a charge.
 TEST(GltfMemory, ArraysAreCharged) {
   const std::pair<const char*, const char*> arrays[] = {
       {"buffers", R"({"byteLength":1})"},
@@ -351,7 +351,8 @@ TEST(GltfMemory, SkippedStringsAreNotCharged) {
   EXPECT_EQ(open.triangles().size(), 1u);
 }
 
-// The matrices of a skin with hundreds of thousands of joints are charged. Earlier they were not.
+// The matrices of a skin with hundreds of thousands of joints are charged, so they exceed the
+// budget.
 TEST(GltfMemory, JointMatricesAreCharged) {
   SceneBuilder scene = one_triangle();
   Json& attributes = scene.root["meshes"][0]["primitives"][0]["attributes"];

@@ -69,7 +69,6 @@ class CubeBaking : public testing::Test {
       const size_t most = append();
       EXPECT_GE(most, CubeBaker::kManyRecordBytes);
       // Records are taken at kManyRecordBytes. One more region has at most 600 KiB of normals.
-      // normals.
       EXPECT_LE(most, CubeBaker::kManyRecordBytes + (610 << 10));
       ++baked.parts;
     });
