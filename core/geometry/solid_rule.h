@@ -1,7 +1,7 @@
 // The rules that decide which empty voxels are inside a surface (docs/solid.md).
 //
-// All rules decide per unit, a connected set of empty voxels. Let B be the edge of a block, 8
-// voxels or less in a tiny grid. The units are
+// All rules decide per unit, a connected set of empty voxels. Let B be the edge of a block: 8
+// voxels, or 4 in a grid with an edge of 4 voxels. The units are
 //
 //   1. the maximal empty cubes of the octree with an edge of at least B;
 //   2. in every aligned block of B^3 voxels that has a voxel of the shell, each 6-connected
@@ -16,10 +16,11 @@
 //   parity   view = (left mod 2) + ((total - left) mod 2)
 //
 // A corner has the sum of its three views. A unit with k corners is inside iff the absolute sum
-// over its corners is > 3 k: if most of the six directions see the same side of the surface.
+// over its corners is > 3 k. If every direction counts as 0 (outside) or 1 (inside), more than half
+// of the 6 k directions must count as 1.
 //
-// A component without a corner of its block is blind. Its view comes from a walk to the component
-// from the block's low corner (BlindWalk in core/backend/cpu/solid).
+// A component without a corner of its block is blind. Its views come from a walk to the component
+// from the block's low corner (BlindComponent in core/backend/cpu/solid).
 #pragma once
 
 #include <cstdint>

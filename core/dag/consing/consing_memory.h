@@ -1,6 +1,6 @@
 // Limits for memory that only makes hash-consing faster. Hash-consing finds equal nodes by their
 // hashes while a sub-DAG is built. If such memory would exceed its limit, the build uses less of it
-// or none. The DAG is the same.
+// or none. The resulting DAG is the same.
 #pragma once
 
 #include <algorithm>

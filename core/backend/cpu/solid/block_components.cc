@@ -18,9 +18,9 @@ void exchange_words(uint64_t (&words)[8], int word_bit, int shift, uint64_t low)
   }
 }
 
-// A Morton number has the bits x2 y2 z2 | x1 y1 z1 x0 y0 z0, a slice's x2 x1 x0 | y2 y1 y0 z2 z1 z0
-// (word | bit). Three exchanges of two bits each turn one into the other, so the function is its
-// own inverse.
+// A voxel's number (word | bit) has the bits x2 y2 z2 | x1 y1 z1 x0 y0 z0 in Morton order, and x2
+// x1 x0 | y2 y1 y0 z2 z1 z0 in slices. Three exchanges of two bits each turn one order into the
+// other, so the function is its own inverse.
 void exchange_order(uint64_t (&words)[8]) {
   exchange_words(words, 2, 32, 0x00000000ffffffffull);  // y2 and x1
   exchange_words(words, 1, 4, 0x0f0f0f0f0f0f0f0full);   // z2 and x0

@@ -21,7 +21,7 @@ struct Slices {
   bool operator==(const Slices&) const = default;
 };
 
-// Returns the voxels of a block in the other order, and back.
+// Reorder the voxels of a block, from Morton order to slices and back.
 Slices slices_of(const VoxelBlock& block);
 VoxelBlock block_of(const Slices& slices);
 

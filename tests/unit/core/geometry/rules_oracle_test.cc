@@ -1,4 +1,4 @@
-// The oracle of the rules, on meshes whose answers are known.
+// The oracle for the rules of solids and of thin shells, on meshes whose answers are known.
 #include <gtest/gtest.h>
 
 #include "tests/oracle/solid/crossing.h"
@@ -83,7 +83,7 @@ TEST(RulesOracle, ThinVoxelsAreInTheShell) {
   }
 }
 
-// A walk through the empty voxels' centers never changes the winding number.
+// The centers of two empty voxels that share a face have the same winding number.
 TEST(RulesOracle, ThinVoxelsSeparate) {
   for (const SolidKind kind : kClosedSolids) {
     SCOPED_TRACE(kind_name(kind));

@@ -1,4 +1,5 @@
-// Lookups of so many points that they begin in TopCells, the table of a coarse grid.
+// Lookups of so many points that they begin in TopCells, the table of a coarse grid, find exactly
+// the cells that are set.
 #include "query/lookup/top_cells.h"
 
 #include <gtest/gtest.h>
