@@ -193,7 +193,7 @@ CUDA_MACRO = re.compile(r"\b__(CUDA|NVCC)\w*")
 
 
 def layer_of(path):
-    """The folder of the tables above that a file belongs to."""
+    """Returns the folder of the tables above that a file belongs to."""
     if path.startswith(INSTALLED_PREFIX):
         return "include"
     parts = path.split("/")
@@ -205,7 +205,7 @@ def folder_of(path):
 
 
 def check_inner_include(source, target, layers):
-    """What is wrong with an include between two folders of these layers, or None."""
+    """Returns the problem of an include between two folders of these layers, or None."""
     if layers is None:
         return None
     for folder in (source, target):
@@ -217,7 +217,7 @@ def check_inner_include(source, target, layers):
 
 
 def check_include(path, bracket, header):
-    """What is wrong with this file including that header, or None."""
+    """Returns the problem if the file at `path` includes `header`, or None."""
     layer = layer_of(path)
     if layer == "include" and ("." in header or "/" in header) and layer_of(header) != "include":
         return f"is installed, yet includes {header}"

@@ -17,7 +17,7 @@ import subprocess
 import sys
 
 MAX_PER_1000 = 6
-# Folders with less prose than this count as this many lines: one place must not fail them.
+# A folder with fewer lines of prose counts as this many, so that one finding does not fail it.
 MIN_LINES = 200
 
 VERBS = (
@@ -46,7 +46,7 @@ PATTERNS = {
     r"|Read|Written|Given) (?:is|are)\b",
 }
 COMPILED = {cure: re.compile(pattern) for cure, pattern in PATTERNS.items()}
-# This file names the patterns.
+# This file contains the patterns themselves, and the license is a fixed text.
 LEFT_OUT = {"tools/check_prose.py", "LICENSE"}
 
 SLASHES = (".h", ".cc", ".cpp", ".cu", ".cuh", ".c", ".js", ".css")

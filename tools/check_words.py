@@ -85,7 +85,7 @@ COMPILED = [(term, re.compile(pattern)) for term, pattern in RULES]
 TEXT = re.compile(
     r"\.(h|cc|cu|cuh|cmake|py|sh|js|css|html|md|json|toml|txt)$|^(tools|\.ci)/|^Dockerfile$"
 )
-# Two scripts name the words, and the license is a fixed text.
+# Two scripts contain the forbidden words themselves, and the license is a fixed text.
 LEFT_OUT = ("tools/check_words.py", "tools/check_prose.py", "LICENSE")
 
 

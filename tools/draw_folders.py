@@ -45,7 +45,7 @@ BOXES = {
 
 
 def include_graph():
-    """Folder -> folders it includes, itself aside, as the sources stand."""
+    """Returns, for each folder, the other folders that its sources include."""
     listing = subprocess.run(["git", "ls-files", "-z"], check=True, capture_output=True, text=True)
     graph = collections.defaultdict(set)
     for path in filter(SOURCE.search, listing.stdout.split("\0")):
@@ -74,7 +74,7 @@ def reachable(graph, start):
 
 
 def reduced(graph):
-    """The graph without arrows that follow from others."""
+    """Returns the graph without the arrows that follow from other arrows."""
     return {
         source: {
             target
@@ -86,7 +86,7 @@ def reduced(graph):
 
 
 def corner_of(folder):
-    """The upper left corner of the folder's box, in pixels."""
+    """Returns the upper left corner of the folder's box, in pixels."""
     column, row, _ = BOXES[folder]
     return MARGIN + column * STEP_X, MARGIN + row * STEP_Y
 

@@ -74,7 +74,7 @@ class ClusterTest(unittest.TestCase):
         return self.expected[key]
 
     def start(self, resolution, tasks, *options):
-        """The command that is followed: a wait for what its tasks do fails once it ends."""
+        """Starts a build that wait_for() watches: a wait fails when this build ends early."""
         self.build = subprocess.Popen(
             [VOXDAG, "build", self.scene, "-r", str(resolution), "-o", self.output, "--json",
              "--cluster", "slurm", "--cluster-tasks", str(tasks), "--cluster-grace", "2", *options],
@@ -294,7 +294,7 @@ class ClusterTest(unittest.TestCase):
 
     def test_restart_stops_the_tasks(self):
         build = self.start(16384, 8)
-        # It would run on for ever.
+        # This task cannot end by itself.
         os.kill(self.a_task(), signal.SIGSTOP)
         name = self.task_name()
         build.kill()
@@ -406,7 +406,7 @@ class ClusterTest(unittest.TestCase):
         stopped = self.a_task()
         os.kill(stopped, signal.SIGSTOP)
         name = self.wait_for_merge_job()
-        # It attaches.
+        # The interrupted build leaves its tasks running, and the next start attaches to them.
         build.send_signal(signal.SIGINT)
         _, messages = self.end(build)
         self.assertIn("and its tasks run on", messages)

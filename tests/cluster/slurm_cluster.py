@@ -185,7 +185,7 @@ class SlurmCluster:
 
     def wait_for_idle_nodes(self):
         def are_idle():
-            # A node is drained when a task of before its restart comes back to it.
+            # Slurm drains a restarted node if an earlier task returns to it.
             self.resume_nodes()
             return self.count_idle() == len(self.nodes)
 

@@ -33,7 +33,7 @@ DECODERS = {"vdb": "libopenvdb", "nvdb": "libnanovdb"}
 
 
 def run(args):
-    """Exit status, output, messages, CPU seconds and peak memory in MiB of a command."""
+    """Returns exit status, output, messages, CPU seconds and peak memory in MiB of a command."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = subprocess.Popen([str(arg) for arg in args], stdout=out, stderr=err)
         _, status, usage = os.wait4(process.pid, 0)
@@ -46,7 +46,7 @@ def run(args):
 
 
 def digest(options, *args):
-    """What the decoder finds, as (voxels or faces, hashes), and its CPU seconds."""
+    """Returns (voxels or faces, hashes), as decoded by digest_voxels, and its CPU seconds."""
     status, out, err, seconds, _ = run([options.digest, *args])
     assert status == 0, f"digest_voxels {' '.join(map(str, args))}: status {status}, {err.strip()}"
     count, hashes = out.split()
@@ -54,7 +54,7 @@ def digest(options, *args):
 
 
 def mebibytes(size):
-    """Number of MiB in a size such as 512MiB or 4GiB."""
+    """Returns the number of MiB in a size such as 512MiB or 4GiB."""
     number, unit = re.fullmatch(r"(\d+)(MiB|GiB)", size).groups()
     return int(number) * (1024 if unit == "GiB" else 1)
 
@@ -81,7 +81,7 @@ class Selection:
 
 
 def check(options, selection, name, folder):
-    """A row of the table; raises AssertionError if the export is wrong."""
+    """Returns a row of the table; raises AssertionError if the export is wrong."""
     output = folder / ("whole" + SUFFIXES.get(name, "." + name))
     region = ["--region", ",".join(selection.region)] if selection.region else []
     started = time.monotonic()

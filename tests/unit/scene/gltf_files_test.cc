@@ -351,8 +351,7 @@ TEST(GltfMemory, SkippedStringsAreNotCharged) {
   EXPECT_EQ(open.triangles().size(), 1u);
 }
 
-// The matrices of a skin with hundreds of thousands of joints are charged, so they exceed the
-// budget.
+// A skin with 100,000 joints is refused, because its matrices are charged and exceed the budget.
 TEST(GltfMemory, JointMatricesAreCharged) {
   SceneBuilder scene = one_triangle();
   Json& attributes = scene.root["meshes"][0]["primitives"][0]["attributes"];
