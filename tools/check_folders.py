@@ -12,7 +12,7 @@ import re
 import subprocess
 import sys
 
-# The folders that a folder may include, besides itself. The relation is not transitive: every edge
+# For each folder, the other folders that it may include. The relation is not transitive: every edge
 # is listed.
 CORE_INCLUDES = {
     "core/base": [],

@@ -78,8 +78,8 @@ const Accessor& at(const Document& d, int accessor) {
 }
 
 // Adds a copy of accessor `accessor`, and sets `accessor` to the index of the copy. Its `count`
-// elements are packed and begin at `offset` of buffer `buffer`. Returns the bytes of all its
-// elements.
+// elements are packed and begin at `offset` of buffer `buffer`. Returns the number of bytes
+// of all its elements.
 uint64_t move_accessor(Document& d, int& accessor, uint64_t count, int buffer, uint64_t offset) {
   Accessor copy = at(d, accessor);
   copy.count = count;

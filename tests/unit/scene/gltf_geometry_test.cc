@@ -256,8 +256,8 @@ TEST(GltfGeometry, LeftoverCornersAreNamedInAWarning) {
             std::string::npos);
 }
 
-// Returns the triangles of strips or fans, which `rows` holds, without restarts: one primitive for
-// each row.
+// Returns the triangles of a scene with one primitive of type `mode` per row, and no restarts. Each
+// row is a strip or a fan.
 std::vector<Corners> separate_rows(const std::vector<std::vector<uint32_t>>& rows, int mode,
                                    const std::vector<float>& positions) {
   SceneBuilder scene;
