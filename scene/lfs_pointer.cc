@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "core/base/error.h"
+#include "core/io/lfs_pointer.h"
 #include "scene/messages.h"
 
 namespace voxdag {

@@ -1,4 +1,4 @@
-// Git LFS pointers: the small texts that replace files in a clone without git lfs.
+// Refuses Git LFS pointers (core/io/lfs_pointer.h).
 #pragma once
 
 #include <string>
@@ -6,9 +6,6 @@
 #include "core/io/file_system.h"
 
 namespace voxdag {
-
-// The first bytes of every pointer.
-inline constexpr const char* kLfsPointerBegin = "version https://git-lfs.github.com/spec/";
 
 bool is_lfs_pointer(const ReadableFile& file);
 

@@ -4,6 +4,8 @@
 #include <iterator>
 #include <string_view>
 
+#include "core/io/lfs_pointer.h"
+
 namespace voxdag {
 namespace {
 
@@ -14,6 +16,12 @@ constexpr const char* kConvertImage = "convert it to PNG with: magick IN OUT.png
 constexpr const char* kConvertKtx =
     "convert the scene with: gltf-transform ktxdecompress IN.glb OUT.glb, or the image with: ktx "
     "extract IN.ktx2 OUT.png";
+
+constexpr const char* kWebPage = "a web page, perhaps the error page of a failed download";
+
+constexpr ImageFormat no_image(const char* name, const char* remedy) {
+  return {name, remedy, ImageDecoder::kNone, false};
+}
 
 struct Signature {
   size_t offset;
@@ -26,7 +34,7 @@ constexpr Signature kSignatures[] = {
     {0, "\x89PNG\r\n\x1a\n", {"a PNG image", "", ImageDecoder::kPng}},
     {0, "\xff\xd8\xff", {"a JPEG image", "", ImageDecoder::kJpeg}},
     {8, "WEBP", {"a WebP image", kConvertScene, ImageDecoder::kWebp}},
-    {0, "version https://git-lfs", {"a Git LFS pointer, not the image itself", "run git lfs pull"}},
+    {0, kLfsPointerBegin, no_image("a Git LFS pointer, not the image itself", "run git lfs pull")},
     {0, "\xabKTX 20", {"a KTX2 image", kConvertKtx}},
     {0, "\xabKTX 11", {"a KTX image", kConvertImage}},
     {0, "DDS ", {"a DDS image", kConvertImage}},
@@ -52,10 +60,10 @@ constexpr Signature kSignatures[] = {
     {0, "gimp xcf", {"a GIMP image", kConvertImage}},
     {0, {"\0\0\1\0", 4}, {"an icon file", kConvertImage}},
     {0, "<svg", {"an SVG drawing", kConvertImage}},
-    {0, "<?xml", {"an XML file, perhaps an SVG drawing", kConvertImage}},
-    {0, "<!DOCTYPE html", {"a web page, perhaps the error page of a failed download", ""}},
-    {0, "<html", {"a web page, perhaps the error page of a failed download", ""}},
-    {0, "\x1f\x8b", {"compressed by gzip", "unpack it first"}},
+    {0, "<?xml", no_image("an XML file, perhaps an SVG drawing", kConvertImage)},
+    {0, "<!DOCTYPE html", no_image(kWebPage, "")},
+    {0, "<html", no_image(kWebPage, "")},
+    {0, "\x1f\x8b", no_image("compressed by gzip", "unpack it first")},
     {0, "BM", {"a BMP image", kConvertImage}},
 };
 

@@ -13,9 +13,11 @@ struct ImageFormat {
   const char* name;                            // "a GIF image"
   const char* remedy = "";                     // how a user gets a readable image
   ImageDecoder decoder = ImageDecoder::kNone;  // decoder of the format, perhaps not in this program
+  bool is_image = true;
 };
 
-// Returns the format of an image with these first bytes; null if it is unknown.
+// Returns the format of a file with these first bytes; null if it is unknown. Includes formats that
+// often replace an image, such as a web page.
 const ImageFormat* image_format_of(std::span<const std::byte> head);
 
 }  // namespace voxdag

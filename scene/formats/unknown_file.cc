@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <string>
 #include <string_view>
 
+#include "core/image/image_formats.h"
+#include "core/io/lfs_pointer.h"
 #include "scene/formats/formats.h"
-#include "scene/lfs_pointer.h"
 #include "scene/messages.h"
 #include "scene/text/characters.h"
 
@@ -27,7 +29,7 @@ constexpr const char* kImport = kConvert;
 constexpr const char* kUnpackOrImport = kConvert;
 #endif
 
-// A format that voxdag does not read. Its files have `bytes` at `offset`.
+// A format that is no image and that voxdag does not read. Its files have `bytes` at `offset`.
 struct KnownFormat {
   size_t offset;
   std::string_view bytes;
@@ -54,7 +56,6 @@ constexpr KnownFormat kKnown[] = {
     {0, "BLENDER", "a Blender file", "export it as .glb"},
     {0, "PXR-USDC", "a USD file", kConvert},
     {0, "#usda", "a USD file", kConvert},
-    {0, {"MM\0*", 4}, "a TIFF image"},
     {0, "MM", "a 3DS file", kImport},
     {0, "Ogawa", "an Alembic file", kConvert},
     {0, "\x89HDF\r\n\x1a\n", "an HDF5 file", kConvert},
@@ -80,13 +81,6 @@ constexpr KnownFormat kKnown[] = {
     {0, "AC10", "a DWG file", kConvert},
     {0, "VOX ", "a MagicaVoxel file"},
     {0, "DRACO", "a bare Draco file", "convert it to .glb"},
-    {0, "KHRONOS", "a KTX file, which is an image"},
-    {0, "\xabKTX", "a KTX file, which is an image"},
-    {0, "\x89PNG", "a PNG image"},
-    {0, "\xff\xd8\xff", "a JPEG image"},
-    {0, "GIF8", "a GIF image"},
-    {8, "WEBP", "a WebP image"},
-    {0, "II*\0", "a TIFF image"},
     {0, "%PDF", "a PDF document"},
     {0, "SQLite format 3", "an SQLite database"},
     {0,
@@ -108,6 +102,8 @@ std::string contents_of_markup(std::string_view text) {
 // Returns the format and the remedy: "is compressed by gzip: unpack it first".
 std::string describe(std::string_view begin) {
   if (begin.empty()) return "is empty";
+  const ImageFormat* const image = image_format_of(std::as_bytes(std::span(begin)));
+  if (image && image->is_image) return std::string("is ") + image->name;
   for (const KnownFormat& known : kKnown)
     if (begin.size() > known.offset && begin.substr(known.offset).starts_with(known.bytes))
       return "is " + std::string(known.name) + (*known.remedy ? ": " : "") + known.remedy;

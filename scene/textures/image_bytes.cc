@@ -1,6 +1,7 @@
 #include "scene/textures/image_bytes.h"
 
 #include <algorithm>
+#include <string_view>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
@@ -17,6 +18,7 @@ ImageBytes::ImageBytes(FileSystem& files, const ImageSource& source)
     : file_(files.open_read(source.file.path)),
       at_(source.offset),
       end_(source.offset + source.size),
+      is_text_(source.is_base64 || source.is_data_uri),
       is_base64_(source.is_base64),
       left_(source.bytes) {
   const FileIdentity &before = source.file.identity, now = file_->identity();
@@ -26,7 +28,7 @@ ImageBytes::ImageBytes(FileSystem& files, const ImageSource& source)
                                               ": its file changed while the scene was read: "
                                               "expected files that do not change");
   end_ = std::min(end_, file_->size());
-  if (!is_base64_) {
+  if (!is_text_) {
     at_ = std::min(end_, at_ + std::min(source.skip, end_ - std::min(at_, end_)));
     return;
   }
@@ -42,7 +44,7 @@ ImageBytes::ImageBytes(FileSystem& files, const ImageSource& source)
 size_t ImageBytes::read(std::span<std::byte> out) {
   out = out.first(static_cast<size_t>(std::min<uint64_t>(out.size(), left_)));
   size_t size = 0;
-  if (!is_base64_) {
+  if (!is_text_) {
     size = read_plain(out);
   } else {
     while (size < out.size() && (group_at_ < group_size_ || next_group()))
@@ -61,9 +63,13 @@ size_t ImageBytes::read_plain(std::span<std::byte> out) {
 }
 
 // Reads the next character of the text. Returns false at the end of the range. Decodes JSON's
-// escapes: white space becomes a blank, and a \u escape over \u007f becomes "!", which is not
-// base64.
+// escapes; a \u escape over \u007f becomes "!", which is not base64.
 bool ImageBytes::next_character(char& c) {
+  if (!pending_.empty()) {
+    c = pending_.front();
+    pending_.erase(0, 1);
+    return true;
+  }
   const auto raw = [&](char& out) {
     if (window_at_ == window_.size()) {
       window_.resize(kImageWindow);
@@ -77,7 +83,8 @@ bool ImageBytes::next_character(char& c) {
   if (!raw(c)) return false;
   if (c != '\\') return true;
   if (!raw(c)) return false;
-  if (c == 'n' || c == 'r' || c == 't' || c == 'f') c = ' ';
+  constexpr std::string_view kEscapes = "bfnrt", kMeanings = "\b\f\n\r\t";
+  if (const size_t at = kEscapes.find(c); at != kEscapes.npos) c = kMeanings[at];
   if (c != 'u') return true;
   int code = 0;
   for (int i = 0; i < 4; ++i) {
@@ -106,8 +113,32 @@ bool ImageBytes::next_base64_character(char& c) {
   return true;
 }
 
+// Reads the next byte of a percent-encoded text. A percent sign without two hexadecimal digits
+// means itself.
+bool ImageBytes::next_percent_decoded(char& c) {
+  if (!next_character(c)) return false;
+  if (c != '%') return true;
+  std::string escape = "%";
+  char digit = 0;
+  while (escape.size() < 3 && next_character(digit)) escape += digit;
+  const auto decoded = percent_decoded(escape);
+  if (decoded && decoded->size() == 1)
+    c = decoded->front();
+  else
+    pending_.insert(0, escape.substr(1));
+  return true;
+}
+
 bool ImageBytes::next_group() {
   group_at_ = group_size_ = 0;
+  if (is_base64_) return next_base64_group();
+  char c = 0;
+  if (!next_percent_decoded(c)) return false;
+  group_[group_size_++] = static_cast<std::byte>(c);
+  return true;
+}
+
+bool ImageBytes::next_base64_group() {
   std::array<std::byte, 4> characters;
   size_t count = 0;
   char c = 0;

@@ -2,6 +2,8 @@
 #include <cstring>
 
 #include "tests/cli/command_line.h"
+#include "tests/unit/scene/points/las_builder.h"
+#include "tests/unit/scene/scene_files.h"
 
 namespace command_line {
 namespace {
@@ -102,25 +104,48 @@ TEST_F(MeshFormats, AreMixedInOneScene) {
 }
 
 struct Faulty {
-  const char* name;
-  const char* contents;
+  std::string name, contents;
   const char* code;
   uint64_t count;
 };
 
-constexpr Faulty kFaulty[] = {
-    {"lines.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\np 3\n", "points-or-lines", 2},
-    {"pair.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\n", "degenerate-faces", 1},
-    {"words.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nwidget 3\n", "unknown-statements", 1},
-    {"no.obj", "mtllib no.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "missing-file", 1},
-};
+std::string withheld_las() {
+  voxdag::test::LasBuilder las;
+  las.points = {{{0, 0, 0}, {}, false}, {{100, 200, 300}, {}, false}, {{1, 2, 3}, {}, true}};
+  return las.file();
+}
+
+// The mesh has an unknown weight for a morph target that does not exist.
+std::string morphed_glb() {
+  voxdag::test::SceneBuilder scene = voxdag::test::one_triangle();
+  scene.root["meshes"][0]["weights"] = {1};
+  return scene.glb();
+}
+
+std::vector<Faulty> faulty_files() {
+  const std::string header =
+      "ply\nformat ascii 1.0\nMade by hand\nmore\nelement vertex 3\nproperty float x\n"
+      "property float y\nproperty float z\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  return {
+      {"lines.obj", triangle + "l 1 2\np 3\n", "points-or-lines", 2},
+      {"pair.obj", triangle + "f 1 2\n", "degenerate-faces", 1},
+      {"words.obj", triangle + "widget 3\n", "unknown-statements", 1},
+      {"no.obj", "mtllib no.mtl\n" + triangle, "missing-file", 1},
+      {"weights.glb", morphed_glb(), "morph-weights", 1},
+      {"lines.ply", header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "ignored-line", 2},
+      {"words.stl", stl_text() + "widget 3\n", "unknown-statements", 1},
+      {"withheld.las", withheld_las(), "withheld-points", 1},
+  };
+}
 
 // A warning has a code, a count and its first place. With --strict the build fails instead.
 TEST_F(MeshFormats, ReportWarnings) {
-  for (const Faulty& file : kFaulty) {
+  for (const Faulty& file : faulty_files()) {
     SCOPED_TRACE(file.name);
     put(file.name, file.contents);
-    const std::string output = std::string(file.name) + ".vdag";
+    const std::string output = file.name + ".vdag";
     const Answer answer = run({"build", file.name, "-r", "64", "--color", "--json", "-o", output});
     EXPECT_NE(answer.err.find("warning"), std::string::npos) << answer.err;
     const Json warnings = Json::parse(answer.out)["warnings"];

@@ -46,9 +46,8 @@ void set_buffer(FileSystem& files, const ReadableFile& scene_file, const Documen
       break;
     case BufferSource::Kind::kBase64:
     case BufferSource::Kind::kMemory:
-      if (!buffer.is_base64) out.problem = "is in " + where + ", whose data: URI is not base64";
       set_file(scene_file, buffer.range, out);
-      out.is_base64 = true;
+      out.is_base64 = buffer.is_base64;
       out.is_data_uri = buffer.kind == BufferSource::Kind::kMemory;
       break;
   }
@@ -62,9 +61,10 @@ void find(FileSystem& files, const ReadableFile& scene_file, const Document& d, 
   const RawString& uri = d.image_uris[static_cast<size_t>(index)];
   if (is_data_uri(image.uri)) {
     set_file(scene_file, uri.characters, out);
-    out.is_base64 = out.is_data_uri = true;
     const auto parsed = parse_data_uri(image.uri);
-    if (!parsed || !parsed->is_base64) out.problem = "has a data: URI that is not base64";
+    if (!parsed) out.problem = "has a data: URI without data, expected a comma";
+    out.is_base64 = parsed && parsed->is_base64;
+    out.is_data_uri = true;
   } else if (!image.uri.empty()) {
     if (uri.is_clipped)
       out.problem = "has a uri that is longer than any file name";

@@ -164,17 +164,26 @@ TEST(Textures, InBase64Buffers) {
 // Reads images in data: URIs in forms that RFC 2397 does not allow.
 TEST(Textures, InDataUrisOfOtherPrograms) {
   const std::string png = png_of(5, 5, noise(4 * 25)), text = base64(png);
-  std::string lines, url_safe, percent;
+  std::string lines, url_safe, percent, bytes;
   for (size_t i = 0; i < text.size(); ++i) {
     lines += (i % 20 == 19 ? "\r\n" : "") + text.substr(i, 1);
     url_safe += text[i] == '+' ? '-' : text[i] == '/' ? '_' : text[i];
     percent += text[i] == '+' ? "%2B" : text[i] == '/' ? "%2f" : text.substr(i, 1);
   }
   ASSERT_NE(url_safe, text);
+  for (const char byte : png) {
+    const auto value = static_cast<unsigned char>(byte);
+    // Printable characters mean themselves, also a percent sign that is not followed by digits.
+    if (value > ' ' && value < 127 && value != '%')
+      bytes += byte;
+    else
+      bytes += {'%', "0123456789abcdef"[value / 16], "0123456789ABCDEF"[value % 16]};
+  }
   Textures plain(textured(png).glb());
   for (const std::string& uri :
        {"data:image/png;base64,\n" + lines + "\n", "data:image/png;base64, " + url_safe,
-        "data:image/png;base64," + percent, "DATA:image/png; Base64," + text}) {
+        "data:image/png;base64," + percent, "DATA:image/png; Base64," + text,
+        "data:image/png," + bytes}) {
     SceneBuilder scene = textured("");
     scene.root["images"][0]["uri"] = uri;
     Textures t(scene.glb());

@@ -129,6 +129,15 @@ TEST_F(Import, Binary3ds) {
   EXPECT_EQ(triangles(), std::vector<Corners>({{{{0, 0, 0}, {1, 0, 0}, {0, 0, -1}}}}));
 }
 
+TEST_F(Import, Archive3mf) {
+  refuse("cut.3mf", three_mf().substr(0, 300));
+  import("a.3mf", three_mf());
+  EXPECT_THAT(warnings_, IsEmpty());
+  EXPECT_EQ(material().factor, (std::array<uint16_t, 4>{65535, 0, 0, 65535}));
+  EXPECT_EQ(triangles(), std::vector<Corners>({{{{10, 0, 0}, {14, 1, 0}, {10, 2, 0}}},
+                                               {{{10, 0, 0}, {14, 1, 0}, {11, 1, 3}}}}));
+}
+
 // The unit becomes the meter, and y becomes the upward axis.
 TEST_F(Import, UnitAndAxesOfFbx) {
   import("a.fbx", kFbx);

@@ -1,9 +1,13 @@
 // Small scenes in the formats that voxdag import reads.
 #pragma once
 
+#include <zlib.h>
+
 #include <cstdint>
 #include <cstring>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace voxdag::test {
 
@@ -127,6 +131,56 @@ inline std::string max_3ds() {
       chunk(0x4120, raw(faces) + chunk(0x4130, std::string("red\0\1\0\0\0", 8)));
   return chunk(0x4d4d, chunk(0x3d3d, material + chunk(0x4000, std::string("box\0", 4) +
                                                                   chunk(0x4100, mesh))));
+}
+
+// Returns a zip archive whose files are not compressed.
+inline std::string zip_archive(const std::vector<std::pair<std::string, std::string>>& files) {
+  const auto u16 = [](size_t value) {
+    return std::string{static_cast<char>(value), static_cast<char>(value >> 8)};
+  };
+  const auto u32 = [&](size_t value) { return u16(value) + u16(value >> 16); };
+  std::string archive, directory;
+  for (const auto& [name, contents] : files) {
+    const auto crc = crc32(0, reinterpret_cast<const Bytef*>(contents.data()),
+                           static_cast<uInt>(contents.size()));
+    // Version 2.0, no flags, method "stored", no time, date 1980-01-01.
+    const std::string common = u16(20) + u32(0) + u16(0) + u16(33) + u32(crc) +
+                               u32(contents.size()) + u32(contents.size()) + u16(name.size()) +
+                               u16(0);
+    directory += "PK\1\2" + u16(20) + common + u16(0) + u16(0) + u16(0) + u32(0) +
+                 u32(archive.size()) + name;
+    archive += "PK\3\4" + common + name + contents;
+  }
+  return archive + directory + "PK\5\6" + u32(0) + u16(files.size()) + u16(files.size()) +
+         u32(directory.size()) + u32(archive.size()) + u16(0);
+}
+
+// A 3MF file with two red triangles, moved by (10 0 0).
+inline std::string three_mf() {
+  const std::string types = R"(<?xml version="1.0"?>
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
+</Types>)";
+  const std::string relations = R"(<?xml version="1.0"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Target="/3D/3dmodel.model" Id="rel0"
+ Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
+</Relationships>)";
+  const std::string model = R"(<?xml version="1.0"?>
+<model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
+<resources>
+<basematerials id="1"><base name="paint" displaycolor="#FF0000FF"/></basematerials>
+<object id="2" type="model" pid="1" pindex="0"><mesh>
+<vertices><vertex x="0" y="0" z="0"/><vertex x="4" y="1" z="0"/><vertex x="0" y="2" z="0"/>
+<vertex x="1" y="1" z="3"/></vertices>
+<triangles><triangle v1="0" v2="1" v3="2"/><triangle v1="0" v2="1" v3="3"/></triangles>
+</mesh></object>
+</resources>
+<build><item objectid="2" transform="1 0 0 0 1 0 0 0 1 10 0 0"/></build>
+</model>)";
+  return zip_archive(
+      {{"[Content_Types].xml", types}, {"_rels/.rels", relations}, {"3D/3dmodel.model", model}});
 }
 
 }  // namespace voxdag::test
