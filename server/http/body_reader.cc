@@ -7,8 +7,12 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxLineBytes = 4096;
-constexpr size_t kSizeLineBytes = 18;  // the longest chunk size in hex, and CRLF
+// Free bytes in the line of a chunk with content: the longest size in hex. Content pays for them,
+// because it is at least one byte per line. All other bytes outside the content count against
+// kMaxExtraBytes: extensions, the line of the last chunk, and trailers with their line ends.
+constexpr size_t kMaxSizeDigits = 16;
 constexpr size_t kMaxExtraBytes = 16384;
+constexpr size_t kLineEndBytes = 2;
 
 // Parses the size of a chunk from its line, "1f40" or "1f40;extension"; nullopt if it is malformed.
 std::optional<uint64_t> chunk_size(std::string_view line) {
@@ -45,13 +49,15 @@ BodyEnd BodyReader::read_chunks(const Request::Sink& sink) {
     if (!read_line(line)) return failure();
     const auto size = chunk_size(line);
     if (!size) return BodyEnd::kBroken;
+    const size_t free_bytes = *size > 0 ? kMaxSizeDigits : 0;
+    if (!count_extra(line.size() - std::min(line.size(), free_bytes))) return BodyEnd::kBroken;
     if (*size == 0) break;
     const BodyEnd end = pass(*size, sink);
     if (end != BodyEnd::kComplete) return end;
     if (!read_line(line) || !line.empty()) return failure();
   }
   do {
-    if (!read_line(line)) return failure();
+    if (!read_line(line) || !count_extra(line.size() + kLineEndBytes)) return failure();
   } while (!line.empty());
   return BodyEnd::kComplete;
 }
@@ -70,8 +76,13 @@ bool BodyReader::read_line(std::string& line) {
   line.clear();
   if (!connection_.read_line(line, kMaxLineBytes) || line.find('\r') + 2 != line.size())
     return false;
-  extra_bytes_ += line.size() - std::min(line.size(), kSizeLineBytes);
-  line.resize(line.size() - 2);
+  line.resize(line.size() - kLineEndBytes);
+  return true;
+}
+
+bool BodyReader::count_extra(size_t bytes) {
+  extra_bytes_ += bytes;
+  if (extra_bytes_ > kMaxExtraBytes) connection_.close_without_linger();
   return extra_bytes_ <= kMaxExtraBytes;
 }
 

@@ -1,5 +1,6 @@
-// Reads the body of a request from its connection. Memory is bounded for any client: the reader
-// passes data on as it arrives, and limits the lines between chunks. Used by one thread.
+// Reads the body of a request from its connection. Memory and the number of bytes outside the
+// content are bounded for any client: the reader passes content on as it arrives, and limits the
+// lines between and after chunks. Used by one thread.
 #pragma once
 
 #include "server/http/connection/connection.h"
@@ -12,7 +13,8 @@ class BodyReader {
  public:
   BodyReader(Connection& connection, const RequestHead& head);
 
-  // Like Request::read_body. A malformed chunk is BodyEnd::kBroken.
+  // Like Request::read_body. A malformed chunk, or too many bytes outside the content, is
+  // BodyEnd::kBroken.
   BodyEnd read(const Request::Sink& sink);
   // True if the body was read to its end, so that another request can follow.
   bool is_complete() const { return complete_; }
@@ -22,6 +24,8 @@ class BodyReader {
   BodyEnd pass(uint64_t bytes, const Request::Sink& sink);
   // Reads a line without its CRLF. Returns false if it is too long or the connection fails.
   bool read_line(std::string& line);
+  // Counts bytes outside the content. Returns false above the limit for one body.
+  bool count_extra(size_t bytes);
   BodyEnd failure() const;
 
   Connection& connection_;
@@ -29,7 +33,7 @@ class BodyReader {
   const bool chunked_;
   const bool expects_continue_;
   bool complete_;
-  size_t extra_bytes_ = 0;  // ignored bytes so far: chunk extensions and trailers
+  size_t extra_bytes_ = 0;  // bytes so far that count_extra() has counted
 };
 
 }  // namespace voxdag::server

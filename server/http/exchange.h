@@ -24,7 +24,10 @@ class Exchange {
 
  private:
   std::string read_head(size_t max_bytes);
-  bool send_pieces(ReadableFile& file, const std::vector<FilePiece>& pieces);
+  std::string answer_head(const Response& response, bool keep_alive) const;
+  bool send(const Response& response, const std::string& head);
+  bool send_event(const std::string& text);
+  bool send_pieces(const Response& response);
   bool send_events(const EventSource& next);
 
   Connection& connection_;

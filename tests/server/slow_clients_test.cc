@@ -69,6 +69,35 @@ class SlowClients : public RunningService {
   std::vector<int> sockets_;
 };
 
+// Connections that send `begin` and then `piece` again and again. A closed one is opened again.
+class EndlessRequests {
+ public:
+  EndlessRequests(int port, std::string begin, std::string piece)
+      : thread_(
+            [port, begin = std::move(begin), piece = std::move(piece)](const std::stop_token& end) {
+              std::vector<int> sockets(kAttackers, -1);
+              while (!end.stop_requested()) {
+                for (int& socket : sockets) send_more(port, socket, begin, piece);
+                std::this_thread::sleep_for(std::chrono::milliseconds(20));
+              }
+              for (const int socket : sockets) close(socket);
+            }) {}
+
+ private:
+  static void send_more(int port, int& socket, const std::string& begin, const std::string& piece) {
+    const auto put = [&](const std::string& bytes) {
+      return send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT) >= 0 ||
+             errno == EAGAIN;
+    };
+    if (socket >= 0 && put(piece)) return;
+    close(socket);
+    socket = raw_connect(port);
+    put(begin);
+  }
+
+  std::jthread thread_;
+};
+
 // The line before a chunk has a limit. So do its extension, and the fields after the last chunk.
 TEST_F(SlowClients, LinesOfChunksAreBounded) {
   start();
@@ -92,6 +121,29 @@ TEST_F(SlowClients, SlowBodiesDoNotBlockOthers) {
         "Content-Length: 60000\r\n\r\n{");
   usleep(kAttackBeginsUs);
   EXPECT_EQ(answered(), 20);
+}
+
+// Clients that keep sending a request that has no end do not block others: neither with trailers,
+// which are limited, nor with a JSON body of tiny chunks, which has a deadline.
+TEST_F(SlowClients, BodiesWithoutEndDoNotBlockOthers) {
+  start();
+  const std::string head =
+      "POST /api/v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+      "Transfer-Encoding: chunked\r\n\r\n";
+  std::string trailers, chunks, empty_lines;
+  for (int i = 0; i < 400; ++i) {
+    trailers += "a:b\r\n";
+    chunks += "1\r\n \r\n";
+    empty_lines += "\r\n";
+  }
+  const std::pair<std::string, std::string> attacks[] = {
+      {head + "2\r\n{}\r\n0\r\n", trailers}, {head, chunks}, {"\r\n", empty_lines}};
+  for (const auto& [begin, piece] : attacks) {
+    SCOPED_TRACE(piece.substr(0, 5));
+    const EndlessRequests attack(port(), begin, piece);
+    usleep(kAttackBeginsUs);
+    EXPECT_EQ(answered(), 20);
+  }
 }
 
 // Connections whose answers are not read are closed when other clients want to connect. The kernel

@@ -139,13 +139,14 @@ std::string read_json_body(Request& request, uint64_t max_bytes) {
                           "the body is larger than " + std::to_string(max_bytes) + " bytes");
   if (request.content_length.value_or(0) > max_bytes) throw too_large;
   std::string body;
-  const BodyEnd end = request.read_body([&](std::string_view piece) {
+  const BodyEnd end = request.read_short_body([&](std::string_view piece) {
     body += piece;
     return body.size() <= max_bytes;
   });
   if (end == BodyEnd::kStopped) throw too_large;
   if (end == BodyEnd::kTooSlow) throw Problem(408, "timeout", "the body was sent too slowly");
-  if (end == BodyEnd::kBroken) throw bad_request("the connection ended within the body");
+  if (end == BodyEnd::kBroken)
+    throw bad_request("the connection ended within the body, or the body's chunks are malformed");
   return body;
 }
 

@@ -38,6 +38,7 @@ bool Connection::handshake() {
 bool Connection::wait_for_request() {
   phase_ = Phase::kWaiting;
   reading_ = {};
+  request_end_s_ = HUGE_VAL;
   if (begin_ == end_ && !fill()) return false;
   phase_ = Phase::kHeader;
   reading_ = {};
@@ -48,6 +49,15 @@ void Connection::begin_exchange() {
   phase_ = Phase::kExchange;
   reading_ = writing_ = {};
   table_.set_working(place_);
+}
+
+void Connection::limit_request() {
+  request_begin_s_ = wall_seconds();
+  request_end_s_ = request_begin_s_ + limits_.grace_s;
+}
+
+bool Connection::has_short_body(const Pace& pace) const {
+  return &pace == &reading_ && request_end_s_ < HUGE_VAL;
 }
 
 double Connection::max_wait_s() const {
@@ -76,8 +86,15 @@ bool Connection::wait_for_io(ssize_t outcome, Pace& pace) {
     return false;
   }
   const double start = wall_seconds();
-  const double deadline = start + max_wait_s() - pace.behind_minimum_s;
-  table_.set_waiting(place_, start - pace.behind_steady_s, phase_ != Phase::kExchange);
+  double deadline = start + max_wait_s() - pace.behind_minimum_s;
+  if (has_short_body(pace)) {
+    deadline = std::min(deadline, request_end_s_);
+    table_.set_waiting(place_, request_begin_s_, ConnectionTable::Waiting::kForShortBody);
+  } else {
+    table_.set_waiting(place_, start - pace.behind_steady_s,
+                       phase_ == Phase::kExchange ? ConnectionTable::Waiting::kInExchange
+                                                  : ConnectionTable::Waiting::kForRequest);
+  }
   bool ready = false, broken = false;
   double now = start;
   for (; !ready && !broken && now < deadline; now = wall_seconds()) {
@@ -96,6 +113,10 @@ bool Connection::wait_for_io(ssize_t outcome, Pace& pace) {
 
 bool Connection::fill() {
   if (error_ != ErrorState::kNone) return false;
+  if (has_short_body(reading_) && wall_seconds() > request_end_s_) {
+    error_ = ErrorState::kTooSlow;
+    return false;
+  }
   for (;;) {
     const ssize_t got = tls_.read(socket_, buffer_.data(), buffer_.size());
     if (got > 0) {
@@ -126,7 +147,6 @@ bool Connection::read_line(std::string& text, size_t max_bytes) {
     if (size > max_bytes - std::min(max_bytes, text.size())) return false;
     text += bytes.substr(0, size);
     begin_ += size;
-    count(size, reading_);
   }
   return true;
 }
@@ -160,10 +180,11 @@ bool Connection::peer_disconnected() const {
 }
 
 void Connection::linger() {
-  if (error_ == ErrorState::kBroken) return;
+  if (error_ == ErrorState::kBroken || !lingers_) return;
   tls_.shutdown();
   if (shutdown(socket_, SHUT_WR) != 0) return;
-  table_.set_waiting(place_, 0, true);  // makes this connection the first one to be evicted
+  // Makes this connection the first one to be evicted.
+  table_.set_waiting(place_, 0, ConnectionTable::Waiting::kForRequest);
   const double deadline = wall_seconds() + kLingerS;
   for (size_t bytes = 0; bytes < kLingerBytes;) {
     pollfd waiting{socket_, POLLIN, 0};

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "core/base/clock.h"
+#include "core/base/process_limits.h"
 
 namespace voxdag::server {
 namespace {
@@ -14,6 +16,10 @@ namespace {
 // During a body or an answer, a client that has been idle for less than this time counts as active.
 constexpr double kMinExchangeWaitS = 0.25;
 constexpr std::chrono::seconds kMaxEvictionWait{1};
+// Interval at which an answer that waits for memory looks for connections to close.
+constexpr std::chrono::milliseconds kReleaseWait{20};
+// Freed memory is returned to the system after this many bytes of answers.
+constexpr size_t kTrimIntervalBytes = 32 << 20;
 
 }  // namespace
 
@@ -45,7 +51,8 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
   if (!removed_.wait_for(lock, kMaxEvictionWait, [&] { return entries_.size() < max_entries; }) ||
       (entries_.size() >= limits_.max_connections && !evict_one()))
     return false;
-  place = entries_.insert(entries_.end(), Entry{socket, client, true, true, wall_seconds(), false});
+  place = entries_.insert(entries_.end(),
+                          Entry{socket, client, Waiting::kForRequest, wall_seconds(), false});
   ++by_client_[client];
   return true;
 }
@@ -54,12 +61,17 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
 // connection's thread then finds the end of the stream and removes the entry. Until then the table
 // has both this entry and the entry of the new connection.
 bool ConnectionTable::evict_one() {
+  return evict_longest([](const Entry&) { return true; });
+}
+
+template <class IsCandidate>
+bool ConnectionTable::evict_longest(const IsCandidate& is_candidate) {
   const double now = wall_seconds();
   Entry* longest = nullptr;
   for (Entry& entry : entries_) {
     const bool may_be_closed =
-        entry.waiting && !entry.evicted &&
-        (entry.between_requests || now - entry.waiting_since_s >= kMinExchangeWaitS);
+        entry.waiting != Waiting::kNot && !entry.evicted && is_candidate(entry) &&
+        (entry.waiting != Waiting::kInExchange || now - entry.waiting_since_s >= kMinExchangeWaitS);
     if (may_be_closed && (!longest || entry.waiting_since_s < longest->waiting_since_s))
       longest = &entry;
   }
@@ -69,16 +81,15 @@ bool ConnectionTable::evict_one() {
   return true;
 }
 
-void ConnectionTable::set_waiting(Place place, double since_s, bool between_requests) {
+void ConnectionTable::set_waiting(Place place, double since_s, Waiting waiting) {
   std::lock_guard lock(mutex_);
-  place->waiting = true;
-  place->between_requests = between_requests;
+  place->waiting = waiting;
   place->waiting_since_s = since_s;
 }
 
 void ConnectionTable::set_working(Place place) {
   std::lock_guard lock(mutex_);
-  place->waiting = false;
+  place->waiting = Waiting::kNot;
 }
 
 void ConnectionTable::remove(Place place) {
@@ -87,6 +98,56 @@ void ConnectionTable::remove(Place place) {
   if (--count->second == 0) by_client_.erase(count);
   entries_.erase(place);
   removed_.notify_all();
+  released_.notify_all();
+}
+
+template <class Counts>
+size_t ConnectionTable::answer_bytes(const Counts& counts) const {
+  size_t bytes = 0;
+  for (const Entry& entry : entries_)
+    if (counts(entry)) bytes += entry.answer_bytes;
+  return bytes;
+}
+
+// Returns true if the limits allow the answer now. Otherwise closes connections, unless the
+// connections that were closed before will release enough.
+bool ConnectionTable::make_room_for_answer(const Entry& entry, size_t bytes) {
+  const auto fits = [&](size_t limit, const auto& counts) {
+    const size_t used = answer_bytes(counts);
+    if (used + bytes <= limit) return true;
+    const size_t leaving =
+        answer_bytes([&](const Entry& other) { return counts(other) && other.evicted; });
+    if (used - leaving + bytes > limit)
+      evict_longest([&](const Entry& other) { return counts(other) && other.answer_bytes > 0; });
+    return false;
+  };
+  const auto same_client = [&](const Entry& other) { return other.client == entry.client; };
+  if (!is_loopback(entry.client) && !fits(kMaxAnswerBytesPerClient, same_client)) return false;
+  return fits(kMaxAnswerBytes, [](const Entry&) { return true; });
+}
+
+bool ConnectionTable::reserve_answer(Place place, size_t bytes) {
+  if (bytes > kMaxAnswerBytesPerClient) return false;
+  const auto deadline = std::chrono::steady_clock::now() + kMaxEvictionWait;
+  std::unique_lock lock(mutex_);
+  while (!make_room_for_answer(*place, bytes)) {
+    if (std::chrono::steady_clock::now() >= deadline) return false;
+    released_.wait_for(lock, kReleaseWait);
+  }
+  place->answer_bytes = bytes;
+  return true;
+}
+
+void ConnectionTable::release_answer(Place place) {
+  bool trims = false;
+  {
+    std::lock_guard lock(mutex_);
+    bytes_since_trim_ += std::exchange(place->answer_bytes, 0);
+    trims = bytes_since_trim_ >= kTrimIntervalBytes;
+    if (trims) bytes_since_trim_ = 0;
+  }
+  released_.notify_all();
+  if (trims) trim_heap();
 }
 
 size_t ConnectionTable::size() const {
@@ -97,7 +158,7 @@ size_t ConnectionTable::size() const {
 void ConnectionTable::close_waiting() {
   std::lock_guard lock(mutex_);
   for (const Entry& entry : entries_)
-    if (entry.waiting && entry.between_requests) shutdown(entry.socket, SHUT_RD);
+    if (entry.waiting == Waiting::kForRequest) shutdown(entry.socket, SHUT_RD);
 }
 
 void ConnectionTable::close_all() {

@@ -1,6 +1,7 @@
-// The open connections, within their limits. If the table is full, a new connection replaces the
-// connection that has waited longest for its client. So clients that send little or nothing cannot
-// keep other clients out. Thread-safe.
+// The open connections, and the memory of the answers that they send, within their limits. If the
+// table is full, a new connection replaces the connection that has waited longest for its client.
+// If the memory is used up, a new answer replaces the answer that has waited longest. So clients
+// that send or read little or nothing cannot keep other clients out. Thread-safe.
 #pragma once
 
 #include <condition_variable>
@@ -15,18 +16,28 @@
 namespace voxdag::server {
 
 class ConnectionTable {
+ public:
+  // What a connection waits for its client to do: nothing, to send the head of a request, to send a
+  // short body, or to send or receive the rest of an exchange.
+  enum class Waiting { kNot, kForRequest, kForShortBody, kInExchange };
+
  private:
   struct Entry {
     int socket;
     std::string client;
-    bool waiting;           // waits for the client to send or receive
-    bool between_requests;  // waits for the rest of a request's head
+    Waiting waiting;
     double waiting_since_s;
     bool evicted;
+    size_t answer_bytes = 0;  // memory of the answer
   };
 
  public:
   using Place = std::list<Entry>::iterator;
+
+  // Maximum memory of the answers of all connections.
+  static constexpr size_t kMaxAnswerBytes = 64 << 20;
+  // The same for the connections of one client. The loopback (a proxy) is exempt.
+  static constexpr size_t kMaxAnswerBytesPerClient = kMaxAnswerBytes / 2;
 
   explicit ConnectionTable(const HttpLimits& limits) : limits_(limits) {}
 
@@ -35,10 +46,16 @@ class ConnectionTable {
   // are still ending. Must be called by one thread only.
   bool admit(int socket, const std::string& address, Place& place);
   // Records that the connection has waited for its client since `since_s` (wall_seconds()).
-  void set_waiting(Place place, double since_s, bool between_requests);
+  void set_waiting(Place place, double since_s, Waiting waiting);
   void set_working(Place place);
   // Call it before closing the socket.
   void remove(Place place);
+
+  // Reserves memory for an answer of the connection. If too little is free, closes connections
+  // whose answers have waited longest for their clients, and waits up to a second for their memory.
+  // Returns false if there is still too little. release_answer() or remove() frees the memory.
+  bool reserve_answer(Place place, size_t bytes);
+  void release_answer(Place place);
 
   size_t size() const;
   // Closes the connections that wait for a request or for the end of its header.
@@ -48,12 +65,20 @@ class ConnectionTable {
 
  private:
   bool evict_one();
+  // Closes the connection that has waited longest among those for which `is_candidate` is true.
+  template <class IsCandidate>
+  bool evict_longest(const IsCandidate& is_candidate);
+  template <class Counts>
+  size_t answer_bytes(const Counts& counts) const;
+  bool make_room_for_answer(const Entry& entry, size_t bytes);
 
   const HttpLimits& limits_;
-  mutable std::mutex mutex_;  // guards all members below
-  std::condition_variable removed_;
+  mutable std::mutex mutex_;          // guards all members below
+  std::condition_variable removed_;   // a connection was removed
+  std::condition_variable released_;  // memory of an answer was released
   std::list<Entry> entries_;
   std::map<std::string, size_t> by_client_;
+  size_t bytes_since_trim_ = 0;  // released since freed memory was returned to the system
 };
 
 // True for addresses of the loopback: 127.0.0.0/8, also as ::ffff:127.x.x.x, and ::1.

@@ -33,6 +33,9 @@ struct Request {
   // most once. If the body is not read to its end, the connection is closed after the answer.
   using Sink = std::function<bool(std::string_view piece)>;
   std::function<BodyEnd(const Sink& sink)> read_body;
+  // Like read_body, for a body that the handler keeps in memory: JSON. The complete body must
+  // arrive within grace_s, however fast its bytes follow each other.
+  std::function<BodyEnd(const Sink& sink)> read_short_body;
 
   // Returns true if the client has closed the connection. Handlers that take long call this
   // function often, and stop when it returns true.
@@ -54,14 +57,19 @@ using EventSource = std::function<std::optional<std::string>()>;
 struct Response {
   int status = 200;
   HeaderMap headers;
-  // At most one of body, file and next_event is set.
+  // At most one of body, static_body, file and next_event is set.
   std::string body;
+  std::string_view static_body;  // of a text that outlives the server
   std::shared_ptr<ReadableFile> file;
   std::vector<FilePiece> pieces;  // parts of `file` to send
   EventSource next_event;
+  bool is_stream = false;  // the answer to HEAD for a stream, which has no next_event
   // A permit of a ConcurrencyLimiter; null if none is needed. It is released when the answer is
   // sent.
   std::shared_ptr<void> permit;
+  // A permit to build the answer in memory. It is released as soon as the server has reserved the
+  // memory of the answer.
+  std::shared_ptr<void> build_permit;
 };
 
 inline Response make_response(int status, const char* content_type, const char* cache_control,

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "core/base/clock.h"
 #include "server/http/connection/connection_table.h"
 #include "server/http/message/byte_range.h"
@@ -128,12 +131,65 @@ TEST(SlowConnections, SlowTransfersAreEvicted) {
   table.set_working(more);
   ASSERT_TRUE(table.admit(-1, "10.0.0.1", slow));
   ASSERT_TRUE(table.admit(-1, "10.0.0.2", fast));
-  table.set_waiting(slow, wall_seconds() - 2, false);
-  table.set_waiting(fast, wall_seconds(), false);
+  table.set_waiting(slow, wall_seconds() - 2, ConnectionTable::Waiting::kInExchange);
+  table.set_waiting(fast, wall_seconds(), ConnectionTable::Waiting::kInExchange);
   EXPECT_TRUE(table.admit(-1, "10.0.0.3", other));
   table.remove(slow);
   table.set_working(other);
   EXPECT_FALSE(table.admit(-1, "10.0.0.3", slow)) << "only the fast one waits";
+}
+
+// A connection that waits for the rest of a short body may be closed at any time.
+TEST(SlowConnections, ShortBodiesAreEvictedWithoutDelay) {
+  HttpLimits limits;
+  limits.max_connections = 1;
+  ConnectionTable table(limits);
+  ConnectionTable::Place first, second;
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", first));
+  table.set_waiting(first, wall_seconds(), ConnectionTable::Waiting::kInExchange);
+  EXPECT_FALSE(table.admit(-1, "10.0.0.2", second));
+  table.set_waiting(first, wall_seconds(), ConnectionTable::Waiting::kForShortBody);
+  EXPECT_TRUE(table.admit(-1, "10.0.0.2", second));
+}
+
+// The answers of all connections have a memory limit. An answer that waits for its client gives way
+// to a new one; an answer whose client reads does not.
+TEST(AnswerMemory, TheLongestWaitingAnswerGivesWay) {
+  constexpr size_t kMost = ConnectionTable::kMaxAnswerBytes;
+  const HttpLimits limits;
+  ConnectionTable table(limits);
+  ConnectionTable::Place first, second, third;
+  for (ConnectionTable::Place* place : {&first, &second, &third}) {
+    ASSERT_TRUE(table.admit(-1, "127.0.0.1", *place));
+    table.set_working(*place);
+  }
+  ASSERT_TRUE(table.reserve_answer(first, kMost / 2));
+  ASSERT_TRUE(table.reserve_answer(second, kMost / 2));
+  EXPECT_FALSE(table.reserve_answer(third, 1)) << "nobody waits";
+  table.set_waiting(first, wall_seconds() - 2, ConnectionTable::Waiting::kInExchange);
+  table.set_waiting(second, wall_seconds() - 1, ConnectionTable::Waiting::kInExchange);
+  std::thread evicted([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    table.remove(first);
+  });
+  EXPECT_TRUE(table.reserve_answer(third, kMost / 2)) << "the first one is closed";
+  evicted.join();
+  table.release_answer(third);
+  EXPECT_TRUE(table.reserve_answer(third, kMost / 2)) << "the second one is still there";
+}
+
+TEST(AnswerMemory, OneClientCannotTakeItAll) {
+  constexpr size_t kMost = ConnectionTable::kMaxAnswerBytesPerClient;
+  const HttpLimits limits;
+  ConnectionTable table(limits);
+  ConnectionTable::Place first, second, other;
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", first));
+  ASSERT_TRUE(table.admit(-1, "10.0.0.1", second));
+  ASSERT_TRUE(table.admit(-1, "10.0.0.2", other));
+  for (const ConnectionTable::Place place : {first, second, other}) table.set_working(place);
+  ASSERT_TRUE(table.reserve_answer(first, kMost));
+  EXPECT_FALSE(table.reserve_answer(second, 1));
+  EXPECT_TRUE(table.reserve_answer(other, kMost));
 }
 
 // The number of evicted connections whose threads still run is limited.

@@ -4,7 +4,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <string>
+#include <thread>
 
 #include "core/base/clock.h"
 #include "server/http/exchange.h"
@@ -153,6 +155,9 @@ class Client {
     });
   }
   const std::string& body() const { return body_; }
+  void send_more(const std::string& bytes) {
+    send(ends_[1], bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  }
   bool answer(Response response) { return exchange_->answer(std::move(response), false); }
   // Returns the bytes that the client can read now.
   std::string received() {
@@ -232,8 +237,12 @@ TEST(HostileRequests, LinesOfChunksAreBounded) {
     extensions += "1;" + std::string(1000, 'x') + "\r\na\r\n";
     trailers += "X: " + std::string(1000, 'x') + "\r\n";
   }
-  for (const std::string& body : {endless, "4;" + endless, "1\r\na" + endless, "0\r\nX: " + endless,
-                                  extensions + "0\r\n\r\n", "0\r\n" + trailers + "\r\n"}) {
+  std::string short_trailers;
+  for (int i = 0; i < 4000; ++i) short_trailers += "a:b\r\n";
+  for (const std::string& body :
+       {endless, "4;" + endless, "1\r\na" + endless, "0\r\nX: " + endless, extensions + "0\r\n\r\n",
+        "0\r\n" + trailers + "\r\n", "2\r\n{}\r\n0\r\n" + short_trailers + "\r\n",
+        "0;" + std::string(4000, 'x') + "\r\n" + trailers + "\r\n"}) {
     SCOPED_TRACE(body.substr(0, 20));
     Client client(chunked(body));
     ASSERT_EQ(client.next_request(), 200);
@@ -246,6 +255,44 @@ TEST(HostileRequests, LinesOfChunksAreBounded) {
   ASSERT_EQ(client.next_request(), 200);
   EXPECT_EQ(client.read_body(), BodyEnd::kComplete) << "small chunks are allowed";
   EXPECT_EQ(client.body().size(), 10000u);
+}
+
+// Empty lines before a request are ignored, but only as many as a header may have bytes.
+TEST(HostileRequests, EmptyLinesAreBounded) {
+  std::string lines;
+  for (int i = 0; i < 20000; ++i) lines += "\r\n";
+  Client client(lines + "GET / HTTP/1.1\r\nHost: a\r\n\r\n");
+  EXPECT_EQ(client.next_request(), 431);
+}
+
+// The time limit of a short body ends with the body. It does not concern the next request.
+TEST(HostileRequests, TheDeadlineOfABodyEndsWithIt) {
+  Client client(put("Content-Length: 1\r\n", "x"), true);
+  ASSERT_EQ(client.next_request(), 200);
+  const auto ignore = [](std::string_view) { return true; };
+  EXPECT_EQ(client.request().read_short_body(ignore), BodyEnd::kComplete);
+  std::this_thread::sleep_for(std::chrono::milliseconds(150));
+  EXPECT_TRUE(client.answer(make_response(200, "text/plain", "no-store", "x")));
+  client.send_more(put("Content-Length: 1\r\n", "y"));
+  ASSERT_EQ(client.next_request(), 200);
+  EXPECT_EQ(client.request().read_short_body(ignore), BodyEnd::kComplete);
+}
+
+// A short body has a time limit for the complete request, even if its bytes follow each other
+// faster than the minimum rate.
+TEST(HostileRequests, ShortBodiesHaveADeadline) {
+  Client client(put("Content-Length: 100000000\r\n", ""), true);
+  ASSERT_EQ(client.next_request(), 200);
+  std::jthread sender([&](const std::stop_token& end) {
+    while (!end.stop_requested()) {
+      client.send_more(std::string(200, 'x'));
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  });
+  const double start = wall_seconds();
+  const BodyEnd end = client.request().read_short_body([](std::string_view) { return true; });
+  EXPECT_EQ(end, BodyEnd::kTooSlow);
+  EXPECT_LT(wall_seconds() - start, 20);
 }
 
 TEST(HostileRequests, HeadersAreBounded) {
