@@ -4,6 +4,7 @@
 #include "cli/option_fields.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "scheduler/run_build.h"
 #include "scheduler/spec/build_fields.h"
 
@@ -17,7 +18,7 @@ struct BuildCommand {
 };
 
 void print(const BuildReport& r) {
-  std::printf("%s: %s, sha256 %s\n", r.output.c_str(), size_text(r.bytes).c_str(),
+  std::printf("%s: %s, sha256 %s\n", printable_line(r.output).c_str(), size_text(r.bytes).c_str(),
               r.sha256.c_str());
   std::printf("  %s triangles in a grid of %lld^3\n", count_text(r.triangles).c_str(),
               static_cast<long long>(r.grid.resolution()));
@@ -36,7 +37,7 @@ void print(const BuildReport& r) {
         count_text(c->rows_after).c_str());
   std::printf(" ");
   for (const StageTime& stage : r.stages)
-    std::printf(" %s %s%s", stage.name.c_str(), duration_text(stage.wall_s).c_str(),
+    std::printf(" %s %s%s", printable_line(stage.name).c_str(), duration_text(stage.wall_s).c_str(),
                 &stage == &r.stages.back() ? "\n" : ",");
   std::printf(
       "  %s wall, %s CPU, %s voxels/s, peak memory %s of %s\n", duration_text(r.wall_s).c_str(),
@@ -57,7 +58,7 @@ void run(const BuildCommand& command, CommandContext& context) {
     }
   });
   if (command.json)
-    std::printf("%s\n", report_json(report).c_str());
+    std::printf("%s\n", printable_json(report_json(report)).c_str());
   else
     print(report);
 }

@@ -8,6 +8,7 @@
 #include "cli/output.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
 
@@ -72,8 +73,8 @@ void run(const DiffCommand& command, CommandContext& context) {
   } else {
     std::printf("%s of %s voxels only in %s\n%s of %s voxels only in %s\n",
                 count_text(report.only_a).c_str(), count_text(a->voxels()).c_str(),
-                command.a.c_str(), count_text(report.only_b).c_str(),
-                count_text(b->voxels()).c_str(), command.b.c_str());
+                printable_line(command.a).c_str(), count_text(report.only_b).c_str(),
+                count_text(b->voxels()).c_str(), printable_line(command.b).c_str());
   }
   if (colors) print_colors(*a, *b, *colors);
 }

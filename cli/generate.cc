@@ -7,6 +7,7 @@
 #include "cli/terminal/progress_bar.h"
 #include "core/base/clock.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 
 namespace voxdag::cli {
 namespace {
@@ -19,8 +20,8 @@ struct GenerateCommand {
 };
 
 void print(const GenerateCommand& command, const GenerateReport& r, double wall_s) {
-  std::printf("%s: %s, %s triangles, %s", command.output.path.c_str(), command.kind.c_str(),
-              count_text(r.triangles).c_str(), size_text(r.bytes).c_str());
+  std::printf("%s: %s, %s triangles, %s", printable_line(command.output.path).c_str(),
+              command.kind.c_str(), count_text(r.triangles).c_str(), size_text(r.bytes).c_str());
   if (r.instances > 0)
     std::printf(" (%s triangles stored, %s instances)", count_text(r.stored_triangles).c_str(),
                 count_text(r.instances).c_str());

@@ -3,6 +3,7 @@
 
 #include "cli/output.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
 
@@ -41,7 +42,8 @@ nlohmann::ordered_json info_json(const voxdag_reader::File& file, const std::str
 
 void print(const voxdag_reader::File& file, const std::string& sha256) {
   const double(&origin)[3] = file.origin();
-  std::printf("%s: %s\n", file.path().c_str(), size_text(file.file_bytes()).c_str());
+  std::printf("%s: %s\n", printable_line(file.path()).c_str(),
+              size_text(file.file_bytes()).c_str());
   if (!sha256.empty()) std::printf("  sha256 %s\n", sha256.c_str());
   std::printf("  grid of %lld^3 voxels, low corner %.9g %.9g %.9g, edge %.9g\n",
               static_cast<long long>(file.resolution()), origin[0], origin[1], origin[2],

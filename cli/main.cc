@@ -8,6 +8,7 @@
 
 #include "cli/command.h"
 #include "core/base/process_limits.h"
+#include "core/base/text/printable.h"
 
 namespace voxdag::cli {
 namespace {
@@ -38,7 +39,7 @@ void catch_signals() {
 }
 
 int report(ErrorCode code, const char* message) {
-  std::fprintf(stderr, "voxdag: error: %s\n", message);
+  std::fprintf(stderr, "voxdag: error: %s\n", printable_line(message).c_str());
   return exit_status(code);
 }
 
@@ -91,7 +92,8 @@ int run(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return report(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "voxdag: error: a defect of voxdag: %s\n", error.what());
+    std::fprintf(stderr, "voxdag: error: a defect of voxdag: %s\n",
+                 printable_line(error.what()).c_str());
     return kDefectStatus;
   }
 }

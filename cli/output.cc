@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/text/printable.h"
 #include "core/format/global/open_global.h"
 #include "core/io/overwrite.h"
 
@@ -12,7 +13,8 @@ namespace {
 
 template <class Json>
 void print_line(const Json& json) {
-  std::printf("%s\n", json.dump(-1, ' ', false, Json::error_handler_t::replace).c_str());
+  const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::printf("%s\n", printable_json(text).c_str());
 }
 
 }  // namespace

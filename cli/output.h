@@ -10,8 +10,8 @@
 
 namespace voxdag::cli {
 
-// Prints the JSON on one line. Bytes that are not valid UTF-8, for example in a path, are printed
-// as U+FFFD.
+// Prints the JSON on one line, with escapes for characters that are not printable, and U+FFFD for
+// bytes that are not UTF-8.
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
 

@@ -10,6 +10,7 @@
 #include "core/base/clock.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "core/format/global/open_global.h"
 #include "query/render/depth.h"
 #include "query/render/renderer.h"
@@ -79,8 +80,8 @@ void report(const RenderCommand& command, const query::Placement& placement,
     return print_json(json);
   }
   const std::string& name = command.output.path.empty() ? command.depth : command.output.path;
-  std::printf("%s: %d x %d, %s\n", name.c_str(), command.options.width, command.options.height,
-              duration_text(wall_s).c_str());
+  std::printf("%s: %d x %d, %s\n", printable_line(name).c_str(), command.options.width,
+              command.options.height, duration_text(wall_s).c_str());
   std::printf("  --camera %.6g,%.6g,%.6g --target %.6g,%.6g,%.6g --fov %.4g\n", eye[0], eye[1],
               eye[2], target[0], target[1], target[2], placement.fov_degrees);
 }

@@ -5,6 +5,7 @@
 #include "cli/cluster.h"
 #include "cli/command.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "scheduler/state/job_status.h"
 #include "scheduler/state/work_folder.h"
 
@@ -18,22 +19,25 @@ struct StatusCommand {
 };
 
 void print(const JobStatus& status, FileSystem& files, const std::string& work_folder) {
-  std::printf("%s; %s of %s subvolumes built\n",
-              status.running ? ("being built by " + status.holder).c_str() : "not running",
-              count_text(status.built).c_str(), count_text(status.subvolumes).c_str());
+  std::printf(
+      "%s; %s of %s subvolumes built\n",
+      status.running ? ("being built by " + printable_line(status.holder)).c_str() : "not running",
+      count_text(status.built).c_str(), count_text(status.subvolumes).c_str());
   if (const auto& p = status.progress) {
-    std::printf("  stage %s: %s of %s %s, %s/s", p->stage.c_str(), count_text(p->done).c_str(),
-                count_text(p->total).c_str(), p->unit.c_str(),
+    std::printf("  stage %s: %s of %s %s, %s/s", printable_line(p->stage).c_str(),
+                count_text(p->done).c_str(), count_text(p->total).c_str(),
+                printable_line(p->unit).c_str(),
                 count_text(static_cast<uint64_t>(status.rate())).c_str());
     if (status.running && status.eta_s() > 0)
       std::printf(", %s left", duration_text(status.eta_s()).c_str());
     std::printf("\n  memory %s, disk %s\n", size_text(p->memory_bytes).c_str(),
                 size_text(p->disk_bytes).c_str());
-    if (!p->last_error.empty()) std::printf("  last error: %s\n", p->last_error.c_str());
+    if (!p->last_error.empty())
+      std::printf("  last error: %s\n", printable_line(p->last_error).c_str());
   }
   print_cluster_status(files, work_folder);
   for (const StageTime& stage : status.stages)
-    std::printf("  %-10s %s wall, %s CPU\n", stage.name.c_str(),
+    std::printf("  %-10s %s wall, %s CPU\n", printable_line(stage.name).c_str(),
                 duration_text(stage.wall_s).c_str(), duration_text(stage.cpu_s).c_str());
 }
 
@@ -43,9 +47,10 @@ void run(const StatusCommand& command, CommandContext& context) {
     if (!first && !context.files.exists(WorkFolder::store_path(command.work_folder))) return;
     const JobStatus status = read_job_status(context.files, command.work_folder);
     if (command.json)
-      std::printf(
-          "%s\n",
-          status_json(status, cluster_status_json(context.files, command.work_folder)).c_str());
+      std::printf("%s\n",
+                  printable_json(
+                      status_json(status, cluster_status_json(context.files, command.work_folder)))
+                      .c_str());
     else
       print(status, context.files, command.work_folder);
     std::fflush(stdout);

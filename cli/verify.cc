@@ -11,6 +11,7 @@
 #include "cli/terminal/progress_bar.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "core/format/global/open_global.h"
 #include "query/verify/color_sample.h"
 #include "query/verify/surface_sample.h"
@@ -76,9 +77,9 @@ Sample check_against(const VerifyCommand& command, const voxdag_reader::File& fi
 }
 
 void print(const voxdag_reader::File& file, const std::optional<Sample>& sample) {
-  std::printf("%s: valid; %s voxels, %s octree nodes, %s DAG nodes\n", file.path().c_str(),
-              count_text(file.voxels()).c_str(), count_text(file.svo_nodes()).c_str(),
-              count_text(file.dag_nodes()).c_str());
+  std::printf("%s: valid; %s voxels, %s octree nodes, %s DAG nodes\n",
+              printable_line(file.path()).c_str(), count_text(file.voxels()).c_str(),
+              count_text(file.svo_nodes()).c_str(), count_text(file.dag_nodes()).c_str());
   if (sample)
     std::printf("  equal to the scene: %s voxels compared in %s boxes near its surface, %s set\n",
                 count_text(sample->voxels.voxels).c_str(), count_text(sample->voxels.boxes).c_str(),

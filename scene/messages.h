@@ -7,10 +7,10 @@
 
 namespace voxdag {
 
-// Returns a text from the file for use in a message. Quotes, control characters and bytes that are
-// not UTF-8 become question marks, so that the text cannot forge a line of a log. Control
-// characters are below U+0020, or from U+007F to U+009F, because terminals also obey these. A text
-// of over `max_bytes` is cut and ends with "...".
+// Returns a text from the file for use in a message. Quotes, and all characters that are not
+// printable (core/base/text/printable.h), become question marks, so that the text cannot forge a
+// line of a log or control a terminal. A text of over `max_bytes` is cut and ends with "...". The
+// text may be of any encoding.
 std::string printable(std::string_view text, size_t max_bytes = 64);
 
 // Returns the message of an exception of the JSON library without its prefix "[json.exception...]

@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/routes/routes.h"
 #include "server/disk/data_folder.h"
@@ -68,8 +69,8 @@ std::string shown(const std::string& path) {
 Service::Service(ServerConfig config, FileSystem& files, Log log)
     : config_(checked(std::move(config), files, log)),
       files_(files),
-      log_(log),
-      steps_(log, config_.before_step),
+      log_([log = std::move(log)](const std::string& line) { log(printable_line(line)); }),
+      steps_(log_, config_.before_step),
       lock_(lock_folder(files, config_.data_folder)),
       disk_(files, config_.data_folder, config_.jobs.min_free_disk_bytes),
       access_(config_, files),

@@ -5,6 +5,7 @@
 #include "cli/cluster.h"
 #include "core/base/error.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "scheduler/slurm/files/cluster_state.h"
 
 namespace voxdag::cli {
@@ -14,7 +15,7 @@ std::optional<ClusterState> read_state(FileSystem& files, const std::string& wor
   try {
     return read_cluster_state(files, work_folder);
   } catch (const Error& error) {
-    std::fprintf(stderr, "voxdag: %s\n", error.what());
+    std::fprintf(stderr, "voxdag: %s\n", printable_line(error.what()).c_str());
     return std::nullopt;
   }
 }
@@ -28,22 +29,23 @@ void print(const ClusterState& cluster) {
     if (batch.task && !batch.task->node.empty()) ++by_node[batch.task->node];
     if (!batch.failures.empty()) failed = &batch;
   }
-  std::printf("  tasks %s: %s batches built, %zu open", cluster.task_name().c_str(),
+  std::printf("  tasks %s: %s batches built, %zu open", printable_line(cluster.task_name()).c_str(),
               count_text(cluster.totals.batches).c_str(), cluster.open.size());
-  for (const auto& [state, count] : by_state) std::printf(", %zu %s", count, state.c_str());
+  for (const auto& [state, count] : by_state)
+    std::printf(", %zu %s", count, printable_line(state).c_str());
   std::printf("; %s attempts failed\n", count_text(cluster.totals.attempts).c_str());
   for (const auto& [node, count] : cluster.totals.batches_of_node) by_node.try_emplace(node, 0);
   for (const auto& [node, running] : by_node) {
     const auto built = cluster.totals.batches_of_node.find(node);
     std::printf(
-        "  node %s: %s built, %zu running\n", node.c_str(),
+        "  node %s: %s built, %zu running\n", printable_line(node).c_str(),
         count_text(built == cluster.totals.batches_of_node.end() ? 0 : built->second).c_str(),
         running);
   }
   if (failed)
     std::printf("  batch %u has failed %zu times, last as task %s: %s\n", failed->number,
-                failed->failures.size(), failed->failures.back().task.c_str(),
-                failed->failures.back().reason.c_str());
+                failed->failures.size(), printable_line(failed->failures.back().task).c_str(),
+                printable_line(failed->failures.back().reason).c_str());
 }
 
 }  // namespace

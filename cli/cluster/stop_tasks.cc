@@ -2,6 +2,7 @@
 
 #include "cli/command.h"
 #include "core/base/error.h"
+#include "core/base/text/printable.h"
 #include "scheduler/cluster/cluster.h"
 #include "scheduler/slurm/files/cluster_state.h"
 
@@ -20,7 +21,8 @@ void run(const StopTasksCommand& command, CommandContext& context) {
                     " has no record of cluster tasks: expected the work folder "
                     "of a build on a cluster");
   stop_cluster_tasks(context.files, command.work_folder);
-  std::printf("stopped the tasks %s; finished subvolumes are kept\n", state->task_name().c_str());
+  std::printf("stopped the tasks %s; finished subvolumes are kept\n",
+              printable_line(state->task_name()).c_str());
 }
 
 void declare(Command& command, StopTasksCommand& state) {

@@ -9,6 +9,7 @@
 #include "core/base/clock.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag::cli {
@@ -22,10 +23,10 @@ struct ExportCommand {
 
 void print(const query::ExportReport& report, double wall_s) {
   for (const std::string& file : report.files)
-    std::printf("%s%s", &file == report.files.data() ? "" : ", ", file.c_str());
+    std::printf("%s%s", &file == report.files.data() ? "" : ", ", printable_line(file).c_str());
   std::printf(": %s, %s voxels, %s\n", size_text(report.bytes).c_str(),
               count_text(report.voxels).c_str(), duration_text(wall_s).c_str());
-  for (const std::string& note : report.notes) std::printf("  %s\n", note.c_str());
+  for (const std::string& note : report.notes) std::printf("  %s\n", printable_line(note).c_str());
 }
 
 void run(const ExportCommand& command, CommandContext& context) {

@@ -9,6 +9,7 @@
 #include "core/base/clock.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag::cli {
@@ -27,8 +28,8 @@ struct Times {
 };
 
 void print(const ExtractCommand& command, const query::ExtractReport& r, const Times& times) {
-  std::printf("%s: %s, sha256 %s\n", command.output.c_str(), size_text(r.bytes).c_str(),
-              r.sha256.c_str());
+  std::printf("%s: %s, sha256 %s\n", printable_line(command.output).c_str(),
+              size_text(r.bytes).c_str(), r.sha256.c_str());
   std::printf("  grid of %lld^3 voxels, low corner %.9g %.9g %.9g, edge %.9g\n",
               static_cast<long long>(r.grid.resolution()), r.grid.origin[0], r.grid.origin[1],
               r.grid.origin[2], r.grid.edge);

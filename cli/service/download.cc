@@ -5,6 +5,7 @@
 #include "cli/terminal/progress_bar.h"
 #include "client/result_download.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "core/format/global/global_writer.h"
 
 namespace voxdag::cli {
@@ -28,8 +29,8 @@ void run(const DownloadCommand& command, ServiceClient& service, CommandContext&
                     {"resumed_bytes", result.resumed_bytes},
                     {"sha256", result.sha256}});
   } else {
-    std::printf("%s: %s, sha256 %s\n", command.output.path.c_str(), size_text(result.bytes).c_str(),
-                result.sha256.c_str());
+    std::printf("%s: %s, sha256 %s\n", printable_line(command.output.path).c_str(),
+                size_text(result.bytes).c_str(), result.sha256.c_str());
   }
 }
 

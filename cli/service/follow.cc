@@ -18,7 +18,7 @@ class JobView {
     state_ = state;
     const Json& warnings = job.at("warnings");
     for (; warnings_ < warnings.size(); ++warnings_)
-      line_.warn(printable(record_from_json<Warning>(warnings[warnings_]).text()));
+      line_.warn(record_from_json<Warning>(warnings[warnings_]).text());
     if (job.at("progress").is_object()) show_progress(job, job.at("progress"));
   }
 
@@ -72,7 +72,7 @@ void check_succeeded(const Json& job) {
     throw Error(ErrorCode::kIo, "job " + id + " is " + state + "; the service gives no reason");
   const Json& error = job.at("error");
   throw Error(client::error_code_of(error.at("code"), 500),
-              "job " + id + " failed: " + printable(error.at("message").get<std::string>()));
+              "job " + id + " failed: " + error.at("message").get<std::string>());
 }
 
 }  // namespace voxdag::cli

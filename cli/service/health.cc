@@ -2,6 +2,7 @@
 
 #include "cli/command.h"
 #include "client/http_client.h"
+#include "core/base/text/printable.h"
 
 namespace voxdag::cli {
 namespace {
@@ -33,7 +34,7 @@ void run(const HealthCommand& command, CommandContext&) {
     throw Error(ErrorCode::kIo, "server " + command.url + ": /readyz answers with status " +
                                     std::to_string(answer.status) +
                                     ", expected 200 and \"ready\", as a voxdag service answers");
-  std::printf("%s: ready\n", command.url.c_str());
+  std::printf("%s: ready\n", printable_line(command.url).c_str());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 
 namespace voxdag::cli {
 namespace {
@@ -19,29 +20,24 @@ std::string error_code(const Json& job) {
 
 }  // namespace
 
-std::string printable(std::string text) {
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < ' ' || c == 0x7f) c = '?';
-  return text;
-}
-
 std::string job_title(const Json& job) {
   std::string title = job.at("name");
-  if (!title.empty()) return printable(title);
+  if (!title.empty()) return printable_line(title);
   for (const Json& scene : job.at("scene")) {
     const std::string path = scene;
     title += (title.empty() ? "" : " + ") + path.substr(path.rfind('/') + 1);
   }
-  return printable(title);
+  return printable_line(title);
 }
 
 std::string state_line(const Json& job) {
   const std::string state = job.at("state");
-  std::string line = "job " + job.at("id").get<std::string>() + ": " + state;
+  std::string line =
+      "job " + printable_line(job.at("id").get<std::string>()) + ": " + printable_line(state);
   if (job.at("position").is_number())
     line += ", number " + job.at("position").dump() + " in the queue";
   if (state == "queued" && !error_code(job).empty())
-    line += ", retry after " + printable(error_code(job));
+    line += ", retry after " + printable_line(error_code(job));
   return line;
 }
 
@@ -49,11 +45,12 @@ std::string progress_text(const Json& job) {
   const std::string state = job.at("state");
   const Json& progress = job.at("progress");
   if (state == "succeeded") return size_text(job.at("result").at("bytes"));
-  if (state == "failed") return printable(error_code(job));
+  if (state == "failed") return printable_line(error_code(job));
   if (state == "queued" && job.at("position").is_number())
     return "number " + job.at("position").dump();
   if (!progress.is_object()) return "";
-  std::string text = printable(progress.at("stage")) + percent_text(progress);
+  std::string text =
+      printable_line(progress.at("stage").get<std::string>()) + percent_text(progress);
   const double left_s = progress.at("eta_s");
   if (state == "running" && left_s > 0) text += ", " + duration_text(left_s) + " left";
   return text;
@@ -62,8 +59,9 @@ std::string progress_text(const Json& job) {
 void print_result(const Json& job) {
   const Json& r = job.at("result");
   const auto count = [&](const char* name) { return count_text(r.at(name)); };
-  std::printf("job %s: %s, sha256 %s\n", job.at("id").get<std::string>().c_str(),
-              size_text(r.at("bytes")).c_str(), r.at("sha256").get<std::string>().c_str());
+  std::printf("job %s: %s, sha256 %s\n", printable_line(job.at("id").get<std::string>()).c_str(),
+              size_text(r.at("bytes")).c_str(),
+              printable_line(r.at("sha256").get<std::string>()).c_str());
   std::printf("  %s triangles in a grid of %s^3\n", count("triangles").c_str(),
               job.at("resolution").dump().c_str());
   std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count("voxels").c_str(),

@@ -9,8 +9,6 @@ namespace voxdag::cli {
 
 using client::Json;
 
-// Replaces control characters in a text from the network, because a terminal would interpret them.
-std::string printable(std::string text);
 // Returns a line such as "job 6b1f0c7a93d2e845: queued, number 2 in the queue".
 std::string state_line(const Json& job);
 // Returns the job's name, or its scenes if it has no name.

@@ -3,6 +3,7 @@
 #include "cli/output.h"
 #include "cli/service/job_text.h"
 #include "cli/service/service_options.h"
+#include "core/base/text/printable.h"
 
 namespace voxdag::cli {
 namespace {
@@ -17,16 +18,35 @@ struct JobsCommand {
 void print(const Json& answer) {
   std::printf("%-16s  %-10s  %10s  %-28s  %s\n", "ID", "STATE", "RESOLUTION", "PROGRESS", "NAME");
   for (const Json& job : answer.at("jobs"))
-    std::printf("%-16s  %-10s  %10s  %-28s  %s\n", job.at("id").get<std::string>().c_str(),
-                job.at("state").get<std::string>().c_str(), job.at("resolution").dump().c_str(),
-                progress_text(job).c_str(), job_title(job).c_str());
+    std::printf(
+        "%-16s  %-10s  %10s  %-28s  %s\n", printable_line(job.at("id").get<std::string>()).c_str(),
+        printable_line(job.at("state").get<std::string>()).c_str(),
+        job.at("resolution").dump().c_str(), progress_text(job).c_str(), job_title(job).c_str());
   if (!answer.at("next_cursor").is_null()) std::printf("(more: raise --limit)\n");
 }
 
+// Returns up to command.limit jobs in the form of one page. A page of the service may have fewer
+// jobs than its limit, so this requests further pages.
+Json get_jobs(const JobsCommand& command, ServiceClient& service) {
+  const auto page = [&](size_t limit, const std::string& cursor) {
+    std::string path = "/api/v1/jobs?limit=" + std::to_string(limit) + cursor;
+    if (!command.states.empty()) path += "&state=" + command.states;
+    return service.get(path);
+  };
+  Json answer = page(command.limit, "");
+  Json& jobs = answer.at("jobs");
+  while (answer.at("next_cursor").is_string() && jobs.size() < command.limit) {
+    const Json next =
+        page(command.limit - jobs.size(), "&cursor=" + answer.at("next_cursor").get<std::string>());
+    if (next.at("jobs").empty()) break;
+    jobs.insert(jobs.end(), next.at("jobs").begin(), next.at("jobs").end());
+    answer["next_cursor"] = next.at("next_cursor");
+  }
+  return answer;
+}
+
 void run(const JobsCommand& command, ServiceClient& service, CommandContext&) {
-  std::string path = "/api/v1/jobs?limit=" + std::to_string(command.limit);
-  if (!command.states.empty()) path += "&state=" + command.states;
-  const Json answer = service.get(path);
+  const Json answer = get_jobs(command, service);
   if (command.json)
     print_json(answer);
   else

@@ -11,6 +11,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 
 namespace voxdag::cli {
 namespace {
@@ -125,12 +126,12 @@ void ProgressLine::show(const StageView& stage, bool ended) {
   const double part = stage.total ? std::min(1.0, done / total) : 0;
   std::string line = terminal_ ? kClearLine : "";
   const size_t begin = line.size();
-  line.append(stage.name).append(" ");
+  line.append(printable_line(stage.name)).append(" ");
   line.resize(std::max(line.size(), begin + kNameWidth), ' ');
   if (terminal_ && stage.total && !ended) line += bar(part);
   if (stage.total && !ended) line += percent(part);
   line += short_count(done) + (stage.total ? " of " + short_count(total) : "");
-  line += " " + std::string(stage.unit) + ", " + short_count(stage.rate) + "/s, " +
+  line += " " + printable_line(stage.unit) + ", " + short_count(stage.rate) + "/s, " +
           duration_text(stage.elapsed_s);
   if (!ended && stage.eta_s > 0) line += ", " + duration_text(stage.eta_s) + " left";
   open_ = terminal_ && !ended;
@@ -145,8 +146,7 @@ void ProgressLine::warn(std::string_view message) {
 
 void ProgressLine::note(std::string_view text) {
   open_ = false;
-  std::fprintf(stderr, "%s%.*s\n", terminal_ ? kClearLine : "", static_cast<int>(text.size()),
-               text.data());
+  std::fprintf(stderr, "%s%s\n", terminal_ ? kClearLine : "", printable_line(text).c_str());
 }
 
 std::unique_ptr<Progress> make_progress_bar(bool quiet) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "core/base/text/printable.h"
+
 namespace voxdag {
 
 std::string joined(const std::vector<std::string>& words, const char* separator) {
@@ -54,9 +56,8 @@ bool fits_integer_limits(const Field& field, int64_t value) {
 }
 
 bool is_valid_line(const Field& field, std::string_view text) {
-  const bool has_control = std::ranges::any_of(
-      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
-  return !has_control && fits_integer_limits(field, static_cast<int64_t>(character_count(text)));
+  return is_printable(text) &&
+         fits_integer_limits(field, static_cast<int64_t>(character_count(text)));
 }
 
 }  // namespace voxdag

@@ -7,7 +7,9 @@ namespace {
 // units. The pattern omits them because it could not check their minimum of 64 MiB.
 constexpr const char* kSizePattern =
     "^((6[4-9]|[7-9][0-9]|[1-9][0-9]{2,5})MiB|[1-9][0-9]{0,5}GiB)$";
-constexpr const char* kLinePattern = "^[^\\u0000-\\u001f\\u007f]+$";
+// The printable characters of core/base/text/printable.h.
+constexpr const char* kLinePattern =
+    "^[^\\u0000-\\u001f\\u007f-\\u009f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069]+$";
 
 }  // namespace
 

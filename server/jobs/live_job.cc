@@ -9,6 +9,47 @@ namespace {
 
 constexpr size_t kMaxWarnings = 100;
 constexpr size_t kMaxStages = 64;
+// Limits for texts of the job's process, so that a job has a bounded size in memory and in answers.
+constexpr size_t kMaxNameBytes = 64;
+constexpr size_t kMaxPlaceBytes = 1024;
+constexpr size_t kMaxTextBytes = 4096;
+constexpr size_t kMaxWarningBytes = 32 << 10;  // all warnings of a job
+constexpr size_t kMaxNodes = 512;
+constexpr size_t kMaxResultBytes = 64 << 10;
+
+// Returns the text on one line, cut after `max_bytes`.
+std::string bounded(const std::string& text, size_t max_bytes) {
+  if (text.size() <= max_bytes) return printable_line(text);
+  return printable_line(std::string_view(text).substr(0, max_bytes)) + "...";
+}
+
+Warning bounded(const Warning& warning) {
+  return {bounded(warning.code, kMaxNameBytes), bounded(warning.place, kMaxPlaceBytes),
+          bounded(warning.message, kMaxTextBytes), warning.count};
+}
+
+size_t bytes_of(const std::vector<Warning>& warnings) {
+  size_t bytes = 0;
+  for (const Warning& warning : warnings)
+    bytes += warning.code.size() + warning.place.size() + warning.message.size();
+  return bytes;
+}
+
+// Keeps at most kMaxNodes nodes.
+std::map<std::string, uint64_t> bounded(const std::map<std::string, uint64_t>& nodes) {
+  std::map<std::string, uint64_t> kept;
+  for (const auto& [name, count] : nodes) {
+    if (kept.size() == kMaxNodes) break;
+    kept[bounded(name, kMaxNameBytes)] += count;
+  }
+  return kept;
+}
+
+ClusterTasks bounded(ClusterTasks tasks) {
+  tasks.running = bounded(tasks.running);
+  tasks.built_of_node = bounded(tasks.built_of_node);
+  return tasks;
+}
 
 nlohmann::ordered_json cluster_json(const ClusterTasks& tasks) {
   using nlohmann::ordered_json;
@@ -38,8 +79,10 @@ void LiveJob::apply(const Message& message) {
   const double now = wall_seconds();
   if (const auto* begun = std::get_if<StageBegun>(&message)) {
     if (stages_.size() == kMaxStages) stages_.erase(stages_.begin());
-    stages_.push_back(
-        {.name = begun->stage, .unit = begun->unit, .total = begun->total, .start_s = now});
+    stages_.push_back({.name = bounded(begun->stage, kMaxNameBytes),
+                       .unit = bounded(begun->unit, kMaxNameBytes),
+                       .total = begun->total,
+                       .start_s = now});
   }
   if (const auto* resumed = std::get_if<StageResumed>(&message); resumed && !stages_.empty())
     stages_.back().done = stages_.back().resumed_at = resumed->done;
@@ -56,12 +99,15 @@ void LiveJob::apply(const Message& message) {
   }
   if (const auto* subvolumes = std::get_if<SubvolumeTotals>(&message)) subvolumes_ = *subvolumes;
   if (const auto* usage = std::get_if<Usage>(&message)) usage_ = *usage;
-  if (const auto* tasks = std::get_if<ClusterTasks>(&message)) cluster_tasks_ = *tasks;
+  if (const auto* tasks = std::get_if<ClusterTasks>(&message)) cluster_tasks_ = bounded(*tasks);
   if (const auto* reported = std::get_if<WarningReported>(&message);
-      reported && warnings_.size() < kMaxWarnings)
-    warnings_.push_back(reported->warning);
-  if (const auto* failure = std::get_if<Failure>(&message)) failure_ = *failure;
-  if (const auto* result = std::get_if<Result>(&message)) result_ = result->json;
+      reported && warnings_.size() < kMaxWarnings && bytes_of(warnings_) < kMaxWarningBytes)
+    warnings_.push_back(bounded(reported->warning));
+  if (const auto* failure = std::get_if<Failure>(&message))
+    failure_ = {bounded(failure->code, kMaxNameBytes), bounded(failure->text, kMaxTextBytes)};
+  if (const auto* result = std::get_if<Result>(&message);
+      result && result->json.size() <= kMaxResultBytes)
+    result_ = result->json;
 }
 
 std::string LiveJob::progress_json() const {

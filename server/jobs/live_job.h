@@ -20,7 +20,7 @@ class LiveJob {
   // Memory limit of the job's process.
   uint64_t memory_bytes() const { return memory_bytes_; }
 
-  // Updates this object by a message of the job's process.
+  // Applies a message of the job's process. Its texts become printable and are cut if long.
   void apply(const Message& message);
   // Returns the JSON object PROGRESS of docs/api.md; "" before the first stage. Keeps the text
   // until the next message arrives.

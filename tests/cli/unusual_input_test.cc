@@ -25,6 +25,30 @@ class UnusualInput : public CommandLine {
   }
 };
 
+// Names with control characters do not reach the terminal, and cannot forge a line. In JSON they
+// are escaped.
+TEST_F(UnusualInput, ControlCharactersOfNamesAreNotPrinted) {
+  const std::string evil = "a\x1b[31m\nforged\xc2\x9b\xe2\x80\xae";
+  ASSERT_EQ(run({"build", "m.glb", "-r", "64", "-o", evil + ".vdag"}).status, 0);
+  const auto expect_printable = [&](const std::vector<std::string>& args) {
+    SCOPED_TRACE(args[0]);
+    const Answer answer = run(args);
+    const std::string text = answer.out + answer.err;
+    EXPECT_NE(text.find("forged"), std::string::npos) << text;
+    for (const std::string control : {"\x1b", "\nforged", "\xc2\x9b", "\xe2\x80\xae"})
+      EXPECT_EQ(text.find(control), std::string::npos) << text;
+  };
+  expect_printable({"info", evil + ".vdag"});
+  expect_printable({"info", evil + "x.vdag"});
+  expect_printable({"verify", evil + ".vdag"});
+  expect_printable({"build", evil + ".glb", "-r", "64", "-o", "b.vdag"});
+  expect_printable({"build", "m.glb", "-r", "64", "-o", evil + ".vdag"});
+  expect_printable({"build", "m.glb", "-r", "64", "-o", evil + ".vdag", "--json"});
+  expect_printable({"render", evil + ".vdag", "-o", evil + ".png", "--size", "32x32"});
+  expect_printable({"generate", "menger", evil + ".glb", "--level", "1"});
+  expect_printable({"export", evil + ".vdag", "-o", evil + ".ply", "--to", "ply"});
+}
+
 constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, for a byte that is not UTF-8
 
 // A path is a sequence of bytes. In JSON, U+FFFD replaces bytes that are not UTF-8. The file itself

@@ -9,10 +9,12 @@
 namespace voxdag::server {
 namespace {
 
-// Converts a text to a JSON string, or a list of texts to an array.
+// Converts a text to a JSON string, or a list of warnings to an array. Makes texts printable.
 template <class T>
 std::string as_json(const T& value) {
-  return json_text(nlohmann::json(value));
+  nlohmann::json json(value);
+  make_printable(json);
+  return json_text(json);
 }
 
 std::string time_member(double unix_s) {
@@ -42,12 +44,15 @@ std::string request_members(const std::string& request) {
       {"scene", ordered_json::array()}, {"resolution", 0}, {"options", ordered_json::object()}};
   for (const auto& [name, value] : members.items())
     if (stored.contains(name)) value = stored[name];
+  make_printable(members);
   const std::string text = json_text(members);
   return text.substr(1, text.size() - 2);
 }
 
-// Returns the JSON text, or "null" if it is empty.
-std::string or_null(const std::string& json) { return json.empty() ? "null" : json; }
+// Returns the JSON with printable texts, or "null" if it is empty.
+std::string or_null(const std::string& json) {
+  return json.empty() ? "null" : printable_json_text(json);
+}
 
 }  // namespace
 

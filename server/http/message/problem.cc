@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/base/text/printable.h"
+
 namespace voxdag::server {
 Problem problem(ErrorCode code, std::string detail) {
   return Problem(http_status(code), error_name(code), std::move(detail));
@@ -24,7 +26,7 @@ std::string problem_json(const Problem& problem) {
                                  {"title", status_title(problem.status)},
                                  {"status", problem.status},
                                  {"code", problem.code},
-                                 {"detail", problem.detail}};
+                                 {"detail", printable_line(problem.detail)}};
   if (!problem.state.empty()) json["state"] = problem.state;
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }

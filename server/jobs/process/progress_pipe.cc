@@ -10,6 +10,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 
 namespace voxdag::server {
 namespace {
@@ -184,7 +185,8 @@ void ProgressPipe::write_subvolumes() {
 }
 
 void ProgressPipe::log(const std::string& text) {
-  write_all(STDERR_FILENO, utc_text(time(nullptr), "%Y-%m-%dT%H:%M:%SZ ") + text + "\n");
+  write_all(STDERR_FILENO,
+            utc_text(time(nullptr), "%Y-%m-%dT%H:%M:%SZ ") + printable_line(text) + "\n");
 }
 
 }  // namespace voxdag::server
