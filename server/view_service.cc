@@ -3,6 +3,7 @@
 #include <exception>
 #include <thread>
 
+#include "core/base/text/printable.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/routes/routes.h"
 #include "server/api/routes/tile_routes.h"
@@ -13,22 +14,17 @@ namespace {
 constexpr double kDrainS = 1;
 // Enough for the old and the new file while the file is being replaced.
 constexpr size_t kMaxOpen = 2;
-
-HttpOptions options(int port) {
-  HttpOptions options;
-  options.port = port;
-  return options;
-}
+constexpr size_t kMaxConcurrentTiles = 64;
 
 }  // namespace
 
 ViewService::ViewService(const std::string& path, int port, FileSystem& files, Log log)
     : path_(path),
-      log_(std::move(log)),
+      log_([log = std::move(log)](const std::string& line) { log(printable_line(line)); }),
       open_sources_(files, kMaxOpen),
+      tiles_(kMaxConcurrentTiles, kMaxConcurrentTiles),
       access_(ServerConfig{}, files),
-      http_(options(port), [this](Request& request) { return answer(request); }) {
-  open_sources_.open(path_);
+      http_(checked_options(port), [this](Request& request) { return answer(request); }) {
   add_tile_routes(
       router_,
       {.base = "/api/v1/view",
@@ -37,11 +33,21 @@ ViewService::ViewService(const std::string& path, int port, FileSystem& files, L
        .manifest_schema = "TileManifest",
        .packing = Packing::kNone},
       [this](const Call&) {
-        return TileAccess{open_sources_.open(path_), nullptr};
+        auto permit = tiles_.acquire("");
+        if (!permit) throw busy("too many concurrent requests for tiles: " + tiles_.limits(), 1);
+        return TileAccess{open_sources_.open(path_), std::move(permit)};
       },
       stopping_);
   add_asset_routes(router_, "viewer.html");
   add_document_route(router_);
+}
+
+// Opens the file first, so that no port is open if the file is refused.
+HttpOptions ViewService::checked_options(int port) {
+  open_sources_.open(path_);
+  HttpOptions options;
+  options.port = port;
+  return options;
 }
 
 std::string ViewService::url() const {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/api/access/access_control.h"
+#include "server/api/access/concurrency_limiter.h"
 #include "server/api/routing/router.h"
 #include "server/base/steps.h"
 #include "server/http/http_server.h"
@@ -30,11 +31,13 @@ class ViewService {
   }
 
  private:
+  HttpOptions checked_options(int port);
   Response answer(Request& request);
 
   const std::string path_;
   const Log log_;
   OpenTileSources open_sources_;
+  ConcurrencyLimiter tiles_;
   CancelToken stopping_;
   AccessControl access_;
   Router router_;

@@ -24,6 +24,8 @@ constexpr const char* kQueueOrder = "priority DESC, front DESC, number ASC";
 constexpr unsigned kFreeInterruptions = 5;
 constexpr unsigned kMaxInterruptions = 15;
 
+constexpr int64_t kMaxEvents = 256;  // number of events that are kept of each job
+
 constexpr const char* kSchema = R"sql(
 CREATE TABLE job (
   number INTEGER PRIMARY KEY,
@@ -161,7 +163,8 @@ std::optional<Job> find_job(SqlDatabase& database, const std::string& id) {
   return read_job(rows);
 }
 
-// Records the current state of the job as its newest event.
+// Records the current state of the job as its newest event. Keeps only the newest events of a job,
+// because a client can suspend and resume a job any number of times.
 void write_event(SqlDatabase& database, const Job& job) {
   database
       .prepare("INSERT INTO job_event (job, at_s, state, attempt, error) VALUES (?, ?, ?, ?, ?)")
@@ -170,6 +173,13 @@ void write_event(SqlDatabase& database, const Job& job) {
       .bind(2, static_cast<int64_t>(job.state))
       .bind(3, int64_t{job.attempts})
       .bind(4, job.error ? job.error->code : std::string())
+      .run();
+  database
+      .prepare(
+          "DELETE FROM job_event WHERE job = ?1 AND number <= (SELECT number FROM job_event "
+          "WHERE job = ?1 ORDER BY number DESC LIMIT 1 OFFSET ?2)")
+      .bind(0, job.id)
+      .bind(1, kMaxEvents)
       .run();
 }
 
@@ -428,9 +438,9 @@ double JobQueue::last_event_s() {
 std::vector<JobEvent> JobQueue::events_after(const std::string& id, int64_t number) {
   std::lock_guard lock(read_mutex_);
   auto rows = reader_.prepare(
-      "SELECT number, at_s, state, attempt, error FROM job_event WHERE job = ? AND number > ? "
-      "ORDER BY number");
-  rows.bind(0, id).bind(1, number);
+      "SELECT * FROM (SELECT number, at_s, state, attempt, error FROM job_event WHERE job = ? AND "
+      "number > ? ORDER BY number DESC LIMIT ?) ORDER BY number");
+  rows.bind(0, id).bind(1, number).bind(2, kMaxEvents);
   std::vector<JobEvent> events;
   while (rows.step())
     events.push_back({rows.integer(0), rows.real(1), static_cast<JobState>(rows.integer(2)),

@@ -93,7 +93,7 @@ class JobQueue {
 
   // Time of the last recorded change of a state; 0 for never.
   double last_event_s();
-  // Returns the job's events with numbers above `number`, oldest first.
+  // Returns the last events (at most 256) with numbers above `number` of a job, oldest first.
   std::vector<JobEvent> events_after(const std::string& id, int64_t number);
   // Returns the job that was added with this key; nullopt if none exists. Throws
   // RequestError{kKeyReused} if the key was used with a different request.

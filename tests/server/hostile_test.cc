@@ -4,6 +4,7 @@
 #include <random>
 
 #include "core/base/clock.h"
+#include "core/base/text/printable.h"
 #include "server/api/access/tokens.h"
 #include "tests/server/running_service.h"
 
@@ -74,6 +75,76 @@ TEST_F(Hostile, TooLargeBodiesAreRejected) {
   EXPECT_EQ(not_problem(http_->send("POST", "/api/v1/jobs", "{}", {{"Content-Encoding", "gzip"}}),
                         415, "unsupported_media_type"),
             "");
+}
+
+// The stored part of a request has a limit, because every answer about the job contains it.
+TEST_F(Hostile, LongRequestsAreRejected) {
+  start();
+  put_scene("a.glb", scene_bytes());
+  const auto request_of = [](const std::string& scene) {
+    return Json{{"scene", std::vector<std::string>(64, scene)}, {"resolution", 64}};
+  };
+  EXPECT_EQ(post("/api/v1/jobs", request_of("a.glb")).status, 202);
+  const std::string long_path = "/" + std::string(600, 'a') + ".glb";
+  const ClientResponse answer = post("/api/v1/jobs", request_of(long_path));
+  EXPECT_EQ(not_problem(answer, 400, "invalid_input"), "");
+  EXPECT_NE(answer.body.find("at most 32768"), std::string::npos) << answer.body;
+}
+
+// A chunked body without content is not a scene.
+TEST_F(Hostile, EmptyScenesAreRejected) {
+  start();
+  const std::string head = "PUT /api/v1/scenes/a.glb HTTP/1.1\r\nHost: localhost\r\n";
+  EXPECT_EQ(status(head + "Content-Length: 0\r\n\r\n"), 400);
+  EXPECT_EQ(status(head + "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n"), 400);
+  EXPECT_EQ(http_->get("/api/v1/scenes/a.glb").status, 404);
+}
+
+// HEAD has the header fields of GET: an event stream has no length.
+TEST_F(Hostile, HeadOfAStreamHasNoLength) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 64}});
+  const std::string answer =
+      raw_exchange(port(), "HEAD /api/v1/jobs/" + id +
+                               "/events HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 ")) << answer;
+  EXPECT_NE(answer.find("Transfer-Encoding: chunked"), std::string::npos) << answer;
+  EXPECT_EQ(answer.find("Content-Length"), std::string::npos) << answer;
+}
+
+// Control characters in a scene's texts reach neither answers nor logs, and a job's name cannot
+// have them.
+TEST_F(Hostile, TextsOfScenesArePrintable) {
+  start();
+  const std::string uri = "%1b%5b31m%0aforged%3a%20done%c2%9b%e2%80%ae.bin";
+  const Json scene = {
+      {"asset", {{"version", "2.0"}}},
+      {"buffers", {{{"byteLength", 36}, {"uri", uri}}}},
+      {"bufferViews", {{{"buffer", 0}, {"byteLength", 36}}}},
+      {"accessors", {{{"bufferView", 0}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}}}},
+      {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}}}},
+      {"nodes", {{{"mesh", 0}}}},
+      {"scenes", {{{"nodes", {0}}}}},
+      {"scene", 0}};
+  put_scene("a.gltf", scene.dump());
+  const std::string id = post_job({{"scene", "a.gltf"}, {"resolution", 64}});
+  ASSERT_TRUE(until([&] { return job(id)["state"] == "failed"; }));
+  const std::string message = job(id)["error"]["message"];
+  EXPECT_NE(message.find("forged: done"), std::string::npos) << message;
+  EXPECT_TRUE(is_printable(message)) << message;
+  const std::string log_of_job = http_->get("/api/v1/jobs/" + id + "/log").body;
+  EXPECT_EQ(printable_lines(log_of_job), log_of_job);
+  EXPECT_EQ(log_of_job.find("\nforged"), std::string::npos) << log_of_job;
+  EXPECT_EQ(printable_lines(log()), log());
+  const ClientResponse dry =
+      post("/api/v1/jobs?dry_run=true", {{"scene", "a.gltf"}, {"resolution", 64}});
+  EXPECT_TRUE(is_printable(Json::parse(dry.body)["detail"].get<std::string>())) << dry.body;
+  for (const char* name : {"a\u009b31m", "a\u202eb", "a\nb", "a\u007f"})
+    EXPECT_EQ(
+        not_problem(post("/api/v1/jobs", {{"scene", "a.gltf"}, {"resolution", 64}, {"name", name}}),
+                    400, "invalid_input"),
+        "");
 }
 
 // The service ignores the content type of a scene, so it does not parse a multipart body.

@@ -81,12 +81,30 @@ TEST_F(JobRecovery, AJobWhoseDeletionFailedIsNotTriedAgain) {
   EXPECT_EQ(delete_job(id).status, 500);
   EXPECT_EQ(not_problem(act(id, "retry"), 409, "conflict"), "");
   EXPECT_EQ(job(id)["state"], "canceled");
+  // The job is still listed. Its files are gone, and requests for them are not internal errors.
+  EXPECT_EQ(http_->get("/api/v1/jobs/" + id + "/log").status, 200);
+  for (const char* part : {"/dag", "/report", "/preview.png", "/subvolumes", "/partial"})
+    EXPECT_EQ(http_->get("/api/v1/jobs/" + id + part).status, 404) << part;
   edit_queue("DROP TRIGGER broken");
   stop();
   start();
   EXPECT_TRUE(until([&] { return http_->get("/api/v1/jobs/" + id).status == 404; }));
   EXPECT_TRUE(until([&] { return log().find("job " + id + " deleted") != std::string::npos; }));
   EXPECT_FALSE(std::filesystem::exists(data("jobs/" + id + ".deleted")));
+}
+
+// The same for a job that succeeded: its result is gone, although it is still listed.
+TEST_F(JobRecovery, AResultWhoseDeletionFailedIsNotFound) {
+  start();
+  const std::string id = posted_job();
+  ASSERT_TRUE(until_state(id, "succeeded"));
+  edit_queue("CREATE TRIGGER broken BEFORE DELETE ON job BEGIN SELECT RAISE(ABORT, 'broken'); END");
+  EXPECT_EQ(delete_job(id).status, 500);
+  for (const char* part : {"/dag", "/report", "/preview.png", "/subvolumes", "/tiles"})
+    EXPECT_EQ(http_->get("/api/v1/jobs/" + id + part).status, 404) << part;
+  edit_queue("DROP TRIGGER broken");
+  EXPECT_EQ(delete_job(id).status, 204);
+  EXPECT_EQ(http_->get("/api/v1/jobs/" + id).status, 404);
 }
 
 // Only the marked folder is deleted. The job's new folder and the job's record are kept.

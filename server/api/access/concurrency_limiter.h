@@ -2,6 +2,7 @@
 // client keeps one client from taking all permits. Thread-safe.
 #pragma once
 
+#include <condition_variable>
 #include <cstddef>
 #include <map>
 #include <memory>
@@ -27,6 +28,14 @@ class ConcurrencyLimiter {
     return std::shared_ptr<void>(state_.get(),
                                  [state = state_, client](void*) { state->release(client); });
   }
+  // Waits for a permit. For operations that take only milliseconds.
+  std::shared_ptr<void> wait() {
+    std::unique_lock lock(state_->mutex);
+    state_->released.wait(lock, [&] { return state_->in_use < max_; });
+    ++state_->by_client[""];
+    ++state_->in_use;
+    return std::shared_ptr<void>(state_.get(), [state = state_](void*) { state->release(""); });
+  }
   // Returns the limits, for messages.
   std::string limits() const {
     return "expected at most " + std::to_string(max_per_client_) + " per client and " +
@@ -44,9 +53,11 @@ class ConcurrencyLimiter {
       --in_use;
       const auto found = by_client.find(client);
       if (--found->second == 0) by_client.erase(found);
+      released.notify_one();
     }
 
     std::mutex mutex;  // guards in_use and by_client
+    std::condition_variable released;
     size_t in_use = 0;
     std::map<std::string, size_t> by_client;
   };

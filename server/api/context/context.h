@@ -37,6 +37,9 @@ struct Context {
   ConcurrencyLimiter uploads{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter downloads{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter tiles{config.transfers.max_concurrent, config.transfers.max_per_client};
+  // Answers that are built in memory: a few at a time, so that their memory is bounded before the
+  // server knows their size.
+  ConcurrencyLimiter answers{4, 4};
   ConcurrencyLimiter plans{config.jobs.max_concurrent_plans, config.jobs.max_concurrent_plans};
   OpenTileSources open_sources{files, 16};
   PartialViews partial{files, 16};

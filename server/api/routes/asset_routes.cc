@@ -24,7 +24,7 @@ Response get_asset(Call& call, const Asset& asset) {
     return response;
   }
   response.headers.emplace("Content-Type", asset.type);
-  response.body = asset.contents;
+  response.static_body = asset.contents;
   return response;
 }
 

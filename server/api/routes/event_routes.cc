@@ -1,6 +1,7 @@
 // Serves the server-sent events of a job.
 #include "core/base/clock.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "server/api/answers/job_json.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
@@ -23,7 +24,8 @@ std::string state_data(const JobEvent& event) {
   return "{\"seq\":" + std::to_string(event.number) + ",\"at\":\"" + time_text(event.at_s) +
          "\",\"state\":\"" + state_name(event.state) +
          "\",\"attempt\":" + std::to_string(event.attempt) +
-         ",\"error\":" + (event.error.empty() ? "null" : '"' + event.error + '"') + "}";
+         ",\"error\":" + (event.error.empty() ? "null" : '"' + printable_line(event.error) + '"') +
+         "}";
 }
 
 // The event stream of one client for one job (docs/api.md, "Events of a job"). Used by one thread.
@@ -80,6 +82,7 @@ void EventFeed::wait() {
 }
 
 void EventFeed::add_changes(std::string& text) {
+  const auto permit = context_.answers.wait();
   const auto job = context_.queue.find(id_);
   if (!job) {
     ended_ = true;
@@ -124,7 +127,10 @@ Response follow(Context& context, Call& call) {
   find_job(context.queue, call.names[0]);
   Response response = make_response(200, "text/event-stream", "no-store");
   response.headers.emplace("X-Accel-Buffering", "no");  // a proxy must not buffer events
-  if (call.request.method == "HEAD") return response;
+  if (call.request.method == "HEAD") {
+    response.is_stream = true;
+    return response;
+  }
   auto permit = context.event_streams.acquire(call.caller.client);
   if (!permit) throw busy("too many event streams: " + context.event_streams.limits(), 10);
   const auto feed =

@@ -12,6 +12,7 @@
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
+#include "server/base/json_text.h"
 #include "server/disk/data_folder.h"
 #include "server/jobs/process/child_process.h"
 
@@ -19,6 +20,11 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxKeyChars = 255;
+constexpr size_t kMaxPageBytes = 512 << 10;  // a page of jobs ends with the job that exceeds it
+constexpr size_t kJobsPerRead = 16;
+// Maximum size of a stored request. The service keeps it as long as the job, and sends it with
+// every answer about the job.
+constexpr size_t kMaxRequestBytes = 32 << 10;
 constexpr const char* kJobs = "/api/v1/jobs";
 constexpr const char* kJob = "/api/v1/jobs/{id}";
 
@@ -61,8 +67,21 @@ IdempotencyKey key_of(const Request& request, const JobRequest& job) {
   return {key, sha256_hex(job.text + '\n' + std::to_string(job.priority) + '\n' + job.name)};
 }
 
+// Returns the answer with one job, which `get` returns.
+template <class Get>
+Response job_response_of(Context& context, int status, const Get& get) {
+  auto permit = context.answers.wait();
+  Response response = json_response(status, to_json(context, get()));
+  response.build_permit = std::move(permit);
+  return response;
+}
+
+Response job_response(Context& context, int status, const Job& job) {
+  return job_response_of(context, status, [&]() -> const Job& { return job; });
+}
+
 Response accepted(Context& context, const Job& job, bool replayed) {
-  Response response = json_response(202, to_json(context, job));
+  Response response = job_response(context, 202, job);
   response.headers.emplace("Location", "/api/v1/jobs/" + job.id);
   if (replayed) response.headers.emplace("Idempotent-Replayed", "true");
   return response;
@@ -155,15 +174,24 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
   if (failure) throw problem_of(*failure);
   if (estimate.empty())
     throw Problem(500, "internal", "the process that makes the plan ended without a result");
-  return json_response(200, estimate);
+  return json_response(200, printable_json_text(estimate));
+}
+
+JobRequest read_job_request(Context& context, Call& call) {
+  const std::string body = read_json_body(call.request, context.config.transfers.max_body_bytes);
+  const auto permit = context.answers.wait();  // parsed JSON needs a multiple of its text
+  JobRequest request = parse_job_request(body);
+  if (request.text.size() > kMaxRequestBytes)
+    throw bad_request("scene, resolution and options have " + std::to_string(request.text.size()) +
+                      " bytes as JSON: expected at most " + std::to_string(kMaxRequestBytes));
+  return request;
 }
 
 Response post_job(Context& context, Call& call) {
   const std::string dry = call.query("dry_run");
   if (call.request.target.query.contains("dry_run") && dry != "true" && dry != "false")
     throw bad_request("'dry_run' is '" + printable(dry) + "': expected true or false");
-  const JobRequest request =
-      parse_job_request(read_json_body(call.request, context.config.transfers.max_body_bytes));
+  const JobRequest request = read_job_request(context, call);
   const IdempotencyKey key = key_of(call.request, request);
   if (dry == "true") return dry_run(context, call, request);
   if (context.draining) throw busy("the service is stopping");
@@ -198,17 +226,31 @@ JobFilter filter_of(const Call& call) {
   return filter;
 }
 
-Response list_jobs(Context& context, Call& call) {
-  JobFilter filter = filter_of(call);
-  const size_t limit = filter.limit++;  // one more job than the page: shows if there is a next page
-  std::vector<Job> jobs = context.queue.list(filter);
-  std::string next = "null";
-  if (jobs.size() > limit) {
-    jobs.resize(limit);
-    next = '"' + std::to_string(jobs.back().number) + '"';
+// Adds the jobs of a page to `body`: up to filter.limit jobs, and none after the page has
+// kMaxPageBytes. Reads a few jobs at a time. Returns the JSON of next_cursor.
+std::string add_page(Context& context, JobFilter filter, std::string& body) {
+  size_t missing = filter.limit;
+  bool more = true;
+  for (const char* separator = ""; more && missing > 0 && body.size() < kMaxPageBytes;) {
+    filter.limit = std::min(missing, kJobsPerRead) + 1;  // one more: shows if others follow
+    std::vector<Job> jobs = context.queue.list(filter);
+    more = jobs.size() == filter.limit;
+    if (more) jobs.pop_back();
+    for (const Job& job : jobs) {
+      if (body.size() >= kMaxPageBytes) return '"' + std::to_string(filter.before) + '"';
+      body += separator + to_json(context, job);
+      separator = ",";
+      filter.before = job.number;
+      --missing;
+    }
   }
+  return more ? '"' + std::to_string(filter.before) + '"' : "null";
+}
+
+Response list_jobs(Context& context, Call& call) {
+  auto permit = context.answers.wait();
   std::string body = "{\"jobs\":[";
-  for (const Job& job : jobs) body += (&job == &jobs.front() ? "" : ",") + to_json(context, job);
+  const std::string next = add_page(context, filter_of(call), body);
   body += "],\"next_cursor\":" + next + ",\"counts\":{";
   const auto counts = context.queue.counts();
   for (size_t i = 0; i < kJobStateNames.size(); ++i) {
@@ -216,18 +258,20 @@ Response list_jobs(Context& context, Call& call) {
     body += (i ? ",\"" : "\"") + std::string(kJobStateNames[i]) +
             "\":" + std::to_string(found == counts.end() ? 0 : found->second);
   }
-  return json_response(200, body + "}}");
+  Response response = json_response(200, std::move(body += "}}"));
+  response.build_permit = std::move(permit);
+  return response;
 }
 
 Response get_job(Context& context, Call& call) {
-  return json_response(200, to_json(context, find_job(context.queue, call.names[0])));
+  return job_response_of(context, 200, [&] { return find_job(context.queue, call.names[0]); });
 }
 
 Response patch_job(Context& context, Call& call) {
   const JobPatch patch =
       parse_job_patch(read_json_body(call.request, context.config.transfers.max_body_bytes));
   const Job job = context.queue.change(call.names[0], [&](Job& j) { j.priority = patch.priority; });
-  return json_response(200, to_json(context, job));
+  return job_response(context, 200, job);
 }
 
 Response delete_job(Context& context, Call& call) {
@@ -254,14 +298,14 @@ Response retry_job(Context& context, Call& call) {
   // Forgets the partial view, because the job's scene may have been replaced since the last
   // attempt.
   if (has_ended(job.state)) context.partial.close(job.id);
-  return json_response(202, to_json(context, queued));
+  return job_response(context, 202, queued);
 }
 
 // Returns a handler that applies the action to a job.
 Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
   return [action](Context& context, Call& call) {
     expect_no_body(call.request);
-    return json_response(202, to_json(context, (context.dispatcher.*action)(call.names[0])));
+    return job_response(context, 202, (context.dispatcher.*action)(call.names[0]));
   };
 }
 
@@ -293,7 +337,9 @@ void add_list_routes(Router& router) {
               .summary = "Jobs, newest first",
               .tag = "jobs",
               .query = {kJobStates, kJobLimit, kJobCursor},
-              .answers = {{200, "a page of jobs", {json_content("JobList")}}}},
+              .answers = {{200,
+                           "a page of jobs; it has fewer than limit if they are long",
+                           {json_content("JobList")}}}},
              list_jobs);
 }
 

@@ -2,18 +2,19 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/text/printable.h"
 #include "core/io/random_id.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
+#include "server/base/json_text.h"
 #include "server/http/message/digest_field.h"
 
 namespace voxdag::server {
 namespace {
 
 constexpr const char* kDagType = "application/octet-stream";
-// Limit for answers built in memory: reports, previews and lists of subvolumes.
-constexpr uint64_t kMaxResultBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxReportBytes = uint64_t{1} << 20;
 const Parameter kMaxLogBytes = {"max_bytes", "maximum size of the answer", "",
                                 IntegerRange{1, 1 << 20, 65536}};
 
@@ -123,12 +124,23 @@ Response get_dag(Context& context, Call& call) {
   return response;
 }
 
+// Answers with a complete file, which is read while it is sent.
+Response stream_file(Context& context, const std::string& path, Response response) {
+  response.file = context.files.open_read(path);
+  response.pieces.push_back({"", {0, response.file->size()}});
+  return response;
+}
+
 Response get_report(Context& context, Call& call) {
+  auto permit = context.answers.wait();
   const Job job = finished_job(context, call);
   auto report = nlohmann::ordered_json::parse(
-      read_small_file(context.files, context.dispatcher.folder(job.id).report(), kMaxResultBytes));
+      read_small_file(context.files, context.dispatcher.folder(job.id).report(), kMaxReportBytes));
   report["output"] = file_name(job);
-  return json_response(200, report.dump());
+  make_printable(report);
+  Response response = json_response(200, json_text(report));
+  response.build_permit = std::move(permit);
+  return response;
 }
 
 Response get_preview(Context& context, Call& call) {
@@ -137,8 +149,7 @@ Response get_preview(Context& context, Call& call) {
   if (job.preview != Preview::kReady || !context.files.exists(path))
     throw not_found(job.preview == Preview::kFailed ? "the preview could not be rendered"
                                                     : "the preview is not rendered yet");
-  return make_response(200, "image/png", "private, max-age=3600",
-                       read_small_file(context.files, path, kMaxResultBytes));
+  return stream_file(context, path, make_response(200, "image/png", "private, max-age=3600"));
 }
 
 Response get_log(Context& context, Call& call) {
@@ -147,11 +158,13 @@ Response get_log(Context& context, Call& call) {
   const std::string path = context.dispatcher.folder(job.id).log();
   Response response = make_response(200, "text/plain; charset=utf-8", "no-store");
   if (!context.files.exists(path)) return response;
+  response.build_permit = context.answers.wait();
   const auto file = context.files.open_read(path);
   const uint64_t size = file->size(), begin = size - std::min(size, max_bytes);
   response.body.resize(size - begin);
   file->read_at(begin, std::as_writable_bytes(std::span(response.body)));
   if (begin > 0) response.body.erase(0, response.body.find('\n') + 1);
+  response.body = printable_lines(response.body);
   return response;
 }
 
@@ -159,7 +172,7 @@ Response get_subvolumes(Context& context, Call& call) {
   const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).subvolumes();
   if (!context.files.exists(path)) throw not_found("the subvolumes of the job are not planned yet");
-  return json_response(200, read_small_file(context.files, path, kMaxResultBytes));
+  return stream_file(context, path, json_response(200, ""));
 }
 
 }  // namespace

@@ -131,7 +131,7 @@ uint64_t announced_bytes(Context& context, const Part& part) {
 }
 
 // Writes the request's body to `upload`. Stops at a body that is longer than the part; then returns
-// kStopped. Throws Problem (400) for a body that is shorter than the part.
+// kStopped. Throws Problem (400) for a body that is shorter than the part, or empty.
 BodyEnd receive(Context& context, Call& call, const Part& part, DiskSpace::Reservation& space,
                 SceneUpload& upload) {
   const uint64_t end_offset = part.end.value_or(context.config.transfers.max_scene_bytes);
@@ -147,6 +147,8 @@ BodyEnd receive(Context& context, Call& call, const Part& part, DiskSpace::Reser
   if (end == BodyEnd::kComplete && part.end && received != *part.end)
     throw bad_request("the body has " + std::to_string(received - part.first) +
                       " bytes: expected " + std::to_string(*part.end - part.first));
+  if (end == BodyEnd::kComplete && !part.end && received == part.first)
+    throw bad_request("the body is empty: expected the scene");
   return end;
 }
 
@@ -188,7 +190,9 @@ Response put_scene(Context& context, Call& call) {
     case BodyEnd::kTooSlow:
       throw Problem(408, "timeout", "the body was sent too slowly; resume at Upload-Offset");
     case BodyEnd::kBroken:
-      throw bad_request("the connection ended within the body; resume at Upload-Offset");
+      throw bad_request(
+          "the connection ended within the body, or the body's chunks are malformed; resume at "
+          "Upload-Offset");
   }
   const bool last = part.is_last(part.end.value_or(part.total.value_or(0)));
   const auto check = [&] { check_running(context); };
@@ -202,6 +206,7 @@ Response put_scene(Context& context, Call& call) {
 }
 
 Response list_scenes(Context& context, Call& call) {
+  auto permit = context.answers.wait();
   const size_t limit = call.query_integer(kSceneLimit);
   const std::string cursor = call.query("cursor");
   if (call.request.target.query.contains("cursor") && !is_scene_name(cursor))
@@ -215,7 +220,9 @@ Response list_scenes(Context& context, Call& call) {
     json["next_cursor"] = scenes.back().name;
   }
   for (const Scene& scene : scenes) json["scenes"].push_back(scene_json(scene));
-  return json_response(200, json.dump());
+  Response response = json_response(200, json.dump());
+  response.build_permit = std::move(permit);
+  return response;
 }
 
 Response get_scene(Context& context, Call& call) {

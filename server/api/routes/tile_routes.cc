@@ -22,10 +22,9 @@ constexpr const char* kImmutable = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
 // Limits for the address of a node above the bricks (docs/format.md).
 constexpr uint64_t kMaxLevel = 17, kMaxOffset = (uint64_t{1} << 40) - 1;
-// An answer of at least this many bytes holds its permit until it is sent, so that the number of
-// permits bounds the memory of large answers. A smaller answer releases its permit before it is
-// sent, so that a client with a slow link does not delay other clients with the same token. The
-// number of connections bounds the memory of small answers.
+// An answer of at least this many bytes holds its permit until it is sent, so that a client with
+// many large answers waits for its own answers. A smaller answer releases its permit before it is
+// sent, so that a client with a slow link does not delay other clients with the same token.
 constexpr size_t kLargeAnswer = 512 << 10;
 // Limits for the level of a color page, and for its position.
 constexpr uint64_t kMaxColorLevel = 20, kMaxPage = (uint64_t{1} << 17) - 1;
@@ -241,7 +240,8 @@ std::shared_ptr<void> tile_permit(Context& context, const Call& call) {
 }
 
 void hold_permit(std::shared_ptr<void> permit, Response& response) {
-  if (response.body.size() >= kLargeAnswer) response.permit = std::move(permit);
+  (response.body.size() >= kLargeAnswer ? response.permit : response.build_permit) =
+      std::move(permit);
 }
 
 TileAccess open_result(Context& context, const Call& call) {

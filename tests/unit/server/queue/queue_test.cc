@@ -150,6 +150,19 @@ TEST_F(Queue, RecordsEveryChangeOfState) {
   EXPECT_EQ(queue_->events_after(other, 0).size(), 1u);
 }
 
+// A job has a bounded number of events: a client can suspend and resume it any number of times.
+TEST_F(Queue, KeepsTheLastEvents) {
+  const std::string id = post().id, other = post().id;
+  for (int i = 0; i < 400; ++i)
+    set_state(id, i % 2 == 0 ? JobState::kSuspended : JobState::kQueued);
+  const auto events = queue_->events_after(id, 0);
+  ASSERT_EQ(events.size(), 256u);
+  EXPECT_EQ(events.back().state, JobState::kQueued);
+  EXPECT_LT(events.front().number, events.back().number);
+  EXPECT_EQ(queue_->events_after(id, events[250].number).size(), 5u);
+  EXPECT_EQ(queue_->events_after(other, 0).size(), 1u);
+}
+
 // If an edit throws, the job is unchanged.
 TEST_F(Queue, RollsBackAChangeThatFails) {
   const std::string id = post().id;
@@ -267,6 +280,22 @@ TEST_F(Queue, InterruptedRunsCountInTheEnd) {
   EXPECT_EQ(queue_->find(id)->error->code, "internal");
   EXPECT_FALSE(queue_->find(id)->error->transient);
   EXPECT_EQ(queue_->next(1e12, 900, {})->id, other);
+}
+
+// A suspended job remains suspended, however often the service ends, and can then be resumed.
+TEST_F(Queue, ASuspendedJobSurvivesInterruptions) {
+  const std::string id = post().id;
+  for (int i = 0; i < 7; ++i) {
+    set_state(id, JobState::kRunning);
+    queue_->recover({}, pause_);
+  }
+  set_state(id, JobState::kSuspended);
+  for (int i = 0; i < 20; ++i) {
+    reopen();
+    EXPECT_TRUE(queue_->recover({}, pause_).empty());
+    EXPECT_EQ(queue_->find(id)->state, JobState::kSuspended);
+    EXPECT_EQ(queue_->find(id)->interruptions, 7u);
+  }
 }
 
 TEST_F(Queue, RecoversNothingThatRuns) {
