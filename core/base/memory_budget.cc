@@ -31,10 +31,10 @@ bool MemoryBudget::try_charge(uint64_t bytes) {
 
 void MemoryBudget::charge(uint64_t bytes, std::string_view what) {
   if (try_charge(bytes)) return;
-  throw Error(ErrorCode::kOutOfMemory, "out of memory: " + std::string(what) + " needs " +
-                                           std::to_string(bytes) + " bytes, " +
-                                           std::to_string(available()) + " of a budget of " +
-                                           std::to_string(limit_) + " are free");
+  throw Error(ErrorCode::kOutOfMemory,
+              "out of memory: " + std::string(what) + " needs " + std::to_string(bytes) +
+                  " bytes, " + std::to_string(available()) + " of a budget of " +
+                  std::to_string(limit_) + " are free: expected a larger memory budget (--memory)");
 }
 
 void MemoryBudget::release(uint64_t bytes) {

@@ -19,7 +19,10 @@ void WarningList::add(const Warning& warning) {
   else if (list_.size() < kMaxWarnings - 1)
     list_.push_back(warning);
   else if (list_.size() < kMaxWarnings)
-    list_.push_back({"further-warnings", warning.place, "further warnings", warning.count});
+    list_.push_back(
+        {"further-warnings", warning.place,
+         "further warnings; at most " + std::to_string(kMaxWarnings - 1) + " kinds are listed",
+         warning.count});
   else
     list_.back().count += warning.count;
 }

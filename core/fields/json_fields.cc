@@ -67,7 +67,7 @@ FieldJson difference(const FieldJson& options, const FieldJson& defaults) {
 void Decoder::refuse_unknown_members(const std::string& where) const {
   for (const auto& [name, value] : object_.items())
     if (std::ranges::find(known_, name) == known_.end())
-      refuse(name.substr(0, 64), "a documented member of " + where);
+      refuse(name.substr(0, 64), "a documented member of " + where + "; this member is unknown");
 }
 
 }  // namespace voxdag::json_fields

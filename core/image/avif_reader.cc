@@ -74,14 +74,18 @@ class AvifReader : public ImageReader {
     const uint64_t bytes = limit * (bits_ == 16 ? kBytesPerWidePixel : kBytesPerPixel);
     if (bytes > kMaxDecoderBytes)
       throw BrokenImage{"is an AVIF image that takes " + std::to_string(bytes >> 20) +
-                        " MiB to decode, the limit is 2048"};
+                        " MiB to decode, the limit is 2048 MiB"};
     charge_ = MemoryCharge(budget_, bytes, "decoding an AVIF image");
     parse(static_cast<uint32_t>(limit));
     if (const avifResult result = avifDecoderNextImage(decoder_.get()); result != AVIF_RESULT_OK)
       fail(result);
     const avifImage& image = *decoder_->image;
     if (image.width != width_ || image.height != height_ || (image.depth > 8 ? 16 : 8) != bits_)
-      throw BrokenImage{"is a broken AVIF image (its data have another size than it declares)"};
+      throw BrokenImage{"is a broken AVIF image (its data have " + std::to_string(image.width) +
+                        " x " + std::to_string(image.height) + " pixels of " +
+                        std::to_string(image.depth) + " bits, its header declares " +
+                        std::to_string(width_) + " x " + std::to_string(height_) + " pixels of " +
+                        (bits_ == 8 ? "8" : "over 8") + " bits)"};
     rows_.emplace(planes_of(image));
   }
 
@@ -105,7 +109,9 @@ class AvifReader : public ImageReader {
 
   [[noreturn]] static void fail(avifResult result) {
     if (result == AVIF_RESULT_OUT_OF_MEMORY)
-      throw Error(ErrorCode::kOutOfMemory, "out of memory: the system has none left for an AVIF");
+      throw Error(ErrorCode::kOutOfMemory,
+                  "out of memory: the system has none left for an AVIF image: expected more free "
+                  "memory on this machine");
     throw BrokenImage{std::string("is a broken AVIF image (") + avifResultToString(result) + ")"};
   }
 

@@ -39,8 +39,9 @@ class JpegReader : public ImageReader {
       check_size(jpeg_.image_width, jpeg_.image_height);
       const J_COLOR_SPACE space = jpeg_.jpeg_color_space;
       if (space != JCS_GRAYSCALE && space != JCS_YCbCr && space != JCS_RGB)
-        throw BrokenImage{
-            "is a JPEG image that is neither gray nor YCbCr nor RGB (for example CMYK)"};
+        throw BrokenImage{"is a JPEG image with " + std::to_string(jpeg_.num_components) +
+                          " channels that are neither gray nor YCbCr nor RGB (4 channels are CMYK "
+                          "or YCCK), expected one of these three"};
       // Refuses images that not every version and build of the library decodes. Ss (in the header
       // of the first scan) is the predictor of a lossless image. In all other images, the first
       // scan has the mean of each block, so Ss is 0.
@@ -137,7 +138,7 @@ class JpegReader : public ImageReader {
     if (is_whole_) bytes += coefficients;
     if (bytes > kMaxDecoderBytes)
       throw BrokenImage{"is a JPEG image of several scans that takes " +
-                        std::to_string(bytes >> 20) + " MiB to decode, the limit is 2048"};
+                        std::to_string(bytes >> 20) + " MiB to decode, the limit is 2048 MiB"};
     charge_ = {};
     charge_ = MemoryCharge(budget, bytes, "decoding a JPEG image");
   }
@@ -158,7 +159,9 @@ class JpegReader : public ImageReader {
   [[noreturn]] void fail() {
     source_->rethrow();
     if (lacks_memory_)
-      throw Error(ErrorCode::kOutOfMemory, "out of memory: the system has none left for a JPEG");
+      throw Error(ErrorCode::kOutOfMemory,
+                  "out of memory: the system has none left for a JPEG image: expected more free "
+                  "memory on this machine");
     throw BrokenImage{std::string("is a broken JPEG image (") +
                       (message_[0] ? message_ : "it ends early") + ")"};
   }

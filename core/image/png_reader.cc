@@ -28,7 +28,9 @@ class PngReader : public ImageReader {
     if (png_) info_ = png_create_info_struct(png_);
     if (!info_) {
       destroy();
-      throw Error(ErrorCode::kOutOfMemory, "out of memory: the system has none left for a PNG");
+      throw Error(ErrorCode::kOutOfMemory,
+                  "out of memory: the system has none left for a PNG image: expected more free "
+                  "memory on this machine");
     }
     try {
       if (!read_header()) fail();
@@ -113,7 +115,7 @@ class PngReader : public ImageReader {
     if (row * height_ > kMaxDecoderBytes)
       throw BrokenImage{"is an interlaced PNG image that takes " +
                         std::to_string((row * height_) >> 20) +
-                        " MiB to decode, the limit is 2048"};
+                        " MiB to decode, the limit is 2048 MiB"};
     all_ = PageBuffer<std::byte>(budget, static_cast<size_t>(row * height_),
                                  "an interlaced PNG image");
     for (int pass = 0; pass < passes_; ++pass)
@@ -123,7 +125,9 @@ class PngReader : public ImageReader {
   [[noreturn]] void fail() {
     source_->rethrow();
     if (lacks_memory_)
-      throw Error(ErrorCode::kOutOfMemory, "out of memory: the system has none left for a PNG");
+      throw Error(ErrorCode::kOutOfMemory,
+                  "out of memory: the system has none left for a PNG image: expected more free "
+                  "memory on this machine");
     throw BrokenImage{std::string("is a broken PNG image (") + message_ + ")"};
   }
   void destroy() { png_destroy_read_struct(&png_, &info_, nullptr); }

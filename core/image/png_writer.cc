@@ -15,7 +15,10 @@ std::string encode_png(uint32_t width, uint32_t height, std::span<const uint8_t>
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::string png(size, '\0');
   if (!png_image_write_to_memory(&image, png.data(), &size, 0, rgb.data(), 0, nullptr))
-    throw Error(ErrorCode::kOutOfMemory, std::string("writing PNG: ") + image.message);
+    throw Error(ErrorCode::kOutOfMemory, "out of memory: libpng cannot write an image of " +
+                                             std::to_string(width) + " x " +
+                                             std::to_string(height) + " pixels (" + image.message +
+                                             "): expected a smaller image");
   png.resize(size);
   return png;
 }

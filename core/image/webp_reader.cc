@@ -59,12 +59,13 @@ class WebpReader : public ImageReader {
     if (bytes + row * height_ > kMaxDecoderBytes)
       throw BrokenImage{"is a WebP image that takes " +
                         std::to_string((bytes + row * height_) >> 20) +
-                        " MiB to decode, the limit is 2048"};
+                        " MiB to decode, the limit is 2048 MiB"};
     const MemoryCharge charge(budget_, bytes, "decoding a WebP image");
     pixels_ = PageBuffer<std::byte>(budget_, static_cast<size_t>(row * height_), "a WebP image");
     WebPDecoderConfig config;
     if (!WebPInitDecoderConfig(&config))
-      throw BrokenImage{"needs another version of libwebp than the installed one"};
+      throw BrokenImage{
+          "cannot be decoded: expected the version of libwebp that voxdag was built with"};
     config.output.colorspace = MODE_RGBA;
     config.output.is_external_memory = 1;
     config.output.u.RGBA = {reinterpret_cast<uint8_t*>(pixels_.data()), static_cast<int>(row),
@@ -100,7 +101,9 @@ class WebpReader : public ImageReader {
   static void check(VP8StatusCode status) {
     if (status == VP8_STATUS_OK) return;
     if (status == VP8_STATUS_OUT_OF_MEMORY)
-      throw Error(ErrorCode::kOutOfMemory, "out of memory: the system has none left for a WebP");
+      throw Error(ErrorCode::kOutOfMemory,
+                  "out of memory: the system has none left for a WebP image: expected more free "
+                  "memory on this machine");
     const bool is_short = status == VP8_STATUS_NOT_ENOUGH_DATA || status == VP8_STATUS_SUSPENDED;
     throw BrokenImage{std::string("is a broken WebP image (") +
                       (is_short ? "it ends early" : "its data are damaged") + ")"};

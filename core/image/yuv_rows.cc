@@ -48,7 +48,7 @@ YuvRows::YuvRows(const YuvPlanes& planes) : planes_(planes) {
     const auto found = std::ranges::find(kWeights, planes.matrix, &Weights::matrix);
     if (found == std::end(kWeights))
       throw BrokenImage{"has colors with the matrix " + std::to_string(planes.matrix) +
-                        " of ITU-T H.273, which voxdag does not read"};
+                        " of ITU-T H.273, expected 0 to 2, 4 to 9 or 12"};
     red_ = found->red;
     blue_ = found->blue;
   }

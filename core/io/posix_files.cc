@@ -82,7 +82,8 @@ class PosixReadableFile : public ReadableFile {
     if (fd_.get() < 0) fail("open", path, errno);
     struct stat s {};
     if (fstat(fd_.get(), &s) != 0) fail("stat", path, errno);
-    if (!S_ISREG(s.st_mode)) throw Error(ErrorCode::kInvalidInput, path + " is not a regular file");
+    if (!S_ISREG(s.st_mode))
+      throw Error(ErrorCode::kInvalidInput, path + " is not a regular file: expected one");
     const auto nanoseconds = [](const timespec& t) {
       return int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
     };
@@ -99,8 +100,9 @@ class PosixReadableFile : public ReadableFile {
       if (n < 0 && errno == EINTR) continue;
       if (n < 0) fail("read", path_ + " at offset " + std::to_string(offset), errno);
       if (n == 0)
-        throw Error(ErrorCode::kCorrupt, path_ + " ends at byte " + std::to_string(offset) + ", " +
-                                             std::to_string(out.size()) + " bytes too early");
+        throw Error(ErrorCode::kCorrupt, path_ + " ends at byte " + std::to_string(offset) +
+                                             ": expected at least " +
+                                             std::to_string(offset + out.size()) + " bytes");
       offset += static_cast<uint64_t>(n);
       out = out.subspan(static_cast<size_t>(n));
     }

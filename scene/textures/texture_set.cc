@@ -109,7 +109,7 @@ void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const
     body();
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kOutOfMemory) throw;
-    throw Error(error.code(), name + ": " + error.message() + "; give it more memory");
+    throw Error(error.code(), name + ": " + error.message());
   }
 }
 

@@ -10,7 +10,8 @@ std::unique_ptr<Backend> make_cuda_backend(Method method, int device) {
                                                                          method);
   } catch (const OutOfBudget&) {
     throw Error(ErrorCode::kDevice,
-                "CUDA device " + std::to_string(device) + " has no memory left to open it");
+                "CUDA device " + std::to_string(device) +
+                    " has no memory left: expected a device with free memory, or the backend cpu");
   }
 }
 

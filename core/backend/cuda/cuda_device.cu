@@ -19,7 +19,8 @@ std::vector<int> usable_devices(std::string& problem) {
     cudaGetLastError();
     const bool has_driver = cudaDriverGetVersion(&driver) == cudaSuccess && driver > 0;
     problem = std::string("no CUDA device: ") +
-              (has_driver ? cudaGetErrorString(status) : "no NVIDIA driver is installed");
+              (has_driver ? cudaGetErrorString(status) : "no NVIDIA driver is installed") +
+              "; expected an NVIDIA GPU and its driver, or the backend cpu";
     return {};
   }
   std::vector<int> usable;

@@ -7,7 +7,8 @@ namespace voxdag {
 int cuda_device_count() { return 0; }
 
 std::string cuda_device_problem() {
-  return "this build has no CUDA backend: it was made without nvcc";
+  return "this voxdag was compiled without CUDA: expected the backend auto, cpu or parallel-host, "
+         "or a voxdag that was compiled with nvcc";
 }
 
 std::unique_ptr<Backend> make_cuda_backend(Method, int) {

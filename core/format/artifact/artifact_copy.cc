@@ -103,7 +103,10 @@ CacheEntry read_cache_entry(FileSystem& files, const std::string& path) {
   entry.file->read_at(entry.file->size() - kFooterBytes, footer);
   ByteSource source(footer);
   if (source.get<uint64_t>() != kEntryMagic)
-    corrupt_copy(path, "it does not end with the footer of a cache entry");
+    corrupt_copy(
+        path,
+        "its last " + std::to_string(kFooterBytes) +
+            " bytes do not begin with the signature of a footer: expected a complete cache entry");
   entry.ref.offset = source.get<uint64_t>();
   entry.ref.bytes = source.get<uint64_t>();
   entry.ref.index_offset = source.get<uint64_t>();

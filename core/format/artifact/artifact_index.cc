@@ -36,7 +36,9 @@ ArtifactRoot get_root(ByteSource& source, const std::string& where) {
   root.cube.level = source.get<uint32_t>();
   for (uint32_t& p : root.cube.position) p = source.get<uint32_t>();
   root.index = source.get<uint32_t>();
-  if (source.get<uint32_t>() != 0) corrupt(where, "a reserved field of a root is not 0");
+  if (const uint32_t reserved = source.get<uint32_t>(); reserved != 0)
+    corrupt(where, "the reserved field of the root at row " + std::to_string(root.index) + " is " +
+                       std::to_string(reserved) + ", expected 0");
   root.hash = source.get<uint64_t>();
   root.voxels = source.get<uint64_t>();
   root.svo_nodes = source.get<uint64_t>();
@@ -48,8 +50,10 @@ void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std:
   const std::string name =
       "the root at row " + std::to_string(root.index) + " of level " + std::to_string(level);
   const bool has_level = level <= brick_level && brick_level - level < index.levels.size();
-  if (!has_level || root.index >= index.levels[brick_level - level].rows)
-    corrupt(where, name + ", which the artifact does not have");
+  const uint64_t rows = has_level ? index.levels[brick_level - level].rows : 0;
+  if (root.index >= rows)
+    corrupt(where, name + " does not exist: expected a row of the " + std::to_string(rows) +
+                       " rows that the artifact has on this level");
   for (const uint32_t p : root.cube.position)
     if (p >> level != 0)
       corrupt(where, name + " has the position " + std::to_string(p) + ", expected less than 2^" +
@@ -59,8 +63,8 @@ void check_root(const ArtifactRoot& root, const ArtifactIndex& index, const std:
                        std::to_string(root.svo_nodes) +
                        " octree nodes, expected at least 1 of each");
   if (truncate_hash(root.hash, index.shape.hash_bits) != root.hash)
-    corrupt(where,
-            name + " has a hash of more than " + std::to_string(index.shape.hash_bits) + " bits");
+    corrupt(where, name + " has the hash " + std::to_string(root.hash) + ", expected at most " +
+                       std::to_string(index.shape.hash_bits) + " bits");
 }
 
 // Reads the entries of one level's frames. `offset` is the segment offset of the level's first
@@ -95,8 +99,10 @@ void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& 
                   " children, expected " +
                   (bricks ? "0" : "1 to 8 for each of " + std::to_string(frame.rows) + " rows"));
     if (frame.first_hash < hash)
-      corrupt(here, "the first hash of frame " + std::to_string(i) +
-                        " is less than the first hash of frame " + std::to_string(i - 1));
+      corrupt(here, "the first hash of frame " + std::to_string(i) + " is " +
+                        std::to_string(frame.first_hash) + ", expected at least " +
+                        std::to_string(hash) + ", the first hash of frame " +
+                        std::to_string(i - 1));
     hash = frame.first_hash;
     rows += frame.rows;
     children += frame.children;
@@ -157,7 +163,8 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
   if (checksum64(bytes) != ref.checksum) corrupt(where, "the index fails its checksum");
   ByteSource source(bytes);
   if (source.get<uint64_t>() != kIndexMagic)
-    corrupt(where, "no index begins at byte " + std::to_string(ref.index_offset));
+    corrupt(where, "no index begins at byte " + std::to_string(ref.index_offset) +
+                       ": expected the signature of an index");
   check_version(source.get<uint32_t>(), where);
   ArtifactIndex index;
   index.shape.grid_levels = source.get<uint32_t>();
@@ -176,10 +183,11 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
     corrupt(where, std::to_string(levels) + " levels, expected at most " +
                        std::to_string(index.shape.brick_level() + 1));
   // After this check, everything allocated below is limited by the size of `bytes`.
-  if (bytes.size() !=
-      kFixedBytes + roots * kRootBytes + levels * kLevelBytes + frames * kFrameBytes)
-    corrupt(where, "the index has " + std::to_string(bytes.size()) +
-                       " bytes, which do not fit its " + std::to_string(roots) + " roots, " +
+  const uint64_t expected =
+      kFixedBytes + roots * kRootBytes + levels * kLevelBytes + frames * kFrameBytes;
+  if (bytes.size() != expected)
+    corrupt(where, "the index has " + std::to_string(bytes.size()) + " bytes, expected " +
+                       std::to_string(expected) + " for " + std::to_string(roots) + " roots, " +
                        std::to_string(levels) + " levels and " + std::to_string(frames) +
                        " frames");
   if (frame_bytes != ref.index_offset - ref.offset)
@@ -228,14 +236,16 @@ std::vector<std::byte> encode_segment_header(uint32_t id) {
 
 void check_segment_header(std::span<const std::byte> bytes, uint32_t id, const std::string& where) {
   ByteSource source(bytes);
-  if (source.get<uint64_t>() != kSegmentMagic) corrupt(where, "not a voxdag segment file");
+  if (source.get<uint64_t>() != kSegmentMagic)
+    corrupt(where, "not a voxdag segment file: expected the signature in its first 8 bytes");
   check_version(source.get<uint32_t>(), where);
   const uint32_t found_id = source.get<uint32_t>();
   source.get<uint64_t>();
   if (source.get<uint64_t>() != checksum64(bytes.first(kSegmentHeaderBytes - sizeof(uint64_t))))
     corrupt(where, "the segment header fails its checksum");
   if (found_id != id)
-    corrupt(where, "segment " + std::to_string(found_id) + ", expected " + std::to_string(id));
+    corrupt(where,
+            "it contains segment " + std::to_string(found_id) + ", expected " + std::to_string(id));
 }
 
 }  // namespace voxdag

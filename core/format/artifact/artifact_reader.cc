@@ -21,7 +21,7 @@ std::vector<std::byte> read_index(const ReadableFile& file, const ArtifactRef& r
   if (!inside)
     throw Error(ErrorCode::kCorrupt,
                 where + ": " + std::to_string(ref.bytes) + " bytes, with the index at byte " +
-                    std::to_string(ref.index_offset) + ", are not a part of the file of " +
+                    std::to_string(ref.index_offset) + ": expected a part of the file, which has " +
                     std::to_string(size) + " bytes");
   std::vector<std::byte> bytes(ref.offset + ref.bytes - ref.index_offset);
   file.read_at(ref.index_offset, bytes);

@@ -77,7 +77,10 @@ void SegmentWriter::sync() {
 
 void SegmentWriter::sync_written() {
   if (sync_failed_)
-    throw Error(ErrorCode::kIo, "sync " + file_->path() + ": an earlier sync failed");
+    throw Error(ErrorCode::kIo,
+                "sync " + file_->path() +
+                    ": an earlier sync of this file failed, so its contents are uncertain; "
+                    "start the build again");
   sync_failed_ = true;
   file_->sync();
   sync_failed_ = false;

@@ -112,8 +112,11 @@ uint64_t finest_cells(const File& file) {
   for (uint64_t i = 0; i < tier.region_count; ++i) {
     ColorRegion region;
     if (!ColorSection::region(tier, i, region))
-      file.broken_section(file.colors(),
-                          "region " + std::to_string(i) + " of the finest tier is damaged");
+      file.broken_section(
+          file.colors(),
+          "region " + std::to_string(i) +
+              " of the finest tier is damaged: expected counts and an offset within the "
+              "section");
     cells += region.counts[0];
   }
   return cells;

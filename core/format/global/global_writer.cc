@@ -130,8 +130,10 @@ struct GlobalFileWriter::State {
   std::string digest(const HeaderPage& header, std::span<const uint64_t> checksums,
                      unsigned threads, const CancelToken& cancel) const;
   [[noreturn]] void damaged(uint64_t at) const {
-    throw Error(ErrorCode::kCorrupt, partial_path + " from byte " + std::to_string(at) +
-                                         " differs from the written bytes");
+    throw Error(ErrorCode::kCorrupt,
+                partial_path + " from byte " + std::to_string(at) +
+                    " differs from the bytes that this build wrote: expected a file that no "
+                    "other process changes; start the build again");
   }
 };
 

@@ -184,7 +184,9 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
   for (uint64_t i = 0; i < section.tier(0).region_count; ++i) {
     voxdag_reader::ColorRegion region;
     if (!voxdag_reader::ColorSection::region(section.tier(0), i, region))
-      broken(file_.path() + ": " + plural, "region " + std::to_string(i) + " is damaged");
+      broken(file_.path() + ": " + plural,
+             "region " + std::to_string(i) +
+                 " is damaged: expected counts and an offset within the section");
     finest_cells += region.counts[0];
   }
   if (field(kAttributeCellsAt) != cells || field(kAttributeFinestCellsAt) != finest_cells)
@@ -267,7 +269,8 @@ void Verifier::check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& h
   uint64_t nodes = 0;
   index.visit_span(span, [&](uint64_t i, uint64_t at) {
     const uint64_t hash = hashes[i] = hash_at(at);
-    if (bricks && file_.brick(at) == 0) broken(where(level, at), "the brick is empty");
+    if (bricks && file_.brick(at) == 0)
+      broken(where(level, at), "the brick is empty: expected at least one voxel");
     const auto in_order = [&] {
       if (hash != previous_hash) return previous_hash < hash;
       return bricks ? file_.brick(previous) < file_.brick(at)
@@ -277,7 +280,7 @@ void Verifier::check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& h
       broken(where(level, at), bricks
                                    ? "the brick does not follow the one before it by hash and mask"
                                    : "the node does not follow the one before it in the total "
-                                     "order");
+                                     "order of nodes (docs/format.md)");
     previous = at;
     previous_hash = hash;
     ++nodes;
@@ -303,7 +306,8 @@ void Verifier::check_all_used(uint32_t level) const {
                  const uint64_t end = std::min((item + 1) * kNodesPerItem, used_.size());
                  for (uint64_t i = item * kNodesPerItem; i < end; ++i)
                    if (!used_[i])
-                     broken(where(level), "node " + std::to_string(i) + " has no parent");
+                     broken(where(level),
+                            "node " + std::to_string(i) + " has no parent: expected at least one");
                });
 }
 

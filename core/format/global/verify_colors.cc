@@ -64,6 +64,11 @@ class CellWalk {
   const voxdag_reader::File& file_;
 };
 
+// A directory entry of a region that ColorSection::region() refuses.
+constexpr const char* kBrokenEntry =
+    "a count of cells or the offset of its data is out of range: expected at most the cells of the "
+    "region's cube, and data within the section";
+
 class ColorVerifier {
  public:
   ColorVerifier(const voxdag_reader::File& file, Attribute attribute)
@@ -79,16 +84,17 @@ class ColorVerifier {
   // Checks one region and returns it.
   ColorRegion check_region(const ColorTier& tier, uint64_t i) const {
     ColorRegion region;
-    if (!ColorSection::region(tier, i, region))
-      fail(tier, i, "a count of cells or the place of its data is out of range");
+    if (!ColorSection::region(tier, i, region)) fail(tier, i, kBrokenEntry);
     for (int at = 29; at < 32; ++at)
       if (tier.directory[32 * i + static_cast<uint64_t>(at)] != 0)
         fail(tier, i,
-             "the reserved byte " + std::to_string(at) + " of its directory entry is not 0");
+             "the reserved byte " + std::to_string(at) + " of its directory entry is " +
+                 std::to_string(tier.directory[32 * i + static_cast<uint64_t>(at)]) +
+                 ", expected 0");
     uint64_t place;
     if (region.morton >> 3 * tier.region_level != 0 ||
         !cells_.find(tier.region_level, region.morton, place))
-      fail(tier, i, "the DAG has no cells in this region");
+      fail(tier, i, "the DAG has no cells in this region: expected no entry for it");
     std::array<uint32_t, kRegionLevels + 1> counts{};
     std::vector<uint32_t> prefix[2];
     std::vector<ValuedCell> finest;  // unused for colors
@@ -146,7 +152,9 @@ class ColorVerifier {
     const uint64_t prefix_bytes = 4 * (region.prefix_count(0) + region.prefix_count(1));
     for (uint64_t at = region.block_bytes * blocks + prefix_bytes; at < 16 * region.units(); ++at)
       if (region.blocks[at] != 0)
-        fail(tier, i, "byte " + std::to_string(at) + " of its data is padding and not 0");
+        fail(tier, i,
+             "byte " + std::to_string(at) + " of its data is padding: expected 0, not " +
+                 std::to_string(region.blocks[at]));
   }
 
   // Checks the values of a region; not for colors. `cells` are the region's cells of the finest
@@ -186,14 +194,13 @@ class ColorVerifier {
     size_t count = 0;
     for (uint64_t i = ColorSection::lower_bound(below, code << 3); i < below.region_count; ++i) {
       ColorRegion region;
-      if (!ColorSection::region(below, i, region))
-        fail(below, i, "a count of cells or the place of its data is out of range");
+      if (!ColorSection::region(below, i, region)) fail(below, i, kBrokenEntry);
       if (region.morton >> 3 != code || count == 8) break;
       children[count++] = region.value(region.cells - 1);
     }
     if (count == 0)
       fail(tier, ": the cell with Morton code " + std::to_string(code) +
-                     " has no regions in the next finer tier");
+                     " has no regions in the next finer tier: expected at least one");
     return traits_.value_of_parent(std::span(children, count));
   }
 
@@ -240,7 +247,7 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
       uint64_t expected = 0;
       ColorRegion before;
       if (i > 0 && !ColorSection::region(tier, i - 1, before))
-        verifier.fail(tier, i - 1, "a count of cells or the place of its data is out of range");
+        verifier.fail(tier, i - 1, kBrokenEntry);
       if (i > 0) expected = before.first_unit + before.units();
       if (region.first_unit != expected)
         verifier.fail(tier, i,
@@ -253,7 +260,10 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
                           ": expected more than the previous region's " +
                           std::to_string(before.morton));
       if (i + 1 == tier.region_count && region.first_unit + region.units() != tier.units)
-        verifier.fail(tier, i, "it is the last region, but the tier has data after it");
+        verifier.fail(tier, i,
+                      "its data end at unit " + std::to_string(region.first_unit + region.units()) +
+                          " of 16 bytes: expected " + std::to_string(tier.units) +
+                          ", the end of the tier, because it is the last region");
       cells += region.cells;
       progress.advance(1);
     });

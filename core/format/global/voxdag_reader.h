@@ -115,7 +115,7 @@ class Bytes {
     struct stat s;
     if (fstat(fd, &s) != 0 || !S_ISREG(s.st_mode)) {
       ::close(fd);
-      throw Error(Problem::kIo, path + " is not a regular file");
+      throw Error(Problem::kIo, path + " is not a regular file: expected a .vdag file");
     }
     size_ = static_cast<uint64_t>(s.st_size);
     if (access == Access::kMap && size_ > 0) {
@@ -366,8 +366,8 @@ class File {
     const unsigned char* const page = data();
     static const unsigned char kMagic[8] = {0x89, 'V', 'D', 'A', 'G', '\n', 0x1a, '\n'};
     if (bytes_->size() < sizeof(kMagic) || std::memcmp(page, kMagic, sizeof(kMagic)) != 0)
-      corrupt("not a voxdag file");
-    if (bytes_->size() < kPageBytes) corrupt("the file ends within its header");
+      corrupt("not a voxdag file: expected the signature of a .vdag file at its begin");
+    if (bytes_->size() < kPageBytes) corrupt("the header is incomplete: expected 4096 bytes");
     version_ = get<uint32_t>(page + 8);
     if (version_ != 1 && version_ != 2)
       unsupported("format version " + str(version_) + ", expected 1 or 2");
@@ -375,7 +375,7 @@ class File {
            "fails its checksum");
     const uint64_t features = version_ == 1 ? 0 : get<uint64_t>(page + 2176);
     if (features & ~(kWideLevels | kAttributes))
-      unsupported("feature bits " + str(features) + ", expected none but 1 and 2");
+      unsupported("feature bits " + str(features) + ", expected only the bits 1 and 2");
     max_pointer_bits_ = features & kWideLevels ? 64 : 32;
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
@@ -389,7 +389,7 @@ class File {
     edge_ = get<double>(page + 56);
     expect(std::isfinite(origin_[0]) && std::isfinite(origin_[1]) && std::isfinite(origin_[2]) &&
                std::isfinite(edge_) && edge_ > 0,
-           "expected finite bounds and an edge above 0");
+           "edge " + std::to_string(edge_) + ", expected finite bounds and an edge above 0");
     voxels_ = get<uint64_t>(page + 64);
     svo_nodes_ = get<uint64_t>(page + 72);
     dag_nodes_ = get<uint64_t>(page + 80);
@@ -415,7 +415,7 @@ class File {
       level.words = reinterpret_cast<const uint32_t*>(data() + kPageBytes);
       if (dag_nodes_ == 0) {
         expect(level.file_offset == 0 && level.node_count == 0 && level.word_count == 0,
-               where + "expected no nodes, because the scene is empty");
+               where + str(level.node_count) + " nodes, expected none, because the scene is empty");
         continue;
       }
       expect(level.file_offset == end,
@@ -452,10 +452,10 @@ class File {
     for (uint64_t i = 0; i < count; ++i) {
       const unsigned char* const entry = page + 1152 + 64 * i;
       const uint32_t kind = get<uint32_t>(entry), levels = get<uint32_t>(entry + 4);
-      const uint64_t bytes = get<uint64_t>(entry + 16);
+      const uint64_t at = get<uint64_t>(entry + 8), bytes = get<uint64_t>(entry + 16);
       const std::string where = "attribute section " + str(i) + ": ";
       expect(kind > last_kind, where + "kind " + str(kind) + ", expected over " + str(last_kind));
-      expect(get<uint64_t>(entry + 8) == table_offset_, where + "does not follow the data before");
+      expect(at == table_offset_, where + "byte " + str(at) + ", expected " + str(table_offset_));
       expect(bytes > 0 && bytes <= bytes_->size() - table_offset_, where + "is not in the file");
       expect(levels >= 2 && levels <= grid_levels_,
              where + "level " + str(levels) + ", expected 2 to " + str(grid_levels_));

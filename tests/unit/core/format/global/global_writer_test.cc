@@ -224,7 +224,7 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
     write_bytes(partial, bytes);
     const Error error = error_of([&] { writer.seal({dag.voxels, dag.svo_nodes}); });
     EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
-    EXPECT_THAT(error.message(), HasSubstr("differs from the written bytes"));
+    EXPECT_THAT(error.message(), HasSubstr("differs from the bytes that this build wrote"));
     at += (4 * levels[i].size() + kPageBytes - 1) / kPageBytes * kPageBytes;
   }
   GlobalFileProgress saved;
