@@ -22,7 +22,7 @@ namespace voxdag {
 
 class GlbLayout : public BlockSink {
  public:
-  // Advances `progress` by the number of triangles of each mesh, but not of parts.
+  // mesh() advances `progress` by the mesh's number of triangles; part() and instances() do not.
   GlbLayout(Progress& progress, const CancelToken& cancel) : progress_(progress), cancel_(cancel) {}
   void mesh(const MeshBuilder& mesh) override;
   void part(const MeshBuilder& mesh) override;

@@ -82,8 +82,9 @@ double AssimpScene::meters_per_unit() const {
   return as_double > 0 && as_double < HUGE_VAL ? as_double / 100 : 1;
 }
 
-// Returns the axes of an FBX file that point to the right, up and to the front. The axes of other
-// files, and of files that assimp has turned, are 0, 1 and 2.
+// Returns the axes of an FBX file that point right, up and to the front. Returns 0, 1 and 2 for
+// other files, for files without valid metadata of their axes, and if assimp has already rotated
+// the scene (its root node then has a transformation).
 std::array<AssimpScene::Axis, 3> AssimpScene::axes() const {
   const std::array<Axis, 3> standard = {Axis{0, 1}, Axis{1, 1}, Axis{2, 1}};
   if (!scene_->mMetaData || scene_->mRootNode->mTransformation != aiMatrix4x4()) return standard;

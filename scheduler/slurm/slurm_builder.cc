@@ -32,8 +32,8 @@ class SlurmBuilder : public ClusterBuilder {
  public:
   explicit SlurmBuilder(BuildJob& job) : job_(job), cluster_(job) {}
 
-  // Resume rule: open batches of an earlier run remain open, and records that its tasks have
-  // written since then are accepted.
+  // Continues an earlier run. Its unfinished batches remain open. Completion records that its tasks
+  // wrote after the run ended are accepted.
   void resume(const std::string& scene_digest) override;
   // Cuts the triangles of `planned` into batches. Then waits until all batches are built, unless a
   // merge job will wait for them. Throws Error with the reason of the last failure if a batch has

@@ -17,7 +17,8 @@ enum class Access { kRead, kWrite, kAtomic };
 
 // Begins a block: forgets what earlier blocks wrote, and allows accesses to `shared_bytes` bytes.
 void begin_block(size_t shared_bytes);
-// Call this function when all threads of the block have passed a barrier.
+// Ends an interval between two barriers. Call it when all threads of the block have reached the
+// barrier, before any of them continues.
 void next_interval();
 
 bool in_shared_memory(const void* p);

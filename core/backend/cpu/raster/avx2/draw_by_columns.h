@@ -119,9 +119,9 @@ VOXDAG_INLINE void draw_along(const TileTriangle<int32_t>& t, TileBricks& tile) 
     ColumnWalk<D, Spread>(t, tile).run();
 }
 
-// Draws a triangle. Spread<D> is constructed from the HeightBounds (sides.h) of a column of bricks.
-// Its mask(up) is the set of touched voxels in one brick of the column: the brick that is `up`
-// bricks above the column's first brick; up < 4.
+// Draws a triangle. Spread<D> converts the HeightBounds (sides.h) of a column of bricks to voxels.
+// Its mask(up) is the set of touched voxels of one brick. `up`, from 0 to 3, counts bricks upward
+// from the brick at whose floor HeightBounds has height 0.
 template <template <int> class Spread>
 VOXDAG_INLINE void draw_by_columns(const TileTriangle<int32_t>& t, TileBricks& tile) {
   if (t.normal[t.dominant] == 0) return draw_exactly(t, tile);
