@@ -9,6 +9,50 @@
 
 namespace voxdag {
 
+// Finds the first point of a row that is beyond a triangle. A division of 128-bit integers takes
+// longer than two exact tests of points next to an estimate in floating point.
+class FirstBeyond {
+ public:
+  FirstBeyond(const FixedTriangle& t, int axis) : axis_(axis) {
+    double e[2][3];
+    for (int i = 0; i < 2; ++i)
+      for (int a = 0; a < 3; ++a) e[i][a] = static_cast<double>(t.v[i + 1][a] - t.v[i][a]);
+    double n[3];
+    for (int a = 0; a < 3; ++a) {
+      vertex_[a] = static_cast<double>(t.v[0][a]);
+      n[a] = e[0][(a + 1) % 3] * e[1][(a + 2) % 3] - e[0][(a + 2) % 3] * e[1][(a + 1) % 3];
+    }
+    for (int a = 0; a < 3; ++a) slope_[a] = n[a] / n[axis];
+  }
+
+  // Returns the smallest k for which the point k * 2^step_log2 of the row through p is beyond the
+  // crossing. Changes p along the axis.
+  template <class EdgeInt, class PlaneInt>
+  int64_t find(const RowTest<EdgeInt, PlaneInt>& test, int64_t (&p)[3], int step_log2) const {
+    const int b = (axis_ + 1) % 3, c = (axis_ + 2) % 3;
+    if constexpr (sizeof(PlaneInt) > sizeof(int64_t)) {
+      const double at = vertex_[axis_] - slope_[b] * (static_cast<double>(p[b]) - vertex_[b]) -
+                        slope_[c] * (static_cast<double>(p[c]) - vertex_[c]);
+      if (at > -kMaxEstimate && at < kMaxEstimate) {
+        const int64_t k = (static_cast<int64_t>(at) >> step_log2) + 1;
+        p[axis_] = (k - 1) << step_log2;
+        if (!test.is_beyond(p)) {
+          p[axis_] = k << step_log2;
+          if (test.is_beyond(p)) return k;
+        }
+      }
+    }
+    return test.first_beyond(p[b], p[c], step_log2);
+  }
+
+ private:
+  static constexpr double kMaxEstimate = 0x1p41;
+
+  const int axis_;
+  double vertex_[3];
+  double slope_[3];  // by which the crossing moves back along the axis
+};
+
 // The sample rows of a closed cube: lattice lines at a distance of 2^pitch_log2 units, which
 // divides the cube's low corner.
 struct SampleRows {
@@ -28,14 +72,14 @@ struct SampleRows {
     const int64_t base = low[axis] >> pitch_log2;
     with_row_test(triangle, axis, [&](const auto& test) {
       if (test.sign() == 0) return;
+      const FirstBeyond first_beyond(triangle, axis);
       int64_t p[3] = {0, 0, 0};
       for (int i = f.low; i <= f.high; ++i) {
         p[first] = low[first] + (int64_t{i} << pitch_log2);
         for (int j = s.low; j <= s.high; ++j) {
           p[second] = low[second] + (int64_t{j} << pitch_log2);
           if (!test.crosses(p)) continue;
-          const int64_t beyond =
-              test.first_beyond(p[(axis + 1) % 3], p[(axis + 2) % 3], pitch_log2);
+          const int64_t beyond = first_beyond.find(test, p, pitch_log2);
           visit(i, j, beyond - 1 - base, test.sign());
         }
       }

@@ -7,7 +7,7 @@ namespace voxdag::cpu {
 RunningRows::RunningRows(PooledMemory& memory, const SolidEntry& entry, int tiles, int blocks)
     : tiles_(static_cast<size_t>(tiles)),
       blocks_(blocks),
-      views_(memory, 3 * tiles_ * tiles_ * kSquare) {
+      views_(memory, 3 * tiles_ * tiles_ * kSquare, PooledArray<int32_t>::kZero) {
   const int stride = tiles * blocks + 1;
   size_t at = 0;
   for (const auto& rows : entry.views)

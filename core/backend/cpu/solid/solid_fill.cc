@@ -23,7 +23,7 @@ SolidFill::SolidFill(const SubvolumeTask& task, PooledMemory& memory, SubDagTabl
       box_(lattice_cube(task.cube, task.grid_levels)),
       tile_edge_(kUnitsPerVoxel << tile_log2_of(task)),
       running_(memory, *task.solid, tiles_of(task), blocks_of(task)),
-      filler_(rule_, task.grid_levels),
+      filler_(memory, rule_, task.grid_levels),
       rows_{{0, 0, 0}, sample_pitch_log2(task.grid_levels), blocks_of(task)} {}
 
 void SolidFill::begin_tile(const LatticeCube& tile) {

@@ -18,6 +18,11 @@ uint64_t count_voxels(const Slices& slices) {
   return count;
 }
 
+void add_voxels(const Slices& voxels, VoxelBlock& block) {
+  const VoxelBlock added = block_of(voxels);
+  for (int i = 0; i < kBlockBricks; ++i) block.bricks[i] |= added.bricks[i];
+}
+
 // Returns the sum of the signs of the triangle's crossings with the walk.
 int64_t walk_crossings(const FixedTriangle& t, const int64_t (&from)[3], const int64_t (&to)[3]) {
   int64_t p[3] = {from[0], from[1], from[2]};
@@ -90,29 +95,58 @@ void TileFiller::fill_cube(int level, int index, const int (&low)[3]) {
 }
 
 void TileFiller::fill_block(int index, const int (&low)[3]) {
-  const Slices shell = slices_of(tile_->blocks[index]);
+  VoxelBlock& block = tile_->blocks[index];
+  FillMemo::Views views;
+  for (int c = 0; c < 8; ++c)
+    views.of[c] = views_->at(low[0] + child_coordinate(c, 0), low[1] + child_coordinate(c, 1),
+                             low[2] + child_coordinate(c, 2));
+  const FillMemo::Filled* known = memo_.find(block, views);
+  FillMemo::Filled result{block, 0, 0};
+  if (known == nullptr) {
+    const Slices shell = slices_of(block);
+    const int edge = 1 << block_log2_;
+    const uint64_t square = block_log2_ == kBlockLog2 ? ~uint64_t{0} : 0x0f0f0f0full;
+    Slices rest;
+    for (int x = 0; x < edge; ++x) rest.x[x] = ~shell.x[x] & square;
+    fill_components(views, rest, result);
+    if (rest.any())
+      add_blind(index, low, rest);
+    else
+      memo_.insert(block, views, result);
+    known = &result;
+  }
+  block = known->block;
+  filled_->filled += known->filled;
+  filled_->disputed += known->disputed;
+}
+
+void TileFiller::fill_components(const FillMemo::Views& views, Slices& rest,
+                                 FillMemo::Filled& result) const {
   const int last = (1 << block_log2_) - 1;  // coordinate of the voxels at the high faces
-  const uint64_t square = block_log2_ == kBlockLog2 ? ~uint64_t{0} : 0x0f0f0f0full;
-  Slices rest;
-  for (int x = 0; x <= last; ++x) rest.x[x] = ~shell.x[x] & square;
+  const auto position = [&](int c) {
+    return (8 * child_coordinate(c, 1) + child_coordinate(c, 2)) * last;
+  };
+  FilledVoxels filled;
   for (int c = 0; c < 8; ++c) {
     const int x = child_coordinate(c, 0) * last;
-    const uint64_t bit = uint64_t{1}
-                         << (8 * child_coordinate(c, 1) + child_coordinate(c, 2)) * last;
+    const uint64_t bit = uint64_t{1} << position(c);
     if ((rest.x[x] & bit) == 0) continue;
     Slices component;
     component.x[x] = bit;
     component = flood(component, rest);
     UnitViews unit;
-    for (int d = c; d < 8; ++d) {
-      const int position = (8 * child_coordinate(d, 1) + child_coordinate(d, 2)) * last;
-      if (component.x[child_coordinate(d, 0) * last] >> position & 1)
-        unit.add(views_->at(low[0] + child_coordinate(d, 0), low[1] + child_coordinate(d, 1),
-                            low[2] + child_coordinate(d, 2)));
-    }
-    if (unit.is_inside()) add_voxels(index, component, unit);
+    for (int d = c; d < 8; ++d)
+      if (component.x[child_coordinate(d, 0) * last] >> position(d) & 1) unit.add(views.of[d]);
     for (int i = 0; i < 8; ++i) rest.x[i] &= ~component.x[i];
+    if (!unit.is_inside()) continue;
+    add_voxels(component, result.block);
+    filled.add(unit, count_voxels(component));
   }
+  result.filled = static_cast<uint16_t>(filled.filled);
+  result.disputed = static_cast<uint16_t>(filled.disputed);
+}
+
+void TileFiller::add_blind(int index, const int (&low)[3], Slices& rest) {
   while (rest.any()) {
     const VoxelBlock order = block_of(rest);
     int brick = 0;
@@ -146,15 +180,11 @@ void TileFiller::fill_blind() {
   });
   for (const BlindComponent& blind : blind_) {
     const UnitViews unit{views_after(rule_, blind.views, blind.crossings), 1};
-    if (unit.is_inside()) add_voxels(blind.block, blind.voxels, unit);
+    if (!unit.is_inside()) continue;
+    add_voxels(blind.voxels, tile_->blocks[blind.block]);
+    filled_->add(unit, count_voxels(blind.voxels));
   }
   blind_.clear();
-}
-
-void TileFiller::add_voxels(int index, const Slices& voxels, const UnitViews& unit) {
-  const VoxelBlock filled = block_of(voxels);
-  for (int i = 0; i < kBlockBricks; ++i) tile_->blocks[index].bricks[i] |= filled.bricks[i];
-  filled_->add(unit, count_voxels(voxels));
 }
 
 }  // namespace voxdag::cpu

@@ -9,6 +9,7 @@
 
 #include "core/backend/cpu/raster/tile_bricks.h"
 #include "core/backend/cpu/solid/block_components.h"
+#include "core/backend/cpu/solid/fill_memo.h"
 #include "core/backend/cpu/solid/tile_views.h"
 #include "core/geometry/fixed_triangle.h"
 
@@ -30,8 +31,9 @@ class TileFiller {
   // Calls its argument for each triangle of the tile.
   using ForEachTriangle = std::function<void(const std::function<void(const FixedTriangle&)>&)>;
 
-  TileFiller(SolidRule rule, uint32_t grid_levels)
-      : rule_(rule), block_log2_(solid_block_log2(grid_levels)) {}
+  // Throws OutOfBudget.
+  TileFiller(PooledMemory& memory, SolidRule rule, uint32_t grid_levels)
+      : rule_(rule), block_log2_(solid_block_log2(grid_levels)), memo_(memory) {}
 
   // Fills a tile with an edge of 2^size_log2 voxels, whose low corner in lattice units is `low`.
   // Returns false, without filling, if the tile has no voxel of the shell.
@@ -53,14 +55,18 @@ class TileFiller {
   bool is_occupied(int size_log2, int index) const;
   void fill_cube(int size_log2, int index, const int (&low)[3]);
   void fill_block(int index, const int (&low)[3]);
+  // Fills the components with corners in `block`. Removes their voxels from `rest`.
+  void fill_components(const FillMemo::Views& views, Slices& rest, FillMemo::Filled& result) const;
+  // Adds the components of `rest` to blind_.
+  void add_blind(int index, const int (&low)[3], Slices& rest);
   void fill_blind();
-  void add_voxels(int index, const Slices& voxels, const UnitViews& unit);
 
   const SolidRule rule_;
   const int block_log2_;
   // Bit sets of the cubes with voxels, in Morton order, by the log2 of their edges in blocks.
   uint64_t occupied_[4][kTileBlocks / 64];
   std::vector<BlindComponent> blind_;
+  FillMemo memo_;
   // Arguments of fill().
   TileBricks* tile_ = nullptr;
   const int64_t* tile_low_ = nullptr;

@@ -21,22 +21,30 @@ void TileViews::add(const FixedTriangle& triangle) {
 }
 
 void TileViews::finish(SolidRule rule, RunningRows& running, const int (&tile)[3]) {
-  const int blocks = rows_.blocks;
   std::memset(views_, 0, sizeof views_);
   for (int a = 0; a < 3; ++a) {
     int32_t* const rows = running.column(a, tile);
-    for (int k = 0; k <= blocks; ++k) {
-      for (int i = 0; i <= blocks; ++i)
-        for (int j = 0; j <= blocks; ++j) {
-          const int at[3] = {a == 0 ? k : i, a == 1 ? k : a == 0 ? i : j, a == 2 ? k : j};
-          views_[at[0]][at[1]][at[2]] += rows[RunningRows::kRows * i + j];
-        }
-      if (k == blocks || !has_crossings_[a]) continue;
+    for (int k = 0; k <= rows_.blocks; ++k) {
+      add_views(a, k, rows);
+      if (k == rows_.blocks || !has_crossings_[a]) continue;
       for (int row = 0; row < RunningRows::kSquare; ++row)
         rows[row] = view_after(rule, rows[row], crossings_[a][k][row]);
     }
     if (has_crossings_[a]) std::memset(crossings_[a], 0, sizeof crossings_[a]);
     has_crossings_[a] = false;
+  }
+}
+
+void TileViews::add_views(int axis, int k, const int32_t* rows) {
+  constexpr int n = kCorners;
+  if (axis == 0) {
+    for (int row = 0; row < n * n; ++row) (&views_[k][0][0])[row] += rows[row];
+  } else if (axis == 1) {
+    for (int x = 0; x < n; ++x)
+      for (int z = 0; z < n; ++z) views_[x][k][z] += rows[n * x + z];
+  } else {
+    for (int x = 0; x < n; ++x)
+      for (int y = 0; y < n; ++y) views_[x][y][k] += rows[n * x + y];
   }
 }
 

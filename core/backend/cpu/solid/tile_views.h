@@ -26,6 +26,9 @@ class TileViews {
   UnitViews corners_of(const int (&low)[3], int edge) const;
 
  private:
+  // Adds the rows' views along an axis to the corners at position k of the axis.
+  void add_views(int axis, int k, const int32_t* rows);
+
   SampleRows rows_;
   bool has_crossings_[3] = {};
   // Sums of the signs of the crossings between corners k and k + 1 of a row: [axis][k][row].
