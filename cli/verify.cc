@@ -14,6 +14,7 @@
 #include "core/base/text/printable.h"
 #include "core/format/global/open_global.h"
 #include "query/verify/color_sample.h"
+#include "query/verify/interior_sample.h"
 #include "query/verify/surface_sample.h"
 #include "scene/formats/formats.h"
 #include "scene/textures/find_cutouts.h"
@@ -26,6 +27,7 @@ struct VerifyCommand {
   std::vector<std::string> scenes;
   SceneOptions scene_options;
   std::string cutouts;
+  std::string solid;
   uint64_t seed = 1;
   std::string memory;
   unsigned threads = default_threads();
@@ -39,6 +41,7 @@ Grid grid_of(const voxdag_reader::File& file) {
 
 struct Sample {
   query::SampleReport voxels;
+  std::optional<query::InteriorReport> interior;   // for a solid
   std::optional<query::ColorSampleReport> colors;  // for a file with attributes
 };
 
@@ -67,7 +70,14 @@ Sample check_against(const VerifyCommand& command, const voxdag_reader::File& fi
       query::sample_surface(*scene, grid, command.seed, progress, context.cancel, cutouts);
   Sample sample;
   with_reader_errors([&] {
-    sample.voxels = query::compare_with_sample(file, boxes);
+    const SolidRule rule = command.solid.empty()        ? SolidRule::kNone
+                           : command.solid == "winding" ? SolidRule::kWinding
+                                                        : SolidRule::kParity;
+    const bool is_solid = rule != SolidRule::kNone;
+    sample.voxels = query::compare_with_sample(file, boxes, is_solid);
+    if (is_solid)
+      sample.interior =
+          query::compare_interior(file, *scene, grid, rule, command.seed, progress, context.cancel);
     if (has_attributes)
       sample.colors = query::compare_sampled_colors(
           file, grid, context.files, *scene, command.seed, file.path() + ".images.vdspill",
@@ -84,6 +94,13 @@ void print(const voxdag_reader::File& file, const std::optional<Sample>& sample)
     std::printf("  equal to the scene: %s voxels compared in %s boxes near its surface, %s set\n",
                 count_text(sample->voxels.voxels).c_str(), count_text(sample->voxels.boxes).c_str(),
                 count_text(sample->voxels.set).c_str());
+  if (sample && sample->interior)
+    std::printf("  %s random voxels of the solid compared, %s inside%s\n",
+                count_text(sample->interior->voxels).c_str(),
+                count_text(sample->interior->inside).c_str(),
+                sample->interior->is_closed
+                    ? ""
+                    : "; the surface is not closed, so only voxels that it touches are compared");
   if (sample && sample->colors)
     std::printf(
         "  %ss like the scene's: %s cells compared in %llu regions, of which %llu are "
@@ -105,6 +122,10 @@ nlohmann::ordered_json verify_json(const VerifyCommand& command, const voxdag_re
                        {"boxes", sample->voxels.boxes},
                        {"voxels", sample->voxels.voxels},
                        {"set", sample->voxels.set}};
+  if (sample && sample->interior)
+    json["against"]["interior"] = {{"closed", sample->interior->is_closed},
+                                   {"voxels", sample->interior->voxels},
+                                   {"inside", sample->interior->inside}};
   if (sample && sample->colors)
     json["against"]["colors"] = {{"regions", sample->colors->regions},
                                  {"equal", sample->colors->equal},
@@ -136,6 +157,8 @@ void declare(Command& command, VerifyCommand& state) {
                "drop invalid triangles of the scene, as the build did");
   command.option("--cutouts", state.cutouts, "skip or keep, as in the build")
       .one_of({"skip", "keep"});
+  command.option("--solid", state.solid, "winding or parity, as in the build")
+      .one_of({"winding", "parity"});
   command.option("--point-radius", state.scene_options.point_radius,
                  "half edge of the cube that replaces each point, as in the build");
   command.option("--columns", state.scene_options.columns,

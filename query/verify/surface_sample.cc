@@ -220,7 +220,7 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
 }
 
 SampleReport compare_with_sample(const voxdag_reader::File& file,
-                                 const std::vector<SampleBox>& boxes) {
+                                 const std::vector<SampleBox>& boxes, bool is_solid) {
   SampleReport report;
   report.boxes = boxes.size();
   uint64_t wrong = 0;
@@ -230,6 +230,7 @@ SampleReport compare_with_sample(const voxdag_reader::File& file,
       for (int64_t y = 0; y < box.edge; ++y)
         for (int64_t z = 0; z < box.edge; ++z) {
           const bool expected = box.set[static_cast<size_t>((x * kBoxEdge + y) * kBoxEdge + z)];
+          if (is_solid && !expected) continue;
           ++report.voxels;
           report.set += expected;
           if (file.voxel(box.low[0] + x, box.low[1] + y, box.low[2] + z) == expected) continue;

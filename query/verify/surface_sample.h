@@ -40,8 +40,9 @@ struct SampleReport {
   uint64_t set = 0;     // compared voxels that are set in the sample
 };
 
-// Compares the file with a sample. Throws Error{kCorrupt} with the first voxel that differs.
+// Compares the file with a sample. Throws Error{kCorrupt} with the first voxel that differs. If the
+// file is a solid, compares only voxels that are set in the sample.
 SampleReport compare_with_sample(const voxdag_reader::File& file,
-                                 const std::vector<SampleBox>& boxes);
+                                 const std::vector<SampleBox>& boxes, bool is_solid = false);
 
 }  // namespace voxdag::query

@@ -1,0 +1,35 @@
+// A random sample of voxels of a solid, compared with the scene. Every voxel is decided by its own
+// winding number: the crossings of the three rows through its center with the triangles of the
+// scene. This shares only the crossing predicate with the code that builds solids.
+//
+// On a closed surface the winding number is the same along all rows and decides every voxel that no
+// triangle touches. If a sampled row is open, the surface is not closed; then a solid depends on
+// majorities, and only voxels that triangles touch are compared.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/progress.h"
+#include "core/format/global/voxdag_reader.h"
+#include "core/geometry/grid.h"
+#include "core/geometry/solid_rule.h"
+#include "scene/triangle_source.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::query {
+
+inline constexpr size_t kInteriorVoxels = 256;
+
+struct InteriorReport {
+  bool is_closed = true;  // all sampled rows enter the solid as often as they leave it
+  uint64_t voxels = 0;    // compared voxels
+  uint64_t inside = 0;    // compared voxels that are inside
+};
+
+// Compares kInteriorVoxels random voxels of the grid. Throws Error{kCorrupt} with the first voxel
+// that differs.
+InteriorReport compare_interior(const voxdag_reader::File& file, TriangleSource& scene,
+                                const Grid& grid, SolidRule rule, uint64_t seed, Progress& progress,
+                                const CancelToken& cancel);
+
+}  // namespace voxdag::query
