@@ -24,6 +24,13 @@ void print(const BuildReport& r) {
               static_cast<long long>(r.grid.resolution()));
   std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count_text(r.merge.voxels).c_str(),
               count_text(r.merge.svo_nodes).c_str(), count_text(r.merge.dag_nodes).c_str());
+  if (r.solid)
+    std::printf(
+        "  %s voxels inside by the rule %s, of which %s are disputed; %s of %s sample rows are "
+        "open\n",
+        count_text(r.solid->interior).c_str(), r.solid->rule.c_str(),
+        count_text(r.solid->disputed).c_str(), count_text(r.solid->open_rows).c_str(),
+        count_text(r.solid->rows).c_str());
   std::printf("  %s subvolumes (%s split), artifacts %s, spilled %s, %u merge pass%s\n",
               count_text(r.subvolumes).c_str(), count_text(r.subvolumes_split).c_str(),
               size_text(r.artifact_bytes).c_str(), size_text(r.spill_bytes).c_str(), r.merge.passes,

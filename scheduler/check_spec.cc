@@ -23,6 +23,17 @@ constexpr uint64_t kColorResolution = 4096;
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
 
+void check_solid(const RunOptions& run) {
+  if (run.backend == BackendName::kCuda || run.backend == BackendName::kParallelHost)
+    throw Error(ErrorCode::kInvalidInput, std::string("backend ") + name_of(run.backend) +
+                                              ": it does not fill solids; expected --backend cpu "
+                                              "or auto");
+  if (run.cluster)
+    throw Error(ErrorCode::kInvalidInput,
+                "'solid': expected no cluster at the same time, because its tasks do not fill "
+                "solids");
+}
+
 }  // namespace
 
 BuildSpec checked(const BuildSpec& spec) {
@@ -34,6 +45,7 @@ BuildSpec checked(const BuildSpec& spec) {
   check_options(spec);
   choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that cannot be a grid
   check_backend(r);
+  if (solid_rule_of(g) != SolidRule::kNone) check_solid(r);
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = default_threads();
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();

@@ -11,6 +11,7 @@
 #include "core/base/text.h"
 #include "scheduler/check_spec.h"
 #include "scheduler/cluster/cluster.h"
+#include "scheduler/solid/solid_report.h"
 #include "scheduler/stages/attributes/attribute_sections.h"
 #include "scheduler/stages/build/thread_builder.h"
 #include "scheduler/stages/ingest/ingest_stage.h"
@@ -51,6 +52,7 @@ void prepare_work_folder(BuildJob& job) {
   if (job.start_over) {
     job.checkpoint.forget();
     job.work.remove_colors();
+    job.work.remove_rows();
     remove_tasks(job);
   } else {
     refuse_other_options(job);
@@ -100,6 +102,7 @@ void plan(BuildJob& job, const PreparedScene& scene) {
   }
   if (check_disk_space(job.spec, scene, job.scene, job.work.path(), job.budget, job.context))
     job.clock.finish("estimate");
+  job.work.remove_rows();
   std::vector<StoredSubvolume> subvolumes(scene.plan.size());
   for (size_t i = 0; i < subvolumes.size(); ++i) {
     subvolumes[i].cube = scene.plan[i].cube;
@@ -134,10 +137,34 @@ void report_artifacts(BuildJob& job) {
     job.report.artifact_nodes += subvolume.summary.dag_nodes;
 }
 
+// Opens the sample rows of a solid, if an earlier run saved them.
+void open_rows(BuildJob& job, const std::string& scene_digest) {
+  const SolidRule rule = solid_rule_of(job.spec.geometry);
+  if (rule == SolidRule::kNone) return;
+  job.rows = std::make_unique<SolidRows>(job.context.files, job.work.rows_path(), rule,
+                                         job.report.grid.levels,
+                                         scene_digest + " " + geometry_json(job.spec.geometry));
+  job.rows->load();
+}
+
 // A strict build refuses warnings that an earlier run of the job only reported.
 void refuse_stored_warnings(BuildJob& job) {
   if (!job.spec.run.strict) return;
   for (const Warning& warning : job.store->warnings()) refuse_warning(warning);
+}
+
+// Adds the interior of a solid to the report. Warns if its surface is not closed.
+void report_solid(BuildJob& job) {
+  if (!job.has_rows()) return;
+  uint64_t interior = 0, disputed = 0;
+  for (const StoredSubvolume& subvolume : job.store->leaves()) {
+    interior += subvolume.summary.interior;
+    disputed += subvolume.summary.disputed;
+  }
+  BuildReport& report = job.report;
+  report.solid = solid_report(*job.rows, interior, disputed);
+  if (const auto warning = solid_warning(*report.solid, job.spec.geometry.scenes.front()))
+    job.context.progress.warn_of_input(*warning);
 }
 
 // Runs the stages scan, ingest, plan, partition and build, from the scene to all artifacts.
@@ -147,6 +174,7 @@ void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
   refuse_stored_warnings(job);
   report_scene(job, scene.state);
   plan(job, scene);
+  open_rows(job, scene.digest());
   job.scene.close();  // frees its memory for the subvolumes
   resume_subvolumes(job, builder, scene.digest());
   job.context.progress.set_grid(job.report.grid.origin, job.report.grid.edge);
@@ -154,10 +182,12 @@ void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
   report_subvolumes(leaves, job.report.grid.levels, job.context.progress);
   const std::vector<StoredSubvolume> planned = job.planned();
   job.report.subvolumes_reused = leaves.size() - planned.size();
-  if (!planned.empty()) builder.build(scene, planned);
+  const bool needs_rows = job.rows && !job.rows->is_ready();
+  if (!planned.empty() || needs_rows) builder.build(scene, planned);
   builder.add_to(job.report);
   if (scene.triangles) job.report.spill_bytes += scene.triangles->file_bytes();
   report_artifacts(job);
+  report_solid(job);
 }
 
 // Closes the segments before subvolumes are built again. First records the finished artifacts in
@@ -244,6 +274,7 @@ void write_report(BuildJob& job, double start_s) {
   BuildReport& report = job.report;
   report.stages = job.clock.stages();
   report.warnings = job.store->warnings();
+  if (report.solid) report.solid->volume = solid_volume(report.grid, report.merge.voxels);
   report.wall_s = wall_seconds() - start_s;
   report.cpu_s = process_cpu_seconds();
   report.peak_rss_bytes = peak_resident_bytes();

@@ -40,6 +40,10 @@ enum class MethodName { kDefault, kConsing, kPointers, kHashes };
 // kSkip with colors, and kKeep without.
 enum class CutoutRule { kDefault, kSkip, kKeep };
 
+// The rule that decides which empty voxels are inside the surface and are filled (docs/solid.md).
+// kNone fills nothing: only voxels that the surface touches are set.
+enum class SolidName { kNone, kWinding, kParity };
+
 struct BuildOptions {
   // The scene: files (glTF 2.0, PLY, OBJ, STL, LAS, text with points), a mesh in memory, or both.
   // The files and the mesh form one scene.
@@ -65,6 +69,7 @@ struct BuildOptions {
   bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
   CutoutRule cutouts = CutoutRule::kDefault;
   uint32_t hash_bits = 64;  // bits of the node hash, 4 to 64
+  SolidName solid = SolidName::kNone;
   // The attributes to store for each cell of the color grid. `color_resolution` is the number of
   // cells per edge of this grid, a power of two. 0 means the smaller of `resolution` and 4096.
   bool color = false, alpha = false, normal = false, material = false;

@@ -99,6 +99,8 @@ def _call(
     given: dict[str, Any] = {**options, "output": output}
     if given.get("bounds") is not None:
         given["bounds"] = [float(number) for number in given["bounds"]]
+    if isinstance(given.get("solid"), bool):  # True is the recommended rule
+        given["solid"] = "winding" if given["solid"] else None
     for name in PATHS:
         if given.get(name) is not None:
             given[name] = path_text(given[name])

@@ -49,6 +49,10 @@ void fields(Visitor& visit, GeometryOptions& g) {
   visit(kResolutionField, g.resolution);
   visit(option("hash_bits", "bits of a node's hash that count").range(4, 64).key(true),
         g.hash_bits);
+  visit(option("solid", "fill the interior by this rule (docs/solid.md)")
+            .unset_means("fill nothing")
+            .or_unset(),
+        g.solid);
   visit(option("skip_invalid", "drop and count invalid triangles").key(true), g.skip_invalid);
   visit(option("cutouts", "leave out voxels whose surfaces are cut out by alpha, or keep them")
             .unset_means("skip with colors, otherwise keep")

@@ -14,6 +14,17 @@
 
 namespace voxdag {
 
+// The interior of a solid build.
+struct SolidReport {
+  std::string rule;
+  uint64_t interior = 0;   // set voxels that the surface does not touch
+  double volume = 0;       // volume of all set voxels, in units of the scene
+  uint64_t rows = 0;       // sample rows that cross the surface
+  uint64_t open_rows = 0;  // sample rows that enter the solid more or less often than they leave it
+  uint64_t odd_rows = 0;   // sample rows with an odd number of crossings
+  uint64_t disputed = 0;   // voxels of the interior on which the directions disagree
+};
+
 struct BuildReport {
   std::string output;
   std::string sha256;
@@ -38,6 +49,7 @@ struct BuildReport {
   double wall_s = 0;
   double cpu_s = 0;
   uint64_t peak_rss_bytes = 0;
+  std::optional<SolidReport> solid;      // only for a solid build
   std::optional<ColorReport> colors;     // only for a build with colors
   std::optional<ClusterTotals> cluster;  // only for a cluster build
   std::vector<Warning> warnings;         // warnings about the scene

@@ -69,6 +69,10 @@ void check_options(const BuildSpec& spec) {
     json_fields::refuse(kResolutionField.name, expectation<uint64_t>(kResolutionField), 0);
   if (!g.columns.empty() && !points::Columns::parse(g.columns))
     json_fields::refuse("columns", points::Columns::kExpected, g.columns);
+  if (g.solid != SolidName::kNone && g.attributes.any())
+    json_fields::refuse("solid", "no color and no attributes at the same time");
+  if (g.solid != SolidName::kNone && g.cutouts == CutoutRule::kSkip)
+    json_fields::refuse("solid", "no cutouts that are skipped, because they are holes");
   if (g.color_resolution && !g.attributes.any())
     json_fields::refuse("color_resolution", "color or attributes as well");
   if (g.color_resolution > g.resolution)

@@ -12,6 +12,7 @@
 #include "core/base/progress.h"
 #include "core/color/attribute_set.h"
 #include "core/geometry/grid.h"
+#include "core/geometry/solid_rule.h"
 #include "core/io/file_system.h"
 #include "voxdag/build.h"
 #include "voxdag/cancel_token.h"
@@ -28,6 +29,7 @@ constexpr std::array<const char*, 4> enum_names(MethodName) {
   return {"", "consing", "pointers", "hashes"};
 }
 constexpr std::array<const char*, 3> enum_names(CutoutRule) { return {"", "skip", "keep"}; }
+constexpr std::array<const char*, 3> enum_names(SolidName) { return {"", "winding", "parity"}; }
 enum class ClusterEngine { kNone, kSlurm };
 constexpr std::array<const char*, 2> enum_names(ClusterEngine) { return {"", "slurm"}; }
 
@@ -43,11 +45,16 @@ struct GeometryOptions {
   std::string columns;                        // names of the columns of text files with points
   std::vector<std::string> ignore_extension;  // required extensions of glTF files
   uint32_t hash_bits = 64;
-  AttributeSet attributes;  // attributes of the color grid's cells
+  SolidName solid = SolidName::kNone;  // the rule that fills the interior
+  AttributeSet attributes;             // attributes of the color grid's cells
   // Cells per edge of the color grid, a power of two from 4 to the resolution; 0: the build chooses
   // it.
   uint64_t color_resolution = 0;
 };
+
+inline SolidRule solid_rule_of(const GeometryOptions& options) {
+  return static_cast<SolidRule>(options.solid);
+}
 
 // Returns the geometry options as one line of JSON, for comparing jobs and for messages. Scenes are
 // left out because only their content matters.

@@ -10,12 +10,16 @@
 //                 cursors and pieces of the scene   1/2 of free                  each part
 //                   lists of touched cells, cubes   up to 3 MiB each             nobody
 //   partition     half-filled chunks of triangles   1/8                          nobody
+//   rows          sample rows of a solid's subvolume,
+//                 for every thread                  1/64 each, up to 1/2 of free RowSums
+//                   columns of sample rows          up to 3/2 of that            RowColumn
 //   estimate      pilot builds, consecutive         3/4 of free                  Backend
 //   build         WorkerMemory, for every worker    free / workers
 //                   segment writer                  1.5 MiB                      SegmentWriter
 //                   pages that a backend retains    8 MiB                        nobody
 //                   half-filled chunks of a split   512 KiB                      nobody
 //                   share: Backend::build()         the rest                     Backend
+//                     sample rows of a solid        twice 1/64 of the budget     executor
 //                     tables made in advance        1/4 of its free part         BackendMemory
 //                     each table of the plane memo  1/16, 1/8 of free            BackendMemory
 //                     block memo                    1/16 of free                 BackendMemory
@@ -78,6 +82,8 @@ struct MemoryPlan {
     return static_cast<unsigned>(
         std::clamp<uint64_t>(std::min(pieces, ingest_workers(free_bytes)), 1, threads));
   }
+  // Returns the maximum size of the sample rows of a solid's planned subvolume.
+  static constexpr uint64_t solid_row_bytes(uint64_t budget_bytes) { return budget_bytes / 64; }
   // Returns the budget of a pilot build when `free_bytes` are free.
   static constexpr uint64_t pilot_bytes(uint64_t free_bytes) { return free_bytes * 3 / 4; }
 };

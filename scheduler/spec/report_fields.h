@@ -29,6 +29,17 @@ void fields(Visitor& visit, ColorReport& colors) {
   });
 }
 
+template <class Visitor>
+void fields(Visitor& visit, SolidReport& solid) {
+  visit("rule", solid.rule);
+  visit("interior", solid.interior);
+  visit("volume", solid.volume);
+  visit("rows", solid.rows);
+  visit("open_rows", solid.open_rows);
+  visit("odd_rows", solid.odd_rows);
+  visit("disputed", solid.disputed);
+}
+
 // Omits ClusterTotals::split, because the report has this number under "subvolumes".
 template <class Visitor>
 void fields(Visitor& visit, ClusterTotals& totals) {
@@ -97,6 +108,7 @@ void fields(Visitor& visit, BuildReport& report) {
   visit("peak_rss_bytes", report.peak_rss_bytes);
   visit.derived("voxels_per_s",
                 report.wall_s > 0 ? static_cast<double>(report.merge.voxels) / report.wall_s : 0.0);
+  visit("solid", report.solid);
   visit("colors", report.colors);
   visit("cluster", report.cluster);
   visit("warnings", report.warnings);

@@ -9,7 +9,7 @@ namespace {
 // "vdag": marks a database as a job store.
 constexpr int64_t kApplicationId = 0x76646167;
 
-constexpr int64_t kSchemaVersion = 8;
+constexpr int64_t kSchemaVersion = 9;
 
 constexpr const char* kTables = R"sql(
 CREATE TABLE job (
@@ -30,7 +30,7 @@ CREATE TABLE subvolume (
   segment INTEGER NOT NULL, offset INTEGER NOT NULL, bytes INTEGER NOT NULL,
   index_offset INTEGER NOT NULL, checksum INTEGER NOT NULL,
   voxels INTEGER NOT NULL, svo_nodes INTEGER NOT NULL, dag_nodes INTEGER NOT NULL,
-  root_hash INTEGER NOT NULL,
+  root_hash INTEGER NOT NULL, interior INTEGER NOT NULL, disputed INTEGER NOT NULL,
   row_checksum INTEGER NOT NULL
 );
 -- Replacing a row searches for rows that refer to it. Without this index SQLite reads all rows.

@@ -220,12 +220,15 @@ void WorkFolder::remove_silently(const std::string& path) {
 void WorkFolder::remove() {
   released_.clear();
   try {
-    // The lock file is removed last, so that no other build uses the folder before it is empty.
+    // The lock file is removed last, so that no other build uses the folder before it is empty. The
+    // sample rows of a solid are removed after the job store, because its report needs them.
     std::vector<std::string> others = scratch_files();
     for (const DirectoryEntry& entry : files_.list(path_))
-      if (is_ours(entry) && !entry.is_directory && entry.name != kLockName)
+      if (is_ours(entry) && !entry.is_directory && entry.name != kLockName &&
+          path_ + "/" + entry.name != rows_path())
         others.push_back(path_ + "/" + entry.name);
     parallel_for(kRemovers, others.size(), [&](unsigned, size_t i) { files_.remove(others[i]); });
+    remove_rows();
     remove_cluster_files();
     if (files_.exists(scratch_path())) files_.remove_directory(scratch_path());
     files_.remove(path_ + "/" + std::string(kLockName));

@@ -40,6 +40,9 @@ class WorkFolder {
   static std::string decoded_path(const std::string& folder) { return folder + "/decoded.vdspill"; }
   // Triangles that outlive a run.
   std::string durable_path() const { return path_ + "/triangles.vddurable"; }
+  // The sample rows of a solid.
+  std::string rows_path() const { return path_ + "/rows.vddurable"; }
+  std::string row_sums_path() const { return path_ + "/rows.vdspill"; }
   // Colors of cubes that outlive a run.
   std::string colors_path() const { return path_ + "/colors.vddurable"; }
   std::string scratch_path() const { return path_ + "/merge"; }
@@ -66,6 +69,8 @@ class WorkFolder {
   void remove_spilled() { remove_silently(spill_path()); }
   // Removes durable triangles. Errors are ignored.
   void remove_durable() { remove_silently(durable_path()); }
+  // Removes the sample rows of a solid. Errors are ignored.
+  void remove_rows() { remove_silently(rows_path()); }
   // Removes stored colors. Errors are ignored.
   void remove_colors() { remove_silently(colors_path()); }
   // Removes all files of voxdag, and the folder if it is empty afterwards. Errors are ignored,

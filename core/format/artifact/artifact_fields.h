@@ -31,6 +31,8 @@ void fields(Visitor& visit, SubDagSummary& summary) {
   visit("svo_nodes", summary.svo_nodes);
   visit("dag_nodes", summary.dag_nodes);
   visit("root_hash", summary.root_hash);
+  visit("interior", summary.interior);
+  visit("disputed", summary.disputed);
 }
 
 }  // namespace voxdag

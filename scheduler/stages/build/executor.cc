@@ -10,6 +10,9 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/artifact/artifact_writer.h"
+#include "scheduler/solid/full_cubes.h"
+#include "scheduler/solid/part_rows.h"
+#include "scheduler/solid/row_sums.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/build/split_subvolume.h"
 #include "scheduler/stages/partition/partition.h"
@@ -100,6 +103,7 @@ class Worker {
   std::vector<QueuedSubvolume> build(const QueuedSubvolume& queued) {
     cancel_.check();
     const StoredSubvolume& subvolume = queued.subvolume;
+    if (options_.rows != nullptr) return build_solid(queued);
     const int64_t edge = subvolume.cube.edge_voxels(options_.shape.grid_levels);
     if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(queued);
     progress_.subvolume_begun(subvolume.id);
@@ -116,17 +120,9 @@ class Worker {
         return {};
       }
     }
-    ArtifactWriter artifact(segment_, options_.shape);
     StoredSubvolume built = subvolume;
-    if (backend_->build(task, *triangles, share_, cancel_, artifact, built.summary) ==
-        BuildOutcome::kNeedsSplit)
-      return split(queued);
-    if (!built.summary.empty()) {
-      const ArtifactRoot root{subvolume.cube, 0, built.summary.root_hash, built.summary.voxels,
-                              built.summary.svo_nodes};
-      built.artifact = artifact.finish({&root, 1});
-      if (key) add_to_cache(*key, built.artifact);
-    }
+    if (!build_artifact(task, *triangles, built)) return split(queued);
+    if (key && !built.summary.empty()) add_to_cache(*key, built.artifact);
     record_built(built, queued.bin);
     return {};
   }
@@ -135,6 +131,61 @@ class Worker {
   ExecutorCounts counts;
 
  private:
+  // Builds a subvolume of a solid. If it has no voxel of the shell, it needs no triangles and is
+  // never split.
+  std::vector<QueuedSubvolume> build_solid(const QueuedSubvolume& queued) {
+    const Cube& cube = queued.subvolume.cube;
+    const SolidUnit unit = options_.rows->find(cube).unit;
+    const int64_t edge = cube.edge_voxels(options_.shape.grid_levels);
+    if (unit == SolidUnit::kShell && edge > std::max(options_.longest_edge, kSmallestEdge))
+      return split(queued);
+    progress_.subvolume_begun(queued.subvolume.id);
+    StoredSubvolume built = queued.subvolume;
+    if (unit == SolidUnit::kShell) {
+      if (!build_solid_artifact(*triangles_.open(queued.bin), built)) return split(queued);
+    } else if (unit == SolidUnit::kEmptyUnit) {
+      const UnitViews views =
+          views_of_empty(read_entry(cube).entry, cube, options_.shape.grid_levels);
+      if (views.is_inside()) {
+        built.artifact = add_full_cubes(segment_, options_.shape, {&cube, 1});
+        built.summary = full_summary(cube, options_.shape, views.is_disputed());
+      }
+    }
+    record_built(built, queued.bin);
+    return {};
+  }
+
+  struct ChargedEntry {
+    MemoryCharge charge;
+    SolidEntry entry;
+  };
+  ChargedEntry read_entry(const Cube& cube) {
+    MemoryCharge charge(share_, row_bytes(cube, options_.shape.grid_levels),
+                        "the sample rows of a solid");
+    return {std::move(charge), options_.rows->read_entry(cube)};
+  }
+
+  bool build_solid_artifact(TriangleStream& triangles, StoredSubvolume& built) {
+    const ChargedEntry rows = read_entry(built.cube);
+    return build_artifact(
+        {options_.shape.grid_levels, built.cube, options_.shape.hash_bits, &rows.entry}, triangles,
+        built);
+  }
+
+  // Sets the artifact and the summary. Returns false if the subvolume must be split.
+  bool build_artifact(const SubvolumeTask& task, TriangleStream& triangles,
+                      StoredSubvolume& built) {
+    ArtifactWriter artifact(segment_, options_.shape);
+    if (backend_->build(task, triangles, share_, cancel_, artifact, built.summary) ==
+        BuildOutcome::kNeedsSplit)
+      return false;
+    if (built.summary.empty()) return true;
+    const ArtifactRoot root{task.cube, 0, built.summary.root_hash, built.summary.voxels,
+                            built.summary.svo_nodes};
+    built.artifact = artifact.finish({&root, 1});
+    return true;
+  }
+
   void record_built(const StoredSubvolume& built, BinId bin) {
     commits_->add_built(built, bin);
     SubvolumeStatus status = status_of(built, options_.shape.grid_levels);
@@ -157,8 +208,10 @@ class Worker {
                       " voxels per edge does not fit a worker's share of " +
                       std::to_string(share_.limit()) + " bytes: expected more memory (--memory)");
     ++counts.split;
-    return split_subvolume(whole, options_.shape.grid_levels, triangles_, jobs_, progress_,
-                           cancel_);
+    std::optional<SplitSolid> solid;
+    if (options_.rows != nullptr) solid.emplace(SplitSolid{*options_.rows, share_});
+    return split_subvolume(whole, options_.shape.grid_levels, triangles_, jobs_, progress_, cancel_,
+                           solid ? &*solid : nullptr);
   }
 
   const ExecutorOptions& options_;

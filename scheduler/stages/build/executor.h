@@ -11,6 +11,7 @@
 
 #include "core/backend/backend.h"
 #include "core/format/artifact/artifact.h"
+#include "scheduler/solid/solid_rows.h"
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/state/artifact_cache.h"
 #include "scheduler/state/commit_queue.h"
@@ -35,6 +36,7 @@ struct ExecutorOptions {
   std::string segment_folder;
   uint32_t first_segment_id = 0;
   double checkpoint_interval_s = 2;
+  SolidRows* rows = nullptr;       // null for the shell
   ArtifactCache* cache = nullptr;  // null if builds do not share artifacts
 };
 

@@ -13,10 +13,18 @@
 
 namespace voxdag {
 
+// The rows of a solid, and the memory to compute the rows of a split subvolume's octants.
+struct SplitSolid {
+  SolidRows& rows;
+  MemoryBudget& budget;
+};
+
 // Records, in place of `whole`, its octants that have triangles. Returns these octants with a bin
-// for each, and releases the bin of `whole`. The edge of `whole` must be longer than kSmallestEdge.
+// for each, and releases the bin of `whole`. Octants of a solid without triangles are kept if they
+// are inside. The edge of `whole` must be longer than kSmallestEdge.
 std::vector<QueuedSubvolume> split_subvolume(const QueuedSubvolume& whole, uint32_t grid_levels,
                                              TriangleStore& triangles, JobStore& jobs,
-                                             Progress& progress, const CancelToken& cancel);
+                                             Progress& progress, const CancelToken& cancel,
+                                             const SplitSolid* solid = nullptr);
 
 }  // namespace voxdag

@@ -1,6 +1,7 @@
 #include "scheduler/stages/build/thread_builder.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -21,12 +22,27 @@ ExecutorOptions executor_options(BuildJob& job, const BackendChoice& backend) {
   options.segment_folder = job.work.path();
   options.first_segment_id = job.work.next_segment_id();
   options.checkpoint_interval_s = run.checkpoint_interval_s;
-  if (job.cache) options.cache = &*job.cache;
+  options.rows = job.rows.get();
+  if (job.cache && !job.rows) options.cache = &*job.cache;
   options.built = job.report.subvolumes_reused;
   return options;
 }
 
 }  // namespace
+
+void ThreadBuilder::prepare_rows(std::span<const PlannedCube> planned,
+                                 const TriangleStore& triangles) {
+  if (planned.size() != job_.store->leaves().size()) job_.has_rows();  // throws
+  std::optional<OutsideRows> outside;
+  if (job_.spec.geometry.bounds) {
+    outside.emplace(job_.report.grid.levels, job_.budget);
+    outside->read(job_.scene.open(), job_.report.grid, job_.stage());
+    job_.scene.close();
+  }
+  compute_rows(*job_.rows, planned, triangles, outside ? &*outside : nullptr,
+               job_.work.row_sums_path(), job_.stage());
+  job_.clock.finish("rows");
+}
 
 void ThreadBuilder::build(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
   std::vector<Cube> cubes;
@@ -37,8 +53,15 @@ void ThreadBuilder::build(PreparedScene& scene, std::span<const StoredSubvolume>
   const MemoryCharge lists(job_.budget, queue.size() * (sizeof queue[0] + sizeof planned[0]),
                            "lists of subvolumes");
   job_.clock.finish("partition");
+  if (job_.rows && !job_.rows->is_ready()) {
+    std::vector<PlannedCube> bins_of_cubes;
+    for (size_t i = 0; i < planned.size(); ++i) bins_of_cubes.push_back({planned[i].cube, bins[i]});
+    prepare_rows(bins_of_cubes, *scene.triangles);
+  }
   Progress& progress = job_.context.progress;
-  const BackendChoice backend = choose_backend(job_.spec.run, progress);
+  RunOptions run = job_.spec.run;
+  if (job_.rows) run.backend = BackendName::kCpu;  // the only backend that fills solids
+  const BackendChoice backend = choose_backend(run, progress);
   job_.report.backend = backend.name;
   const ExecutorOptions options = executor_options(job_, backend);
   progress.begin_stage("build", options.built + queue.size(), "subvolumes");

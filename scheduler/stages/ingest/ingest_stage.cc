@@ -11,6 +11,8 @@
 #include "core/base/process_limits.h"
 #include "scene/formats/formats.h"
 #include "scene/textures/find_cutouts.h"
+#include "scheduler/solid/row_sums.h"
+#include "scheduler/spec/build_fields.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/ingest/ingest.h"
 
@@ -30,17 +32,33 @@ constexpr int64_t kMaxWaitNs = 200'000'000;
 // are split later instead.
 constexpr size_t kMaxBins = 8192;
 
-std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const RunOptions& options) {
+// Returns the longest edge of a subvolume. A worker holds all sample rows of a solid's subvolume,
+// so they limit its edge.
+int64_t longest_edge(const BuildSpec& spec) {
+  if (solid_rule_of(spec.geometry) == SolidRule::kNone) return INT64_MAX;
+  int64_t edge = kSmallestEdge;
+  while (edge < kMaxOptionEdge &&
+         solid_row_bytes(2 * edge) <= MemoryPlan::solid_row_bytes(spec.run.memory_bytes))
+    edge *= 2;
+  return edge;
+}
+
+std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const BuildSpec& spec) {
+  const RunOptions& options = spec.run;
+  int64_t longest = longest_edge(spec);
   if (options.subvolume_edge) {
-    int64_t edge = static_cast<int64_t>(options.subvolume_edge);
+    int64_t edge = std::min(static_cast<int64_t>(options.subvolume_edge), longest);
     auto plan = top.subvolumes_by_edge(edge);
     while (plan.size() > kMaxBins) plan = top.subvolumes_by_edge(edge *= 2);
     return plan;
   }
   double max_weight = std::clamp(top.total_weight() / kMinSubvolumes, kMinBricksPerSubvolume,
                                  kMaxBricksPerSubvolume);
-  auto plan = top.subvolumes_by_weight(max_weight);
-  while (plan.size() > kMaxBins) plan = top.subvolumes_by_weight(max_weight *= 2);
+  auto plan = top.subvolumes_by_weight(max_weight, longest);
+  while (plan.size() > kMaxBins) {
+    if (longest <= kMaxOptionEdge) longest *= 2;
+    plan = top.subvolumes_by_weight(max_weight *= 2, longest);
+  }
   return plan;
 }
 
@@ -160,7 +178,7 @@ class Preparation {
       state_.position = 0;
       checkpoint_.save(state_, cells_of(top));
     }
-    prepared_.plan = choose_subvolumes(top, spec_.run);
+    prepared_.plan = choose_subvolumes(top, spec_);
   }
 
   StageContext stage_context() const { return {context_, spec_.run.threads, budget_}; }

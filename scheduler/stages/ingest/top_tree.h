@@ -93,9 +93,10 @@ class TopTree {
   }
   uint64_t occupied_cells() const;
 
-  // Returns the largest occupied cubes of weight <= `max_weight`, in Morton order. Includes single
-  // cells of greater weight, which cannot be divided.
-  std::vector<SubvolumePlan> subvolumes_by_weight(double max_weight) const;
+  // Returns the largest occupied cubes of weight <= `max_weight` and of an edge <= `max_edge`, in
+  // Morton order. Includes single cells that exceed a limit, which cannot be divided.
+  std::vector<SubvolumePlan> subvolumes_by_weight(double max_weight,
+                                                  int64_t max_edge = INT64_MAX) const;
   // Returns the occupied cubes of this edge (or of the cells' edge if that is larger), in Morton
   // order.
   std::vector<SubvolumePlan> subvolumes_by_edge(int64_t edge_voxels) const;

@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "merge/merge.h"
+#include "scheduler/solid/full_cubes.h"
 
 namespace voxdag {
 namespace {
@@ -29,6 +30,17 @@ class StoredCheckpoint : public Checkpoint {
  private:
   BuildJob& job_;
 };
+
+// Writes an artifact of the empty cubes above the subvolumes that are inside a solid. No row of the
+// job store names it: a resumed merge writes it again.
+ArtifactRef write_full_cubes(BuildJob& job) {
+  SegmentWriter segment(job.context.files, job.work.path(), job.work.next_segment_id(), job.budget);
+  std::vector<Cube> cubes;
+  for (const FullCube& full : job.rows->full_cubes) cubes.push_back(full.cube);
+  const ArtifactRef artifact = add_full_cubes(segment, job.shape(), cubes);
+  segment.sync();
+  return artifact;
+}
 
 }  // namespace
 
@@ -55,6 +67,8 @@ void merge_artifacts(BuildJob& job, GlobalFileWriter& out) {
   MergeInputs inputs;
   inputs.shape = job.shape();
   inputs.artifacts = distinct_artifacts(job.store->leaves(), job.work.store_path());
+  if (job.has_rows() && !job.rows->full_cubes.empty())
+    inputs.artifacts.push_back(write_full_cubes(job));
   const MemoryCharge list(job.budget, inputs.artifacts.size() * sizeof(ArtifactRef),
                           "the list of artifacts");
   inputs.open_segment = [&](uint32_t id) { return job.work.open_segment(id); };

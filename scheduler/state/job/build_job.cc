@@ -55,6 +55,16 @@ std::vector<StoredSubvolume> BuildJob::planned() const {
   return leaves;
 }
 
+bool BuildJob::has_rows() const {
+  if (!rows) return false;
+  if (!rows->is_ready())
+    throw Error(ErrorCode::kCorrupt,
+                work.rows_path() +
+                    ": the sample rows of this solid are missing or damaged: start "
+                    "over with --restart");
+  return true;
+}
+
 void BuildJob::commit_best_effort() {
   try {
     commits.commit();

@@ -9,6 +9,7 @@
 
 #include "core/base/memory_budget.h"
 #include "core/dag/sub_dag.h"
+#include "scheduler/solid/solid_rows.h"
 #include "scheduler/spec/build_report.h"
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/spec/stage_clock.h"
@@ -35,6 +36,9 @@ struct BuildJob {
   }
   // Returns the subvolumes that are not built yet.
   std::vector<StoredSubvolume> planned() const;
+  // Returns true if the build is solid and its rows are complete. Throws Error{kCorrupt} if they
+  // are missing although subvolumes were built.
+  bool has_rows() const;
   // Records finished work. Errors are ignored: the caller already handles an error, and subvolumes
   // that are not recorded are only built again.
   void commit_best_effort();
@@ -55,7 +59,8 @@ struct BuildJob {
   const BuildContext context;
   IngestCheckpoint checkpoint;
   BuildReport report;
-  bool start_over;  // the stored job is ignored
+  std::unique_ptr<SolidRows> rows;  // null unless the build is solid and its scene was read
+  bool start_over;                  // the stored job is ignored
 };
 
 // Returns the work folder of a build with these options.

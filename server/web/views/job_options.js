@@ -39,6 +39,8 @@ class Fields {
       columns: h("input", {placeholder: "x,y,z,r,g,b", autocomplete: "off", on}),
       ignore_extension: h("input", {placeholder: "ACME_bent, …", autocomplete: "off", on}),
       cutouts: this.choice([kAutomatic, ["skip", "Leave out"], ["keep", "Keep"]]),
+      solid:
+          this.choice([["", "Surface only"], ["winding", "By winding"], ["parity", "By parity"]]),
       color_resolution: this.choice([kAutomatic, ...gridChoices(kMinLevel, kMaxLevel)]),
       hash_bits: this.number({min: "4", max: "64", step: "1", placeholder: "64"}),
       memory: h("input", {placeholder: "2GiB", autocomplete: "off", on}),
@@ -99,6 +101,7 @@ export class JobOptions {
             "Ignored extensions", options.ignore_extension,
             "Required extensions of glTF files to read without."),
         field("Cutouts", options.cutouts, "Parts of surfaces that alpha makes invisible."),
+        field("Interior", options.solid, "Also sets the voxels inside the surface."),
         checkRow(flags.skip_invalid, "Skip invalid triangles"),
         checkRow(flags.color, "Colors of the scene"),
         attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,
@@ -185,7 +188,7 @@ function checkRow(input, label) {
 
 // Returns the value of an option, in the form that a request needs.
 function valueOf(name, input) {
-  if (["memory", "backend", "method", "columns", "cutouts"].includes(name))
+  if (["memory", "backend", "method", "columns", "cutouts", "solid"].includes(name))
     return input.value.trim();
   if (name === "ignore_extension") return input.value.split(",").map((text) => text.trim());
   return numberOf(input, `The ${name.replace("_", " ")}`);

@@ -180,7 +180,7 @@ TEST_F(JobStoreTest, RefusesAnEarlierVersion) {
       EXPECT_EQ(error.code(), ErrorCode::kUnsupportedVersion);
       EXPECT_NE(error.message().find("--restart"), std::string::npos) << error.message();
     }
-  set_version("8");
+  set_version("9");
   EXPECT_EQ(JobStore(path(), JobStore::Access::kRead).leaves().size(), 3u);
 }
 

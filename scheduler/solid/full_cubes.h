@@ -1,0 +1,20 @@
+// Artifacts of full cubes, in which all voxels are set.
+#pragma once
+
+#include <span>
+
+#include "core/dag/sub_dag.h"
+#include "core/format/artifact/artifact.h"
+#include "core/format/artifact/segment_writer.h"
+
+namespace voxdag {
+
+// Appends an artifact with a root for each cube. It has one node per level. There must be at least
+// one cube.
+ArtifactRef add_full_cubes(SegmentWriter& segment, const DagShape& shape,
+                           std::span<const Cube> cubes);
+
+// Returns the totals of a full cube of the interior.
+SubDagSummary full_summary(const Cube& cube, const DagShape& shape, bool is_disputed);
+
+}  // namespace voxdag

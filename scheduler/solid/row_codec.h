@@ -1,0 +1,17 @@
+// Compresses the numbers of sample rows as runs of equal numbers: each run is the difference from
+// the previous run's number and the run's length, both as variable-length integers. Most rows have
+// the number of their neighbor.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace voxdag {
+
+void encode_rows(std::span<const int32_t> numbers, std::vector<std::byte>& out);
+// Fills `out`. Returns false for bytes that encode_rows() did not make from as many numbers.
+bool decode_rows(std::span<const std::byte> bytes, std::span<int32_t> out);
+
+}  // namespace voxdag

@@ -1,0 +1,51 @@
+// The crossings of a cube's triangles with its sample rows (core/geometry/solid_rule.h).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/geometry/cube.h"
+#include "core/geometry/row_crossings.h"
+
+namespace voxdag {
+
+// The low corner of a cube, in lattice units, and its sample rows.
+SampleRows sample_rows_of(const Cube& cube, uint32_t grid_levels);
+// Returns the number of sample rows along one axis of a closed cube.
+uint64_t rows_per_axis(const Cube& cube, uint32_t grid_levels);
+// Bytes of one number for each sample row of a closed cube.
+inline uint64_t row_bytes(const Cube& cube, uint32_t grid_levels) {
+  return 3 * rows_per_axis(cube, grid_levels) * sizeof(int32_t);
+}
+
+// The same for an edge in voxels, in a grid of at least 8^3 voxels.
+constexpr uint64_t solid_row_bytes(int64_t edge) {
+  const auto side = static_cast<uint64_t>(edge / 8 + 1);
+  return 3 * side * side * sizeof(int32_t);
+}
+
+// The numbers of one row: the sum of the signs of its crossings, times 2, plus 1 if there are any.
+constexpr int32_t row_sum(int32_t number) { return number >> 1; }
+constexpr bool has_crossing(int32_t number) { return (number & 1) != 0; }
+inline void add_crossing(int32_t& number, int sign) { number = (number + 2 * sign) | 1; }
+
+// Sums the crossings within a cube. Not thread-safe.
+class RowSums {
+ public:
+  // Charges row_bytes() to the budget.
+  RowSums(const Cube& cube, uint32_t grid_levels, MemoryBudget& budget);
+  void add(const FixedTriangle& triangle);
+  const std::vector<int32_t>& numbers(int axis) const { return numbers_[axis]; }
+  // True if a triangle touches the cube, so that the cube has a voxel of the shell.
+  bool is_occupied() const { return is_occupied_; }
+
+ private:
+  const SampleRows rows_;
+  const int64_t edge_;  // in lattice units
+  const MemoryCharge charge_;
+  std::vector<int32_t> numbers_[3];
+  bool is_occupied_ = false;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,70 @@
+#include "scheduler/solid/solid_report.h"
+
+#include <cstdio>
+
+#include "core/base/text.h"
+#include "core/fields/field.h"
+#include "scheduler/spec/build_spec.h"
+
+namespace voxdag {
+namespace {
+
+// Parts of the sample rows that may be open without a warning, and beyond which the surface is more
+// likely a scene than an object.
+constexpr double kClosed = 0.001, kScene = 0.05;
+
+std::string percent_text(double part) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2g %%", 100 * part);
+  return text;
+}
+
+}  // namespace
+
+double solid_volume(const Grid& grid, uint64_t voxels) {
+  const double edge = grid.edge / static_cast<double>(grid.resolution());
+  return static_cast<double>(voxels) * edge * edge * edge;
+}
+
+SolidReport solid_report(const SolidRows& rows, uint64_t interior, uint64_t disputed) {
+  SolidReport report;
+  report.rule = name_of(static_cast<SolidName>(rows.rule()));
+  report.interior = interior;
+  report.disputed = disputed;
+  for (const FullCube& full : rows.full_cubes) {
+    const uint64_t filled = uint64_t{1} << 3 * (rows.grid_levels() - full.cube.level);
+    report.interior += filled;
+    if (full.is_disputed) report.disputed += filled;
+  }
+  report.rows = rows.counts.rows;
+  report.open_rows = rows.counts.open;
+  report.odd_rows = rows.counts.odd;
+  return report;
+}
+
+std::optional<Warning> solid_warning(const SolidReport& report, const std::string& scene) {
+  if (report.rows == 0) return std::nullopt;
+  const bool is_parity = report.rule == name_of(SolidName::kParity);
+  const uint64_t open = is_parity ? report.odd_rows : report.open_rows;
+  const double part = static_cast<double>(open) / static_cast<double>(report.rows);
+  if (report.interior == 0 && report.open_rows == 0 && report.odd_rows == 0)
+    return Warning{"solid-canceled", scene,
+                   "nothing is inside: the faces cancel each other, as double-sided faces do"};
+  if (!is_parity && open > 0 && report.odd_rows == 0)
+    return Warning{"solid-orientation", scene,
+                   "the surface is closed, but its faces are oriented inconsistently (" +
+                       percent_text(part) +
+                       " of the sample rows): --solid parity ignores orientation"};
+  if (part > kScene)
+    return Warning{"solid-open", scene,
+                   "the surface is not closed (" + percent_text(part) +
+                       " of the sample rows), so it is more a scene than an object: " +
+                       count_text(report.disputed) + " filled voxels rest on a majority"};
+  if (part > kClosed)
+    return Warning{"solid-open", scene,
+                   "the surface is not closed (" + percent_text(part) + " of the sample rows): " +
+                       count_text(report.disputed) + " filled voxels rest on a majority"};
+  return std::nullopt;
+}
+
+}  // namespace voxdag

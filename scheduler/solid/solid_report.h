@@ -1,0 +1,24 @@
+// The report of a solid's interior, and the warnings about it.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "core/base/warning.h"
+#include "core/geometry/grid.h"
+#include "scheduler/solid/solid_rows.h"
+#include "scheduler/spec/build_report.h"
+
+namespace voxdag {
+
+// Returns the report without the volume. `interior` and `disputed`: voxels of the subvolumes; the
+// function adds the full cubes of `rows`.
+SolidReport solid_report(const SolidRows& rows, uint64_t interior, uint64_t disputed);
+
+// Returns the volume of voxels, in units of the scene.
+double solid_volume(const Grid& grid, uint64_t voxels);
+
+// Returns a warning if the surface is unlikely to be what the rule expects.
+std::optional<Warning> solid_warning(const SolidReport& report, const std::string& scene);
+
+}  // namespace voxdag

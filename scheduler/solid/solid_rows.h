@@ -1,0 +1,94 @@
+// The durable state of a solid between the stages `rows`, `build` and `merge`: for each subvolume
+// the views from its low faces, and the empty cubes above the subvolumes that are inside.
+//
+//   header    magic, place of the last index, checksum
+//   rows      compressed views of one subvolume along one axis
+//   index     the job, the subvolumes with the places of their rows, the full cubes, the counts
+//
+// Bins of built subvolumes are freed, so the views cannot be computed again once a subvolume is
+// built. save() makes everything durable: it appends an index, and then replaces the header, which
+// refers to it. Thread-safe, except load() and start().
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/geometry/cube.h"
+#include "core/geometry/solid_rule.h"
+#include "core/io/file_system.h"
+#include "scheduler/solid/row_file.h"
+
+namespace voxdag {
+
+// What a subvolume is for the rules of a solid.
+enum class SolidUnit : uint32_t {
+  kShell,      // it has voxels of the shell
+  kEmptyUnit,  // it has none, but the cube around it does: it is one unit
+  kEmpty,      // the cube around it has none either, so it is a part of a larger unit
+};
+
+struct SubvolumeRows {
+  SolidUnit unit = SolidUnit::kShell;
+  RowExtent views[3];
+};
+
+// A maximal empty cube above the subvolumes that is inside.
+struct FullCube {
+  Cube cube;
+  bool is_disputed = false;
+};
+
+// Numbers of sample rows of the grid.
+struct RowCounts {
+  uint64_t rows = 0;  // rows with a crossing
+  uint64_t open = 0;  // rows whose signs do not sum to 0
+  uint64_t odd = 0;   // rows with an odd number of crossings
+};
+
+class SolidRows {
+ public:
+  // `identity` names the job; rows of other jobs are not used.
+  SolidRows(FileSystem& files, std::string path, SolidRule rule, uint32_t grid_levels,
+            std::string identity);
+  ~SolidRows();
+
+  // Loads the last save(). Returns false if there is none for this job.
+  bool load();
+  // True after load() returned true, and after start().
+  bool is_ready() const { return file_ != nullptr; }
+  // Starts an empty file.
+  void start();
+  // Makes all added rows and the members below durable.
+  void save();
+
+  SolidRule rule() const { return rule_; }
+  uint32_t grid_levels() const { return grid_levels_; }
+  RowFile& file() { return *file_; }
+  void add(const Cube& cube, const SubvolumeRows& rows);
+  SubvolumeRows find(const Cube& cube) const;
+  // Reads the views from a subvolume's low faces, row_bytes() in memory.
+  SolidEntry read_entry(const Cube& cube) const;
+
+  std::vector<FullCube> full_cubes;
+  RowCounts counts;
+
+ private:
+  std::vector<std::byte> encode_index() const;
+  bool decode_index(std::span<const std::byte> bytes);
+
+  FileSystem& files_;
+  const std::string path_;
+  const SolidRule rule_;
+  const uint32_t grid_levels_;
+  const std::string identity_;
+  mutable std::mutex mutex_;  // guards the members below
+  std::map<Cube, SubvolumeRows> cubes_;
+  std::unique_ptr<RowFile> file_;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,45 @@
+// The crossings of the grid's sample rows outside the grid, which exist only with --bounds. They
+// are in no subvolume. Not thread-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+
+#include "core/base/memory_budget.h"
+#include "core/geometry/row_crossings.h"
+#include "scene/triangle_source.h"
+#include "scheduler/spec/build_spec.h"
+#include "scheduler/stages/rows/row_column.h"
+
+namespace voxdag {
+
+class OutsideRows {
+ public:
+  // Memory for rows that are crossed outside the grid is charged to `budget`. Throws
+  // Error{kOutOfMemory}.
+  OutsideRows(uint32_t grid_levels, MemoryBudget& budget);
+  // Adds all triangles of the scene. Throws Error{kLimit} for a triangle that a sample row can
+  // cross and that has a vertex beyond kCoordinateLimit.
+  void read(TriangleSource& scene, const Grid& grid, const StageContext& context);
+  void add(const FixedTriangle& triangle);
+
+  // The rows of a tile's closed square along an axis; null if none is crossed outside the grid.
+  const OutsideTile* find(int axis, int first, int second) const;
+  // Calls visit(axis, first, second, tile) for all tiles with rows that are crossed.
+  template <class Visit>
+  void for_each(Visit visit) const {
+    for (const auto& [key, tile] : tiles_) visit(key[0], key[1], key[2], tile);
+  }
+
+ private:
+  void add(int axis, int i, int j, bool is_before, int sign);
+
+  const TileGrid grid_;
+  const SampleRows rows_;  // of the grid
+  MemoryBudget& budget_;
+  MemoryCharge charge_;
+  std::map<std::array<int, 3>, OutsideTile> tiles_;  // by axis and position
+};
+
+}  // namespace voxdag

@@ -1,0 +1,37 @@
+// A build of a solid is killed, loses power, or its disk becomes full or fails, at any disk
+// operation. The next build gives the same bytes and the same report of the interior.
+#include "tests/crash/crash_fixture.h"
+
+namespace crash {
+namespace {
+
+class SolidCrashTest : public CrashTest {
+ protected:
+  // Spheres are closed, so the build does not warn.
+  void SetUp() override {
+    voxdag::GenerateOptions options;
+    options.kind = voxdag::SceneKind::kSpheres;
+    options.triangles = is_durable() ? 20000 : 3000;
+    voxdag::NoProgress progress;
+    voxdag::CancelToken cancel;
+    voxdag::generate_scene(voxdag::system_files(), folder_.file("scene.glb"), options, progress,
+                           cancel);
+    expected_ = run(voxdag::system_files()).sha256;
+    std::filesystem::remove(output());
+  }
+  BuildSpec spec() const override {
+    BuildSpec spec = CrashTest::spec();
+    spec.geometry.solid = voxdag::SolidName::kWinding;
+    return spec;
+  }
+};
+
+TEST_P(SolidCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
+
+TEST_P(SolidCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
+
+INSTANTIATE_TEST_SUITE_P(Ingested, SolidCrashTest,
+                         testing::Values(Ingested::kInMemory, Ingested::kDurable), name_of);
+
+}  // namespace
+}  // namespace crash
