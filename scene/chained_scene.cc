@@ -105,7 +105,9 @@ class ChainedScene : public TriangleSource {
     for (auto& source : sources) {
       const uint64_t first = declared_triangles(), count = source->declared_triangles();
       if (count > INT64_MAX - first)
-        throw Error(ErrorCode::kLimit, "the scene has over 2^63 triangles, instances counted");
+        throw Error(ErrorCode::kLimit,
+                    "the files of the scene have over 2^63 triangles together, including "
+                    "instances: expected fewer");
       const uint32_t materials = source->material_count();
       parts_.push_back({std::move(source), first, first + count, material_count_});
       material_count_ += materials;

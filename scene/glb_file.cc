@@ -26,7 +26,7 @@ GlbFile::GlbFile(FileSystem& files, const std::string& path, std::string json, u
     throw Error(ErrorCode::kLimit, path +
                                        ": the limit of a .glb is 4 294 967 295 bytes, this scene "
                                        "takes " +
-                                       std::to_string(bytes));
+                                       std::to_string(bytes) + ": expected fewer triangles");
   file_ = files.create(path + ".partial");
   buffer_.reserve(kBufferBytes);
   for (uint64_t v :

@@ -52,7 +52,9 @@ uint64_t count_triangles(const Document& document, MemoryBudget& budget) {
     total += per_instance * instance_count(document, node);
   }
   if (total > INT64_MAX)
-    throw Error(ErrorCode::kLimit, document.path + ": over 2^63 triangles, instances counted");
+    throw Error(
+        ErrorCode::kLimit,
+        document.path + ": the scene has over 2^63 triangles, including instances: expected fewer");
   return static_cast<uint64_t>(total);
 }
 

@@ -136,8 +136,9 @@ void TriangleReader::next_draw() {
   if (next.node < 0 || next.primitive == primitives().size()) {
     do {
       if (!walk_->next())
-        throw Error(ErrorCode::kCorrupt, document_.path + ": triangle " +
-                                             std::to_string(draw_.end) + " is not declared");
+        throw Error(ErrorCode::kCorrupt,
+                    document_.path + ": triangle " + std::to_string(draw_.end) +
+                        " does not exist, although the counts of the accessors include it");
       next.node = walk_->node();
     } while (primitives().empty());
     next.primitive = 0;
@@ -275,8 +276,8 @@ void TriangleReader::report(const uint32_t* corners) const {
                                  " does not exist, there are " + std::to_string(vertex_count_) +
                                  " vertices");
   refuse(document_.path, where + "a vertex of " + document_.name_accessor(primitive.position) +
-                             (voxdag::is_finite(world_) ? " is not a finite position"
-                                                        : " is not finite once transformed"));
+                             (voxdag::is_finite(world_) ? "" : " with the node's transform") +
+                             kNotFinite);
 }
 
 }  // namespace voxdag::gltf

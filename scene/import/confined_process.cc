@@ -148,9 +148,13 @@ class Child {
 
 [[noreturn]] void report_signal(const std::string& what, int signal) {
   if (signal == SIGKILL)
-    throw Error(ErrorCode::kOutOfMemory,
-                what + ": the system ended the process, probably because memory ran out");
-  throw Error(ErrorCode::kInvalidInput, what + ": the process crashed (" + strsignal(signal) +
+    throw Error(
+        ErrorCode::kOutOfMemory,
+        what +
+            ": the system ended the process that converts the file, probably because memory ran "
+            "out: expected more free memory");
+  throw Error(ErrorCode::kInvalidInput, what + ": the process that converts the file crashed (" +
+                                            strsignal(signal) +
                                             "); the file may be damaged, or --memory too small");
 }
 

@@ -52,7 +52,10 @@ void GlbExport::add_meshes(GlbArrays& arrays) {
     const std::string where =
         scene_.path() + ": mesh " + numbered(static_cast<int>(i), printable(text_of(mesh.mName)));
     if (mesh.mMaterialIndex >= scene_->mNumMaterials)
-      throw Error(ErrorCode::kInvalidInput, where + " has no material");
+      throw Error(ErrorCode::kInvalidInput,
+                  where + " has the material " + std::to_string(mesh.mMaterialIndex) +
+                      ", expected less than " + std::to_string(scene_->mNumMaterials) +
+                      ", the number of materials");
     const MeshExport& added =
         meshes_.emplace_back(mesh, where, materials_.uv_channel(mesh.mMaterialIndex), warnings_);
     json& primitive = primitives_.emplace_back();
@@ -99,7 +102,8 @@ json GlbExport::node_of(const aiNode& node) {
   const auto matrix = columns_of(node.mTransformation);
   for (const double number : matrix)
     if (!std::isfinite(number))
-      refuse(scene_.path(), "node \"" + printable(name) + "\" has a transform that is not finite");
+      refuse(scene_.path(), "node \"" + printable(name) +
+                                "\" has a transform that is not finite, expected finite numbers");
   set_matrix(out, matrix);
   if (const auto mesh = mesh_of(node)) out["mesh"] = *mesh;
   return out;
@@ -110,8 +114,9 @@ std::optional<size_t> GlbExport::mesh_of(const aiNode& node) {
   std::vector<unsigned> parts;
   for (unsigned i = 0; i < node.mNumMeshes; ++i) {
     if (node.mMeshes[i] >= primitives_.size())
-      refuse(scene_.path(),
-             "node \"" + printable(text_of(node.mName)) + "\" has a mesh that does not exist");
+      refuse(scene_.path(), "node \"" + printable(text_of(node.mName)) + "\" has the mesh " +
+                                std::to_string(node.mMeshes[i]) + ", expected less than " +
+                                std::to_string(primitives_.size()) + ", the number of meshes");
     if (!primitives_[node.mMeshes[i]].is_null()) parts.push_back(node.mMeshes[i]);
   }
   if (parts.empty()) return std::nullopt;

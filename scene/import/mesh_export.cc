@@ -50,9 +50,9 @@ MeshExport::MeshExport(const aiMesh& mesh, std::string where, unsigned uv_channe
   for (const aiFace& face : faces_of(mesh)) {
     for (const unsigned index : std::span(face.mIndices, face.mNumIndices))
       if (index >= mesh.mNumVertices)
-        throw Error(ErrorCode::kInvalidInput, where_ + ": index " + std::to_string(index) +
-                                                  ", there are " +
-                                                  std::to_string(mesh.mNumVertices) + " vertices");
+        throw Error(ErrorCode::kInvalidInput,
+                    where_ + ": index " + std::to_string(index) + ", expected less than " +
+                        std::to_string(mesh.mNumVertices) + ", the number of vertices");
     if (face.mNumIndices < 3)
       ++points_or_lines;
     else

@@ -114,8 +114,8 @@ void IndexedCursor::report(uint64_t triangle, const uint32_t* corners) {
                                 " vertices");
   for (int k = 0; k < 3; ++k)
     if (std::isnan(cache_.at(corners[k])[0]))
-      refuse(mesh_->path(), where + mesh_->name_vertex(corners[k]) + " is not a finite position");
-  refuse(mesh_->path(), where + "is invalid");
+      refuse(mesh_->path(), where + mesh_->name_vertex(corners[k]) + kNotFinite);
+  refuse(mesh_->path(), where + "a vertex" + kNotFinite);
 }
 
 }  // namespace voxdag

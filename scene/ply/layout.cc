@@ -80,7 +80,8 @@ class LayoutFinder {
     out_.vertex = find_element(header_, "vertex");
     out_.face = find_rows("face");
     out_.strips = find_rows("tristrips");
-    if (out_.vertex == kNone) refuse("has no element vertex");
+    if (out_.vertex == kNone)
+      refuse("has no element vertex, expected the line \"element vertex COUNT\" in its header");
     find_axes();
     if (out_.face != kNone) out_.face_indices = find_indices(out_.face, "faces");
     if (out_.strips != kNone) out_.strip_indices = find_indices(out_.strips, "tristrips");
@@ -106,17 +107,20 @@ class LayoutFinder {
     for (size_t a = 0; a < 3; ++a) {
       out_.axes[a] = find_property(vertex, {kNames[a]}, false);
       if (out_.axes[a] == kNone)
-        refuse(std::string("has vertices without a property ") + kNames[a]);
+        refuse(std::string("has vertices without a property ") + kNames[a] +
+               ", expected x, y and z");
     }
   }
 
   size_t find_indices(size_t index, const std::string& what) const {
     const Element& rows = element(index);
     const size_t list = find_property(rows, {"vertex_indices", "vertex_index"}, true);
-    if (list == kNone) refuse("has " + what + " without a list vertex_indices or vertex_index");
+    if (list == kNone)
+      refuse("has " + what + " without vertices, expected a list vertex_indices or vertex_index");
     const Property& property = rows.properties[list];
     if (!is_integer(property.type))
-      refuse("has " + what + " whose property " + property.name + " is not a list of integers");
+      refuse("has " + what + " whose property " + property.name +
+             " is not a list of integers, expected an integer type");
     return list;
   }
 

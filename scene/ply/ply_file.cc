@@ -147,7 +147,8 @@ void PlyFile::check_end(uint64_t offset, MemoryBudget& budget) const {
   WordScanner text(*file_, budget);
   text.begin_row(offset);
   const std::string_view word = text.word();
-  if (!word.empty()) refuse("has " + printable(word) + " after its last row");
+  if (!word.empty())
+    refuse("has " + printable(word) + " after its last row, expected the end of the file");
 }
 
 // Clears has_splits in blocks whose faces are all fans. Warns about faces whose edges cross each

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "scene/messages.h"
 #include "scene/ply/ply_file.h"
 #include "scene/ply/surfaces.h"
 #include "scene/ply/vertex_reader.h"
@@ -33,7 +34,7 @@ class VertexPointReader : public points::PointReader {
     for (size_t i = 0; i < count; ++i) out[i] = scale.to_color(&numbers_[scale.channels() * i]);
   }
   std::string fault_of(uint64_t point) override {
-    return "vertex " + std::to_string(point) + " is not a finite position";
+    return "vertex " + std::to_string(point) + kNotFinite;
   }
 
  private:

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/integers.h"
+#include "core/base/text.h"
 #include "scene/messages.h"
 
 namespace voxdag::points {
@@ -108,10 +109,11 @@ class LasHeaderParser {
       header.scale[a] = at<double>(131 + 8 * a);
       header.offset[a] = at<double>(155 + 8 * a);
       if (!std::isfinite(header.scale[a]) || header.scale[a] == 0)
-        refuse("its LAS header has an invalid scale factor of " + axis +
-               ", expected a finite number other than 0");
+        refuse("its LAS header has the scale factor " + number_text(header.scale[a]) + " of " +
+               axis + ", expected a finite number other than 0");
       if (!std::isfinite(header.offset[a]))
-        refuse("its LAS header has an invalid offset of " + axis + ", expected a finite number");
+        refuse("its LAS header has the offset " + number_text(header.offset[a]) + " of " + axis +
+               ", expected a finite number");
     }
   }
 

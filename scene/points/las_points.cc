@@ -8,6 +8,7 @@
 
 #include "core/color/surface.h"
 #include "scene/growing_charge.h"
+#include "scene/messages.h"
 #include "scene/points/las_header.h"
 #include "scene/points/light_table.h"
 #include "scene/points/point_scene.h"
@@ -124,7 +125,7 @@ class LasReader : public PointReader {
   }
 
   std::string fault_of(uint64_t point) override {
-    return "point " + std::to_string(point) + " is not a finite position";
+    return "point " + std::to_string(point) + kNotFinite;
   }
 
  private:

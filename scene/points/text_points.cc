@@ -63,7 +63,8 @@ class TextReader : public PointReader {
   }
 
   std::string fault_of(uint64_t point) override {
-    if (!go_to(point)) return "ends before row " + std::to_string(point);
+    if (!go_to(point))
+      return "ends before row " + std::to_string(point) + ", expected a file that does not change";
     return "line " + std::to_string(rows_.place().line) + ": " +
            index_.columns().fault_of(rows_.text());
   }

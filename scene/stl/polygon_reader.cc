@@ -102,7 +102,7 @@ void PolygonReader::read_vertex() {
   for (double& number : numbers) {
     std::string_view word;
     while ((word = next_word(rest_)).empty())
-      if (!next_line()) refuse_line("has a vertex without three numbers");
+      if (!next_line()) refuse_line("has a vertex without three numbers, expected x, y and z");
     const auto value = parse_real<double>(word);
     if (!value) refuse_line("has " + printable(word) + ", expected a coordinate of a vertex");
     number = *value;

@@ -102,7 +102,8 @@ bool LineReader::load_more() {
 void LineReader::skip_comment() {
   if (!trimmed({buffer_.data(), size_}).starts_with('#'))
     throw Error(ErrorCode::kLimit, file_.path() + ": line " + std::to_string(number_) +
-                                       " has over " + std::to_string(kMaxLineBytes) + " bytes");
+                                       " has over " + std::to_string(kMaxLineBytes) +
+                                       " bytes, expected shorter lines");
   base_ += size_ - 1;
   size_ = 1;
   buffer_[0] = '#';

@@ -56,7 +56,8 @@ std::unique_ptr<ReadableFile> open_side_file(FileSystem& files, const std::strin
                                              std::string_view name) {
   const std::vector<std::string> candidates = candidates_of(name);
   if (candidates.empty() || name.find('\0') != name.npos)
-    throw Error(ErrorCode::kInvalidInput, "it has no file name");
+    throw Error(ErrorCode::kInvalidInput,
+                "its file name is empty or has a zero byte, expected the name of a file");
   return open_first(files, from, candidates);
 }
 

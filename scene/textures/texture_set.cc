@@ -139,7 +139,9 @@ void expect_unchanged(FileSystem& files, const ImageSource& source) {
     const ImageBytes opened(files, source);
   } catch (const BrokenImage& broken) {
     throw Error(ErrorCode::kInvalidInput,
-                source.name + " changed during the build: " + broken.message);
+                source.name +
+                    " changed during the build: expected a file that does not change, but it " +
+                    broken.message);
   }
 }
 

@@ -40,6 +40,11 @@ constexpr uint64_t kBytesPerAttribute = 1024;  // objects of an attribute and it
 
 constexpr size_t kWriteElements = 16384;
 
+constexpr const char* kTooMuchMemory =
+    "its Draco data declare more elements than fit in memory: expected undamaged data, or a "
+    "machine "
+    "with more memory";
+
 // Thrown once the number of vertices is known, if only this number is needed.
 struct VertexCount {
   uint64_t vertices;
@@ -108,7 +113,8 @@ class BoundedDecoder : public Decoder {
     if (vertices_ == kCountVertices) throw VertexCount{mesh.num_points()};
     if (mesh.num_points() > vertices_)
       throw BrokenData{"its Draco data have " + std::to_string(mesh.num_points()) +
-                       " vertices, its accessors " + std::to_string(vertices_)};
+                       " vertices, expected at most " + std::to_string(vertices_) +
+                       ", the count of its accessors"};
     uint64_t bytes_per_vertex = 0;
     for (int i = 0; i < mesh.num_attributes(); ++i) {
       const draco::PointAttribute& a = *mesh.attribute(i);
@@ -197,8 +203,8 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
     for (const draco::PointIndex& corner : face) {
       if (corner.value() >= mesh.num_points())
         throw BrokenData{"index " + std::to_string(corner.value()) +
-                         " of its Draco data does not exist, there are " +
-                         std::to_string(mesh.num_points()) + " vertices"};
+                         " of its Draco data does not exist, expected less than " +
+                         std::to_string(mesh.num_points()) + ", the number of vertices"};
       out.add(corner.value());
     }
     out.flush_if_full();
@@ -249,7 +255,7 @@ void write_dequantized(const DracoPart& part, const DracoPart::Attribute& wanted
     const draco::AttributeValueIndex index = found.mapped_index(draco::PointIndex(v));
     if (index.value() >= found.size() ||
         !found.ConvertValue<int32_t>(index, static_cast<int8_t>(wanted.components), value.data()))
-      throw BrokenData{"its Draco attribute " + wanted.name + " cannot be read"};
+      throw BrokenData{"its Draco attribute " + wanted.name + " cannot be read as integers"};
     for (int c = 0; c < wanted.components; ++c)
       out.add(static_cast<float>(value[static_cast<size_t>(c)]) * step + transform.min_value(c));
     out.flush_if_full();
@@ -262,19 +268,19 @@ void write_attribute(const DracoPart& part, const DracoPart::Attribute& wanted,
                      const draco::Mesh& mesh, const Writer<float>::Write& write) {
   const int id = mesh.GetAttributeIdByUniqueId(static_cast<uint32_t>(wanted.id));
   if (id < 0)
-    throw BrokenData{"its Draco data have no attribute " + std::to_string(wanted.id) +
-                     ", which is " + wanted.name};
+    throw BrokenData{"its Draco data have no attribute with the id " + std::to_string(wanted.id) +
+                     ", expected " + wanted.name + " there"};
   const draco::PointAttribute& found = *mesh.attribute(id);
   if (found.num_components() != wanted.components)
     throw BrokenData{"its Draco attribute " + wanted.name + " has " +
-                     std::to_string(found.num_components()) + " components, its accessor " +
-                     std::to_string(wanted.components)};
+                     std::to_string(found.num_components()) + " components, expected " +
+                     std::to_string(wanted.components) + ", as in its accessor"};
   const uint32_t points = mesh.num_points();
   draco::AttributeQuantizationTransform transform;
   if (transform.InitFromAttribute(found)) {
     if (wanted.component_type != kFloat)
-      throw BrokenData{"its Draco attribute " + wanted.name + " is of floats, its accessor of " +
-                       component_name(wanted.component_type)};
+      throw BrokenData{"its Draco attribute " + wanted.name + " has floats, expected the type " +
+                       component_name(wanted.component_type) + ", as in its accessor"};
     return write_dequantized(part, wanted, points, found, transform, write);
   }
   switch (wanted.component_type) {
@@ -299,8 +305,9 @@ void check_faces(const DracoPart& part, uint64_t faces) {
                         ? faces <= triangles && triangles <= kMaxStripTrianglesPerFace * faces
                         : faces == triangles;
   if (!fits)
-    throw BrokenData{"its Draco data have " + std::to_string(faces) + " faces, its indices " +
-                     std::to_string(triangles) + " triangles"};
+    throw BrokenData{"its Draco data have " + std::to_string(faces) + " faces, expected " +
+                     std::to_string(triangles) + ", the number of triangles of its indices" +
+                     (part.is_strip ? ", or fewer (at least an eighth)" : "")};
 }
 
 }  // namespace
@@ -317,9 +324,9 @@ void decode_draco(const DracoPart& part, std::span<std::byte> compressed, Memory
     for (const DracoPart::Attribute& attribute : part.attributes)
       write_attribute(part, attribute, mesh, write);
   } catch (const std::bad_alloc&) {
-    throw BrokenData{"its Draco data claim more memory than there is"};
+    throw BrokenData{kTooMuchMemory};
   } catch (const std::length_error&) {
-    throw BrokenData{"its Draco data claim more memory than there is"};
+    throw BrokenData{kTooMuchMemory};
   }
 }
 
@@ -332,7 +339,7 @@ uint64_t count_draco_vertices(std::span<std::byte> compressed, MemoryCharge& cha
   } catch (const VertexCount& count) {
     return count.vertices;
   } catch (const std::exception&) {
-    throw BrokenData{"its Draco data claim more memory than there is"};
+    throw BrokenData{kTooMuchMemory};
   }
 }
 
@@ -340,10 +347,10 @@ uint64_t count_draco_vertices(std::span<std::byte> compressed, MemoryCharge& cha
 
 void decode_draco(const DracoPart&, std::span<std::byte>, MemoryCharge&,
                   const std::function<void(std::span<const std::byte>)>&) {
-  throw BrokenData{"voxdag was built without libdraco"};
+  throw BrokenData{"voxdag was built without libdraco: expected a decompressed file"};
 }
 uint64_t count_draco_vertices(std::span<std::byte>, MemoryCharge&) {
-  throw BrokenData{"voxdag was built without libdraco"};
+  throw BrokenData{"voxdag was built without libdraco: expected a decompressed file"};
 }
 
 #endif

@@ -21,11 +21,11 @@ class Bytes {
 
   size_t position() const { return at_; }
   uint8_t next() {
-    if (at_ >= data_.size()) throw BrokenData{"its Draco data are cut off"};
+    if (at_ >= data_.size()) refuse_short();
     return std::to_integer<uint8_t>(data_[at_++]);
   }
   void skip(uint64_t count) {
-    if (count > data_.size() - at_) throw BrokenData{"its Draco data are cut off"};
+    if (count > data_.size() - at_) refuse_short();
     at_ += static_cast<size_t>(count);
   }
   // Reads seven bits per byte, the lowest first; the last byte is below 128.
@@ -36,10 +36,16 @@ class Bytes {
       value |= uint64_t{byte & 0x7fu} << shift;
       if (byte < 0x80 && value <= UINT32_MAX) return static_cast<uint32_t>(value);
     }
-    throw BrokenData{"its Draco data have a number of over 32 bits"};
+    throw BrokenData{"its Draco data have a number of over 32 bits before byte " +
+                     std::to_string(at_) + ", expected at most 32"};
   }
 
  private:
+  [[noreturn]] void refuse_short() const {
+    throw BrokenData{"its Draco data end within their header: they have " +
+                     std::to_string(data_.size()) + " bytes, expected more"};
+  }
+
   std::span<std::byte> data_;
   size_t at_;
 };
@@ -74,15 +80,19 @@ DracoHeader read_draco_header(std::span<std::byte> data) {
   Bytes bytes(data, 0);
   for (const char c : kMagic)
     if (bytes.next() != static_cast<uint8_t>(c))
-      throw BrokenData{"its data do not begin with DRACO"};
+      throw BrokenData{
+          "its data do not begin with the signature DRACO, expected compressed data of Draco"};
   const uint8_t major = bytes.next(), minor = bytes.next();
   if (major != 2 || minor != 2)
     throw BrokenData{"its data have Draco version " + std::to_string(major) + "." +
                      std::to_string(minor) + ", expected 2.2"};
   const uint8_t type = bytes.next(), method = bytes.next();
-  if (type != kMesh) throw BrokenData{"its Draco data are not a mesh"};
+  if (type != kMesh)
+    throw BrokenData{"its Draco data are of the type " + std::to_string(type) +
+                     ", expected 1, a mesh"};
   if (method != kSequential && method != kEdgebreaker)
-    throw BrokenData{"its Draco data have the unknown method " + std::to_string(method)};
+    throw BrokenData{"its Draco data have the unknown method " + std::to_string(method) +
+                     ", expected 0 or 1"};
   bytes.next();
   DracoHeader header;
   if (bytes.next() & kMetadataFlag) {

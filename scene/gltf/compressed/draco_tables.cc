@@ -24,7 +24,9 @@ constexpr int kCreaseContexts = 4;
 constexpr uint64_t kOctahedralComponents = 2;
 constexpr uint64_t kTypeBytes = 4;  // bytes per attribute: use, number type, components, normalized
 
-[[noreturn]] void refuse_damaged() { throw BrokenData{"its Draco data are damaged"}; }
+[[noreturn]] void refuse_damaged() {
+  throw BrokenData{"its Draco data are damaged: expected valid connectivity and symbol tables"};
+}
 
 // Reads the data through a copy of Draco's buffer, so that Draco's position does not change.
 class Walker {

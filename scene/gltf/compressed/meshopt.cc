@@ -47,7 +47,7 @@ void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compress
 #else
 
 void decode_meshopt(const MeshoptView&, std::span<const std::byte>, std::span<std::byte>) {
-  throw BrokenData{"voxdag was built without libmeshoptimizer"};
+  throw BrokenData{"voxdag was built without libmeshoptimizer: expected a decompressed file"};
 }
 
 #endif

@@ -36,7 +36,8 @@ void check_view(const Document& d, const BufferView& view, const std::string& wh
     refuse(d.path,
            where + " ends past the " + std::to_string(buffer.byte_length) + " bytes of " + name);
   if (buffer.kind == BufferSource::Kind::kNone)
-    refuse(d.path, where + ": " + name + " has no uri and is not in the file");
+    refuse(d.path,
+           where + ": " + name + " has no uri and is not in the file, expected one of both");
 }
 
 void check_extent(const Document& d, const Extent& extent, const std::string& where) {
@@ -47,8 +48,8 @@ void check_extent(const Document& d, const Extent& extent, const std::string& wh
   check_view(d, view, where + ": " + name);
   if (view.byte_stride != 0 && view.byte_stride < extent.bytes)
     refuse(d.path, where + ": the byteStride of " + name + " is " +
-                       std::to_string(view.byte_stride) + ", less than an element of " +
-                       std::to_string(extent.bytes) + " bytes");
+                       std::to_string(view.byte_stride) + ", expected at least " +
+                       std::to_string(extent.bytes) + ", the bytes of an element");
   if (extent.count == 0) return;
   const uint64_t stride = view.byte_stride != 0 ? view.byte_stride : extent.bytes;
   const uint128 end =
@@ -61,11 +62,15 @@ void check_extent(const Document& d, const Extent& extent, const std::string& wh
 void check_sparse(const Document& d, const Accessor& accessor, const std::string& where) {
   const Sparse& sparse = accessor.sparse;
   if (sparse.count > accessor.count)
-    refuse(d.path, where + " has " + std::to_string(sparse.count) + " sparse replacements for " +
-                       std::to_string(accessor.count) + " elements");
+    refuse(d.path, where + " has " + std::to_string(sparse.count) +
+                       " sparse replacements, expected at most " + std::to_string(accessor.count) +
+                       ", the number of its elements");
   if (sparse.index_type != kUnsignedByte && sparse.index_type != kUnsignedShort &&
       sparse.index_type != kUnsignedInt)
-    refuse(d.path, where + ": its sparse indices are not unsigned integers");
+    refuse(d.path, where +
+                       ": its sparse indices are not unsigned integers, but of the component "
+                       "type " +
+                       std::to_string(sparse.index_type));
   const auto index_bytes = static_cast<uint64_t>(component_bytes(sparse.index_type));
   check_extent(d, {sparse.index_view, sparse.index_offset, sparse.count, index_bytes},
                where + ": its sparse indices");

@@ -129,18 +129,20 @@ void check_mesh(Document& d, int index) {
 void check_skin(Document& d, int index) {
   const Skin& skin = at(d.skins, index);
   const std::string where = d.name_skin(index);
-  if (skin.joints.empty()) refuse(d.path, where + " has no joints");
+  if (skin.joints.empty()) refuse(d.path, where + " has no joints, expected at least one");
   for (int joint : skin.joints) check_index(d, d.nodes.size(), joint, where, "joint node");
   check_geometry(d, skin.inverse_bind, {where + ": inverseBindMatrices", 16, {kFloat}});
   if (skin.inverse_bind >= 0 && at(d.accessors, skin.inverse_bind).count < skin.joints.size())
-    refuse(d.path, where + " has fewer inverse bind matrices than joints");
+    refuse(d.path, where + " has " + std::to_string(at(d.accessors, skin.inverse_bind).count) +
+                       " inverse bind matrices, expected " + std::to_string(skin.joints.size()) +
+                       ", the number of its joints");
 }
 
 void check_instancing(Document& d, const Node& node, const std::string& where) {
   const Instancing& instancing = node.instancing;
   if (!instancing.present) return;
   if (node.skin >= 0)
-    refuse(d.path, where + " has a skin and EXT_mesh_gpu_instancing, which do not go together");
+    refuse(d.path, where + " has a skin and EXT_mesh_gpu_instancing, expected at most one of them");
   const std::string of = where + ": EXT_mesh_gpu_instancing";
   check_geometry(d, instancing.translation, {of + ": TRANSLATION", 3, {kFloat}});
   check_geometry(d, instancing.rotation,

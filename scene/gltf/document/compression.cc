@@ -40,25 +40,28 @@ Value named(const JsonElement& object, const char* key, const char* expected,
 }
 
 void check_layout(const MeshoptView& view, const std::string& path) {
-  const auto violate = [&](const char* what) { throw Violation{path + what}; };
+  const auto violate = [&](const char* member, uint64_t value, const char* expected) {
+    throw Violation{path + "." + member + " is " + std::to_string(value) + ", expected " +
+                    expected};
+  };
   const bool is_vertices = view.mode == MeshoptView::Mode::kAttributes;
   if (is_vertices && (view.stride == 0 || view.stride > 256 || view.stride % 4 != 0))
-    violate(".byteStride is not a multiple of 4 up to 256");
+    violate("byteStride", view.stride, "a multiple of 4 up to 256");
   if (!is_vertices && view.stride != 2 && view.stride != 4)
-    violate(".byteStride is not 2 or 4, the sizes of indices");
+    violate("byteStride", view.stride, "2 or 4, the sizes of indices");
   if (view.mode == MeshoptView::Mode::kTriangles && view.count % 3 != 0)
-    violate(".count is not a multiple of three, as TRIANGLES requires");
-  if (view.count > uint64_t{1} << 32) violate(".count is over the limit of 2^32");
+    violate("count", view.count, "a multiple of three, as TRIANGLES requires");
+  if (view.count > uint64_t{1} << 32) violate("count", view.count, "at most 2^32");
   using Filter = MeshoptView::Filter;
   if (view.filter == Filter::kNone) return;
-  if (!is_vertices) violate(".filter is for ATTRIBUTES only");
+  if (!is_vertices) throw Violation{path + " has a filter, expected one only for ATTRIBUTES"};
   const bool is_4_or_8 = view.stride == 4 || view.stride == 8;
   if (view.filter == Filter::kOctahedral && !is_4_or_8)
-    violate(".byteStride is not 4 or 8, as OCTAHEDRAL requires");
+    violate("byteStride", view.stride, "4 or 8, as OCTAHEDRAL requires");
   if (view.filter == Filter::kColor && !is_4_or_8)
-    violate(".byteStride is not 4 or 8, as COLOR requires");
+    violate("byteStride", view.stride, "4 or 8, as COLOR requires");
   if (view.filter == Filter::kQuaternion && view.stride != 8)
-    violate(".byteStride is not 8, as QUATERNION requires");
+    violate("byteStride", view.stride, "8, as QUATERNION requires");
 }
 
 // Adds a buffer of decoded bytes to the document and returns its index.
@@ -259,10 +262,13 @@ void place_draco_primitive(Document& d, Primitive& primitive, const std::string&
   const bool has_fallback =
       at(d, primitive.position).view >= 0 && (!has_indices || at(d, primitive.indices).view >= 0);
   if (has_fallback) return;
-  if (!has_indices) refuse(d.path, what + " needs an accessor of indices");
+  if (!has_indices)
+    refuse(d.path, what + " is in a primitive without indices, expected an accessor of indices");
   if (primitive.mode == kTriangleFan)
-    refuse(d.path, what + " is for triangles and triangle strips, not for fans");
-  if (primitive.draco->position < 0) refuse(d.path, what + " has no POSITION");
+    refuse(d.path,
+           what + " is in a primitive of mode 6 (fan), expected 4 (triangles) or 5 (strip)");
+  if (primitive.draco->position < 0)
+    refuse(d.path, what + " has no POSITION, expected this attribute");
 
   auto part = std::make_shared<DracoPart>();
   part->where = where;
@@ -271,7 +277,10 @@ void place_draco_primitive(Document& d, Primitive& primitive, const std::string&
   const uint64_t triangles = triangle_count(d, primitive);
   part->vertices = at(d, primitive.position).count;
   if (std::max(part->vertices, triangles) > UINT32_MAX)
-    throw Error(ErrorCode::kLimit, d.path + ": " + what + ": over 2^32 vertices or triangles");
+    throw Error(ErrorCode::kLimit, d.path + ": " + what + ": the accessors have " +
+                                       std::to_string(part->vertices) + " vertices and " +
+                                       std::to_string(triangles) +
+                                       " triangles, expected less than 2^32 of each");
   part->corners = 3 * triangles;
   const std::vector<Replaced> replaced = replaced_attributes(*primitive.draco, primitive);
   for (const Replaced& r : replaced) {
@@ -326,7 +335,8 @@ void check_compressed(const Document& d, const BufferView& view, const std::stri
   const auto index = static_cast<size_t>(from.buffer);
   if (from.buffer < 0 || index >= d.buffers.size() ||
       d.buffers[index].kind == BufferSource::Kind::kDecoded)
-    refuse(d.path, what + ": buffer " + std::to_string(from.buffer) + " does not exist");
+    refuse(d.path, what + ": buffer " + std::to_string(from.buffer) +
+                       " does not exist, expected a buffer of the file");
   d.check_usable("buffers", from.buffer);
   const BufferSource& source = d.buffers[index];
   const uint128 end = static_cast<uint128>(from.byte_offset) + from.byte_length;
@@ -334,8 +344,8 @@ void check_compressed(const Document& d, const BufferView& view, const std::stri
     refuse(d.path, what + " ends past the " + std::to_string(source.byte_length) +
                        " bytes of buffer " + std::to_string(from.buffer));
   if (source.kind == BufferSource::Kind::kNone)
-    refuse(d.path,
-           what + ": buffer " + std::to_string(from.buffer) + " has no uri and is not in the file");
+    refuse(d.path, what + ": buffer " + std::to_string(from.buffer) +
+                       " has no uri and is not in the file, expected one of both");
   if (!(buffer.meshopt ? kHasMeshopt : kHasDraco))
     refuse(d.path, where + " is compressed by " + name +
                        ", which this voxdag was built without: decompress the file (gltf-transform "

@@ -97,7 +97,8 @@ void ModelReader::parse(Document& document) {
           tinygltf::NO_REQUIRE);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::kOutOfMemory,
-                "out of memory: the system has none left for the materials of " + document.path);
+                "out of memory: the system has none left for the materials of " + document.path +
+                    ": expected more free memory on this machine");
   } catch (const std::exception& e) {
     errors = without_prefix(e.what());
   }
@@ -106,7 +107,8 @@ void ModelReader::parse(Document& document) {
     model_->textures.clear();
     model_->samplers.clear();
     document.warn("unusable-materials", "",
-                  "its materials cannot be used: " + printable(errors, kMaxReasonBytes));
+                  "its materials cannot be used (" + printable(errors, kMaxReasonBytes) +
+                      "); all surfaces are white");
   }
   model_->images = std::move(images);
   document.model = std::move(model_);

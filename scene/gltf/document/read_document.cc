@@ -131,7 +131,8 @@ std::string read_structure(const ReadableFile& file, FileRange json, Document& d
        {"scene", kWhole, kChecked,
         [&](const JsonElement& element) { d.scene = element.as_index(); }}},
       budget, cancel);
-  return violation.empty() && !has_asset ? "asset is missing" : violation;
+  return violation.empty() && !has_asset ? "asset is missing, expected an object with version 2.0"
+                                         : violation;
 }
 
 }  // namespace

@@ -242,7 +242,8 @@ BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_f
   if (is_data_uri(text)) {
     read_data_uri(*member, uri, scene_file, budget, out);
   } else {
-    if (uri.is_clipped) throw Violation{member->path() + " is longer than any file name"};
+    if (uri.is_clipped)
+      throw Violation{member->path() + " is longer than any file name, expected a relative path"};
     out.kind = BufferSource::Kind::kExternal;
     out.uri = text;
   }

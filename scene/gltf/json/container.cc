@@ -53,14 +53,14 @@ struct Chunk {
 // Reads the chunk header at `offset` of a GLB that ends at `end`.
 Chunk read_chunk(const ReadableFile& file, uint64_t offset, uint64_t end) {
   if (end - offset < kChunkHeaderBytes)
-    refuse(file.path(),
-           "the GLB ends inside the header of a chunk at byte " + std::to_string(offset));
+    refuse(file.path(), "the GLB ends inside the header of a chunk at byte " +
+                            std::to_string(offset) + ", expected 8 bytes there");
   const uint64_t length = read_u32(file, offset);
   const uint64_t begin = offset + kChunkHeaderBytes;
   if (length > end - begin)
-    refuse(file.path(), "the GLB chunk at byte " + std::to_string(offset) + " claims " +
-                            std::to_string(length) + " bytes, " + std::to_string(end - begin) +
-                            " are left");
+    refuse(file.path(), "the GLB chunk at byte " + std::to_string(offset) + " declares " +
+                            std::to_string(length) + " bytes, expected at most " +
+                            std::to_string(end - begin) + ", the rest of the file");
   return {read_u32(file, offset + 4), {begin, length}};
 }
 
@@ -84,19 +84,24 @@ bool is_padding(const ReadableFile& file, uint64_t offset, uint64_t end) {
 }
 
 Container read_glb(const ReadableFile& file) {
-  if (file.size() < kHeaderBytes) refuse(file.path(), "the GLB ends inside its header");
+  if (file.size() < kHeaderBytes)
+    refuse(file.path(), "the GLB ends inside its header, at byte " + std::to_string(file.size()) +
+                            ", expected at least " + std::to_string(kHeaderBytes) + " bytes");
   const uint32_t version = read_u32(file, 4);
   if (version != 2)
     refuse(file.path(), "is GLB version " + std::to_string(version) + ", expected version 2");
   const uint64_t end = read_u32(file, 8);
   if (end > file.size())
-    refuse(file.path(), "is cut off: the GLB has " + std::to_string(end) + " bytes, the file " +
-                            std::to_string(file.size()));
+    refuse(file.path(), "is cut off: it has " + std::to_string(file.size()) + " bytes, expected " +
+                            std::to_string(end) + ", the length in its GLB header");
   if (end < kHeaderBytes)
-    refuse(file.path(), "claims a GLB length of " + std::to_string(end) +
-                            " bytes, shorter than its header of " + std::to_string(kHeaderBytes));
+    refuse(file.path(), "declares a GLB length of " + std::to_string(end) +
+                            " bytes, expected at least " + std::to_string(kHeaderBytes) +
+                            ", the bytes of its header");
   const Chunk json = read_chunk(file, kHeaderBytes, end);
-  if (json.type != kJsonChunk) refuse(file.path(), "the first chunk of the GLB is not JSON");
+  if (json.type != kJsonChunk)
+    refuse(file.path(),
+           "the first chunk of the GLB is not JSON, expected the chunk type 0x4E4F534A");
   Container container{json.content, false, {}};
   // Chunks of other types may come before BIN. The padding after the last one may be incomplete.
   uint64_t next = next_chunk(file, json.content.begin + json.content.size, end);

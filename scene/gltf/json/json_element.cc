@@ -32,7 +32,7 @@ std::optional<JsonElement> JsonElement::find(const char* key) const {
 
 JsonElement JsonElement::at(const char* key) const {
   if (const auto member = find(key)) return *member;
-  throw Violation{path() + "." + key + " is missing"};
+  throw Violation{path() + "." + key + " is missing, but glTF requires it"};
 }
 
 void JsonElement::expect_object() const {

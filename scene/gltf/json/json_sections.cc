@@ -69,7 +69,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
     if (skips_next_) return true;
     section_ = &*found;
     index_ = 0;
-    if (!seen_.insert(name).second) violate(name + " is given twice");
+    if (!seen_.insert(name).second) violate(name + " is given twice, expected it once");
     return true;
   }
 
@@ -164,7 +164,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
     }
     charge(kBytesPerObjectMember + key_.size());
     if (parent.contains(key_))
-      violate(element().path() + "." + printable(key_) + " is given twice");
+      violate(element().path() + "." + printable(key_) + " is given twice, expected it once");
     Json& member = parent[key_];
     member = std::move(value);
     return &member;

@@ -113,7 +113,8 @@ void JsonWindow::track_outside_strings(char c) {
   is_second_blank_ = after_blank_ = false;
   if (word_ > kMaxWordCharacters)
     refuse(file_.path(), "its JSON has a number of over " + std::to_string(kMaxWordCharacters) +
-                             " characters at byte " + std::to_string(position_));
+                             " characters at byte " + std::to_string(position_) +
+                             ", expected fewer");
 }
 
 void JsonWindow::track_in_string(char c) {

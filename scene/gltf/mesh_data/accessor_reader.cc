@@ -152,8 +152,8 @@ void AccessorReader::check_sparse_indices() {
         refuse(document_.path, where + std::to_string(index) + " follows " +
                                    std::to_string(next - 1) + ", expected a larger index");
       if (index >= accessor_.count)
-        refuse(document_.path, where + std::to_string(index) + " is not below the count of " +
-                                   std::to_string(accessor_.count));
+        refuse(document_.path, where + std::to_string(index) + ", expected less than " +
+                                   std::to_string(accessor_.count) + ", the number of elements");
       next = uint64_t{index} + 1;
     }
   }

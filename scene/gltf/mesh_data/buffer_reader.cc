@@ -109,10 +109,10 @@ void BufferReader::check_length(int index) {
     }
   }
   if (there < buffer.byte_length)
-    refuse(document_.path, "buffer " + std::to_string(index) + " claims " +
-                               std::to_string(buffer.byte_length) + " bytes, " +
-                               std::to_string(there) + " are present" +
-                               (buffer.uri.empty() ? "" : " in " + printable(buffer.uri)));
+    refuse(document_.path, "buffer " + std::to_string(index) + " has " + std::to_string(there) +
+                               " bytes" +
+                               (buffer.uri.empty() ? "" : " in " + printable(buffer.uri)) +
+                               ", expected " + std::to_string(buffer.byte_length));
 }
 
 const ReadableFile& BufferReader::external(int index) {
@@ -146,7 +146,10 @@ std::span<const std::byte> BufferReader::decode_base64(int index, uint64_t offse
   scene_file_.read_at(buffer.range.begin + begin, characters);
   if (!voxdag::decode_base64(characters, window_.data()))
     refuse(document_.path,
-           "buffer " + std::to_string(index) + ": a character of its data: URI is not base64");
+           "buffer " + std::to_string(index) +
+               ": its data: URI has a character that is not base64 among the characters " +
+               std::to_string(begin) + " to " + std::to_string(begin + characters.size() - 1) +
+               ", expected A-Z a-z 0-9 + / =");
   return {window_.data() + offset % 3, size};
 }
 

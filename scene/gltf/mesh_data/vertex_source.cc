@@ -61,7 +61,8 @@ PageBuffer<Transform> joint_matrices(const Document& document, BufferReader& buf
     if (!from_columns(columns.data(), inverse_bind))
       refuse(document.path, document.name_skin(index) + ": " +
                                 document.name_accessor(skin.inverse_bind) + ": matrix " +
-                                std::to_string(i) + " is not affine");
+                                std::to_string(i) +
+                                " is not affine, expected 0 0 0 1 as the last row");
     matrices[i] = multiply(matrices[i], inverse_bind);
   }
   return matrices;

@@ -6,6 +6,7 @@
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "scene/gltf/uri/percent.h"
+#include "scene/messages.h"
 #include "scene/text/side_files.h"
 
 namespace voxdag::gltf {
@@ -21,15 +22,15 @@ bool has_scheme(std::string_view uri) {
   return end != uri.end() && *end == ':' && is_letter(uri.front());
 }
 
-[[noreturn]] void refuse_uri(const std::string& where, const char* what) {
-  throw Error(ErrorCode::kInvalidInput, where + ": its uri " + what);
+[[noreturn]] void refuse_uri(const std::string& where, const std::string& what) {
+  throw Error(ErrorCode::kInvalidInput, where + ": its uri " + what + ", expected a relative path");
 }
 
 }  // namespace
 
 std::vector<std::string> candidate_paths(const std::string& uri, const std::string& where) {
   if (uri.empty()) refuse_uri(where, "is empty");
-  if (has_scheme(uri) || uri.front() == '/') refuse_uri(where, "is not a relative path");
+  if (has_scheme(uri) || uri.front() == '/') refuse_uri(where, "is " + printable(uri));
   if (percent_decoded_leniently(uri).find('\0') != std::string::npos)
     refuse_uri(where, "has a zero byte");
   std::vector<std::string> paths;

@@ -50,7 +50,8 @@ class AsciiRows : public Rows {
     note_irregular(row, "ends before its properties do");
     text_.begin_row(text_.offset());
     text = text_.word();
-    if (text.empty()) refuse(row, "ends before its properties do");
+    if (text.empty())
+      refuse(row, "ends before its properties do, expected a value for each of them");
     return text;
   }
   int64_t integer(uint64_t row) {

@@ -72,7 +72,7 @@ class HeaderParser {
     end_line();
     while (add_line(next_line())) {
     }
-    if (!has_format_) refuse("ends a header without a line \"format NAME 1.0\"");
+    if (!has_format_) refuse("ends a header without format, expected a line \"format NAME 1.0\"");
     header_.data_begin = at_;
     return std::move(header_);
   }
@@ -92,8 +92,9 @@ class HeaderParser {
   void end_line() {
     if (at_ == text_.size()) {
       if (is_whole_file_) refuse("has no end, expected a header that ends with end_header");
-      throw Error(ErrorCode::kLimit,
-                  path_ + ": its header has over " + std::to_string(kMaxHeaderBytes) + " bytes");
+      throw Error(ErrorCode::kLimit, path_ + ": its header has over " +
+                                         std::to_string(kMaxHeaderBytes) +
+                                         " bytes, expected end_header within them");
     }
     const bool has_only_cr = has_cr_ && !has_lf_;
     const bool is_crlf = text_.substr(at_).starts_with("\r\n") && !has_only_cr;
@@ -136,8 +137,8 @@ class HeaderParser {
   }
 
   void set_format(const std::vector<std::string_view>& words) {
-    if (words.size() < 3) refuse("is not \"format NAME 1.0\"");
-    if (has_format_) refuse("is a second format line");
+    if (words.size() < 3) refuse("is incomplete, expected \"format NAME 1.0\"");
+    if (has_format_) refuse("is a second format line, expected one");
     header_.format = format_named(words[1]);
     if (parse_real<double>(words[2]) != 1.0)
       refuse("names version " + printable(words[2]) + ", expected 1.0");
@@ -154,30 +155,37 @@ class HeaderParser {
 
   void add_element(const std::vector<std::string_view>& words) {
     Element element;
-    if (words.size() != 3) refuse("is not \"element NAME COUNT\"");
+    if (words.size() != 3)
+      refuse("has " + std::to_string(words.size()) + " words, expected \"element NAME COUNT\"");
     element.name = words[1];
     const char* const end = words[2].data() + words[2].size();
     const auto parsed = std::from_chars(words[2].data(), end, element.count);
     if (parsed.ec != std::errc() || parsed.ptr != end)
       refuse("has the count " + printable(words[2]) + ", expected a number below 2^64");
     for (const Element& other : header_.elements)
-      if (other.name == element.name) refuse("repeats the name of an element");
+      if (other.name == element.name)
+        refuse("repeats the name of an element, " + printable(other.name) +
+               ", expected a new name");
     header_.elements.push_back(std::move(element));
   }
 
   void add_property(const std::vector<std::string_view>& words) {
     Property property;
-    if (header_.elements.empty()) refuse("declares a property before any element");
+    if (header_.elements.empty())
+      refuse("declares a property before any element, expected an element line first");
     property.is_list = words.size() > 1 && equals_in_any_case(words[1], "list");
     if (words.size() != (property.is_list ? 5 : 3))
-      refuse("is neither \"property TYPE NAME\" nor \"property list TYPE TYPE NAME\"");
+      refuse("has " + std::to_string(words.size()) +
+             " words, expected \"property TYPE NAME\" or \"property list TYPE TYPE NAME\"");
     if (property.is_list) property.count_type = type_of(words[2]);
     property.type = type_of(words[words.size() - 2]);
     property.name = words.back();
     if (!is_integer(property.count_type))
       refuse("has a float type for the count of a list, expected an integer type");
     for (const Property& other : header_.elements.back().properties)
-      if (other.name == property.name) refuse("repeats the name of a property");
+      if (other.name == property.name)
+        refuse("repeats the name of a property, " + printable(other.name) +
+               ", expected a new name");
     header_.elements.back().properties.push_back(std::move(property));
   }
 

@@ -181,7 +181,8 @@ size_t Rows::number_of(size_t property) const {
 }
 
 uint64_t Rows::checked_count(int64_t count, uint64_t row, size_t property) const {
-  if (count < 0) refuse(row, "has a list of " + std::to_string(count) + " entries");
+  if (count < 0)
+    refuse(row, "has a list of " + std::to_string(count) + " entries, expected 0 or more");
   const auto entries = static_cast<uint64_t>(count);
   const uint64_t corners = property == requested_.reals ? (entries + 1) / 2 : entries;
   const bool is_requested = property == requested_.indices || property == requested_.reals;
@@ -190,8 +191,8 @@ uint64_t Rows::checked_count(int64_t count, uint64_t row, size_t property) const
                                        " has " + std::to_string(corners) +
                                        " corners, the limit is " + std::to_string(kMaxEntries));
   if (entries > file_.size())
-    refuse(row,
-           "has a list of " + std::to_string(count) + " entries, more than the file has bytes");
+    refuse(row, "has a list of " + std::to_string(count) + " entries, expected less than the " +
+                    std::to_string(file_.size()) + " bytes of the file");
   return entries;
 }
 

@@ -90,8 +90,8 @@ void StripReader::skip_properties(size_t begin, size_t end) {
 int64_t StripReader::list_count(const Property& property) {
   const int64_t count = integer(property.count_type);
   if (count < 0 || static_cast<uint64_t>(count) > file_.size())
-    refuse("has a list of " + std::to_string(count) + " entries, the file has " +
-           std::to_string(file_.size()) + " bytes");
+    refuse("has a list of " + std::to_string(count) + " entries, expected 0 to " +
+           std::to_string(file_.size()) + ", the bytes of the file");
   return count;
 }
 
@@ -127,7 +127,7 @@ const std::byte* StripReader::bytes(size_t size) {
 std::string_view StripReader::word() {
   text_->begin_row(at_.offset);
   const std::string_view text = text_->word();
-  if (text.empty()) refuse("ends before its properties do");
+  if (text.empty()) refuse("ends before its properties do, expected a value for each of them");
   at_.offset = text_->offset();
   return text;
 }

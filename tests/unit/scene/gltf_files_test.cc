@@ -34,9 +34,9 @@ TEST(GltfContainer, LyingHeaders) {
   };
   EXPECT_NE(with(4, 1).find("GLB version 1, expected version 2"), std::string::npos);
   EXPECT_NE(with(8, 0xffffffff).find("cut off"), std::string::npos);
-  EXPECT_NE(with(8, 3).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(with(8, 3).find("declares a GLB length of 3 bytes"), std::string::npos);
   EXPECT_NE(with(8, 15).find("inside the header of a chunk"), std::string::npos);
-  EXPECT_NE(with(12, 0xfffffff0).find("the GLB chunk at byte 12 claims"), std::string::npos);
+  EXPECT_NE(with(12, 0xfffffff0).find("the GLB chunk at byte 12 declares"), std::string::npos);
   EXPECT_NE(with(16, 0x004E4942).find("not JSON"), std::string::npos);
   EXPECT_NE(with(0, 0x58585858).find("has an unknown format"), std::string::npos);
 }

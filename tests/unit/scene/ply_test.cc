@@ -323,7 +323,7 @@ TEST(Ply, HostileHeadersAreRefused) {
       {begin + "element vertex 0\n" + xyz + "element tristrips 1\n" + list + "end_header\n",
        "tristrips 0 ends past"},
       {begin + "element vertex 0\n" + xyz + "element tristrips 1\nproperty int a\nend_header\n",
-       "tristrips without a list vertex_indices"},
+       "tristrips without vertices, expected a list vertex_indices"},
       {begin + "element vertex 0\n" + xyz + "element tristrips 1\n" + list + "end_header\n\3\1",
        "tristrips 0 ends past"},
       {begin + "element vertex 0\n" + xyz +

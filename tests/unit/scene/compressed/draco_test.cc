@@ -348,28 +348,29 @@ TEST(GltfDraco, WhatDoesNotFitIsRefusedByName) {
   using testing::HasSubstr;
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   const std::string where = "folder/scene: mesh 0: primitive 0: ";
-  EXPECT_THAT(message_of(compressed_scene(data, 25, 96, {{"POSITION", 3}})),
-              HasSubstr(where + "its Draco data have no attribute 3, which is POSITION"));
+  EXPECT_THAT(
+      message_of(compressed_scene(data, 25, 96, {{"POSITION", 3}})),
+      HasSubstr(where + "its Draco data have no attribute with the id 3, expected POSITION"));
   EXPECT_THAT(message_of(compressed_scene(data, 25, 96, {{"NORMAL", 0}})),
               HasSubstr("KHR_draco_mesh_compression has no POSITION"));
   SceneBuilder fan = compressed_scene(data, 25, 96);
   fan.root["meshes"][0]["primitives"][0]["mode"] = 6;
-  EXPECT_THAT(message_of(fan), HasSubstr("not for fans"));
+  EXPECT_THAT(message_of(fan), HasSubstr("mode 6 (fan), expected 4"));
   SceneBuilder no_indices = compressed_scene(data, 25, 96);
   no_indices.root["meshes"][0]["primitives"][0].erase("indices");
-  EXPECT_THAT(message_of(no_indices), HasSubstr("needs an accessor of indices"));
+  EXPECT_THAT(message_of(no_indices), HasSubstr("expected an accessor of indices"));
   SceneBuilder no_view = compressed_scene(data, 25, 96);
   no_view.root["meshes"][0]["primitives"][0]["extensions"] = draco_extension(9, {{"POSITION", 0}});
   EXPECT_THAT(message_of(no_view), HasSubstr("bufferView 9 does not exist"));
   SceneBuilder shorts = compressed_scene(data, 25, 96);
   shorts.root["accessors"][0]["componentType"] = kI16;
   shorts.root["extensionsUsed"].push_back("KHR_mesh_quantization");
-  EXPECT_THAT(message_of(shorts), HasSubstr("is of floats, its accessor of short"));
+  EXPECT_THAT(message_of(shorts), HasSubstr("has floats, expected the type short"));
   auto of_version_1 = data;
   of_version_1[5] = 1;
   EXPECT_THAT(message_of(compressed_scene(of_version_1, 25, 96)), HasSubstr("version 1.2"));
   EXPECT_THAT(message_of(compressed_scene({'G', 'I', 'F', '8', '9', 'a'}, 25, 96)),
-              HasSubstr("its data do not begin with DRACO"));
+              HasSubstr("its data do not begin with the signature DRACO"));
 }
 
 // The data are truncated or changed anywhere. The scene then gives an error, or as many triangles

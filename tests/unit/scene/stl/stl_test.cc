@@ -105,8 +105,8 @@ TEST(Stl, FaultsNameTheLine) {
   std::vector<float> broken = kFacet;
   broken[5] = NAN;
   const std::string facets = facet_bytes(kFacet) + facet_bytes(broken) + facet_bytes(kFacet);
-  EXPECT_EQ(message(binary_stl(facets, 3)),
-            "folder/scene: facet 1: a vertex is not a finite position");
+  EXPECT_THAT(message(binary_stl(facets, 3)),
+              testing::StartsWith("folder/scene: facet 1: a vertex is not a finite position"));
   OpenScene open(binary_stl(facets, 3), {.skip_invalid = true});
   EXPECT_EQ(open.triangles(), (std::vector<Corners>{kLower, kLower}));
 }
