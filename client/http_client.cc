@@ -169,7 +169,9 @@ ErrorCode error_code_of(const std::string& name, int http_status) {
 void throw_if_problem(const ClientResponse& response) {
   if (response.status < 400) return;
   const auto json = nlohmann::json::parse(response.body, nullptr, false);
-  std::string code, detail = "the server answered with status " + std::to_string(response.status);
+  std::string code,
+      detail = "the server answered with status " + std::to_string(response.status) +
+               " and no description of the error, expected one as a voxdag service sends it";
   // Returns the member `name` if it is a string, otherwise `otherwise`. The answer may come from
   // another server or a proxy, so its JSON may have any form.
   const auto text = [&](const char* name, const std::string& otherwise) {

@@ -29,7 +29,8 @@ class Download {
     const uint64_t resumed_bytes = bytes_present();
     for (RetryPolicy retry(service_.cancel()); bytes_present() < size_;) {
       const uint64_t before = bytes_present();
-      std::string reason = "server " + service_.url() + ": the download ended early";
+      std::string reason = "server " + service_.url() + ": the download ended after " +
+                           std::to_string(before) + " bytes, expected " + std::to_string(size_);
       double wait_s = 0;
       try {
         wait_s = fetch_rest(before);

@@ -38,7 +38,9 @@ class Upload {
  public:
   Upload(ServiceClient& service, FileSystem& files, const std::string& path, Progress& progress)
       : service_(service), progress_(progress), file_(files.open_read(path)), size_(file_->size()) {
-    if (size_ == 0) throw Error(ErrorCode::kInvalidInput, "scene " + path + ": the file is empty");
+    if (size_ == 0)
+      throw Error(ErrorCode::kInvalidInput,
+                  "scene " + path + ": the file is empty, expected a scene file with contents");
     progress.begin_stage("checksum", size_, "bytes");
     sha256_ = sha256_of_file(*file_, service.cancel(), &progress);
     name_ = name_on_server(path, sha256_);
@@ -102,7 +104,9 @@ class Upload {
       if (!answer) return false;
       wait_s_ = retry_after_s(*answer);
       if (answer->status == 409 || wait_s_ >= 0) {
-        failure_ = "scene " + name_ + ": the server answered " + std::to_string(answer->status);
+        failure_ = "scene " + name_ + ": the server answered the bytes from " +
+                   std::to_string(offset_) + " on with status " + std::to_string(answer->status) +
+                   ", expected 200 to 202";
         return false;
       }
       throw_if_problem(*answer);

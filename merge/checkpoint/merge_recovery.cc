@@ -32,7 +32,9 @@ PassProgress MergeRecovery::restore(GlobalFileWriter& out) {
 
 PassProgress MergeRecovery::resume(const MergeState& state, GlobalFileWriter& out) {
   if (state.inputs_checksum != pending_.inputs_checksum())
-    throw Error(ErrorCode::kCorrupt, "the merge's saved state is of a merge of other subvolumes");
+    throw Error(ErrorCode::kCorrupt,
+                "the merge's saved state is of a merge of other subvolumes: expected a merge of "
+                "the subvolumes of this build");
   context_.scratch.set_next_id(state.next_scratch_id);
   std::set<uint32_t> segments;
   for (const ArtifactRef& ref : state.intermediates)
@@ -54,8 +56,10 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
                                               ": expected the same output, or --restart");
   if (!pending_.fit_at_once(context_.plan.partition_bytes))
     throw Error(ErrorCode::kOutOfMemory,
-                "out of memory: the interrupted merge used more memory: expected as much memory "
-                "as before (--memory), or --restart");
+                "out of memory: the interrupted merge used more memory than the " +
+                    std::to_string(context_.plan.partition_bytes) +
+                    " bytes that this run has for a part of the merge: expected as much memory as "
+                    "before (--memory), or --restart");
   if (state.narrow_words != out.narrow_words())
     throw Error(ErrorCode::kCorrupt, "the interrupted merge has wide levels above " +
                                          std::to_string(state.narrow_words) +

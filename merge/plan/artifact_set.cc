@@ -34,14 +34,16 @@ class Opener {
                       " grid levels and " + std::to_string(reader.shape().hash_bits) +
                       " hash bits, expected " + std::to_string(shape_.grid_levels) + " and " +
                       std::to_string(shape_.hash_bits));
-    if (reader.roots().empty()) throw Error(ErrorCode::kCorrupt, where + "has no root");
+    if (reader.roots().empty())
+      throw Error(ErrorCode::kCorrupt, where + "has no root, expected at least one");
     for (const ArtifactRoot& root : reader.roots()) {
       const ArtifactLevel* const level = reader.level(root.cube.level);
       if (!level || root.index >= level->rows)
         throw Error(ErrorCode::kCorrupt, where + "the root on level " +
                                              std::to_string(root.cube.level) + " is row " +
-                                             std::to_string(root.index) + ", but the level has " +
-                                             std::to_string(level ? level->rows : 0) + " rows");
+                                             std::to_string(root.index) + ", expected less than " +
+                                             std::to_string(level ? level->rows : 0) +
+                                             ", the number of rows of this level");
     }
   }
 

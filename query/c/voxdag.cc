@@ -61,7 +61,9 @@ voxdag_status answer(const Ask& ask) {
     set_error(error.what());
     return status_of(error.code());
   } catch (const std::bad_alloc&) {
-    set_error("there is not enough memory for the answer");
+    set_error(
+        "out of memory: the system has too little memory for the answer, expected more free "
+        "memory");
     return VOXDAG_OUT_OF_MEMORY;
   } catch (const std::exception& error) {
     set_error(error.what());

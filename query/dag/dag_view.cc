@@ -15,7 +15,8 @@ DagView::DagView(const voxdag_reader::File& file) : grid_levels_(file.grid_level
 
 void DagView::corrupt(uint32_t level, uint64_t offset) const {
   throw Error(ErrorCode::kCorrupt, "level " + std::to_string(level) + ", word " +
-                                       std::to_string(offset) + ": expected a node here");
+                                       std::to_string(offset) +
+                                       ": no node begins here, although a parent points here");
 }
 
 }  // namespace voxdag::query

@@ -32,7 +32,8 @@ class AttributeCursor {
         [&] { return cursor_.find(cell[0], cell[1], cell[2], job_.selection.grid_levels, i); });
     if (!region)
       throw Error(ErrorCode::kCorrupt, job_.file.path() + ": " + cell_text(job_, cell) +
-                                           " has no " + traits_.name + ": the file is damaged");
+                                           " has no " + traits_.name +
+                                           ": the file is damaged (voxdag verify reports where)");
     put_value(traits_.attribute, *region, i, put);
   }
 

@@ -111,7 +111,7 @@ void require_written(const ExportJob& job, uint64_t written, uint64_t expected) 
   if (written != expected)
     throw Error(ErrorCode::kCorrupt, job.file.path() + ": " + count_text(written) +
                                          " voxels were found, expected " + count_text(expected) +
-                                         ": the file is damaged (voxdag verify says where)");
+                                         ": the file is damaged (voxdag verify reports where)");
 }
 
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
@@ -119,8 +119,9 @@ voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCurso
   const auto color = with_reader_errors(
       [&] { return colors.color(cell[0], cell[1], cell[2], job.selection.grid_levels); });
   if (!color)
-    throw Error(ErrorCode::kCorrupt, job.file.path() + ": " + cell_text(job, cell) +
-                                         " has no color: the file is damaged");
+    throw Error(ErrorCode::kCorrupt,
+                job.file.path() + ": " + cell_text(job, cell) +
+                    " has no color: the file is damaged (voxdag verify reports where)");
   return *color;
 }
 

@@ -134,10 +134,10 @@ class HashDagWriter {
       counts[offset] = count;
       if (level < top_levels_) {
         if (top == end)
-          throw Error(ErrorCode::kCorrupt, job_.file.path() + ": level " + std::to_string(level) +
-                                               " has more nodes than the " +
-                                               count_text(dag_.node_count(level)) +
-                                               " of the header");
+          throw Error(ErrorCode::kCorrupt,
+                      job_.file.path() + ": level " + std::to_string(level) +
+                          " has more nodes than expected: its header declares " +
+                          count_text(dag_.node_count(level)));
         enclosed_[top] = count;
         words[0] = mask | static_cast<uint32_t>(top++) << 8;
       } else if (count < kMaxCount) {

@@ -253,7 +253,8 @@ SelectedDag::Size SelectedDag::size_at(uint32_t grid_levels) const {
 
 void SelectedDag::corrupt(uint32_t level, uint64_t offset) const {
   throw Error(ErrorCode::kCorrupt, "level " + std::to_string(level) + ", word " +
-                                       std::to_string(offset) + ": expected a node here");
+                                       std::to_string(offset) +
+                                       ": no node begins here, although a parent points here");
 }
 
 }  // namespace voxdag::query

@@ -247,9 +247,10 @@ class VoxWriter {
     if (depth == depth_) {
       job_.cancel.check();
       if (depth_ + kBrickLevels != view_.grid_levels() && content >= level_words_)
-        throw Error(ErrorCode::kCorrupt, job_.file.path() + ": level " + std::to_string(depth_) +
-                                             ", word " + std::to_string(content) +
-                                             ": no node begins here");
+        throw Error(ErrorCode::kCorrupt,
+                    job_.file.path() + ": level " + std::to_string(depth_) + ", word " +
+                        std::to_string(content) +
+                        ": no node begins here, although a parent points here");
       return visit(corner, content);
     }
     const DagView::Children children = view_.children(depth, content);

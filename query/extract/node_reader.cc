@@ -50,7 +50,7 @@ void CheckedReader::check(uint64_t begin, uint64_t bytes, std::span<std::byte> b
 void NodeReader::corrupt(uint32_t level, uint64_t offset) const {
   throw Error(ErrorCode::kCorrupt, source_.header().path() + ": level " + std::to_string(level) +
                                        ", word " + std::to_string(offset) +
-                                       ": no node begins here");
+                                       ": no node begins here, although a parent points here");
 }
 
 size_t NodeReader::fill(uint32_t level, std::span<const WantedNode> wanted) {

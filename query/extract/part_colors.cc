@@ -173,7 +173,7 @@ class PartColors {
       uint64_t i;
       morton_decode(cell.code, x, y, z);
       const ColorRegion* const region = cursor.find(x, y, z, finest_, i);
-      if (!region) broken_cell(finest_, cell.code, "has no value");
+      if (!region) broken_cell(finest_, cell.code, "has no value, expected one for each cell");
       bytes = region->block_bytes / 32;
       const uint32_t value = region->value(i);
       if (const char* expected = value_error(traits_.encoding, value, section_.names().size()))
@@ -259,8 +259,9 @@ class PartColors {
     ColorRegion region;
     if (at == stored.region_count || !ColorSection::region(stored, at, region) ||
         region.morton != code)
-      file_.broken_section(section_,
-                           voxdag_reader::region_text(stored, code) + " is missing or damaged");
+      file_.broken_section(section_, voxdag_reader::region_text(stored, code) +
+                                         " is missing or damaged, expected an entry with counts "
+                                         "and an offset within the section");
     EncodedRegion copied;
     copied.morton = morton_in_part(region_level(tier), code);
     std::copy(std::begin(region.counts), std::end(region.counts), copied.counts.begin());
@@ -289,9 +290,10 @@ class PartColors {
       for (uint64_t i = ColorSection::lower_bound(tier, begin); i < tier.region_count; ++i) {
         ColorRegion region;
         if (!ColorSection::region(tier, i, region))
-          file_.broken_section(section_, "entry " + std::to_string(i) +
-                                             " of the directory of level " +
-                                             std::to_string(tier.region_level) + " is damaged");
+          file_.broken_section(section_,
+                               "entry " + std::to_string(i) + " of the directory of level " +
+                                   std::to_string(tier.region_level) +
+                                   " is damaged, expected counts and an offset within the section");
         if (region.morton >= end) break;
         source_.check(offset_of(region.blocks), region.units() * color_layout::kUnitBytes, block);
       }
@@ -302,7 +304,7 @@ class PartColors {
     uint32_t x, y, z;
     morton_decode(code, x, y, z);
     const auto rgb = colors.color(x, y, z, level);
-    if (!rgb) broken_cell(level, code, "has no color");
+    if (!rgb) broken_cell(level, code, "has no color, expected one for each cell");
     return *rgb;
   }
   [[noreturn]] void broken_cell(uint32_t level, uint64_t code, const std::string& what) const {

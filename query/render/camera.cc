@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/text.h"
 #include "query/render/sampling.h"
 
 namespace voxdag::query {
@@ -33,6 +34,10 @@ double bound(const std::vector<Vec>& points, const Vec& axis) {
   return last - inner > 0.1 * (last - along.front()) ? inner : last;
 }
 
+std::string point_text(const Vec& p) {
+  return number_text(p[0]) + " " + number_text(p[1]) + " " + number_text(p[2]);
+}
+
 }  // namespace
 
 Camera::Camera(const Placement& p, int width, int height)
@@ -42,12 +47,13 @@ Camera::Camera(const Placement& p, int width, int height)
                                               " degrees: expected more than 0 and less than 180");
   const double distance = length(p.target - p.eye);
   if (!(distance > 0))
-    throw Error(ErrorCode::kInvalidInput,
-                "the camera is at its target: expected two different points");
+    throw Error(ErrorCode::kInvalidInput, "the camera and its target are both at " +
+                                              point_text(p.eye) +
+                                              ": expected two different points");
   if (!std::isfinite(distance))
-    throw Error(
-        ErrorCode::kInvalidInput,
-        "the camera is too far from its target: expected a distance that a double can hold");
+    throw Error(ErrorCode::kInvalidInput, "the distance from the camera at " + point_text(p.eye) +
+                                              " to its target at " + point_text(p.target) +
+                                              " is not finite: expected coordinates below 1e150");
   forward_ = normalized(p.target - p.eye);
   picture_axes(forward_, right_, up_);
   pixel_ = half_tangent(p.fov_degrees) / half_height_;

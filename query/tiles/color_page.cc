@@ -158,8 +158,10 @@ void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_
     check_region(tier, level, first);
     const auto* const region = cursor_.find(first[0], first[1], first[2], level, index);
     if (!region || count > region->cells - index)
-      file_->broken_section(file_->colors(),
-                            cell_text(level, first) + ": its region has fewer colors than cells");
+      file_->broken_section(
+          file_->colors(),
+          cell_text(level, first) +
+              ": its region has fewer colors than cells, expected one for each cell");
     const uint64_t skip = index % kBlockCells,
                    blocks = (skip + count + kBlockCells - 1) / kBlockCells;
     words[0] |= static_cast<uint32_t>(skip) << kSkipShift;
@@ -173,7 +175,9 @@ void ColorPages::add_colors(const ColorPageAddress& address, std::vector<uint32_
     const std::array<int64_t, 3> cell = cell_of(address, code);
     check_region(tier, level, cell);
     const auto rgb = cursor_.color(cell[0], cell[1], cell[2], level);
-    if (!rgb) file_->broken_section(file_->colors(), cell_text(level, cell) + " has no color");
+    if (!rgb)
+      file_->broken_section(file_->colors(),
+                            cell_text(level, cell) + " has no color, expected one for each cell");
     words.push_back(rgb->r | uint32_t{rgb->g} << 8 | uint32_t{rgb->b} << 16);
   }
 }

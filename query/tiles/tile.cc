@@ -28,7 +28,9 @@ void check_address(const DagView& dag, const TileAddress& root, const CheckedBlo
                     ", the number of levels with nodes");
   if (!is_node())
     throw Error(ErrorCode::kNotFound, "level " + std::to_string(root.level) + ", word " +
-                                          std::to_string(root.offset) + ": no node begins here");
+                                          std::to_string(root.offset) +
+                                          ": no node begins here, expected the offset of a node "
+                                          "from the manifest or from a tile");
 }
 
 // Appends the nodes of a level to `words`. Each appended node has the numbers of its children in

@@ -49,8 +49,10 @@ std::vector<SampledRegion> draw_regions(const voxdag_reader::File& file, const C
     for (const Attribute attribute : attributes)
       if (!ColorSection::region(section_of(file, attribute).tier(0), drawn[i],
                                 region.stored[index_of(attribute)]))
-        file.broken_section(section_of(file, attribute), "region " + std::to_string(drawn[i]) +
-                                                             " of the finest tier is damaged");
+        file.broken_section(
+            section_of(file, attribute),
+            "region " + std::to_string(drawn[i]) +
+                " of the finest tier is damaged, expected counts and an offset within the section");
     region.cube.level = grid.region_level();
     auto& [x, y, z] = region.cube.position;
     morton_decode(region.stored[index_of(attributes.front())].morton, x, y, z);
@@ -162,9 +164,12 @@ ColorGrid sampled_grid(const voxdag_reader::File& file) {
     if (section_of(file, attribute).color_levels() != levels ||
         section_of(file, attribute).tier(0).region_count !=
             section_of(file, attributes.front()).tier(0).region_count)
-      file.broken_section(section_of(file, attribute),
-                          std::string("expected the same cells as the ") +
-                              section_of(file, attributes.front()).name());
+      file.broken_section(
+          section_of(file, attribute),
+          "the section has " + std::to_string(section_of(file, attribute).tier(0).region_count) +
+              " regions and ends at level " +
+              std::to_string(section_of(file, attribute).color_levels()) +
+              ": expected the same numbers as the " + section_of(file, attributes.front()).name());
   return {file.grid_levels(), levels};
 }
 

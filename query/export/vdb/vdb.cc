@@ -57,7 +57,8 @@ auto with_vdb_errors(const ExportJob& job, const Work& work) {
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {
-    throw Error(ErrorCode::kIo, job.output + ": OpenVDB: " + error.what());
+    throw Error(ErrorCode::kIo,
+                job.output + ": the library OpenVDB cannot write the file: " + error.what());
   }
 }
 
