@@ -92,7 +92,7 @@ int run(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return report(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "voxdag: error: a defect of voxdag: %s\n",
+    std::fprintf(stderr, "voxdag: error: a defect of voxdag, please report it: %s\n",
                  printable_line(error.what()).c_str());
     return kDefectStatus;
   }

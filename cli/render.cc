@@ -131,7 +131,8 @@ void run(RenderCommand& command, CommandContext& context) {
   const auto file = open_global_file(command.input);
   const query::DagView dag(*file);
   if (!command.gray) command.options.colors = file.get();
-  if (dag.empty()) progress->warn(command.input + " has no voxels");
+  if (dag.empty())
+    progress->warn(command.input + " has no voxels: the picture shows only the background");
   const double start_s = wall_seconds();
   const query::Placement placement = place_camera(command, *file, dag);
   if (!command.output.path.empty()) {

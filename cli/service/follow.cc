@@ -67,9 +67,11 @@ Json follow_job(ServiceClient& service, const std::string& id) {
 void check_succeeded(const Json& job) {
   const std::string state = job.at("state"), id = job.at("id");
   if (state == "succeeded") return;
-  if (state == "canceled") throw Error(ErrorCode::kCanceled, "job " + id + " was canceled");
+  if (state == "canceled")
+    throw Error(ErrorCode::kCanceled, "job " + id + " was canceled, expected it to succeed");
   if (!job.at("error").is_object())
-    throw Error(ErrorCode::kIo, "job " + id + " is " + state + "; the service gives no reason");
+    throw Error(ErrorCode::kIo, "job " + id + " is " + state +
+                                    ", expected it to succeed; the service reports no reason");
   const Json& error = job.at("error");
   throw Error(client::error_code_of(error.at("code"), 500),
               "job " + id + " failed: " + error.at("message").get<std::string>());

@@ -57,7 +57,7 @@ void run(const JobsCommand& command, ServiceClient& service, CommandContext&) {
 // value. The server checks the states themselves.
 std::string check_states(const std::string& states) {
   const bool fine = states.find_first_not_of("abcdefghijklmnopqrstuvwxyz,") == std::string::npos;
-  return fine ? "" : "expected states such as running,queued";
+  return fine ? "" : "'" + states + "': expected states such as running,queued";
 }
 
 void declare(Command& command, JobsCommand& state) {

@@ -66,7 +66,8 @@ void render(const PathText& path, const std::string& view, const std::optional<P
     const auto file = open_global_file(path.bytes);
     const query::DagView dag(*file);
     if (!gray) options.colors = file.get();
-    if (dag.empty()) relay.warn(path.bytes + " has no voxels");
+    if (dag.empty())
+      relay.warn(path.bytes + " has no voxels: the picture shows only the background");
     query::Placement placement{{{0, 0, 1}}, {{0, 0, 0}}};
     const double aspect = static_cast<double>(options.width) / options.height;
     if (camera)

@@ -50,7 +50,9 @@ def render(
         given = "target" if camera is None else "camera"
         raise Error(f"only a {given}: expected a camera and a target, or neither", "invalid_input")
     if not isinstance(view, str):
-        raise Error(f"view {view!r}: expected the name of a view", "invalid_input")
+        raise Error(
+            f"view {view!r}: expected the name of a view, such as 'iso' or 'top'", "invalid_input"
+        )
     if camera is not None and view != "auto":
         raise Error(f"a camera and the view {view!r}: expected one of them", "invalid_input")
     degrees = None if fov is None else _number(fov)
