@@ -253,7 +253,9 @@ void BatchTable::try_save() {
     is_saved_ = true;
   } catch (const Error& error) {
     if (is_saved_)
-      cluster_.progress().warn("the state of the tasks cannot be written: " + error.message());
+      cluster_.progress().warn(
+          "the state of the tasks cannot be written, so a later run may repeat batches: " +
+          error.message());
     is_saved_ = false;
   }
 }

@@ -244,7 +244,7 @@ void SlurmMergeJob::fail(const std::string& id, const std::optional<SlurmEnd>& e
   const std::string log_end = last_lines(context_.files, log);
   throw Error(end ? code_of(*end) : ErrorCode::kIo,
               "the job " + id + " that merges has ended without a result: " +
-                  (end ? end->text() : "Slurm does not say how") +
+                  (end ? end->text() : "Slurm does not report how") +
                   (log_end.empty() ? "" : "; its log " + log + " ends with:\n" + log_end) +
                   "\nthe same command submits it again");
 }

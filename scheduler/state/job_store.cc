@@ -157,8 +157,8 @@ void put_sealed(SqlDatabase& database, const std::string& table, Record record) 
 template <class Record>
 Record unsealed(Sealed<Record> sealed, const std::string& what) {
   if (sealed.checksum != checksum_of(sealed.record))
-    throw Error(ErrorCode::kCorrupt,
-                "job store: the row of " + what + " fails its checksum: start over with --restart");
+    throw Error(ErrorCode::kCorrupt, "the job store (job.db in the work folder): the row of " +
+                                         what + " fails its checksum: start over with --restart");
   return std::move(sealed.record);
 }
 
@@ -237,9 +237,10 @@ std::vector<StoredSubvolume> JobStore::leaves() {
   }
   if (count != job.subvolumes)
     throw Error(ErrorCode::kCorrupt,
-                "job store: expected rows of the subvolumes 1 to " +
-                    std::to_string(job.subvolumes) +
-                    ", but some are missing or too many; start over with --restart");
+                "the job store (job.db in the work folder): the rows of the subvolumes are "
+                "complete only up to " +
+                    std::to_string(count) + ": expected " + std::to_string(job.subvolumes) +
+                    "; start over with --restart");
   return leaves;
 }
 
@@ -276,7 +277,8 @@ std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,
   auto job = find_sealed<JobRow>(database_, "job", "the job");
   if (!job)
     throw Error(ErrorCode::kCorrupt,
-                "job store: the row of the job is missing: start over with --restart");
+                "the job store (job.db in the work folder): the row of the job is missing: start "
+                "over with --restart");
   SubvolumeId next = job->subvolumes + 1;
   job->subvolumes += static_cast<int64_t>(parts.size());
   put_sealed(database_, "job", *job);

@@ -125,7 +125,7 @@ bool SlurmTask::is_held() const { return is_held_forever(state, reason); }
 bool SlurmJob::is_held() const { return is_held_forever(state, reason); }
 
 std::string SlurmEnd::text() const {
-  if (state.empty()) return "ended, and Slurm has forgotten how";
+  if (state.empty()) return "ended, and Slurm no longer reports how";
   std::string text = state;
   if (!reason.empty() && reason != "None") text += ", " + reason;
   if (!exit_code.empty() && exit_code != "0:0") text += ", exit code " + exit_code;
@@ -257,7 +257,7 @@ std::string Slurm::accepted_job(const CommandResult& submitted) {
                     ? ErrorCode::kIo
                     : ErrorCode::kInvalidInput,
                 "sbatch refused the job: " + trimmed(submitted.error + submitted.output) +
-                    ": expected a job id (--cluster-options)");
+                    ": expected a job id (check --cluster-options)");
   without_nodes_since_s_.reset();
   return job;
 }

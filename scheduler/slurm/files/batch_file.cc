@@ -83,7 +83,7 @@ void write_triangles(TriangleStream& triangles, uint64_t expected, size_t record
     while (filled < wanted) {
       const size_t n = triangles.read(std::span(batch).subspan(filled, wanted - filled));
       if (n == 0)
-        throw DamagedTriangles("a bin of triangles ends after " +
+        throw DamagedTriangles("the stored triangles of a subvolume end after " +
                                std::to_string(expected - left + filled) + " triangles: expected " +
                                std::to_string(expected));
       filled += n;

@@ -61,7 +61,8 @@ template <class Record>
 Record open(const std::string& text) {
   const size_t end = text.find('\n');
   if (end == std::string::npos || text.substr(end + 1) != checksum_text(text.substr(0, end)) + "\n")
-    throw Error(ErrorCode::kCorrupt, "it fails its checksum");
+    throw Error(ErrorCode::kCorrupt,
+                "it fails its checksum: expected one line of JSON and its checksum");
   return record_from_text<Record>(text.substr(0, end), "it");
 }
 

@@ -29,7 +29,8 @@ void check_roots(const ArtifactReader& artifact, std::span<const ExpectedSubvolu
     to_find.erase(owner->cube);
   }
   if (!to_find.empty())
-    refuse_record("its artifact lacks the root of the subvolume at " + describe(*to_find.begin()));
+    refuse_record("its artifact lacks the root of the subvolume at " + describe(*to_find.begin()) +
+                  ": expected the roots of all subvolumes of the batch");
 }
 
 }  // namespace
@@ -51,7 +52,7 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
                           &ExpectedSubvolume::id))
     refuse_record("its list of " + std::to_string(record.subvolumes.size()) +
                   " subvolumes differs from the batch's list of " +
-                  std::to_string(subvolumes.size()));
+                  std::to_string(subvolumes.size()) + ": expected the same subvolumes");
   std::set<Cube> to_find;
   for (size_t i = 0; i < subvolumes.size(); ++i)
     if (!record.subvolumes[i].summary.empty()) to_find.insert(subvolumes[i].cube);

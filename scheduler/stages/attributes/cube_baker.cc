@@ -163,9 +163,12 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
     const uint32_t cells_of_child = 1u << (3 * levels - 3);
     for (uint32_t child = 0; child < 8; ++child) {
       if (!bake_cells(region.child(static_cast<int>(child)), cells_of_child, add_surfaces))
-        throw Error(ErrorCode::kOutOfMemory,
-                    "not enough memory for the materials of a region: expected more memory, fewer "
-                    "threads, or a finer color grid");
+        throw Error(
+            ErrorCode::kOutOfMemory,
+            "out of memory: the materials of a region of the color grid need more than the " +
+                std::to_string(budget_.available()) +
+                " bytes that are free: expected more memory (--memory), fewer "
+                "threads, or a finer color grid (--color-resolution)");
       collect(child * cells_of_child, encoders);
     }
   }

@@ -59,8 +59,8 @@ void check_backend(const RunOptions& options) {
   const bool is_given = options.method != MethodName::kDefault;
   if (is_given && parallel == (options.method == MethodName::kConsing))
     refuse_backend("method '" + method + "': backend " + backend +
-                   (parallel ? " has pointers and hashes"
-                             : " has consing only; expected --backend parallel-host or cuda"));
+                   (parallel ? " does not have it: expected --method pointers or hashes"
+                             : " does not have it: expected --backend parallel-host or cuda"));
   if (options.backend == BackendName::kCuda && !cuda_device_available())
     throw Error(ErrorCode::kDevice, "backend cuda: " + cuda_device_problem());
 }

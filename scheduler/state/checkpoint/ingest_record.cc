@@ -55,14 +55,19 @@ std::vector<std::byte> encode(const IngestRecord& record) {
 
 IngestRecord decode_ingest_record(std::span<const std::byte> bytes) {
   const auto corrupt = [](const char* what) {
-    return Error(ErrorCode::kCorrupt, std::string("job store: the ingest record ") + what);
+    return Error(
+        ErrorCode::kCorrupt,
+        std::string(
+            "the job store (job.db in the work folder): the record of the read triangles ") +
+            what + ": expected a complete record");
   };
   if (bytes.size() < sizeof(uint64_t)) throw corrupt("ends too early");
   ByteSource in(bytes.first(bytes.size() - sizeof(uint64_t)));
   if (const auto version = in.get<uint64_t>(); version != kRecordVersion)
-    throw Error(ErrorCode::kUnsupportedVersion, "job store: the ingest record has version " +
-                                                    std::to_string(version) + ": expected " +
-                                                    std::to_string(kRecordVersion));
+    throw Error(
+        ErrorCode::kUnsupportedVersion,
+        "the job store (job.db in the work folder): the record of the read triangles has version " +
+            std::to_string(version) + ": expected " + std::to_string(kRecordVersion));
   if (ByteSource(bytes.last(sizeof(uint64_t))).get<uint64_t>() !=
       checksum64(bytes.first(bytes.size() - sizeof(uint64_t))))
     throw corrupt("fails its checksum");
