@@ -23,7 +23,9 @@ NamedFile::NamedFile(const std::string& path) : path_(path), inode_(inode_of(pat
 
 void NamedFile::check() const {
   if (inode_of(path_) != inode_)
-    throw Error(ErrorCode::kIo, path_ + ": the file was removed or replaced while it is in use");
+    throw Error(ErrorCode::kIo, path_ +
+                                    ": the file was removed or replaced while it is in use: "
+                                    "restore it and restart the service");
 }
 
 }  // namespace voxdag::server

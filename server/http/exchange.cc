@@ -81,7 +81,9 @@ std::string Exchange::read_head(size_t max_bytes) {
   for (size_t line_begin = 0;; line_begin = text.size()) {
     if (!connection_.read_line(text, max_bytes - blank_bytes)) {
       if (connection_.error_state() == Connection::ErrorState::kTooSlow)
-        throw Problem(408, "timeout", "the request was sent too slowly");
+        throw Problem(408, "timeout",
+                      "the header of the request was sent too slowly: expected it within "
+                      "connections.header_timeout_s of the configuration");
       throw Problem(431, "headers_too_large",
                     "the header fields are too large: expected at most " +
                         std::to_string(max_bytes) + " bytes");

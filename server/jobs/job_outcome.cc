@@ -13,15 +13,20 @@ JobError error_of(const LiveJob& live, const ChildProcess::End& end, double now_
   if (const auto failure = live.failure())
     return {failure->code, failure->text, now_s, is_transient(failure->code)};
   if (end.signal == SIGKILL)
-    return {"out_of_memory",
-            "the job's process was killed, perhaps by the system because memory ran out", now_s,
-            false};
+    return {
+        "out_of_memory",
+        "the job's process was killed, perhaps by the system because memory ran out: expected more "
+        "free memory, or a smaller 'memory' of the job",
+        now_s, false};
   if (end.signal != 0)
-    return {"internal", "the job's process crashed (signal " + std::to_string(end.signal) + ")",
+    return {"internal",
+            "the job's process crashed (signal " + std::to_string(end.signal) +
+                "): retry the job, and report the defect if it fails again",
             now_s, false};
   return {"internal",
           "the job's process ended with status " + std::to_string(end.exit_status) +
-              " and reported neither a result nor a failure",
+              " and reported neither a result nor a failure: retry the job, and report the defect "
+              "if it fails again",
           now_s, false};
 }
 

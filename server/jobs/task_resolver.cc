@@ -53,8 +53,9 @@ void TaskResolver::add_scene(const std::string& scene, JobTask& task) {
   const auto found = is_scene_name(scene) ? scenes_.find(scene) : std::nullopt;
   if (!found) throw missing;
   if (!found->complete)
-    throw RequestError(RequestError::Kind::kConflict,
-                       "the scene '" + scene + "' is still being uploaded");
+    throw RequestError(
+        RequestError::Kind::kConflict,
+        "the scene '" + scene + "' is still being uploaded: expected a complete upload");
   const std::string path = resolved_path(scenes_.path(scene));
   if (path.empty()) throw missing;
   task.uploads.emplace(scene, path);

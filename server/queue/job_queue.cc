@@ -153,7 +153,10 @@ Job read_job(const SqlStatement& statement) {
   check(is_json(job.progress), job.progress, "");
   check(is_json(job.result), job.result, "");
   if (job.error && job.error->code.empty()) job.error.reset();
-  if (damaged) job.warnings.push_back({"build", "", "the record of this job is damaged"});
+  if (damaged)
+    job.warnings.push_back({"build", "",
+                            "the record of this job in the queue's database is damaged; fields "
+                            "that cannot be read have default values"});
   return std::move(job);
 }
 
@@ -200,8 +203,9 @@ std::optional<Job> job_of_key(SqlDatabase& database, const IdempotencyKey& key) 
   auto known = database.prepare("SELECT job, request FROM idempotency WHERE key = ?");
   if (!known.bind(0, key.key).step()) return {};
   if (known.text(1) != key.request)
-    throw RequestError(RequestError::Kind::kKeyReused,
-                       "this Idempotency-Key was already used with a different request");
+    throw RequestError(
+        RequestError::Kind::kKeyReused,
+        "this Idempotency-Key was already used with a different request: expected a new key");
   return find_job(database, known.text(0));
 }
 

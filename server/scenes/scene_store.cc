@@ -242,7 +242,8 @@ SceneStore::NameLock::NameLock(SceneStore& store, const std::string& name)
   std::lock_guard lock(store_.mutex_);
   if (!store_.busy_.insert(name_).second)
     throw RequestError(RequestError::Kind::kConflict,
-                       "another request is uploading the scene '" + name_ + "'");
+                       "another request is uploading the scene '" + name_ +
+                           "': expected one upload of a scene at a time");
 }
 
 SceneStore::NameLock::~NameLock() {
@@ -294,7 +295,9 @@ void SceneStore::finish_publishing(const std::string& name, uint64_t size,
 
 void SceneStore::check_part(const std::string& name, uint64_t size) {
   if (!files_.exists(part_path(name)))
-    throw Error(ErrorCode::kCorrupt, part_path(name) + ": the file was removed during the upload");
+    throw Error(ErrorCode::kCorrupt, part_path(name) +
+                                         ": the file was removed during the upload: expected it to "
+                                         "remain; upload the scene again");
   const uint64_t found = files_.open_read(part_path(name))->size();
   if (found != size)
     throw Error(ErrorCode::kCorrupt, part_path(name) + " has " + std::to_string(found) +

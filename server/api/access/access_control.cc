@@ -99,7 +99,9 @@ Caller AccessControl::identify(const Request& request) {
 
 Caller AccessControl::admit(Request& request, Role needed) {
   if (!is_loopback(request.peer) && !requests_.take(client_of(request.peer), wall_seconds()))
-    throw too_many("too many requests from this client: see max_requests_per_s");
+    throw too_many(
+        "too many requests from this client: expected at most transfers.max_requests_per_s of the "
+        "configuration per second");
   if (!tokens_) {
     check_site(request);
     request.caller = "local";

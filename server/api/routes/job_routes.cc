@@ -132,7 +132,10 @@ class Plan {
 Problem problem_of(const Failure& failure) {
   const auto code = error_code_named(failure.code);
   if (code && *code != ErrorCode::kCanceled) return problem(*code, failure.text);
-  return Problem(500, "internal", "the plan failed");
+  return Problem(500, "internal",
+                 "the plan failed with the error " + failure.code +
+                     ": expected an estimate; send the request again, and report the defect if it "
+                     "fails again");
 }
 
 // Returns the estimate of a job without queuing it: runs the plan in a child process. Throws
@@ -164,16 +167,20 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
       },
       [&] { return killed = killed || must_stop(); });
   child.wait();
-  if (killed && context.draining) throw busy("the service is stopping");
+  if (killed && context.draining)
+    throw busy("the service is stopping: expected a request after its restart");
   if (killed && wall_seconds() <= deadline)
-    throw bad_request("the client has closed the connection");
+    throw bad_request("the client has closed the connection: expected it to wait for the estimate");
   if (killed)
     throw busy("the plan took longer than its limit of " +
-                   duration_text(context.config.jobs.plan_timeout_s),
+                   duration_text(context.config.jobs.plan_timeout_s) +
+                   ": expected a smaller scene, or a larger jobs.plan_timeout_s",
                60);
   if (failure) throw problem_of(*failure);
   if (estimate.empty())
-    throw Problem(500, "internal", "the process that makes the plan ended without a result");
+    throw Problem(500, "internal",
+                  "the process that makes the plan ended without a result: send the request again, "
+                  "and report the defect if it fails again");
   return json_response(200, printable_json_text(estimate));
 }
 
@@ -194,7 +201,7 @@ Response post_job(Context& context, Call& call) {
   const JobRequest request = read_job_request(context, call);
   const IdempotencyKey key = key_of(call.request, request);
   if (dry == "true") return dry_run(context, call, request);
-  if (context.draining) throw busy("the service is stopping");
+  if (context.draining) throw busy("the service is stopping: expected a request after its restart");
   std::lock_guard lock(context.scene_mutex);
   if (const auto known = context.queue.find_by_key(key)) return accepted(context, *known, true);
   context.tasks.make(request, JobTask::Kind::kBuild);  // throws if the requested build is invalid

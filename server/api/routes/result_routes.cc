@@ -21,7 +21,8 @@ const Parameter kMaxLogBytes = {"max_bytes", "maximum size of the answer", "",
 Job finished_job(Context& context, Call& call) {
   Job job = find_job(context.queue, call.names[0]);
   if (job.state != JobState::kSucceeded) {
-    Problem problem = not_found("the job has no result: expected a succeeded job");
+    Problem problem = not_found(std::string("the job is ") + state_name(job.state) +
+                                " and has no result: expected a succeeded job");
     problem.state = state_name(job.state);
     throw problem;
   }
@@ -85,7 +86,10 @@ Response answer_with_file(const Request& request, std::shared_ptr<ReadableFile> 
   }
   const RangeAnswer requested = requested_ranges(request, tag, size);
   if (requested.kind == RangeAnswer::Kind::kUnsatisfiable) {
-    Problem problem(416, "range_not_satisfiable", "no requested range is within the file");
+    Problem problem(416, "range_not_satisfiable",
+                    "the range '" + printable(request.header("Range")) +
+                        "' is not within the file: expected bytes from 0 to " +
+                        std::to_string(size - 1));
     problem.headers.emplace("Content-Range", "bytes */" + std::to_string(size));
     throw problem;
   }
@@ -147,8 +151,10 @@ Response get_preview(Context& context, Call& call) {
   const Job job = finished_job(context, call);
   const std::string path = context.dispatcher.folder(job.id).preview();
   if (job.preview != Preview::kReady || !context.files.exists(path))
-    throw not_found(job.preview == Preview::kFailed ? "the preview could not be rendered"
-                                                    : "the preview is not rendered yet");
+    throw not_found(
+        job.preview == Preview::kFailed
+            ? "the preview could not be rendered: expected a file that voxdag render can render"
+            : "the preview is not rendered yet: expected a request later");
   return stream_file(context, path, make_response(200, "image/png", "private, max-age=3600"));
 }
 
@@ -171,7 +177,9 @@ Response get_log(Context& context, Call& call) {
 Response get_subvolumes(Context& context, Call& call) {
   const Job job = find_job(context.queue, call.names[0]);
   const std::string path = context.dispatcher.folder(job.id).subvolumes();
-  if (!context.files.exists(path)) throw not_found("the subvolumes of the job are not planned yet");
+  if (!context.files.exists(path))
+    throw not_found(
+        "the subvolumes of the job are not planned yet: expected a job that has read its scene");
   return stream_file(context, path, json_response(200, ""));
 }
 

@@ -65,7 +65,9 @@ Response scene_response(Context& context, int status, const std::string& name) {
 
 void check_unused(Context& context, const std::string& name) {
   if (context.queue.uses_scene(name))
-    throw conflict("the scene is in use by a job that has not ended");
+    throw conflict("the scene '" + name +
+                   "' is in use by a job that has not ended: expected an unused scene; cancel the "
+                   "job or wait for it");
 }
 
 // The part of a scene in the body of a request: the bytes from `first` to `end`, exclusive.
@@ -234,7 +236,9 @@ Response delete_scene(Context& context, Call& call) {
   const std::string name = checked_name(call);
   std::lock_guard lock(context.scene_mutex);
   check_unused(context, name);
-  if (context.planned_scenes.contains(name)) throw conflict("the scene is in use by a dry run");
+  if (context.planned_scenes.contains(name))
+    throw conflict("the scene '" + name +
+                   "' is in use by a dry run: expected an unused scene; wait for the dry run");
   const bool found = context.disk.with_ballast([&] { return context.scenes.remove(name); });
   if (!found)
     throw not_found("no such scene: '" + name + "': expected the name of an uploaded scene");

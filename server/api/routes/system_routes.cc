@@ -7,6 +7,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "core/base/text.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
@@ -44,14 +45,20 @@ void expect_ready(const char* failure, const Check& check) {
 }
 
 Response get_ready(Context& context, WriteProbe& probe) {
-  if (context.draining) throw busy("the service is stopping");
+  if (context.draining) throw busy("the service is stopping: expected a request after its restart");
   expect_ready("the free space of the data folder's disk cannot be determined", [&] {
-    if (context.disk.is_low()) throw busy("the disk has less free space than min_free_disk", 60);
+    if (context.disk.is_low())
+      throw busy("the disk has " + size_text(context.disk.free()) +
+                     " free: expected at least jobs.min_free_disk of the configuration",
+                 60);
   });
-  expect_ready("queue.db in the data folder was removed or replaced while the service used it",
-               [&] { context.queue.check_file(); });
   expect_ready(
-      "scenes/scenes.db in the data folder was removed or replaced while the service used it",
+      "queue.db in the data folder was removed or replaced while the service used it: restore it "
+      "and restart the service",
+      [&] { context.queue.check_file(); });
+  expect_ready(
+      "scenes/scenes.db in the data folder was removed or replaced while the service used it: "
+      "restore it and restart the service",
       [&] { context.scenes.check_file(); });
   expect_ready("the queue's database, queue.db in the data folder, cannot be read",
                [&] { context.queue.counts(); });

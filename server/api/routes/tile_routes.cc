@@ -182,7 +182,7 @@ Response get_manifest(const TileSource& dag, const CancelToken& stopping) {
     return json_response(200, dag.manifest(stopping));
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCanceled) throw;
-    throw busy("the service is stopping");
+    throw busy("the service is stopping: expected a request after its restart");
   }
 }
 
@@ -203,7 +203,8 @@ template <class Addresses, class Make>
 std::string batch_of(const Call& call, const Addresses& addresses, const Make& make) {
   std::string bytes;
   for (const auto& address : addresses) {
-    if (call.request.client_has_left()) throw bad_request("the client has closed the connection");
+    if (call.request.client_has_left())
+      throw bad_request("the client has closed the connection: expected it to wait for the tiles");
     const std::vector<uint32_t> words = make(address);
     append_words({static_cast<uint32_t>(words.size() * sizeof(uint32_t))}, bytes);
     append_words(words, bytes);
@@ -247,7 +248,8 @@ void hold_permit(std::shared_ptr<void> permit, Response& response) {
 TileAccess open_result(Context& context, const Call& call) {
   const Job job = find_job(context.queue, call.names[0]);
   if (job.state != JobState::kSucceeded) {
-    Problem problem = conflict("the job has no result yet: expected a succeeded job");
+    Problem problem = conflict(std::string("the job is ") + state_name(job.state) +
+                               " and has no result: expected a succeeded job");
     problem.state = state_name(job.state);
     throw problem;
   }
@@ -269,7 +271,8 @@ auto with_unfinished_job(Context& context, const Call& call, const Make& make) {
     // its store, perhaps during this read.
     const bool is_read = find_job(context.queue, call.names[0]).state != JobState::kSucceeded;
     if (is_read && !error.is_corruption() && error.code() != ErrorCode::kInvalidInput) throw;
-    throw not_found("the subvolumes of the job are not known yet");
+    throw not_found(
+        "the subvolumes of the job are not known yet: expected a job that has read its scene");
   }
 }
 

@@ -90,7 +90,8 @@ Response Router::route(Request& request, AccessControl& access) const {
   }
   access.admit(request, Role::kNone);
   if (allowed.empty())
-    throw not_found("no such resource: '" + printable(request.target.path) + "'");
+    throw not_found("no such resource: '" + printable(request.target.path) +
+                    "': expected a path of docs/api.md");
   Problem problem(405, "method_not_allowed",
                   "the method is " + request.method + ": expected one of " + allowed);
   problem.headers.emplace("Allow", allowed);
@@ -135,8 +136,9 @@ std::string read_json_body(Request& request, uint64_t max_bytes) {
                            "application/json"))
     throw Problem(415, "unsupported_media_type",
                   "Content-Type is '" + printable(type) + "': expected application/json");
-  const Problem too_large(413, "too_large",
-                          "the body is larger than " + std::to_string(max_bytes) + " bytes");
+  const Problem too_large(
+      413, "too_large",
+      "the body is too large: expected at most " + std::to_string(max_bytes) + " bytes");
   if (request.content_length.value_or(0) > max_bytes) throw too_large;
   std::string body;
   const BodyEnd end = request.read_short_body([&](std::string_view piece) {
@@ -144,9 +146,14 @@ std::string read_json_body(Request& request, uint64_t max_bytes) {
     return body.size() <= max_bytes;
   });
   if (end == BodyEnd::kStopped) throw too_large;
-  if (end == BodyEnd::kTooSlow) throw Problem(408, "timeout", "the body was sent too slowly");
+  if (end == BodyEnd::kTooSlow)
+    throw Problem(408, "timeout",
+                  "the body was sent too slowly: expected at least connections.min_bytes_per_s of "
+                  "the configuration");
   if (end == BodyEnd::kBroken)
-    throw bad_request("the connection ended within the body, or the body's chunks are malformed");
+    throw bad_request(
+        "the connection ended within the body, or the body's chunks are malformed: expected "
+        "a complete body");
   return body;
 }
 

@@ -82,7 +82,9 @@ TlsContext::TlsContext(const std::string& certificate_file, const std::string& k
     ERR_clear_error();
     throw Error(ErrorCode::kInvalidInput, what);
   };
-  if (!context_) fail("TLS: cannot initialize OpenSSL");
+  if (!context_)
+    fail("TLS: OpenSSL cannot be initialized (" + openssl_reason() +
+         "): expected a working libssl");
   // If a client has closed its connection, OpenSSL's next write raises SIGPIPE. The signal would
   // end the process if it were not ignored.
   std::signal(SIGPIPE, SIG_IGN);
@@ -97,14 +99,17 @@ TlsContext::TlsContext(const std::string& certificate_file, const std::string& k
     fail("TLS key " + key_file + " cannot be loaded (" + openssl_reason() +
          "): expected a readable PEM file");
   if (SSL_CTX_check_private_key(context_.get()) != 1)
-    fail("TLS key " + key_file + " does not belong to the certificate " + certificate_file);
+    fail("TLS key " + key_file + " does not belong to the certificate " + certificate_file +
+         ": expected the private key of this certificate");
 }
 
 TlsSession TlsContext::session(int socket) const {
   TlsSession session;
   session.ssl_.reset(SSL_new(context_.get()));
   if (!session.ssl_ || SSL_set_fd(session.ssl_.get(), socket) != 1)
-    throw Error(ErrorCode::kOutOfMemory, "TLS: no memory for another session");
+    throw Error(
+        ErrorCode::kOutOfMemory,
+        "out of memory: OpenSSL cannot open another TLS session, expected more free memory");
   return session;
 }
 

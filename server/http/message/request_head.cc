@@ -61,10 +61,11 @@ void parse_field(std::string_view line, HeaderMap& headers) {
   const std::string_view value = trimmed(line.substr(colon + 1));
   if (std::ranges::any_of(value, [](char c) { return is_control(c) && c != '\t'; }))
     throw bad_request("the header field " + std::string(line.substr(0, colon)) +
-                      " has a control character");
+                      " has a control character: expected none but tabs");
   if (headers.size() == kMaxFields)
-    throw Problem(431, "headers_too_large",
-                  "the request has more than " + std::to_string(kMaxFields) + " header fields");
+    throw Problem(
+        431, "headers_too_large",
+        "the request has too many header fields: expected at most " + std::to_string(kMaxFields));
   headers.emplace(line.substr(0, colon), value);
 }
 

@@ -17,7 +17,8 @@ std::string decode(std::string text, bool plus_is_space) {
                       "': expected % and two hex digits");
   for (const char c : *out)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-      throw bad_request("the request target has a control character in '" + printable(text) + "'");
+      throw bad_request("the request target has a control character in '" + printable(text) +
+                        "': expected none");
   return std::move(*out);
 }
 

@@ -149,9 +149,13 @@ int run_job(FileSystem& files, const std::string& path, const CancelToken& cance
   } catch (const RequestError& error) {
     return fail(ErrorCode::kInvalidInput, error.message());
   } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
+    return fail(ErrorCode::kOutOfMemory,
+                "out of memory: the system refused an allocation, expected more free memory on "
+                "this machine");
   } catch (const std::system_error&) {
-    return fail(ErrorCode::kOutOfMemory, "the system has no threads or memory left");
+    return fail(ErrorCode::kOutOfMemory,
+                "the system has no threads or memory left for the job: expected fewer or smaller "
+                "concurrent jobs");
   } catch (const std::exception&) {
     // The exception's text is not sent, because messages of libraries may contain paths.
     pipe.fail("internal",

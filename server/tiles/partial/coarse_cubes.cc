@@ -35,7 +35,8 @@ class ArtifactRows {
       throw Error(ErrorCode::kCorrupt,
                   "an artifact does not contain its subvolume of level " +
                       std::to_string(cube.level) + " at " + std::to_string(cube.position[0]) + " " +
-                      std::to_string(cube.position[1]) + " " + std::to_string(cube.position[2]));
+                      std::to_string(cube.position[1]) + " " + std::to_string(cube.position[2]) +
+                      ": expected its root");
     const uint32_t bricks = reader_.shape().brick_level();
     if (cube.level == bricks) return brick(root->index);
     const Frame& frame = frame_of(cube.level, root->index);
@@ -60,7 +61,9 @@ class ArtifactRows {
     const ArtifactLevel* const info = reader_.level(level);
     if (!info || row >= info->rows)
       throw Error(ErrorCode::kCorrupt, "an artifact has no row " + std::to_string(row) +
-                                           " in its level " + std::to_string(level));
+                                           " in its level " + std::to_string(level) +
+                                           ": expected less than " +
+                                           std::to_string(info ? info->rows : 0) + " rows");
     Held& held = held_[level];
     if (held.index != row / kFrameRows) {
       held.index.reset();
@@ -88,7 +91,8 @@ class ArtifactRows {
 void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, double max_read_s) {
   const std::string store_path = WorkFolder::store_path(work_folder);
   if (!files.exists(store_path))
-    throw Error(ErrorCode::kNotFound, work_folder + " has no job store");
+    throw Error(ErrorCode::kNotFound,
+                work_folder + " has no job.db: expected the work folder of a job that has started");
   std::vector<StoredSubvolume> leaves = JobStore(store_path, JobStore::Access::kRead).leaves();
   total_ = leaves.size();
   std::erase_if(leaves, [](const StoredSubvolume& s) { return s.state != SubvolumeState::kBuilt; });

@@ -51,7 +51,8 @@ uint64_t PartialDag::add_parts(const Cube& cube, const Parts& parts) {
                                            std::to_string(part->cube.position[0]) + " " +
                                            std::to_string(part->cube.position[1]) + " " +
                                            std::to_string(part->cube.position[2]) +
-                                           " overlaps another one, or is outside the grid");
+                                           " overlaps another one, or is outside the grid: "
+                                           "expected separate subvolumes in the grid");
   if (parts.size() == 1 && parts[0]->cube.level == cube.level)
     return add_coarse(cube.level, parts[0]->brick);
   std::vector<uint64_t> children;
@@ -116,8 +117,10 @@ uint64_t PartialDag::add_words(uint32_t level, std::vector<uint32_t> words) {
   std::vector<uint32_t>& all = levels_[level];
   const uint64_t offset = all.size();
   if (offset + words.size() > kMaxWords)
-    throw Error(ErrorCode::kLimit,
-                "the built subvolumes have more nodes than pointers can address");
+    throw Error(ErrorCode::kLimit, "the nodes of the built subvolumes have " +
+                                       std::to_string(offset + words.size()) +
+                                       " words: expected at most " + std::to_string(kMaxWords) +
+                                       ", the limit of a preview");
   // The words are appended before their offset is recorded in known_. So every recorded offset has
   // its words, even if a later step throws.
   all.insert(all.end(), words.begin(), words.end());

@@ -24,8 +24,9 @@ std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, uint64_t
     const auto is_outside = [&](uint64_t at) { return at >= resolution || at % edge != 0; };
     if (!std::has_single_bit(edge) || edge < uint64_t{kBrickEdge} || edge > resolution ||
         is_outside(entry.at(0)) || is_outside(entry.at(1)) || is_outside(entry.at(2)))
-      throw Error(ErrorCode::kCorrupt,
-                  "the list of the subvolumes has an invalid cube: " + entry.dump());
+      throw Error(ErrorCode::kCorrupt, "the list of the subvolumes has the invalid cube " +
+                                           entry.dump() +
+                                           ": expected a cube of the octree, [X,Y,Z,EDGE,BUILT]");
     Cube cube{levels - levels_of_resolution(edge), {}};
     for (size_t axis = 0; axis < 3; ++axis)
       cube.position[axis] = static_cast<uint32_t>(entry.at(axis).get<uint64_t>() / edge);
@@ -55,7 +56,8 @@ std::string describe_cubes(const CoarseCubes& cubes, uint64_t resolution) {
 
 nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, uint64_t resolution) {
   if (!files.exists(folder.subvolumes()))
-    throw Error(ErrorCode::kNotFound, "the subvolumes are not planned yet");
+    throw Error(ErrorCode::kNotFound,
+                "the subvolumes are not planned yet: expected a job that has read its scene");
   const uint32_t levels = levels_of_resolution(resolution);
   try {
     const auto plan =

@@ -122,8 +122,10 @@ Answer PartialView::read(const JobFolder& folder, Answer (PublishedAnswers::*ans
 void PartialView::refresh(const std::string& work_folder) {
   if (!limiter_.may_read()) {
     if (has_failed_)
-      throw Error(ErrorCode::kInvalidInput,
-                  work_folder + ": the last read failed, and the next one is not due yet");
+      throw Error(
+          ErrorCode::kInvalidInput,
+          work_folder +
+              ": the last read failed, and the next one is not due yet: expected a request later");
     return;
   }
   const ReadLimiter::Charge charge(limiter_);
@@ -132,7 +134,8 @@ void PartialView::refresh(const std::string& work_folder) {
   try {
     cubes_.refresh(files_, work_folder, kMaxReadingS);
     if (cubes_.total() == 0)
-      throw Error(ErrorCode::kNotFound, "the subvolumes are not planned yet");
+      throw Error(ErrorCode::kNotFound,
+                  "the subvolumes are not planned yet: expected a job that has read its scene");
   } catch (const Error& error) {
     // The job's process may have removed the folder while it was being read.
     if (error.code() != ErrorCode::kNotFound && files_.exists(WorkFolder::store_path(work_folder)))

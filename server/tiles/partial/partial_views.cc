@@ -79,14 +79,18 @@ std::shared_ptr<PartialView> PartialViews::view_of(const std::string& job,
   }
   // Waiting jobs have no folder and need no entry.
   if (!files_.exists(WorkFolder::store_path(folder.work())))
-    throw Error(ErrorCode::kNotFound, folder.work() + " has no job store");
+    throw Error(
+        ErrorCode::kNotFound,
+        folder.work() + " has no job.db: expected the work folder of a job that has started");
   const std::lock_guard lock(mutex_);
   if (auto view = find(job)) return view;
   if (entries_.size() == max_jobs_) {
     // A view that was requested a moment ago keeps its entry. If it were replaced, the next
     // requests of its viewers would in turn replace the entry of another job.
     if (wall_seconds() - entries_.back().used_s < kMinIdleS) {
-      RequestError busy(RequestError::Kind::kBusy, "too many running jobs are being viewed");
+      RequestError busy(RequestError::Kind::kBusy,
+                        "too many running jobs are being viewed: expected a request after another "
+                        "viewer has closed");
       busy.retry_after_s = kMinIdleS;
       throw busy;
     }
