@@ -245,7 +245,8 @@ TEST(ConfinedProcess, FailuresAreErrors) {
     std::raise(SIGSEGV);
   });
   EXPECT_EQ(crash.code(), ErrorCode::kInvalidInput);
-  EXPECT_THAT(crash.message(), HasSubstr("x: the process crashed (Segmentation fault)"));
+  EXPECT_THAT(crash.message(),
+              HasSubstr("x: the process that converts the file crashed (Segmentation fault)"));
   EXPECT_EQ(error_of([](const SendMessage&) { std::raise(SIGKILL); }).code(),
             ErrorCode::kOutOfMemory);
   EXPECT_EQ(error_of([](const SendMessage&) { throw std::bad_alloc(); }).code(),
