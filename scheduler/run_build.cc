@@ -263,9 +263,10 @@ void write_output(BuildJob& job, SubvolumeBuilder& builder) {
   bool has_restarted = false;
   for (int run = 1; !merge_and_publish(job, has_restarted); ++run) {
     if (run == kMaxMerges)
-      throw Error(ErrorCode::kCorrupt, job.work.path() +
-                                           ": artifacts are damaged repeatedly: expected a disk "
-                                           "that returns the written data");
+      throw Error(ErrorCode::kCorrupt,
+                  job.work.path() + ": files of built subvolumes were damaged " +
+                      std::to_string(kMaxMerges) +
+                      " times in a row: expected a disk that returns the written data");
     if (!job.planned().empty()) build_artifacts(job, builder);
   }
 }

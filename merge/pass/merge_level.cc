@@ -201,10 +201,11 @@ void check_group_is_large(const LevelTask& task, uint64_t hash) {
     const FrameSpan frames = run->frames_within({hash, hash});
     if (frames.end - frames.begin > 2) return;
   }
-  throw Error(ErrorCode::kOutOfMemory, "out of memory: level " + std::to_string(task.level) +
-                                           " of " + std::to_string(task.runs.size()) +
-                                           " runs does not fit the merge's memory: expected more "
-                                           "memory (--memory)");
+  throw Error(ErrorCode::kOutOfMemory, "out of memory: merging level " +
+                                           std::to_string(task.level) + " of " +
+                                           std::to_string(task.runs.size()) +
+                                           " inputs takes more than the merge's share of memory: "
+                                           "expected more memory (--memory)");
 }
 
 }  // namespace

@@ -366,7 +366,7 @@ class File {
     const unsigned char* const page = data();
     static const unsigned char kMagic[8] = {0x89, 'V', 'D', 'A', 'G', '\n', 0x1a, '\n'};
     if (bytes_->size() < sizeof(kMagic) || std::memcmp(page, kMagic, sizeof(kMagic)) != 0)
-      corrupt("not a voxdag file: expected the signature of a .vdag file at its begin");
+      corrupt("not a voxdag file: expected the first bytes of a .vdag file");
     if (bytes_->size() < kPageBytes) corrupt("the header is incomplete: expected 4096 bytes");
     version_ = get<uint32_t>(page + 8);
     if (version_ != 1 && version_ != 2)

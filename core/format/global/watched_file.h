@@ -20,7 +20,9 @@ class WatchedFile {
   void check_readable() const {
     if (mapping_.is_damaged())
       throw Error(ErrorCode::kIo,
-                  file_.path() + ": it became shorter, or its disk failed, while it was read");
+                  file_.path() +
+                      ": it became shorter, or its disk failed, while it was read: expected a file "
+                      "that does not change");
   }
 
   // Returns the result of work(). If work() throws an Error, pages of zeros may be the cause. So

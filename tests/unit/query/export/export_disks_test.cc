@@ -173,7 +173,9 @@ TEST_P(ExportTruncated, IsAnError) {
   const Error error = error_of([&] { run(files, "out"); });
   EXPECT_EQ(error.code(), ErrorCode::kIo);
   EXPECT_EQ(error.message(),
-            folder_.file("a.vdag") + ": it became shorter, or its disk failed, while it was read");
+            folder_.file("a.vdag") +
+                ": it became shorter, or its disk failed, while it was read: expected a "
+                "file that does not change");
   expect_only_the_input();
 }
 
