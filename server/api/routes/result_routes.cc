@@ -4,6 +4,7 @@
 #include "core/base/error.h"
 #include "core/base/text/printable.h"
 #include "core/io/random_id.h"
+#include "scene/messages.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
