@@ -19,6 +19,8 @@
 
 namespace voxdag {
 
+constexpr uint64_t kMiB = uint64_t{1} << 20;
+
 struct MergeOptions {
   uint64_t budget_bytes = uint64_t{1} << 30;
   unsigned threads = 2;

@@ -8,8 +8,6 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kMiB = uint64_t{1} << 20;
-
 // Hash partitions and spilled position maps do not change the bytes of the file.
 TEST(MergeMemory, HashPartitionsGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(1, 256);

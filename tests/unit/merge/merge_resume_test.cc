@@ -14,8 +14,6 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kMiB = uint64_t{1} << 20;
-
 void change_byte(const std::string& path, uint64_t at, char change) {
   std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
   file.seekg(static_cast<std::streamoff>(at));

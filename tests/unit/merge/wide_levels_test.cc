@@ -11,8 +11,6 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kMiB = uint64_t{1} << 20;
-
 // The parameter is the number of words above which a level is wide. With the smaller value, all
 // levels except the highest ones are wide; with the larger value, only the bricks.
 class WideLevels : public testing::TestWithParam<uint64_t> {

@@ -11,7 +11,7 @@
 namespace voxdag::test {
 namespace {
 
-const Corners kLower = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
+const Corners kLowHalf = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
 
 // The triangle (0 0 0) (1 0 0) (0 1 0), as most programs write it.
 std::string plain_triangle(PlyFormat format, const std::string& line_end = "\n") {
@@ -28,7 +28,8 @@ std::string plain_triangle(PlyFormat format, const std::string& line_end = "\n")
 TEST(Ply, TriangleInEveryFormatAndLineEnding) {
   for (const PlyFormat format : kFormats)
     for (const char* line_end : {"\n", "\r\n", "\r"})
-      EXPECT_EQ(triangles_of_file(plain_triangle(format, line_end)), std::vector<Corners>{kLower});
+      EXPECT_EQ(triangles_of_file(plain_triangle(format, line_end)),
+                std::vector<Corners>{kLowHalf});
 }
 
 // Properties may have another order and other types. Other elements may come before and between the
@@ -165,45 +166,48 @@ std::string colored_triangle(PlyFormat format, const std::string& type, bool has
 }
 
 // Returns the linear light of an sRGB value, from 0 to 65535, rounded to nearest.
-uint16_t light(double v) {
+uint16_t linear_light(double v) {
   const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
   return static_cast<uint16_t>(std::lround(linear * 65535));
 }
 
 TEST(Ply, ColorsOfVertices) {
-  using Color = std::array<uint16_t, 4>;
+  using Rgba = std::array<uint16_t, 4>;
   const auto colors_of = [](const std::string& file) {
     OpenScene open(file);
-    EXPECT_EQ(open.triangles(), std::vector<Corners>{kLower});
+    EXPECT_EQ(open.triangles(), std::vector<Corners>{kLowHalf});
     const auto all = surfaces_of(*open.source);
     EXPECT_EQ(all.at(0).position.v[2][1], 1);
     EXPECT_EQ(all.at(0).material, 0u);
-    std::array<Color, 3> colors;
+    std::array<Rgba, 3> colors;
     for (size_t k = 0; k < 3; ++k) colors[k] = all.at(0).corners[k].color;
     return colors;
   };
   for (const PlyFormat format : kFormats) {
     EXPECT_EQ(colors_of(colored_triangle<uint8_t>(format, "uchar", true,
                                                   {0, 255, 10, 128, 1, 2, 3, 0, 188, 11, 12, 255})),
-              (std::array{Color{0, 65535, light(10 / 255.0), 128 * 257},
-                          Color{light(1 / 255.0), light(2 / 255.0), light(3 / 255.0), 0},
-                          Color{light(188 / 255.0), light(11 / 255.0), light(12 / 255.0), 65535}}));
+              (std::array{Rgba{0, 65535, linear_light(10 / 255.0), 128 * 257},
+                          Rgba{linear_light(1 / 255.0), linear_light(2 / 255.0),
+                               linear_light(3 / 255.0), 0},
+                          Rgba{linear_light(188 / 255.0), linear_light(11 / 255.0),
+                               linear_light(12 / 255.0), 65535}}));
     EXPECT_EQ(colors_of(colored_triangle<uint16_t>(format, "ushort", false,
                                                    {0, 65535, 300, 1, 2, 3, 40000, 255, 256}))[2],
-              (Color{light(40000 / 65535.0), light(255 / 65535.0), light(256 / 65535.0), 65535}));
+              (Rgba{linear_light(40000 / 65535.0), linear_light(255 / 65535.0),
+                    linear_light(256 / 65535.0), 65535}));
     EXPECT_EQ(colors_of(colored_triangle<float>(format, "float", true,
                                                 {0, 1, 0.5, 0.25, -1, 1.5, 0, 2, 1, 1, 1, 1})),
-              (std::array{Color{0, 65535, light(0.5), 16384}, Color{0, 65535, 0, 65535},
-                          Color{65535, 65535, 65535, 65535}}));
+              (std::array{Rgba{0, 65535, linear_light(0.5), 16384}, Rgba{0, 65535, 0, 65535},
+                          Rgba{65535, 65535, 65535, 65535}}));
     EXPECT_EQ(colors_of(colored_triangle<int32_t>(format, "int", false,
                                                   {300, -5, 77, 0, 0, 0, 0, 0, 0}))[0],
-              (Color{65535, 0, light(77 / 255.0), 65535}));
+              (Rgba{65535, 0, linear_light(77 / 255.0), 65535}));
   }
   // Without blue there are no colors.
   std::string file =
       colored_triangle<uint8_t>(PlyFormat::kLittle, "uchar", false, {0, 0, 0, 0, 0, 0, 0, 0, 0});
   file.replace(file.find("blue"), 4, "glue");
-  EXPECT_EQ(colors_of(file)[1], (Color{65535, 65535, 65535, 65535}));
+  EXPECT_EQ(colors_of(file)[1], (Rgba{65535, 65535, 65535, 65535}));
 }
 
 // Colors take all 256 values. The file has more vertices than the cache can hold, so blocks replace
@@ -233,9 +237,10 @@ TEST(Ply, ColorsOfManyVertices) {
   for (uint32_t f = 0; f < 400; ++f)
     for (uint32_t k = 0; k < 3; ++k) {
       const uint32_t v = vertex(f, k);
-      ASSERT_EQ(all[f].corners[k].color,
-                (std::array<uint16_t, 4>{light(v % 256 / 255.0), light(v / 256 / 255.0),
-                                         light(v % 251 / 255.0), 65535}));
+      ASSERT_EQ(
+          all[f].corners[k].color,
+          (std::array<uint16_t, 4>{linear_light(v % 256 / 255.0), linear_light(v / 256 / 255.0),
+                                   linear_light(v % 251 / 255.0), 65535}));
     }
 }
 
@@ -248,7 +253,7 @@ TEST(Ply, FilesOfBothFormatsAreOneScene) {
   MemoryBudget budget(uint64_t{64} << 20);
   CancelToken cancel;
   const auto scene = open_scene(files, {"a", "b", "b", "c"}, {}, budget, cancel);
-  EXPECT_EQ(triangles_of(*scene), (std::vector<Corners>{kLower, kLower, kLower, kLower}));
+  EXPECT_EQ(triangles_of(*scene), (std::vector<Corners>{kLowHalf, kLowHalf, kLowHalf, kLowHalf}));
   ASSERT_EQ(scene->files().size(), 4u);
   EXPECT_EQ(scene->files()[3].path, "c");
 }
@@ -387,7 +392,7 @@ TEST(Ply, WindowsAreChargedToTheBudget) {
   const std::string file = plain_triangle(PlyFormat::kLittle);
   EXPECT_THROW(OpenScene(file, {}, 64 << 10), Error);
   OpenScene open(file, {}, 2 << 20);
-  EXPECT_EQ(open.triangles(), std::vector<Corners>{kLower});
+  EXPECT_EQ(open.triangles(), std::vector<Corners>{kLowHalf});
 }
 
 }  // namespace

@@ -7,13 +7,13 @@
 namespace voxdag::test {
 namespace {
 
-const std::string kXyz = "property float x\nproperty float y\nproperty float z\n";
-const std::string kList = "property list uchar int vertex_indices\n";
+const std::string kXyzLines = "property float x\nproperty float y\nproperty float z\n";
+const std::string kListLine = "property list uchar int vertex_indices\n";
 const std::string kRows = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-const std::vector<Corners> kLower = {{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}};
+const std::vector<Corners> kOnlyLower = {{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}};
 
 std::string ascii_header(const std::string& faces) {
-  return "ply\nformat ascii 1.0\nelement vertex 3\n" + kXyz + "element face 1\n" + faces +
+  return "ply\nformat ascii 1.0\nelement vertex 3\n" + kXyzLines + "element face 1\n" + faces +
          "end_header\n";
 }
 
@@ -112,7 +112,7 @@ TEST(PlyVariants, IndicesOfStripsOutOfRange) {
 
 TEST(PlyVariants, ConcavePolygons) {
   const std::string file =
-      "ply\nformat ascii 1.0\nelement face 3\n" + kList + "element vertex 5\n" + kXyz +
+      "ply\nformat ascii 1.0\nelement face 3\n" + kListLine + "element vertex 5\n" + kXyzLines +
       "end_header\n4 0 1 2 3\n4 3 0 1 2\n3 0 1 4\n0 0 0\n2 1 5\n0 2 0\n1 1 2.5\n9 9 9\n";
   OpenScene open(file);
   const std::array<double, 3> a{0, 0, 0}, b{2, 1, 5}, c{0, 2, 0}, d{1, 1, 2.5}, e{9, 9, 9};
@@ -132,8 +132,8 @@ TEST(PlyVariants, ConcavePolygons) {
 }
 
 TEST(PlyVariants, CrossedPolygonsAreCounted) {
-  OpenScene open("ply\nformat ascii 1.0\nelement vertex 4\n" + kXyz + "element face 2\n" + kList +
-                 "end_header\n0 0 0\n1 1 0\n1 0 0\n0 1 0\n3 0 1 2\n4 0 1 2 3\n");
+  OpenScene open("ply\nformat ascii 1.0\nelement vertex 4\n" + kXyzLines + "element face 2\n" +
+                 kListLine + "end_header\n0 0 0\n1 1 0\n1 0 0\n0 1 0\n3 0 1 2\n4 0 1 2 3\n");
   EXPECT_EQ(open.triangles().size(), 3u);
   ASSERT_EQ(open.source->warnings().size(), 1u);
   EXPECT_NE(open.source->warnings()[0].text().find("face 1: its edges cross"), std::string::npos);
@@ -167,7 +167,7 @@ TEST(PlyVariants, ListsOfVertices) {
 
 // A header may have comments, blank lines, unknown lines, and keywords in upper or lower case.
 TEST(PlyVariants, TolerantHeaders) {
-  const std::string plain = ascii_header(kList) + kRows;
+  const std::string plain = ascii_header(kListLine) + kRows;
   const std::string formats = "format ascii 1.0";
   for (const std::string& file : {
            replaced(plain, formats, "comment first\nobj_info a b\n" + formats),
@@ -187,9 +187,9 @@ TEST(PlyVariants, TolerantHeaders) {
                     "obj_info x\nelement edge 0\nproperty int a\nelement face"),
            replaced(plain, formats, "element empty 0\n" + formats),
        })
-    EXPECT_EQ(triangles_of_file(file), kLower) << file;
+    EXPECT_EQ(triangles_of_file(file), kOnlyLower) << file;
   OpenScene unknown(replaced(plain, "element vertex", "Made by hand\nand more\nelement vertex"));
-  EXPECT_EQ(unknown.triangles(), kLower);
+  EXPECT_EQ(unknown.triangles(), kOnlyLower);
   ASSERT_EQ(unknown.source->warnings().size(), 1u);
   EXPECT_NE(unknown.source->warnings()[0].text().find("line 3 of the header: begins with Made"),
             std::string::npos);
@@ -199,18 +199,18 @@ TEST(PlyVariants, TolerantHeaders) {
 
 // Lines of one header end in different ways. Binary data may begin with a byte that is a line end.
 TEST(PlyVariants, MixedLineEnds) {
-  const std::string text = ascii_header(kList) + kRows;
+  const std::string text = ascii_header(kListLine) + kRows;
   for (const char* line :
        {"ply", "format ascii 1.0", "element face 1", "end_header", "0 0 0", "3 0 1 2"})
     for (const char* line_end : {"\r\n", "\r"})
       EXPECT_EQ(
           triangles_of_file(replaced(text, std::string(line) + "\n", line + std::string(line_end))),
-          kLower)
+          kOnlyLower)
           << line;
   std::string header =
       "ply\nformat binary_little_endian 1.0\nelement vertex 3\n"
       "property char x\nproperty char y\nproperty char z\nelement face 1\n" +
-      kList + "end_header";
+      kListLine + "end_header";
   const std::string data("\n\r\n\r\r\n\n\n\r\3\0\0\0\0\1\0\0\0\2\0\0\0", 22);
   const std::vector<Corners> expected = {{{{10, 13, 10}, {13, 13, 10}, {10, 10, 13}}}};
   EXPECT_EQ(triangles_of_file(header + "\n" + data), expected);
@@ -222,10 +222,10 @@ TEST(PlyVariants, MixedLineEnds) {
 
 // Rows need not be lines.
 TEST(PlyVariants, RowsOfSeveralLines) {
-  const std::string header = ascii_header(kList);
-  EXPECT_EQ(triangles_of_file(header + replaced(kRows, " ", "\n")), kLower);
-  EXPECT_EQ(triangles_of_file(header + replaced(kRows, "\n", " ")), kLower);
-  EXPECT_EQ(triangles_of_file(header + replaced(kRows, " ", " \r\n\t")), kLower);
+  const std::string header = ascii_header(kListLine);
+  EXPECT_EQ(triangles_of_file(header + replaced(kRows, " ", "\n")), kOnlyLower);
+  EXPECT_EQ(triangles_of_file(header + replaced(kRows, "\n", " ")), kOnlyLower);
+  EXPECT_EQ(triangles_of_file(header + replaced(kRows, " ", " \r\n\t")), kOnlyLower);
   for (const auto& [rows, message] :
        {std::pair{"0 0 0 1 0 0 0 1 0 3 0 1", "face 0 ends before"},
         std::pair{"0 0 0 1 0 0 0 1 0 3 0 1 2 4", "has 4 after its last row"}})
@@ -233,11 +233,11 @@ TEST(PlyVariants, RowsOfSeveralLines) {
 }
 
 TEST(PlyVariants, NumbersAsTextOfOtherPrograms) {
-  const std::string header = replaced(ascii_header(kList), "vertex 3", "vertex 6");
+  const std::string header = replaced(ascii_header(kListLine), "vertex 3", "vertex 6");
   const std::string unused =
       "-1.#IND 1.#QNAN 1.#INF\n-1.#IND00 nan -nan(ind)\n1.#SNAN -1.#INF inf\n";
   EXPECT_EQ(triangles_of_file(header + "0 0 0\n1 0 0\n0 1 0\n" + unused + "3.0 0.0 1e0 +2.\n"),
-            kLower);
+            kOnlyLower);
   EXPECT_NE(error_of_file(header + "1.#IND 0 0\n1 0 0\n0 1 0\n" + unused + "3 0 1 2\n")
                 .message()
                 .find("vertex 0 is not a finite position"),

@@ -26,7 +26,7 @@
 namespace voxdag {
 namespace {
 
-class Warnings : public NoProgress {
+class WarningTexts : public NoProgress {
  public:
   void warn(std::string_view message) override {
     text += std::string(message) + "\n";
@@ -46,7 +46,7 @@ class BuildProtection : public testing::Test {
 
   const TemporaryFolder folder_;
   MeteredFiles files_;
-  Warnings warnings_;
+  WarningTexts warnings_;
   CancelToken cancel_;
 };
 

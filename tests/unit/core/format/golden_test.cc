@@ -12,7 +12,7 @@ namespace {
 const std::string kGolden = std::string(VOXDAG_SOURCE_DIR) + "/tests/golden";
 const std::string kScene = kGolden + "/floor_and_pillar.vdag";
 
-void verify(const std::string& path) {
+void verify_file(const std::string& path) {
   MemoryBudget budget(uint64_t{1} << 20);
   NoProgress progress;
   const CancelToken cancel;
@@ -28,7 +28,7 @@ TEST(GoldenTest, WriterMakesTheSameBytes) {
 }
 
 TEST(GoldenTest, SceneIsRead) {
-  verify(kScene);
+  verify_file(kScene);
   const auto file = open_global_file(kScene);
   EXPECT_EQ(file->voxels(), 71u);
   EXPECT_EQ(file->svo_nodes(), 6u);
@@ -65,12 +65,12 @@ TEST(GoldenTest, CorruptVariantsAreNamed) {
     ByteString bytes = read_bytes(kScene);
     bytes[variant.byte] = static_cast<char>(variant.value);
     write_bytes(path, bytes);
-    const Error error = error_of([&] { verify(path); });
+    const Error error = error_of([&] { verify_file(path); });
     EXPECT_EQ(error.code(), variant.code);
     EXPECT_THAT(error.message(), testing::HasSubstr(variant.message));
   }
   write_bytes(path, read_bytes(kScene).substr(0, 12000));
-  EXPECT_THAT(error_of([&] { verify(path); }).message(),
+  EXPECT_THAT(error_of([&] { verify_file(path); }).message(),
               testing::HasSubstr("the file has 12000 bytes, expected 12296"));
 }
 

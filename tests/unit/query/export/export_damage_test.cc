@@ -14,8 +14,8 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint32_t kLevels = 10;
-constexpr uint64_t kMemory = 64 << 20;
+constexpr uint32_t kDamagedLevels = 10;
+constexpr uint64_t kDamageMemory = 64 << 20;
 
 class ExportDamage : public testing::TestWithParam<const char*> {
  protected:
@@ -29,8 +29,8 @@ class ExportDamage : public testing::TestWithParam<const char*> {
     bool refused = false;
     try {
       export_dag(system_files(), *file,
-                 {&to, {kLevels, {{0, 0, 0}, {1024, 1024, 1024}}}, output, kMemory}, progress,
-                 CancelToken{});
+                 {&to, {kDamagedLevels, {{0, 0, 0}, {1024, 1024, 1024}}}, output, kDamageMemory},
+                 progress, CancelToken{});
       for (const std::string& written : export_paths(to, output)) system_files().remove(written);
     } catch (const Error& error) {
       refused = true;
@@ -46,7 +46,7 @@ class ExportDamage : public testing::TestWithParam<const char*> {
 
 TEST_P(ExportDamage, IsAnErrorOrHarmless) {
   const std::string path = folder_.file("a.vdag");
-  write_corners(path, kLevels);
+  write_corners(path, kDamagedLevels);
   EXPECT_FALSE(is_refused(path));
   std::ifstream input(path, std::ios::binary);
   const std::string intact((std::istreambuf_iterator<char>(input)), {});

@@ -17,17 +17,18 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint32_t kLevels = 10;
+constexpr uint32_t kDiskLevels = 10;
 
 class ExportDisks : public testing::TestWithParam<std::string> {
  protected:
   ExportDisks() {
-    write_corners(folder_.file("a.vdag"), kLevels);
+    write_corners(folder_.file("a.vdag"), kDiskLevels);
     file_ = open_global_file(folder_.file("a.vdag"));
   }
   void run(FileSystem& files, const std::string& name, bool replace = false) {
     NoProgress progress;
-    ExportRequest request{&format(), {kLevels, whole_grid(kLevels)}, output(name), 64 << 20};
+    ExportRequest request{
+        &format(), {kDiskLevels, whole_grid(kDiskLevels)}, output(name), 64 << 20};
     request.replace = replace;
     export_dag(files, *file_, request, progress, CancelToken{});
   }

@@ -8,15 +8,15 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint32_t kLevels = 6;
+constexpr uint32_t kCellLevels = 6;
 constexpr uint64_t kNoLimit = ~uint64_t{0};
 
 class LevelCellsTest : public testing::TestWithParam<uint64_t> {
  protected:
   // Levels of over `narrow_words` words are wide.
   void write(uint64_t seed) {
-    const oracle::Voxels voxels = random_voxels(seed, 1 << kLevels);
-    write_global(path_, oracle::build_dag(voxels, 64), grid_of(1 << kLevels), 64, GetParam());
+    const oracle::Voxels voxels = random_voxels(seed, 1 << kCellLevels);
+    write_global(path_, oracle::build_dag(voxels, 64), grid_of(1 << kCellLevels), 64, GetParam());
   }
   uint64_t cells(const DagView& dag, uint32_t grid_levels) const {
     uint64_t cells = 0;
@@ -38,10 +38,10 @@ TEST_P(LevelCellsTest, AreThoseOfTheOctree) {
     const auto file = open_global_file(path_);
     const DagView dag(*file);
     LevelCells counts(*file, dag, budget_, cancel_);
-    for (uint32_t level = 2; level < kLevels; ++level)
+    for (uint32_t level = 2; level < kCellLevels; ++level)
       EXPECT_EQ(counts.count(level, kNoLimit), cells(dag, level)) << level;
-    EXPECT_EQ(LevelCells(*file, dag, budget_, cancel_).count(kLevels - 1, kNoLimit),
-              cells(dag, kLevels - 1));
+    EXPECT_EQ(LevelCells(*file, dag, budget_, cancel_).count(kCellLevels - 1, kNoLimit),
+              cells(dag, kCellLevels - 1));
   }
   EXPECT_EQ(budget_.used(), 0u);
 }
@@ -52,7 +52,8 @@ TEST_P(LevelCellsTest, NeedMemory) {
   const DagView dag(*file);
   MemoryBudget little(100);
   LevelCells counts(*file, dag, little, cancel_);
-  EXPECT_EQ(error_of([&] { counts.count(kLevels - 1, kNoLimit); }).code(), ErrorCode::kOutOfMemory);
+  EXPECT_EQ(error_of([&] { counts.count(kCellLevels - 1, kNoLimit); }).code(),
+            ErrorCode::kOutOfMemory);
 }
 
 TEST_P(LevelCellsTest, PointersToNoNodeAreDamage) {

@@ -13,7 +13,7 @@ using namespace voxdag::query;
 
 namespace {
 
-constexpr double kFar = 1e30;
+constexpr double kFarAway = 1e30;
 
 // Returns rays in and around a grid of this edge: from one camera, in random directions, along axes
 // and diagonals, and through edges and corners of cells.
@@ -77,12 +77,12 @@ void expect_single_rays(WalkPacket walk) {
       const QueryFile file(random_voxels(static_cast<uint64_t>(edge), edge), narrow_words);
       const DagFile dag(file.path());
       const std::vector<Ray> rays = many_rays(edge, 5);
-      expect_equal(walk, DagView(dag.file()), rays, 0, 0, kFar, 64, hits);
+      expect_equal(walk, DagView(dag.file()), rays, 0, 0, kFarAway, 64, hits);
       expect_equal(walk, DagView(dag.file()), rays, 0, 0, std::numeric_limits<double>::infinity(),
                    33, hits);
       expect_equal(walk, DagView(dag.file()), rays, 0, 0, edge, 7, hits);
       for (const double stop : {1.0, 2.0, 5.5, 2.0 * edge})
-        expect_equal(walk, DagView(dag.file()), rays, stop, 0.25 * edge, kFar, 64, hits);
+        expect_equal(walk, DagView(dag.file()), rays, stop, 0.25 * edge, kFarAway, 64, hits);
     }
   EXPECT_GT(hits, 20000u);
 }

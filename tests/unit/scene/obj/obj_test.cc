@@ -16,7 +16,7 @@ using Channels = std::array<uint16_t, 4>;
 
 const Corners kLower = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
 const Corners kUpper = {{{0, 0, 0}, {0, 1, 0}, {-1, 1, 0}}};
-const std::string kVertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+const std::string kVertexLines = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 
 std::vector<std::string> warnings_of(const std::string& file) {
   OpenScene open(file);
@@ -30,16 +30,17 @@ TEST(Obj, FacesInEveryForm) {
        {"f 1 2 3", "f 1/1 2/2 3/3", "f 1//1 2//1 3//1", "f 1/1/1 2/2/1 3/3/1", "f 1/ 2/ 3//",
         "f -3 -2 -1", "f -3/-3/-1 -2/-2/-1 -1/-1/-1", "f\t1  2\t3 ", "f +1 2 3 # comment",
         "fo 1 2 3", "  f 1 2 3", "f 1 2 \\\n  3", "f 1 2 \\ \r\n3"})
-    EXPECT_EQ(triangles_of_file(kVertices + others + face), std::vector<Corners>{kLower}) << face;
+    EXPECT_EQ(triangles_of_file(kVertexLines + others + face), std::vector<Corners>{kLower})
+        << face;
 }
 
 TEST(Obj, VerticesWithoutFaces) {
-  EXPECT_THAT(warnings_of(kVertices), ElementsAre(HasSubstr("vertices without faces")));
-  EXPECT_THAT(warnings_of(kVertices + "p 1\n"), ElementsAre(HasSubstr("points and lines")));
+  EXPECT_THAT(warnings_of(kVertexLines), ElementsAre(HasSubstr("vertices without faces")));
+  EXPECT_THAT(warnings_of(kVertexLines + "p 1\n"), ElementsAre(HasSubstr("points and lines")));
 }
 
 TEST(Obj, LineEndsAndByteOrderMark) {
-  const std::string text = "# comment \\\n" + kVertices + "f 1 2 3\n";
+  const std::string text = "# comment \\\n" + kVertexLines + "f 1 2 3\n";
   for (const char* line_end : {"\n", "\r\n", "\r"}) {
     std::string file;
     for (const char c : text) file += c == '\n' ? line_end : std::string(1, c);
@@ -54,7 +55,7 @@ TEST(Obj, LineEndsAndByteOrderMark) {
 // A positive index counts all vertices of the file, including vertices after the face. A negative
 // index counts back from the face.
 TEST(Obj, IndicesBeforeAndAfterTheFace) {
-  const std::string file = "f 1 2 3\n" + kVertices + "o second\nv 9 9 9\nf -4 -2 5\nv -1 1 0\n";
+  const std::string file = "f 1 2 3\n" + kVertexLines + "o second\nv 9 9 9\nf -4 -2 5\nv -1 1 0\n";
   EXPECT_EQ(triangles_of_file(file), (std::vector<Corners>{kLower, kUpper}));
 }
 
@@ -65,7 +66,8 @@ TEST(Obj, NumbersAreTheNearestDoubles) {
 }
 
 TEST(Obj, StatementsWithoutVoxelsAreIgnored) {
-  const std::string file = "mtllib\no a\ng b c\ns off\nusemtl\nvp 0 0\nlod 2\nmg 1 2\n" + kVertices;
+  const std::string file =
+      "mtllib\no a\ng b c\ns off\nusemtl\nvp 0 0\nlod 2\nmg 1 2\n" + kVertexLines;
   EXPECT_TRUE(warnings_of(file + "f 1 2 3").empty());
   const auto warnings =
       warnings_of(file + "l 1 2\np 1\nf 1 2\nhello world\nf 1 2 3\nl 2 3\nnews\n");
@@ -78,26 +80,26 @@ TEST(Obj, StatementsWithoutVoxelsAreIgnored) {
 
 TEST(Obj, FaultsNameTheLine) {
   const auto message = [](const std::string& file) { return error_of_file(file).message(); };
-  EXPECT_EQ(message(kVertices + "f 1 2 4\n"),
+  EXPECT_EQ(message(kVertexLines + "f 1 2 4\n"),
             "folder/scene: face 0 in line 4: index 4 does not exist, there are 3 vertices");
-  EXPECT_THAT(message(kVertices + "\nf 1 2 -4\n"), HasSubstr("face 0 in line 5: index -4"));
-  EXPECT_THAT(message(kVertices + "f 1 2 0\n"), HasSubstr("index 0"));
-  EXPECT_THAT(message(kVertices + "f 1 2 99999999999999999999\n"), HasSubstr("index 9"));
-  EXPECT_THAT(message(kVertices + "f 1 2 x\n"), HasSubstr("face 0 in line 4: corner 2 is x"));
-  EXPECT_THAT(message(kVertices + "f 1 2 3;\n"), HasSubstr("corner 2 is 3;"));
+  EXPECT_THAT(message(kVertexLines + "\nf 1 2 -4\n"), HasSubstr("face 0 in line 5: index -4"));
+  EXPECT_THAT(message(kVertexLines + "f 1 2 0\n"), HasSubstr("index 0"));
+  EXPECT_THAT(message(kVertexLines + "f 1 2 99999999999999999999\n"), HasSubstr("index 9"));
+  EXPECT_THAT(message(kVertexLines + "f 1 2 x\n"), HasSubstr("face 0 in line 4: corner 2 is x"));
+  EXPECT_THAT(message(kVertexLines + "f 1 2 3;\n"), HasSubstr("corner 2 is 3;"));
   EXPECT_THAT(message("v 0 0\nvn 0 0 1\nf 1 1 1\n"),
               HasSubstr("vertex 0 in line 1 has 2 numbers, expected three"));
   EXPECT_THAT(message("v 0 0 0\nv 0 0,5 0\nf 1 1 2\n"),
               HasSubstr("vertex 1 in line 2 has 0,5, expected a number"));
   EXPECT_THAT(message("v 0 0 nan\nf 1 1 1\n"), HasSubstr("vertex 1 is not a finite position"));
   EXPECT_THAT(message("v 1e999 0 0\nf 1 1 1\n"), HasSubstr("is not a finite position"));
-  EXPECT_THAT(message(kVertices + "cstype bspline\ndeg 3\ncurv 0 1 1 2 3\n"),
+  EXPECT_THAT(message(kVertexLines + "cstype bspline\ndeg 3\ncurv 0 1 1 2 3\n"),
               HasSubstr("line 4: cstype is part of a free-form curve"));
-  EXPECT_THAT(message(kVertices + "call more.obj\n"), HasSubstr("line 4: call includes"));
+  EXPECT_THAT(message(kVertexLines + "call more.obj\n"), HasSubstr("line 4: call includes"));
 }
 
 TEST(Obj, InvalidFacesCanBeDropped) {
-  OpenScene open(kVertices + "v inf 0 0\nf 1 2 4\nf 1 2 9\nf 1 2 3\nf 0 1 2\n",
+  OpenScene open(kVertexLines + "v inf 0 0\nf 1 2 4\nf 1 2 9\nf 1 2 3\nf 0 1 2\n",
                  {.skip_invalid = true});
   EXPECT_EQ(open.source->declared_triangles(), 4u);
   EXPECT_EQ(open.triangles(), std::vector<Corners>{kLower});
@@ -105,15 +107,15 @@ TEST(Obj, InvalidFacesCanBeDropped) {
 
 TEST(Obj, LongLines) {
   const std::string comment = "#" + std::string(3 << 20, 'x') + "\n";
-  EXPECT_EQ(triangles_of_file(kVertices + comment + comment + "f 1 2 3"),
+  EXPECT_EQ(triangles_of_file(kVertexLines + comment + comment + "f 1 2 3"),
             std::vector<Corners>{kLower});
   std::string many = "f";
   for (int i = 0; i < 30000; ++i) many += " 1 2 3";
-  EXPECT_EQ(error_of_file(kVertices + many).code(), ErrorCode::kLimit);
+  EXPECT_EQ(error_of_file(kVertexLines + many).code(), ErrorCode::kLimit);
   many.clear();
   for (int i = 0; i < 10000; ++i) many += " 1/1/1 2/2/2 3/3/3";
-  EXPECT_EQ(triangles_of_file(kVertices + "f" + many).size(), 29998u);
-  const Error error = error_of_file(kVertices + "f " + std::string(2 << 20, ' ') + "1 2 3");
+  EXPECT_EQ(triangles_of_file(kVertexLines + "f" + many).size(), 29998u);
+  const Error error = error_of_file(kVertexLines + "f " + std::string(2 << 20, ' ') + "1 2 3");
   EXPECT_EQ(error.code(), ErrorCode::kLimit);
   EXPECT_THAT(error.message(), HasSubstr("line 4 has over 1048576 bytes"));
 }
@@ -176,10 +178,10 @@ TEST(Obj, VertexColors) {
   EXPECT_EQ(colors_of("v 0 0 0 0.5\nv 0 0 0 1.0\n").first, (Channels{65535, 65535, 65535, 65535}));
 }
 
-const std::string kTriangle = kVertices + "vt 0 0\nvt 1 0\nvt 0.5 0.25 0\n";
+const std::string kTriangleLines = kVertexLines + "vt 0 0\nvt 1 0\nvt 0.5 0.25 0\n";
 
 TEST(Obj, MaterialsOfLibraries) {
-  const std::string file = "mtllib my colors.mtl second.mtl\n" + kTriangle +
+  const std::string file = "mtllib my colors.mtl second.mtl\n" + kTriangleLines +
                            "f 1 2 3\nusemtl red paint\nf 1 2 3\nusemtl glass # comment\nf 1 2 3\n"
                            "usemtl missing\nf 1 2 3\n";
   const WithLibraries open(
@@ -206,7 +208,7 @@ TEST(Obj, MaterialsOfLibraries) {
 }
 
 TEST(Obj, TextureCoordinatesRunUpward) {
-  const std::string file = "mtllib a.mtl\n" + kTriangle +
+  const std::string file = "mtllib a.mtl\n" + kTriangleLines +
                            "usemtl wood\nf 1/1 2/2 3/3\nf 1 2 3\nf 1/1 2/2 3/9\nusemtl tile\n"
                            "f 1/1 2/2 3/3\n";
   const WithLibraries open(
@@ -237,7 +239,7 @@ TEST(Obj, TextureCoordinatesRunUpward) {
 
 TEST(Obj, MissingFilesAreWarnings) {
   const WithLibraries open(
-      "mtllib none.mtl\nmtllib C:\\models\\a.mtl\n" + kTriangle + "usemtl a\nf 1/1 2/2 3/3\n",
+      "mtllib none.mtl\nmtllib C:\\models\\a.mtl\n" + kTriangleLines + "usemtl a\nf 1/1 2/2 3/3\n",
       {{"folder/a.mtl", "newmtl a\nmap_Kd /etc/passwd\nnewmtl a\nmap_Kd ../out.png\n"}});
   const SceneMaterials materials = open.source->materials();
   EXPECT_THAT(texts_of(materials.warnings.list()),

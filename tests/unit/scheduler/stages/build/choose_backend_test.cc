@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint64_t kPlenty = uint64_t{16} << 30;
 
-class Warnings : public NoProgress {
+class BackendWarnings : public NoProgress {
  public:
   void warn(std::string_view message) override { all.emplace_back(message); }
   std::vector<std::string> all;
@@ -55,7 +55,7 @@ TEST(BackendCheck, FindsOneVoxel) {
 // Without a GPU, the CPU is chosen without a warning. GPUs that pass the check are chosen, and
 // workers use them in turn.
 TEST(ChooseBackend, AutoChoosesGpusThatAreRight) {
-  Warnings warnings;
+  BackendWarnings warnings;
   EXPECT_EQ(choose_automatically({}, kPlenty, warnings).name, "cpu");
   std::vector<int> opened;
   const Gpus gpus{3, [&](int device) {
@@ -77,7 +77,7 @@ TEST(ChooseBackend, AutoChoosesGpusThatAreRight) {
 TEST(ChooseBackend, AutoFallsBackToTheCpu) {
   const auto expect_cpu = [](const Gpus& gpus, uint64_t memory_bytes, const std::string& why) {
     SCOPED_TRACE(why);
-    Warnings warnings;
+    BackendWarnings warnings;
     EXPECT_EQ(choose_automatically(gpus, memory_bytes, warnings).name, "cpu");
     ASSERT_EQ(warnings.all.size(), 1u);
     EXPECT_NE(warnings.all[0].find(why), std::string::npos) << warnings.all[0];
