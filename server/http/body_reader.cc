@@ -74,8 +74,10 @@ BodyEnd BodyReader::pass(uint64_t bytes, const Request::Sink& sink) {
 
 bool BodyReader::read_line(std::string& line) {
   line.clear();
-  if (!connection_.read_line(line, kMaxLineBytes) || line.find('\r') + 2 != line.size())
-    return false;
+  const bool ended = connection_.read_line(line, kMaxLineBytes);
+  const bool is_too_long = !ended && connection_.error_state() == Connection::ErrorState::kNone;
+  if (is_too_long) connection_.close_without_linger();
+  if (!ended || line.find('\r') + 2 != line.size()) return false;
   line.resize(line.size() - kLineEndBytes);
   return true;
 }

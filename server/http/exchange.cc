@@ -84,6 +84,7 @@ std::string Exchange::read_head(size_t max_bytes) {
         throw Problem(408, "timeout",
                       "the header of the request was sent too slowly: expected it within "
                       "connections.header_timeout_s of the configuration");
+      if (blank_bytes > 0) connection_.close_without_linger();
       throw Problem(431, "headers_too_large",
                     "the header fields are too large: expected at most " +
                         std::to_string(max_bytes) + " bytes");

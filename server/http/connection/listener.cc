@@ -23,6 +23,7 @@ constexpr int kBacklog = 512;
 // Kernel memory per connection for unread answers. The kernel doubles this value for its
 // bookkeeping.
 constexpr int kSendBufferBytes = 128 << 10;
+constexpr int kMaxSegmentBytes = 8960;  // Ethernet with jumbo frames
 
 struct FreeAddresses {
   void operator()(addrinfo* list) const { freeaddrinfo(list); }
@@ -66,6 +67,9 @@ Listener::Listener(const std::string& address, int port) {
   // Allows the use of a port whose old connections are still closing, but not of a port on which
   // another socket listens.
   setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  // Without this limit, segments over the loopback interface have 64 KiB. The kernel sizes the
+  // buffers of both ends by the segments, so a connection would have several MB.
+  setsockopt(socket_, IPPROTO_TCP, TCP_MAXSEG, &kMaxSegmentBytes, sizeof kMaxSegmentBytes);
   if (socket_ < 0 || bind(socket_, found->ai_addr, found->ai_addrlen) != 0 ||
       ::listen(socket_, kBacklog) != 0 || pipe2(wake_, O_CLOEXEC | O_NONBLOCK) != 0) {
     const std::string reason = std::strerror(errno);
