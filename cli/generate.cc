@@ -31,11 +31,13 @@ void print(const GenerateCommand& command, const GenerateReport& r, double wall_
 
 void run(GenerateCommand& command, CommandContext& context) {
   command.options.kind = scene_kind(command.kind).kind;
-  command.output.check(context.files, "", is_generated_scene);
+  GuardedOutputs files(context.files);
+  command.output.guard(files);
+  command.output.check(files, "", is_generated_scene);
   const auto progress = make_progress_bar();
   const double start_s = wall_seconds();
-  const GenerateReport report = generate_scene(context.files, command.output.path, command.options,
-                                               *progress, context.cancel);
+  const GenerateReport report =
+      generate_scene(files, command.output.path, command.options, *progress, context.cancel);
   const double wall_s = wall_seconds() - start_s;
   if (!command.json) return print(command, report, wall_s);
   print_json(nlohmann::ordered_json{{"kind", command.kind},

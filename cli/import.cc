@@ -30,7 +30,9 @@ void print(const ImportCommand& command, const ImportReport& r, double wall_s) {
 }
 
 void run(const ImportCommand& command, CommandContext& context) {
-  command.output.check(context.files, command.input, is_imported_scene);
+  GuardedOutputs files(context.files);
+  command.output.guard(files);
+  command.output.check(files, command.input, is_imported_scene);
   const uint64_t memory_bytes = memory_limit(command.memory);
   const auto progress = make_progress_bar();
   auto warnings = nlohmann::ordered_json::array();
@@ -40,8 +42,8 @@ void run(const ImportCommand& command, CommandContext& context) {
     warnings.push_back(record_json(warning));
   };
   const double start_s = wall_seconds();
-  const ImportReport report = import_scene(context.files, command.input, command.output.path,
-                                           memory_bytes, warn, *progress, context.cancel);
+  const ImportReport report = import_scene(files, command.input, command.output.path, memory_bytes,
+                                           warn, *progress, context.cancel);
   const double wall_s = wall_seconds() - start_s;
   if (!command.json) return print(command, report, wall_s);
   print_json(nlohmann::ordered_json{{"input", command.input},

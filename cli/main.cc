@@ -1,12 +1,11 @@
 #include <cerrno>
-#include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 #include <new>
 #include <system_error>
 
 #include "cli/command.h"
+#include "cli/terminal/signals.h"
 #include "core/base/process_limits.h"
 #include "core/base/text/printable.h"
 
@@ -18,29 +17,9 @@ constexpr int kDefectStatus = 70;
 
 CancelToken g_cancel;
 
-// The first signal cancels the command; a second one terminates the process.
-void on_signal(int signal) {
-  if (g_cancel.canceled()) _Exit(128 + signal);
-  g_cancel.cancel();
-}
-
-void catch_signals() {
-  struct sigaction action {};
-  action.sa_handler = on_signal;
-  sigemptyset(&action.sa_mask);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  // SIGHUP means that the terminal was closed. It remains ignored if nohup has set it to be
-  // ignored.
-  struct sigaction hangup {};
-  sigaction(SIGHUP, nullptr, &hangup);
-  if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
-  signal(SIGPIPE, SIG_IGN);
-}
-
-int report(ErrorCode code, const char* message) {
-  std::fprintf(stderr, "voxdag: error: %s\n", printable_line(message).c_str());
-  return exit_status(code);
+int report(const Error& error) {
+  std::fprintf(stderr, "voxdag: error: %s\n", printable_line(error.what()).c_str());
+  return exit_status(error.code());
 }
 
 // Flushes standard output. Throws if the buffered text cannot be written, so that the command
@@ -48,9 +27,8 @@ int report(ErrorCode code, const char* message) {
 void check_output() {
   errno = 0;
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return;
-  throw Error(
-      errno == ENOSPC ? ErrorCode::kNoSpace : ErrorCode::kIo,
-      "write to the standard output: " + std::generic_category().message(errno ? errno : EIO));
+  const int reason = errno ? errno : EIO;
+  throw Error(code_of_errno(reason), "write to the standard output: " + errno_text(reason));
 }
 
 int run(int argc, char** argv) {
@@ -86,11 +64,11 @@ int run(int argc, char** argv) {
     check_output();
     return status;
   } catch (const Error& error) {
-    return report(error.code(), error.what());
+    return report(error);
   } catch (const std::system_error& error) {
-    return report(ErrorCode::kOutOfMemory, error.what());
+    return report(error_of(error));
   } catch (const std::bad_alloc&) {
-    return report(ErrorCode::kOutOfMemory, "out of memory: the system refused an allocation");
+    return report(out_of_memory_error());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "voxdag: error: a defect of voxdag, please report it: %s\n",
                  printable_line(error.what()).c_str());
@@ -103,6 +81,6 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   voxdag::return_freed_memory_to_system();
-  voxdag::cli::catch_signals();
+  voxdag::cli::catch_signals(voxdag::cli::g_cancel);
   return voxdag::cli::run(argc, argv);
 }

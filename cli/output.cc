@@ -50,6 +50,10 @@ void OutputFile::declare_force(Command& command) {
   command.flag("--force", force, "replace a file that this command has not written");
 }
 
+void OutputFile::guard(GuardedOutputs& files) const {
+  if (!force) files.guard_output(path);
+}
+
 void OutputFile::check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const {
   check(files, path, input, is_own);
   check(files, path + ".partial", input, is_own);

@@ -7,6 +7,7 @@
 
 #include "cli/command.h"
 #include "core/format/global/voxdag_reader.h"
+#include "core/io/outputs/guarded_outputs.h"
 
 namespace voxdag::cli {
 
@@ -31,6 +32,8 @@ struct OutputFile {
   std::string path;
   bool force = false;
   void declare_force(Command& command);
+  // Guards the output and its temporary name, unless --force is given. Call it before check().
+  void guard(GuardedOutputs& files) const;
   // Throws Error{kInvalidInput} if writing would destroy `input`. Unless --force is given, also
   // throws it if writing would destroy a file for which `is_own` returns false. Makes the same
   // checks for path + ".partial", the temporary name of write_file_atomically(). Also throws Error

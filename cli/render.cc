@@ -86,17 +86,19 @@ void report(const RenderCommand& command, const query::Placement& placement,
               eye[2], target[0], target[1], target[2], placement.fov_degrees);
 }
 
-void check_outputs(const RenderCommand& command, FileSystem& files) {
+void check_outputs(const RenderCommand& command, GuardedOutputs& files) {
   if (command.output.path.empty() && command.depth.empty())
     throw Error(ErrorCode::kInvalidInput,
                 "no output was given: expected --output, --depth or both");
   if (command.output.path == command.depth)
     throw Error(ErrorCode::kInvalidInput,
                 "--output and --depth are both '" + command.depth + "': expected two files");
+  if (!command.output.path.empty()) command.output.guard(files);
   if (!command.output.path.empty())
     command.output.check(files, command.input, query::is_rendered_png);
   if (command.depth.empty()) return;
   const OutputFile depth{command.depth, command.output.force};
+  depth.guard(files);
   // An array does not record the program that wrote it.
   depth.check(files, command.input, [](const ReadableFile&) { return false; });
 }
@@ -125,7 +127,8 @@ void run(RenderCommand& command, CommandContext& context) {
                                               std::to_string(kMaxPictureEdge) + " pixels");
   command.options.width = width;
   command.options.height = height;
-  check_outputs(command, context.files);
+  GuardedOutputs files(context.files);
+  check_outputs(command, files);
   check_memory(command);
   const auto progress = make_progress_bar();
   const auto file = open_global_file(command.input);
@@ -138,12 +141,12 @@ void run(RenderCommand& command, CommandContext& context) {
   if (!command.output.path.empty()) {
     const query::Picture picture =
         query::render_picture(dag, placement, command.options, *progress, context.cancel);
-    write_file_atomically(context.files, command.output.path, query::encode_png(picture));
+    write_file_atomically(files, command.output.path, query::encode_png(picture));
   }
   if (!command.depth.empty()) {
     const query::DepthMap map =
         query::render_depth(dag, placement, width, height, command.options.threads, context.cancel);
-    write_file_atomically(context.files, command.depth, query::encode_npy(map));
+    write_file_atomically(files, command.depth, query::encode_npy(map));
   }
   report(command, placement, *file, wall_seconds() - start_s);
 }

@@ -28,6 +28,7 @@ GlbFile::GlbFile(FileSystem& files, const std::string& path, std::string json, u
                                        "takes " +
                                        std::to_string(bytes) + ": expected fewer triangles");
   file_ = files.create(path + ".partial");
+  registered_.emplace(path + ".partial");
   buffer_.reserve(kBufferBytes);
   for (uint64_t v :
        {uint64_t{kMagic}, uint64_t{2}, bytes, uint64_t{json.size()}, uint64_t{kJsonChunk}})
@@ -78,6 +79,7 @@ void GlbFile::sync_and_close() {
 uint64_t GlbFile::finish_partial() {
   sync_and_close();
   finished_ = true;
+  registered_.reset();
   return written_;
 }
 
@@ -85,6 +87,7 @@ uint64_t GlbFile::finish() {
   sync_and_close();
   files_.rename(path_ + ".partial", path_);
   finished_ = true;
+  registered_.reset();
   files_.sync_directory(parent_directory(path_));
   return written_;
 }

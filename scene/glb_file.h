@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/io/file_system.h"
+#include "core/io/temporary_paths.h"
 
 namespace voxdag {
 
@@ -41,6 +43,7 @@ class GlbFile {
   std::vector<std::byte> buffer_;
   uint64_t written_ = 0;
   bool finished_ = false;
+  std::optional<TemporaryPath> registered_;  // until it is finished
 };
 
 // True if the file is a .glb whose JSON contains the text `generator`.

@@ -9,6 +9,8 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/io/outputs/guarded_outputs.h"
+#include "core/io/outputs/space_reserve.h"
 #include "scheduler/check_spec.h"
 #include "scheduler/cluster/cluster.h"
 #include "scheduler/solid/solid_report.h"
@@ -383,8 +385,13 @@ std::string submit_merge_job(BuildJob& job, MergeJob& merge_job) {
 
 }  // namespace
 
-BuildReport run_build(const BuildSpec& requested, const BuildContext& context) {
+BuildReport run_build(const BuildSpec& requested, const BuildContext& caller) {
   const BuildSpec spec = checked(requested);
+  SpaceReserve reserve(caller.files, spec.run.min_free_bytes);
+  GuardedOutputs files(reserve);
+  files.guard_output(spec.run.output);
+  files.guard_output(report_path(spec.run.output));
+  const BuildContext context{files, caller.progress, caller.cancel};
   MemoryBudget budget(spec.run.memory_bytes);
   BuildScene scene(spec.geometry, work_folder_of(spec.run), budget, context);
   check_places(spec, scene, context);

@@ -2,6 +2,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -26,6 +27,7 @@ void open_in_browser(const std::string& url) {
   if (child == 0) {
     const int null = open("/dev/null", O_RDWR);
     for (const int fd : {0, 1, 2}) dup2(null, fd);
+    for (const int signal : {SIGPIPE, SIGXFSZ}) std::signal(signal, SIG_DFL);
     setsid();
     if (fork() == 0) execlp("xdg-open", "xdg-open", url.c_str(), nullptr);
     _exit(0);

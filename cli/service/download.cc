@@ -19,10 +19,12 @@ struct DownloadCommand {
 };
 
 void run(const DownloadCommand& command, ServiceClient& service, CommandContext& context) {
-  command.output.check(context.files, command.output.path, "", is_global_file);
+  GuardedOutputs files(context.files);
+  command.output.guard(files);
+  command.output.check(files, command.output.path, "", is_global_file);
   const auto progress = make_progress_bar();
   const client::DownloadResult result = client::download_result(
-      service, context.files, service.job(command.id), command.output.path, *progress);
+      service, files, service.job(command.id), command.output.path, *progress);
   if (command.json) {
     print_json(Json{{"output", command.output.path},
                     {"bytes", result.bytes},

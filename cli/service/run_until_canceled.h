@@ -5,6 +5,7 @@
 #include <functional>
 #include <thread>
 
+#include "cli/terminal/signals.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::cli {
@@ -13,6 +14,7 @@ namespace voxdag::cli {
 // calls stop(): a signal handler may only cancel the token. Throws the exceptions of run().
 template <class Run>
 void run_until_canceled(CancelToken& cancel, const Run& run, const std::function<void()>& stop) {
+  allow_slow_stop();
   std::thread watcher([&] {
     while (!cancel.canceled()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
     stop();

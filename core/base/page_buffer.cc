@@ -3,10 +3,12 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 
 namespace voxdag {
 
@@ -14,9 +16,10 @@ namespace {
 
 void* check_pages(void* pages, size_t bytes, std::string_view what) {
   if (pages == MAP_FAILED)
-    throw Error(ErrorCode::kOutOfMemory,
-                "out of memory: the system refused " + std::to_string(bytes) + " bytes for " +
-                    std::string(what) + ": expected more free memory on this machine");
+    throw Error(ErrorCode::kOutOfMemory, "out of memory: the system refused " +
+                                             std::to_string(bytes) + " bytes for " +
+                                             std::string(what) + ": " + errno_text(errno) +
+                                             ": expected more free memory on this machine");
   // Random access to a large table needs far fewer address translations with huge pages. No huge
   // page extends beyond the mapping, so resident memory does not exceed the charge.
   if (bytes >= (size_t{2} << 20)) madvise(pages, bytes, MADV_HUGEPAGE);

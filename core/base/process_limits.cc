@@ -5,11 +5,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 #include <string>
 #include <thread>
+
+#include "core/base/text.h"
 
 namespace voxdag {
 namespace {
@@ -92,6 +95,52 @@ uint64_t status_bytes(const std::string& name) {
   return 0;
 }
 
+struct ErrnoCode {
+  int reason;
+  ErrorCode code;
+};
+
+constexpr ErrnoCode kCodes[] = {
+    {ENOENT, ErrorCode::kNotFound},
+    {ENOTDIR, ErrorCode::kNotFound},
+    {ENOSPC, ErrorCode::kNoSpace},
+    {EDQUOT, ErrorCode::kNoSpace},
+    {EFBIG, ErrorCode::kNoSpace},
+    {ENOMEM, ErrorCode::kOutOfMemory},
+    {ENAMETOOLONG, ErrorCode::kInvalidInput},
+};
+
+// A limit of processes that makes system calls fail with `reason`.
+struct ProcessLimit {
+  int reason;
+  __rlimit_resource resource;
+  const char* name;
+  bool is_size;  // in bytes, otherwise a number
+};
+
+constexpr ProcessLimit kLimits[] = {
+    {EFBIG, RLIMIT_FSIZE, "file sizes, ulimit -f,", true},
+    {EMFILE, RLIMIT_NOFILE, "open files, ulimit -n,", false},
+    {EAGAIN, RLIMIT_NPROC, "processes and threads, ulimit -u,", false},
+    {EAGAIN, RLIMIT_AS, "address space, ulimit -v,", true},
+    {ENOMEM, RLIMIT_AS, "address space, ulimit -v,", true},
+    {ENOMEM, RLIMIT_DATA, "data memory, ulimit -d,", true},
+};
+
+// Returns the limits of this process that can cause `reason`: " (the limit of ... is ...)", or "".
+std::string limits_text(int reason) {
+  std::string text;
+  for (const ProcessLimit& limit : kLimits) {
+    rlimit value{};
+    if (limit.reason != reason || getrlimit(limit.resource, &value) != 0 ||
+        value.rlim_cur == RLIM_INFINITY)
+      continue;
+    text += (text.empty() ? " (" : "; ") + std::string("the limit of ") + limit.name + " is " +
+            (limit.is_size ? size_text(value.rlim_cur) : count_text(value.rlim_cur));
+  }
+  return text.empty() ? "" : text + ")";
+}
+
 }  // namespace
 
 uint64_t cgroup_memory(const std::string& membership, const std::string& mount) {
@@ -134,6 +183,28 @@ uint64_t resident_bytes() { return status_bytes("VmRSS:"); }
 uint64_t max_open_files() {
   rlimit limit{};
   return getrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_cur : UINT64_MAX;
+}
+
+ErrorCode code_of_errno(int reason) {
+  for (const ErrnoCode& row : kCodes)
+    if (row.reason == reason) return row.code;
+  return ErrorCode::kIo;
+}
+
+std::string errno_text(int reason) {
+  return std::generic_category().message(reason) + limits_text(reason);
+}
+
+Error out_of_memory_error() {
+  return {ErrorCode::kOutOfMemory,
+          "out of memory: the system refused an allocation" + limits_text(ENOMEM)};
+}
+
+Error error_of(const std::system_error& error) {
+  const int reason = error.code().value();
+  if (error.code() == std::errc::resource_unavailable_try_again)
+    return {ErrorCode::kOutOfMemory, "cannot start a thread: " + errno_text(reason)};
+  return {code_of_errno(reason), error.what() + limits_text(reason)};
 }
 
 void return_freed_memory_to_system() {

@@ -1,10 +1,16 @@
 // The memory and CPUs that a build may use on this machine, and the memory that this process uses.
 // Two functions also make the C library return freed memory to the system. Without them the process
 // would use more memory than is charged to its budget. Thread-safe.
+//
+// Also turns errors of system calls into codes and messages. If a limit of this process can be the
+// cause, the message names the limit and its value.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <system_error>
+
+#include "voxdag/error.h"
 
 // VOXDAG_SANITIZED is 1 if the address or thread sanitizer instruments this code, and 0 otherwise.
 // Sanitizers reserve terabytes of address space, retain freed memory and handle signals. g++
@@ -43,6 +49,18 @@ uint64_t peak_resident_bytes();
 uint64_t resident_bytes();
 // Returns the maximum number of open files and sockets of this process (RLIMIT_NOFILE).
 uint64_t max_open_files();
+
+// Returns the code for a value of errno. A full disk, an exceeded quota and an exceeded limit of
+// file sizes are kNoSpace.
+ErrorCode code_of_errno(int reason);
+// Returns the system's text for a value of errno, and the limits that can cause it: "Too many open
+// files (the limit of open files, ulimit -n, is 1024)".
+std::string errno_text(int reason);
+// Returns the error for a memory allocation that the system refused (std::bad_alloc).
+Error out_of_memory_error();
+// Returns the error for an exception of the standard library. The system reports with EAGAIN that
+// it cannot start another thread; the code is then kOutOfMemory.
+Error error_of(const std::system_error& error);
 
 // Makes the C library return freed memory to the system immediately, so that resident memory
 // follows the charges of a MemoryBudget. Only main() calls this function. A library must not,

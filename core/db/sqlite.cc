@@ -1,11 +1,13 @@
 #include "core/db/sqlite.h"
 
 #include <sqlite3.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 
 #include <cerrno>
 
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 #include "core/io/file_system.h"
 
 namespace voxdag {
@@ -15,6 +17,15 @@ namespace {
 bool has_no_inodes(const std::string& path) {
   struct statvfs s {};
   return statvfs(parent_directory(path).c_str(), &s) == 0 && s.f_files > 0 && s.f_favail == 0;
+}
+
+// Throws Error{kInvalidInput} if `path` is a symbolic link, a pipe or another thing that voxdag did
+// not create. SQLite itself does not follow links to its other files.
+void refuse_foreign(const std::string& path) {
+  struct stat found {};
+  if (lstat(path.c_str(), &found) == 0 && !S_ISREG(found.st_mode))
+    throw Error(ErrorCode::kInvalidInput,
+                path + " is not a regular file: expected a database that voxdag wrote");
 }
 
 [[noreturn]] void fail(sqlite3* database, int result, std::string path = "") {
@@ -38,9 +49,16 @@ bool has_no_inodes(const std::string& path) {
     default:
       break;
   }
-  const int reason = database ? sqlite3_system_errno(database) : 0;
-  if (code == ErrorCode::kIo && (reason == ENOSPC || reason == EDQUOT || reason == EFBIG))
+  const bool has_reason = (result & 0xff) == SQLITE_IOERR || (result & 0xff) == SQLITE_CANTOPEN;
+  const int reason = database && has_reason ? sqlite3_system_errno(database) : 0;
+  if (reason != 0) {
+    if (code_of_errno(reason) == ErrorCode::kNoSpace) code = ErrorCode::kNoSpace;
+    message += ": " + errno_text(reason);
+  } else if (database && sqlite3_extended_errcode(database) == SQLITE_IOERR_SHMSIZE) {
+    // SQLite does not keep the reason why the index of its log cannot grow.
     code = ErrorCode::kNoSpace;
+    message += ": " + errno_text(EFBIG);
+  }
   // If SQLite cannot create a file because no inodes are left, it tries to open the file without
   // creating it. It then reports only that the file does not exist.
   if ((result & 0xff) == SQLITE_CANTOPEN && has_no_inodes(path)) {
@@ -134,6 +152,7 @@ std::vector<std::byte> SqlStatement::bytes(int column) const {
 void SqlDatabase::Close::operator()(sqlite3* database) const { sqlite3_close_v2(database); }
 
 SqlDatabase::SqlDatabase(const std::string& path, Mode mode, int busy_ms) {
+  refuse_foreign(path);
   sqlite3* database = nullptr;
   const int flags =
       mode == Mode::kReadOnly ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;

@@ -32,8 +32,9 @@ using Decoder = std::unique_ptr<avifDecoder, DestroyDecoder>;
 class AvifReader : public ImageReader {
  public:
   AvifReader(std::unique_ptr<PeekedSource> source, MemoryBudget& budget)
-      : budget_(budget),
-        file_(*source, budget),
+      : source_(std::move(source)),
+        budget_(budget),
+        file_(*source_, budget),
         state_charge_(budget, kAvifStateBytes, "an AVIF image") {
     parse(static_cast<uint32_t>(kMaxPixels));
     const avifImage& image = *decoder_->image;
@@ -69,6 +70,7 @@ class AvifReader : public ImageReader {
   }
 
   void decode() {
+    source_->check_canceled();
     const uint64_t pixels = uint64_t{width_} * height_;
     const uint64_t limit = std::max<uint64_t>(pixels, kMinSizeLimit);
     const uint64_t bytes = limit * (bits_ == 16 ? kBytesPerWidePixel : kBytesPerPixel);
@@ -115,6 +117,7 @@ class AvifReader : public ImageReader {
     throw BrokenImage{std::string("is a broken AVIF image (") + avifResultToString(result) + ")"};
   }
 
+  const std::unique_ptr<PeekedSource> source_;
   MemoryBudget& budget_;
   const WholeFile file_;
   const MemoryCharge state_charge_;

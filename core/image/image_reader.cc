@@ -75,8 +75,8 @@ std::string readable_image_formats() {
 }
 
 std::unique_ptr<ImageReader> open_image(EncodedBytes& bytes, [[maybe_unused]] MemoryBudget& budget,
-                                        [[maybe_unused]] ImageUse use) {
-  auto source = std::make_unique<PeekedSource>(bytes);
+                                        [[maybe_unused]] ImageUse use, const CancelToken* cancel) {
+  auto source = std::make_unique<PeekedSource>(bytes, cancel);
   const ImageFormat* const format = image_format_of(source->head());
   switch (format ? format->decoder : ImageDecoder::kNone) {
 #ifdef VOXDAG_HAS_IMAGES

@@ -14,6 +14,7 @@
 #include <string>
 
 #include "core/base/memory_budget.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 
@@ -62,10 +63,13 @@ class ImageReader {
 // decoding a JPEG or for all rows of an interlaced PNG.
 enum class ImageUse { kPixels, kSize };
 
-// Opens an image and reads its header. The source must outlive the reader. Throws BrokenImage,
-// Error{kOutOfMemory} if decoding does not fit the budget, and the errors of the source.
+// Opens an image and reads its header. The source and `cancel` must outlive the reader. Throws
+// BrokenImage, Error{kOutOfMemory} if decoding does not fit the budget, and the errors of the
+// source. The reader checks `cancel` while it decodes PNG and JPEG images, and before it decodes
+// WebP and AVIF images, whose libraries cannot be stopped.
 std::unique_ptr<ImageReader> open_image(EncodedBytes& source, MemoryBudget& budget,
-                                        ImageUse use = ImageUse::kPixels);
+                                        ImageUse use = ImageUse::kPixels,
+                                        const CancelToken* cancel = nullptr);
 
 // True if this program has a decoder for the format. `head`: the first bytes of the image, at least
 // kImageHeadBytes unless the image is shorter.

@@ -86,6 +86,7 @@ class JpegReader : public ImageReader {
     on_error(jpeg);
   }
   static void on_progress(j_common_ptr jpeg) {
+    if (self(jpeg).source_->is_canceled()) std::longjmp(self(jpeg).jump_, 1);
     if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number <= kMaxScans) return;
     std::snprintf(self(jpeg).message_, JMSG_LENGTH_MAX, "over %d scans", kMaxScans);
     std::longjmp(self(jpeg).jump_, 1);

@@ -102,6 +102,7 @@ class PngReader : public ImageReader {
     return true;
   }
   bool read_one(std::byte* row) {
+    if (source_->is_canceled()) return false;
     if (setjmp(png_jmpbuf(png_))) return false;
     png_read_row(png_, reinterpret_cast<png_bytep>(row), nullptr);
     return true;

@@ -14,10 +14,11 @@ namespace voxdag {
 // A source of bytes whose first bytes (up to kImageHeadBytes) can be seen in advance with head().
 // read() returns all bytes, including the first. read() stores an exception of the source instead
 // of throwing it, because exceptions must not pass through a decoder written in C. In this case
-// read() returns fewer bytes, and rethrow() throws the exception.
+// read() returns fewer bytes, and rethrow() throws the exception. A canceled token also ends the
+// bytes.
 class PeekedSource {
  public:
-  explicit PeekedSource(EncodedBytes& source) : source_(source) {
+  PeekedSource(EncodedBytes& source, const CancelToken* cancel) : source_(source), cancel_(cancel) {
     head_size_ = source.read({head_, sizeof head_});
   }
   std::span<const std::byte> head() const { return {head_, head_size_}; }
@@ -26,6 +27,7 @@ class PeekedSource {
     std::memcpy(out, head_ + head_read_, from_head);
     head_read_ += from_head;
     if (from_head == size) return size;
+    if (is_canceled()) return from_head;
     try {
       return from_head + source_.read({out + from_head, size - from_head});
     } catch (...) {
@@ -33,12 +35,18 @@ class PeekedSource {
       return from_head;
     }
   }
+  bool is_canceled() const { return cancel_ && cancel_->canceled(); }
+  void check_canceled() const {
+    if (cancel_) cancel_->check();
+  }
   void rethrow() const {
+    check_canceled();
     if (failure_) std::rethrow_exception(failure_);
   }
 
  private:
   EncodedBytes& source_;
+  const CancelToken* const cancel_;
   std::byte head_[kImageHeadBytes];
   size_t head_size_ = 0, head_read_ = 0;
   std::exception_ptr failure_;

@@ -40,7 +40,7 @@ void visit_chunks(std::span<const uint8_t> file, const Visit& visit) {
 class WebpReader : public ImageReader {
  public:
   WebpReader(std::unique_ptr<PeekedSource> source, MemoryBudget& budget)
-      : budget_(budget), file_(*source, budget) {
+      : source_(std::move(source)), budget_(budget), file_(*source_, budget) {
     WebPBitstreamFeatures features;
     check(WebPGetFeatures(file_.bytes().data(), file_.bytes().size(), &features));
     if (features.has_animation)
@@ -55,6 +55,7 @@ class WebpReader : public ImageReader {
 
  private:
   void decode() {
+    source_->check_canceled();
     const uint64_t bytes = decoder_bytes(), row = uint64_t{4} * width_;
     if (bytes + row * height_ > kMaxDecoderBytes)
       throw BrokenImage{"is a WebP image that takes " +
@@ -109,6 +110,7 @@ class WebpReader : public ImageReader {
                       (is_short ? "it ends early" : "its data are damaged") + ")"};
   }
 
+  const std::unique_ptr<PeekedSource> source_;
   MemoryBudget& budget_;
   const WholeFile file_;
   PageBuffer<std::byte> pixels_;

@@ -3,6 +3,27 @@
 #include "core/base/error.h"
 
 namespace voxdag {
+namespace {
+
+std::string contents_of(const ReadableFile& file, uint64_t limit_bytes) {
+  if (file.size() > limit_bytes)
+    throw Error(ErrorCode::kLimit, file.path() + " has " + std::to_string(file.size()) +
+                                       " bytes, expected at most " + std::to_string(limit_bytes));
+  std::string contents(file.size(), '\0');
+  file.read_at(0, std::as_writable_bytes(std::span(contents)));
+  return contents;
+}
+
+// Removes a partial file after an error. Ignores further errors, because the first one is reported.
+void remove_partial(FileSystem& files, const std::string& partial) {
+  try {
+    files.remove(partial);
+  } catch (const Error&) {
+    // The next write replaces the file.
+  }
+}
+
+}  // namespace
 
 std::string parent_directory(const std::string& path) {
   const size_t end = path.find_last_not_of('/');
@@ -14,22 +35,25 @@ std::string parent_directory(const std::string& path) {
 }
 
 std::string read_small_file(FileSystem& files, const std::string& path, uint64_t limit_bytes) {
-  const auto file = files.open_read(path);
-  if (file->size() > limit_bytes)
-    throw Error(ErrorCode::kLimit, path + " has " + std::to_string(file->size()) +
-                                       " bytes, expected at most " + std::to_string(limit_bytes));
-  std::string contents(file->size(), '\0');
-  file->read_at(0, std::as_writable_bytes(std::span(contents)));
-  return contents;
+  return contents_of(*files.open_read(path), limit_bytes);
+}
+
+std::string read_own_file(FileSystem& files, const std::string& path, uint64_t limit_bytes) {
+  return contents_of(*files.open_own(path), limit_bytes);
 }
 
 void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents) {
   const std::string partial = path + ".partial";
   const auto file = files.create(partial);
-  file->write_at(0, std::as_bytes(std::span(contents)));
-  file->sync();
-  file->close();
-  files.rename(partial, path);
+  try {
+    file->write_at(0, std::as_bytes(std::span(contents)));
+    file->sync();
+    file->close();
+    files.rename(partial, path);
+  } catch (const Error&) {
+    remove_partial(files, partial);
+    throw;
+  }
   files.sync_directory(parent_directory(path));
 }
 

@@ -1,8 +1,8 @@
 // All file access of voxdag uses this interface. So tests can replace the disk by a full disk, or
 // by a disk that loses unsynced data or flips bits. Paths are plain byte strings.
 //
-// If the system refuses a call, the error code is kNotFound, kNoSpace (for ENOSPC, EDQUOT and
-// EFBIG) or kIo. The message names the call, the path, the offset if there is one, and the system's
+// If the system refuses a call, code_of_errno() (core/base/process_limits.h) determines the
+// error code. The message names the call, the path, the offset if there is one, and the system's
 // reason. Implementations handle short reads and writes, and EINTR.
 //
 // A FileSystem is thread-safe. A file is not thread-safe, with these exceptions: several threads
@@ -51,7 +51,8 @@ class WritableFile {
   // Frees the disk space of a range whose contents are no longer needed. The range then reads as
   // zeros, or as before if the file system does not support this.
   virtual void release(uint64_t /*offset*/, uint64_t /*bytes*/) {}
-  // Returns after all written data is on the disk.
+  // Returns after all written data is on the disk. A process that ends during this call does not
+  // wait for all of the data.
   virtual void sync() = 0;
   // Closes the file without syncing it. Throws an Error if the system's close() fails. The
   // destructor also closes the file, but ignores errors.
@@ -78,13 +79,20 @@ class FileSystem {
  public:
   virtual ~FileSystem() = default;
   virtual std::unique_ptr<ReadableFile> open_read(const std::string& path) = 0;
+  // Opens a file that voxdag wrote in a folder that other users may write. Like open_read(), but
+  // throws Error{kInvalidInput} if `path` is a symbolic link.
+  virtual std::unique_ptr<ReadableFile> open_own(const std::string& path) = 0;
   // Creates an empty file at `path`, or empties an existing file. Throws Error{kInvalidInput} for a
   // symbolic link and for a file with other hard links; so do open_write() and try_lock().
   virtual std::unique_ptr<WritableFile> create(const std::string& path) = 0;
   // Opens the file at `path` and keeps its contents. Creates an empty file if none exists.
   virtual std::unique_ptr<WritableFile> open_write(const std::string& path) = 0;
+  // Creates an empty file at `path`. Returns false if anything exists at `path`.
+  virtual bool create_new(const std::string& path) = 0;
   virtual bool exists(const std::string& path) = 0;
   virtual void rename(const std::string& from, const std::string& to) = 0;
+  // Renames `from` to `to` in one step, unless anything exists at `to`. Returns false if so.
+  virtual bool rename_new(const std::string& from, const std::string& to) = 0;
   virtual void remove(const std::string& path) = 0;
   // Creates the directory and its missing parents. Throws Error{kInvalidInput} if the directory or
   // a parent exists but is a file.
@@ -129,6 +137,8 @@ void remove_tree(FileSystem& files, const std::string& path);
 std::string parent_directory(const std::string& path);
 // Reads a small file completely. Throws Error{kLimit} if it is larger than `limit_bytes`.
 std::string read_small_file(FileSystem& files, const std::string& path, uint64_t limit_bytes);
+// Like read_small_file(), for a file that open_own() opens.
+std::string read_own_file(FileSystem& files, const std::string& path, uint64_t limit_bytes);
 // Replaces the file at `path` by `contents` atomically: writes the contents to `path` + ".partial",
 // syncs and renames this file, and syncs the directory.
 void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents);

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/error.h"
 #include "core/io/file_system.h"
 
 namespace voxdag {
@@ -19,14 +20,27 @@ class ForwardingFiles : public FileSystem {
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
     return files_.open_read(path);
   }
+  // Calls open_read() for the file that the other file system opened, so a derived class that
+  // changes open_read() also changes this call.
+  std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
+    const FileIdentity own = files_.open_own(path)->identity();
+    auto file = open_read(path);
+    if (file->identity().inode != own.inode)
+      throw Error(ErrorCode::kInvalidInput, path + " changed while it was opened");
+    return file;
+  }
   std::unique_ptr<WritableFile> create(const std::string& path) override {
     return files_.create(path);
   }
   std::unique_ptr<WritableFile> open_write(const std::string& path) override {
     return files_.open_write(path);
   }
+  bool create_new(const std::string& path) override { return files_.create_new(path); }
   bool exists(const std::string& path) override { return files_.exists(path); }
   void rename(const std::string& from, const std::string& to) override { files_.rename(from, to); }
+  bool rename_new(const std::string& from, const std::string& to) override {
+    return files_.rename_new(from, to);
+  }
   void remove(const std::string& path) override { files_.remove(path); }
   void make_directories(const std::string& path) override { files_.make_directories(path); }
   void remove_directory(const std::string& path) override { files_.remove_directory(path); }
@@ -39,6 +53,9 @@ class ForwardingFiles : public FileSystem {
   bool is_locked(const std::string& path) override { return files_.is_locked(path); }
   uint64_t free_space(const std::string& path) override { return files_.free_space(path); }
   uint64_t device(const std::string& path) override { return files_.device(path); }
+
+ protected:
+  FileSystem& files() { return files_; }
 
  private:
   FileSystem& files_;

@@ -11,6 +11,7 @@ OutputLock::OutputLock(FileSystem& files, const std::string& output, std::unique
                 output +
                     " is being written by another process: expected another file (-o), or to wait "
                     "for that process");
+  registered_.emplace(path_);
 }
 
 OutputLock::~OutputLock() {

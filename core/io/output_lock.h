@@ -8,9 +8,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/io/file_system.h"
+#include "core/io/temporary_paths.h"
 
 namespace voxdag {
 
@@ -34,6 +36,7 @@ class OutputLock {
   FileSystem& files_;
   const std::string path_;
   const std::unique_ptr<FileLock> lock_;
+  std::optional<TemporaryPath> registered_;
 };
 
 }  // namespace voxdag

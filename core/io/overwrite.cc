@@ -1,11 +1,28 @@
 #include "core/io/overwrite.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <vector>
 
 #include "core/base/error.h"
 
 namespace voxdag {
+namespace {
+
+int errno_of(int result) { return result == 0 ? 0 : errno; }
+
+int rename_after_check(const std::string& from, const std::string& to) {
+  struct stat found {};
+  if (lstat(to.c_str(), &found) == 0) return EEXIST;
+  return errno_of(::rename(from.c_str(), to.c_str()));
+}
+
+}  // namespace
 
 std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string& path) {
   if (!files.exists(path)) return nullptr;
@@ -47,6 +64,20 @@ bool begins_with(const ReadableFile& file, std::string_view bytes) {
   std::string start(std::min<uint64_t>(file.size(), bytes.size()), '\0');
   file.read_at(0, std::as_writable_bytes(std::span(start)));
   return bytes.starts_with(start);
+}
+
+int rename_without_replacing(const std::string& from, const std::string& to) {
+  const int reason =
+      errno_of(renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE));
+  const bool is_unsupported = reason == EINVAL || reason == ENOSYS;
+  return is_unsupported ? rename_by_link(from, to) : reason;
+}
+
+int rename_by_link(const std::string& from, const std::string& to) {
+  const int reason = errno_of(link(from.c_str(), to.c_str()));
+  if (reason == 0) return errno_of(unlink(from.c_str()));
+  const bool has_no_links = reason == EPERM || reason == EOPNOTSUPP || reason == ENOSYS;
+  return has_no_links ? rename_after_check(from, to) : reason;
 }
 
 }  // namespace voxdag

@@ -7,20 +7,18 @@
 
 #include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 #include "core/io/file_system.h"
+#include "core/io/overwrite.h"
 
 namespace voxdag {
 namespace {
 
 [[noreturn]] void fail(const char* call, const std::string& path, int reason) {
-  ErrorCode code = ErrorCode::kIo;
-  if (reason == ENOENT || reason == ENOTDIR) code = ErrorCode::kNotFound;
-  if (reason == ENOSPC || reason == EDQUOT || reason == EFBIG) code = ErrorCode::kNoSpace;
-  throw Error(code, std::string(call) + " " + path + ": " + strerror(reason));
+  throw Error(code_of_errno(reason), std::string(call) + " " + path + ": " + errno_text(reason));
 }
 
 [[noreturn]] void not_a_folder(const std::string& path) {
@@ -75,10 +73,17 @@ int open_to_change(const char* call, const std::string& path, Contents contents)
   return opened.take();
 }
 
+[[noreturn]] void refuse_link(const std::string& path) {
+  throw Error(ErrorCode::kInvalidInput,
+              path + " is a symbolic link: expected a regular file that voxdag wrote");
+}
+
 class PosixReadableFile : public ReadableFile {
  public:
-  explicit PosixReadableFile(const std::string& path)
-      : path_(path), fd_(open_retrying(path, O_RDONLY | O_NONBLOCK)) {
+  // `more_flags` is O_NOFOLLOW or 0.
+  explicit PosixReadableFile(const std::string& path, int more_flags = 0)
+      : path_(path), fd_(open_retrying(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | more_flags)) {
+    if (fd_.get() < 0 && errno == ELOOP && more_flags == O_NOFOLLOW) refuse_link(path);
     if (fd_.get() < 0) fail("open", path, errno);
     struct stat s {};
     if (fstat(fd_.get(), &s) != 0) fail("stat", path, errno);
@@ -138,7 +143,16 @@ class PosixWritableFile : public WritableFile {
       fallocate(fd_.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(begin),
                 static_cast<off_t>(end - begin));
   }
+  // Writes the data to the disk in pieces. A process cannot end during a system call that waits for
+  // the disk, so each call must be short.
   void sync() override {
+    struct stat s {};
+    constexpr off_t kPieceBytes = off_t{8} << 20;
+    if (fstat(fd_.get(), &s) != 0) fail("stat", path_, errno);
+    for (off_t at = 0; at < s.st_size; at += kPieceBytes)
+      sync_file_range(
+          fd_.get(), at, kPieceBytes,
+          SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
     if (fdatasync(fd_.get()) != 0) fail("sync", path_, errno);
   }
   void close() override {
@@ -163,11 +177,19 @@ class PosixFileSystem : public FileSystem {
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
     return std::make_unique<PosixReadableFile>(path);
   }
+  std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
+    return std::make_unique<PosixReadableFile>(path, O_NOFOLLOW);
+  }
   std::unique_ptr<WritableFile> create(const std::string& path) override {
     return std::make_unique<PosixWritableFile>(path, Contents::kEmpty);
   }
   std::unique_ptr<WritableFile> open_write(const std::string& path) override {
     return std::make_unique<PosixWritableFile>(path, Contents::kKeep);
+  }
+  bool create_new(const std::string& path) override {
+    const Descriptor fd(open_retrying(path, O_RDWR | O_CREAT | O_EXCL));
+    if (fd.get() < 0 && errno != EEXIST) fail("create", path, errno);
+    return fd.get() >= 0;
   }
   bool exists(const std::string& path) override {
     struct stat s {};
@@ -177,6 +199,11 @@ class PosixFileSystem : public FileSystem {
   }
   void rename(const std::string& from, const std::string& to) override {
     if (::rename(from.c_str(), to.c_str()) != 0) fail("rename", from + " to " + to, errno);
+  }
+  bool rename_new(const std::string& from, const std::string& to) override {
+    const int reason = rename_without_replacing(from, to);
+    if (reason != 0 && reason != EEXIST) fail("rename", from + " to " + to, reason);
+    return reason == 0;
   }
   void remove(const std::string& path) override {
     if (unlink(path.c_str()) != 0) fail("remove", path, errno);
@@ -216,7 +243,8 @@ class PosixFileSystem : public FileSystem {
     return entries;
   }
   void touch(const std::string& path) override {
-    if (utimensat(AT_FDCWD, path.c_str(), nullptr, 0) != 0) fail("touch", path, errno);
+    if (utimensat(AT_FDCWD, path.c_str(), nullptr, AT_SYMLINK_NOFOLLOW) != 0)
+      fail("touch", path, errno);
   }
   void sync_directory(const std::string& path) override {
     Descriptor fd(open_retrying(path, O_RDONLY | O_DIRECTORY));
@@ -239,7 +267,7 @@ class PosixFileSystem : public FileSystem {
     return same ? std::move(lock) : try_lock(path);
   }
   bool is_locked(const std::string& path) override {
-    const PosixReadableFile file(path);
+    const PosixReadableFile file(path, O_NOFOLLOW);
     if (flock(file.descriptor(), LOCK_SH | LOCK_NB) == 0) return false;
     if (errno != EWOULDBLOCK) fail("lock", path, errno);
     return true;

@@ -30,13 +30,13 @@ ScratchFile::ScratchFile(ScratchFolder& folder)
       state_{folder.next_id(), 0, {}},
       path_(std::make_shared<ScratchPath>(folder, name_of(state_.id))),
       out_(folder.files().create(path_->path())),
-      in_(folder.files().open_read(path_->path())) {}
+      in_(folder.files().open_own(path_->path())) {}
 
 ScratchFile::ScratchFile(ScratchFolder& folder, ScratchFileState state)
     : folder_(folder),
       state_(std::move(state)),
       path_(std::make_shared<ScratchPath>(folder, name_of(state_.id))),
-      in_(folder.files().open_read(path_->path())) {}
+      in_(folder.files().open_own(path_->path())) {}
 
 void ScratchFile::write(uint64_t first_word, std::span<const uint32_t> words) {
   out_->write_at(first_word * sizeof(uint32_t), std::as_bytes(words));

@@ -33,7 +33,7 @@ class PassSegment {
     scratch_.count_written(writer_->size());
     writer_.reset();
   }
-  std::shared_ptr<ReadableFile> open() const { return scratch_.files().open_read(path_->path()); }
+  std::shared_ptr<ReadableFile> open() const { return scratch_.files().open_own(path_->path()); }
   const std::shared_ptr<ScratchPath>& path() const { return path_; }
 
  private:

@@ -72,8 +72,12 @@ bool check_outputs(FileSystem& files, const Outputs& outputs) {
 }  // namespace
 
 LockedOutputs::LockedOutputs(FileSystem& files, const Outputs& outputs)
-    : is_left_behind_(check_outputs(files, outputs)), lock_(files, outputs.paths[0]) {
+    : is_left_behind_(check_outputs(files, outputs)),
+      lock_(files, outputs.paths[0]),
+      guarded_(files) {
   if (is_left_behind_) remove_leftovers(files, outputs);
+  if (!outputs.replace)
+    for (const std::string& path : outputs.paths) guarded_.guard_output(path);
   refuse_replacing(files, outputs);
 }
 

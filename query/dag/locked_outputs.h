@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/io/output_lock.h"
+#include "core/io/outputs/guarded_outputs.h"
 
 namespace voxdag::query {
 
@@ -26,10 +27,14 @@ class LockedOutputs {
   // the input or is not a regular file, or if it would replace a file that is not empty and
   // `replace` is false; kNotFound if an output's folder does not exist.
   LockedOutputs(FileSystem& files, const Outputs& outputs);
+  // The file system through which the command writes its outputs. Unless `replace` is true, it does
+  // not replace a file that appears at an output after the constructor.
+  FileSystem& files() { return guarded_; }
 
  private:
   const bool is_left_behind_;  // true if a killed process left its files
   const OutputLock lock_;
+  GuardedOutputs guarded_;
 };
 
 }  // namespace voxdag::query

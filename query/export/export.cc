@@ -57,14 +57,14 @@ ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const CancelToken& cancel) {
   check_grid(request.selection, file.grid_levels());
   const std::vector<std::string> paths = export_paths(*request.format, request.output);
-  const LockedOutputs lock(files, {paths, file.path(), request.replace});
+  LockedOutputs outputs(files, {paths, file.path(), request.replace});
   const WatchedFile watched(file);
   MemoryBudget budget(request.memory_bytes);
   const bool has_colors = file.has_colors() && !request.gray;
   const auto write = [&] {
     const DagView dag(file);
-    const ExportJob job{files,          file,         dag,        watched, request.selection,
-                        request.output, paths.back(), has_colors, budget,  progress,
+    const ExportJob job{outputs.files(), file,         dag,        watched, request.selection,
+                        request.output,  paths.back(), has_colors, budget,  progress,
                         cancel};
     if (dag.empty()) refuse_empty(job);
     return request.format->write(job);

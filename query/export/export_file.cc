@@ -15,6 +15,7 @@ std::string partial_name(const std::string& path) { return path + ".partial"; }
 
 ExportFile::ExportFile(FileSystem& files, const std::string& path)
     : files_(files), path_(path), file_(files.create(partial_name(path))) {
+  registered_.emplace(partial_name(path));
   buffer_.reserve(kBufferBytes);
 }
 
@@ -60,6 +61,7 @@ uint64_t ExportFile::publish(std::span<ExportFile* const> written) {
   for (ExportFile* const file : written) {
     file->files_.rename(partial_name(file->path_), file->path_);
     file->published_ = true;
+    file->registered_.reset();
     file->files_.sync_directory(parent_directory(file->path_));
   }
   return bytes;

@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/io/file_system.h"
+#include "core/io/temporary_paths.h"
 
 namespace voxdag::query {
 
@@ -45,6 +47,7 @@ class ExportFile {
   uint64_t buffer_offset_ = 0;  // in the file
   uint64_t size_ = 0;
   bool published_ = false;
+  std::optional<TemporaryPath> registered_;  // until it is published
 };
 
 }  // namespace voxdag::query

@@ -19,6 +19,7 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "core/geometry/octree_descent.h"
+#include "core/io/temporary_paths.h"
 #include "merge/merge.h"
 #include "query/dag/locked_outputs.h"
 #include "query/extract/node_reader.h"
@@ -48,7 +49,7 @@ constexpr uint64_t kMaxFirstParts = 4096;
 class TemporaryWork {
  public:
   TemporaryWork(FileSystem& files, const std::string& prefix)
-      : files_(files), path_(make_temporary_folder(prefix)) {}
+      : files_(files), path_(make_temporary_folder(prefix)), registered_(path_) {}
   ~TemporaryWork() {
     try {
       remove_tree(files_, path_);
@@ -63,6 +64,7 @@ class TemporaryWork {
  private:
   FileSystem& files_;
   const std::string path_;
+  const TemporaryPath registered_;
 };
 
 class Extraction {
@@ -277,7 +279,7 @@ MergeInputs Extraction::merge_inputs(std::vector<ArtifactRef> artifacts) {
   inputs.open_segment = [this, segments, mutex](uint32_t id) {
     const std::lock_guard lock(*mutex);
     std::shared_ptr<ReadableFile>& segment = (*segments)[id];
-    if (!segment) segment = files_.open_read(segment_path(work_.path(), id));
+    if (!segment) segment = files_.open_own(segment_path(work_.path(), id));
     return segment;
   };
   inputs.scratch_folder = work_.path() + "/merge";
@@ -300,10 +302,12 @@ Cube crop_cube(const Selection& selection) {
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel) {
   check_grid(spec.selection, file.grid_levels());
-  const LockedOutputs lock(files, {{spec.output}, file.path(), spec.replace});
+  LockedOutputs outputs(files, {{spec.output}, file.path(), spec.replace});
   const WatchedFile watched(file);  // colors are read in place
   return watched.run([&] {
-    return Extraction(file, spec, files, progress, cancel).run([&] { watched.check_readable(); });
+    return Extraction(file, spec, outputs.files(), progress, cancel).run([&] {
+      watched.check_readable();
+    });
   });
 }
 

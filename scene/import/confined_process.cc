@@ -28,8 +28,6 @@ constexpr int kTickMs = 100;
 // Exit statuses of the child. A child that fails otherwise sends its error before it exits.
 constexpr int kDone = 0, kFailed = 1, kNoMemory = 2;
 
-std::string text_of_errno() { return std::strerror(errno); }
-
 // Returns the size of this process's address space in bytes; 0 if it is unknown.
 uint64_t address_space_bytes() {
   uint64_t pages = 0;
@@ -88,7 +86,7 @@ class Child {
   Child(uint64_t memory_bytes, const std::function<void(const SendMessage&)>& work) {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0)
-      throw Error(ErrorCode::kIo, "cannot start a process: pipe: " + text_of_errno());
+      throw Error(ErrorCode::kIo, "cannot start a process: pipe: " + errno_text(errno));
     const pid_t parent = getpid();
     pid_ = fork();
     if (pid_ == 0) {
@@ -96,7 +94,7 @@ class Child {
       confine(memory_bytes, parent);
       run_child(ends[1], work);
     }
-    const std::string reason = text_of_errno();
+    const std::string reason = errno_text(errno);
     close(ends[1]);
     output_ = ends[0];
     if (pid_ < 0) {

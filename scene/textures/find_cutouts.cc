@@ -36,7 +36,7 @@ struct Task {
 AlphaMask decode(FileSystem& files, const Task& task, MemoryBudget& budget,
                  const CancelToken& cancel) {
   ImageBytes bytes(files, *task.image);
-  const auto image = open_image(bytes, budget);
+  const auto image = open_image(bytes, budget, ImageUse::kPixels, &cancel);
   AlphaMask mask(image->width(), image->height(), budget);
   const bool is_wide = image->bits() == 16;
   PageBuffer<std::byte> row(budget, size_t{image->width()} * (is_wide ? 8 : 4),

@@ -10,6 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
+#include "core/base/text.h"
 #include "core/color/cutouts/hidden.h"
 #include "core/color/rule/texture_lookup.h"
 #include "core/format/checksum.h"
@@ -183,12 +184,16 @@ std::unique_ptr<TextureReader> TextureSet::open(uint64_t memory_bytes) {
 uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, MemoryBudget& budget,
                        const CancelToken& cancel) {
   uint64_t pages = 0;
-  for (const ImageSource& source : materials.images) {
+  std::vector<bool> is_used(materials.images.size());
+  for (const Material& material : materials.materials)
+    if (material.image < is_used.size()) is_used[material.image] = true;
+  for (size_t i = 0; i < materials.images.size(); ++i) {
+    const ImageSource& source = materials.images[i];
     cancel.check();
-    if (!source.problem.empty()) continue;
+    if (!is_used[i] || !source.problem.empty()) continue;
     try {
       ImageBytes bytes(files, source);
-      const auto image = open_image(bytes, budget, ImageUse::kSize);
+      const auto image = open_image(bytes, budget, ImageUse::kSize, &cancel);
       for (const TextureLevel& level : pyramid_levels(image->width(), image->height(), 0))
         pages += level.pages();
     } catch (const BrokenImage&) {
@@ -246,6 +251,11 @@ class TextureSet::Builder {
       set_->memory_ = PageBuffer<uint64_t>(budget_, pages * kPageTexels, "textures");
       return;
     }
+    const std::string folder = parent_directory(path);
+    if (const uint64_t free_bytes = files_.free_space(folder); set_->bytes() > free_bytes)
+      throw Error(ErrorCode::kNoSpace, "the decoded images take " + size_text(set_->bytes()) +
+                                           " of disk space, " + folder + " has " +
+                                           size_text(free_bytes) + " free");
     writer_ = files_.create(path);
     set_->file_ = files_.open_read(path);
     set_->checksums_ = PageBuffer<uint32_t>(budget_, pages, "checksums of textures");
@@ -297,7 +307,7 @@ class TextureSet::Builder {
     alone_if_necessary(mutex_, source.name + users_[i], [&] {
       try {
         ImageBytes bytes(files_, source);
-        body(*open_image(bytes, budget_));
+        body(*open_image(bytes, budget_, ImageUse::kPixels, &cancel_));
       } catch (const BrokenImage& broken) {
         problems_[i] = broken.message;
       }
@@ -311,7 +321,10 @@ class TextureSet::Builder {
                              cancel_.check();
                              write_pages(first, texels);
                            });
-    for (uint32_t y = 0; y < image.height(); ++y) builder.add_row(row.read(image));
+    for (uint32_t y = 0; y < image.height(); ++y) {
+      cancel_.check();
+      builder.add_row(row.read(image));
+    }
     expect_unchanged(files_, materials_.images[i]);
   }
 

@@ -41,7 +41,8 @@ CutBatches make_batches(const Batch& like, std::span<const BatchSubvolume> subvo
     cut.first_items.push_back(item);
     for (; item < end; ++item) {
       batch.subvolumes.push_back(subvolumes[item]);
-      open.subvolumes.push_back({subvolumes[item].id, subvolumes[item].cube});
+      open.subvolumes.push_back(
+          {subvolumes[item].id, subvolumes[item].cube, subvolumes[item].triangles});
       open.weight += subvolumes[item].weight;
     }
     cut.batches.push_back(std::move(batch));

@@ -20,6 +20,7 @@ std::string replace_all(std::string text, const std::string& from, const std::st
 void RecordCollector::collect() {
   const std::vector<ClusterFolder::Entry> entries = cluster_.folder.list(cluster_.files());
   for (const ClusterFolder::Entry& entry : entries) {
+    if (rejected_.contains(entry.path)) continue;
     if (entry.kind == ClusterFolder::Kind::kRecord) read_record(entry);
     if (entry.kind == ClusterFolder::Kind::kFailure) read_failure(entry);
   }
@@ -39,19 +40,21 @@ void RecordCollector::read_failure(const ClusterFolder::Entry& entry) {
   if (OpenBatch* const batch = batches_.find(entry.batch)) {
     try {
       const AttemptFailure failure =
-          decode_failure(read_small_file(cluster_.files(), entry.path, kMaxRecordBytes));
+          decode_failure(read_own_file(cluster_.files(), entry.path, kMaxFailureBytes));
       // On a shared file system the failure of an earlier task can become visible when the batch
       // already has a new task.
       const bool is_earlier =
           batch->task && !failure.task.empty() && failure.task != batch->task->name();
       // Tasks use the absolute path of the work folder; the message shows the user's path.
       const std::string& work = cluster_.job.work.path();
-      if (!is_earlier)
+      const bool is_of_entry = failure.batch == entry.batch && failure.attempt == entry.attempt;
+      if (!is_earlier && is_of_entry)
         batch->error = {replace_all(failure.message, absolute_path(work), work) +
                             (failure.node.empty() ? "" : " (on " + failure.node + ")"),
                         true};
     } catch (const Error&) {
       // The file is damaged or no longer exists. Slurm will report that the task ended.
+      rejected_.insert(entry.path);
     }
   }
   remove_attempt(entry);
@@ -61,19 +64,32 @@ void RecordCollector::read_record(const ClusterFolder::Entry& entry) {
   OpenBatch* const batch = batches_.find(entry.batch);
   // If the batch is no longer open, another attempt's record was already accepted.
   if (!batch) return remove_attempt(entry);
+  bool is_read = false;
   try {
-    accept(read_valid_record(cluster_.files(), cluster_.folder, entry, batches_.state(),
-                             batch->subvolumes));
+    const CompletionRecord record = read_valid_record(cluster_.files(), cluster_.folder, entry,
+                                                      batches_.state(), batch->subvolumes);
+    is_read = true;
+    accept(record);
   } catch (const Error& error) {
-    const bool is_missing = error.code() == ErrorCode::kNotFound;
-    if (is_missing && may_appear_later(entry.path)) return;
-    if (!error.is_corruption() && !is_missing && error.code() != ErrorCode::kUnsupportedVersion)
-      throw;
-    cluster_.progress().warn("the record " + entry.path + " is rejected: " + error.message());
-    // The record may come from an earlier attempt, so the current task may still be running.
-    if (!batch->error) batch->error = {error.message(), false};
-    remove_attempt(entry);
+    // Anything can have the name of a record: a pipe, a folder, a file of another user or of any
+    // size. It does not count, and the build goes on.
+    const bool is_foreign = error.code() == ErrorCode::kInvalidInput ||
+                            error.code() == ErrorCode::kLimit || error.code() == ErrorCode::kIo;
+    if (!error.is_corruption() && (is_read || !is_foreign)) throw;
+    const bool is_unreadable =
+        error.code() == ErrorCode::kNotFound || error.code() == ErrorCode::kIo;
+    if (is_unreadable && may_appear_later(entry.path)) return;
+    reject(entry, *batch, error);
   }
+}
+
+void RecordCollector::reject(const ClusterFolder::Entry& entry, OpenBatch& batch,
+                             const Error& error) {
+  cluster_.progress().warn("the record " + entry.path + " is rejected: " + error.message());
+  // The record may come from an earlier attempt, so the current task may still be running.
+  if (!batch.error) batch.error = {error.message(), false};
+  rejected_.insert(entry.path);
+  remove_attempt(entry);
 }
 
 // Returns true during the grace period after the first call for this record. On a shared file

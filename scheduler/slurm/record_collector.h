@@ -4,8 +4,10 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 
+#include "core/base/error.h"
 #include "scheduler/slurm/batch_table.h"
 #include "scheduler/slurm/cluster_context.h"
 #include "scheduler/slurm/files/cluster_folder.h"
@@ -31,11 +33,15 @@ class RecordCollector {
   void read_record(const ClusterFolder::Entry& entry);
   bool may_appear_later(const std::string& record_path);
   void accept(const CompletionRecord& record);
+  void reject(const ClusterFolder::Entry& entry, OpenBatch& batch, const Error& error);
   void remove_attempt(const ClusterFolder::Entry& entry);
 
   ClusterContext& cluster_;
   BatchTable& batches_;
-  std::map<std::string, Seconds> incomplete_since_;  // records whose segment is not visible yet
+  // Records that cannot be read yet, or whose segment is not visible yet.
+  std::map<std::string, Seconds> incomplete_since_;
+  // Rejected records and failures. Some of them, such as folders, cannot be removed.
+  std::set<std::string> rejected_;
 };
 
 }  // namespace voxdag

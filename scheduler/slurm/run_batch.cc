@@ -14,6 +14,7 @@
 #include "core/format/artifact/segment_writer.h"
 #include "core/io/host_name.h"
 #include "core/io/random_id.h"
+#include "core/io/temporary_paths.h"
 #include "merge/merge.h"
 #include "scheduler/slurm/files/batch_file.h"
 #include "scheduler/slurm/files/cluster_folder.h"
@@ -60,6 +61,7 @@ class TemporaryFolder {
       throw Error(
           ErrorCode::kIo,
           path_ + " is in use by another process: expected a folder that only this task uses");
+    registered_.emplace(path_);
   }
   ~TemporaryFolder() {
     try {
@@ -94,6 +96,7 @@ class TemporaryFolder {
   FileSystem& files_;
   std::string path_;
   std::unique_ptr<FileLock> lock_;
+  std::optional<TemporaryPath> registered_;
 };
 
 class Task {
@@ -124,8 +127,8 @@ class Task {
     for (const ClusterFolder::Entry& entry : folder_.list(context_.files)) {
       if (entry.kind != ClusterFolder::Kind::kRecord || entry.batch != run_.batch) continue;
       try {
-        const CompletionRecord record =
-            decode_record(read_small_file(context_.files, entry.path, kMaxRecordBytes));
+        const CompletionRecord record = decode_record(
+            read_own_file(context_.files, entry.path, max_record_bytes(batch.subvolumes.size())));
         const bool is_complete =
             record.artifact.bytes == 0 ||
             context_.files.exists(segment_of_record(context_.files, folder_, record));
@@ -242,7 +245,7 @@ class Task {
     std::map<uint32_t, std::shared_ptr<ReadableFile>> segments;
     inputs.open_segment = [&](uint32_t id) {
       auto& segment = segments[id];
-      if (!segment) segment = context_.files.open_read(segment_path(temporary, id));
+      if (!segment) segment = context_.files.open_own(segment_path(temporary, id));
       return segment;
     };
     inputs.scratch_folder = temporary + "/merge";
@@ -264,7 +267,7 @@ class Task {
   }
 
   uint64_t rows_of(const std::string& folder, const ArtifactRef& artifact) {
-    const ArtifactReader reader(context_.files.open_read(segment_path(folder, artifact.segment)),
+    const ArtifactReader reader(context_.files.open_own(segment_path(folder, artifact.segment)),
                                 artifact);
     uint64_t rows = 0;
     for (const ArtifactLevel& level : reader.levels()) rows += level.rows;
@@ -276,7 +279,8 @@ class Task {
     try {
       write_file_atomically(
           context_.files, folder_.failure_path(run_.batch, attempt_),
-          encode_failure({run_.batch, attempt_, node_name(), slurm_allocation().task, message}));
+          encode_failure({run_.batch, attempt_, node_name(), slurm_allocation().task,
+                          message.substr(0, kMaxFailureBytes / 8)}));
     } catch (const Error&) {
       // The log contains the message, and Slurm knows the exit status.
     }

@@ -27,7 +27,7 @@ constexpr uint64_t kMaxTailBytes = 600;
 // Returns the last lines of a file; "" if it cannot be read.
 std::string last_lines(FileSystem& files, const std::string& path) {
   try {
-    const auto file = files.open_read(path);
+    const auto file = files.open_own(path);
     const uint64_t bytes = std::min(file->size(), kMaxTailBytes);
     std::string text(static_cast<size_t>(bytes), '\0');
     file->read_at(file->size() - bytes, std::as_writable_bytes(std::span(text)));
@@ -104,8 +104,7 @@ std::optional<BuildReport> SlurmMergeJob::finished() const {
   const std::string path = report_path(spec_.run.output);
   try {
     if (!context_.files.exists(path)) return std::nullopt;
-    const BuildReport report =
-        decode_report(read_small_file(context_.files, path, kMaxReportBytes));
+    const BuildReport report = decode_report(read_own_file(context_.files, path, kMaxReportBytes));
     if (report.merge_request == request_ &&
         context_.files.open_read(spec_.run.output)->size() == report.bytes)
       return report;

@@ -18,9 +18,10 @@ inline std::string full_disk_advice(std::span<const StoredSubvolume> leaves, boo
     bytes += static_cast<double>(subvolume.artifact.bytes);
   }
   std::string needed;
-  if (built > 0) {
+  if (built > 0 && bytes > 0) {
     const double artifacts = bytes * (1 + planned / built);
-    needed = "about " + std::to_string(std::llround((2 * artifacts - bytes) / 1e6)) + " MB of ";
+    const auto megabytes = static_cast<long long>(std::ceil((2 * artifacts - bytes) / 1e6));
+    needed = "about " + std::to_string(megabytes) + " MB of ";
     if (has_colors) needed = "the space for colors (voxdag plan estimates it) and " + needed;
   }
   return "; the job is paused: free " + needed + "disk space and run the same command again";

@@ -41,10 +41,12 @@ bool is_scratch(const DirectoryEntry& entry) {
 // NFS gives such a name to a removed file that a process still has open.
 bool is_left_by_nfs(std::string_view name) { return name.starts_with(".nfs"); }
 
-// Files and folders of a cluster build; slurm/files/cluster_folder.h lists them.
+// Files and folders of a cluster build; slurm/files/cluster_folder.h lists them. Anything may have
+// the name of a record; the build warns about it.
 bool is_of_cluster(const DirectoryEntry& entry) {
-  if (entry.is_special) return false;
   const std::string_view name = entry.name;
+  if (name.starts_with("batch-") && name.ends_with(".json")) return true;
+  if (entry.is_special) return false;
   if (entry.is_directory) return name.starts_with("attempt-");
   if (is_left_by_nfs(name)) return true;
   const auto is = [&](std::string_view begin, std::string_view end) {
@@ -84,7 +86,7 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
   lock_ = wait_for_lock(try_lock, "the work folder " + path_, max_wait_s, context);
   if (!lock_)
     throw Error(ErrorCode::kIo, "the work folder " + path_ + " is in use by " +
-                                    read_small_file(files_, lock_path, 1 << 12) +
+                                    read_own_file(files_, lock_path, 1 << 12) +
                                     ": expected no other build in this folder");
   const std::string holder = "process " + std::to_string(getpid()) + " on " + host_name();
   // create() empties the file, because the previous holder's text may have been longer.
@@ -113,7 +115,7 @@ void WorkFolder::check_is_ours() const {
 std::string WorkFolder::holder(FileSystem& files, const std::string& folder) {
   const std::string lock_path = folder + "/" + std::string(kLockName);
   if (!files.exists(lock_path) || !files.is_locked(lock_path)) return "";
-  return read_small_file(files, lock_path, 1 << 12);
+  return read_own_file(files, lock_path, 1 << 12);
 }
 
 std::vector<std::string> WorkFolder::files_in(FileSystem& files, const std::string& folder) {
@@ -132,7 +134,7 @@ std::vector<std::string> WorkFolder::files_in(FileSystem& files, const std::stri
 }
 
 std::shared_ptr<ReadableFile> WorkFolder::open_segment(uint32_t id) const {
-  return files_.open_read(segment_path(path_, id));
+  return files_.open_own(segment_path(path_, id));
 }
 
 uint32_t WorkFolder::next_segment_id() const {

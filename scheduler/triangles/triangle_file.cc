@@ -8,7 +8,7 @@ TriangleFile::TriangleFile(FileSystem& files, std::string path, uint64_t end)
     : files_(files),
       path_(std::move(path)),
       writer_(end ? files.open_write(path_) : files.create(path_)),
-      reader_(files.open_read(path_)),
+      reader_(files.open_own(path_)),
       name_is_durable_(end > 0),
       first_(end),
       end_(end) {

@@ -79,6 +79,7 @@ JobTask TaskResolver::make(const JobRequest& request, JobTask::Kind kind) {
                            " bytes: expected at most " + std::to_string(memory_bytes_) +
                            ", the limit for a job of this service");
   task.threads = config_.jobs.threads;
+  task.min_free_bytes = config_.jobs.min_free_disk_bytes;
   task.cluster = config_.cluster;
   return task;
 }

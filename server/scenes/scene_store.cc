@@ -70,7 +70,7 @@ std::string scene_name_pattern() {
 std::string file_sha256(FileSystem& files, const std::string& path, uint64_t size,
                         const std::function<void()>& check) {
   constexpr uint64_t kPieceBytes = 256 << 10;
-  const auto file = files.open_read(path);
+  const auto file = files.open_own(path);
   Sha256 digest;
   std::vector<std::byte> piece;
   for (uint64_t at = 0; at < size; at += piece.size()) {
@@ -298,7 +298,7 @@ void SceneStore::check_part(const std::string& name, uint64_t size) {
     throw Error(ErrorCode::kCorrupt, part_path(name) +
                                          ": the file was removed during the upload: expected it to "
                                          "remain; upload the scene again");
-  const uint64_t found = files_.open_read(part_path(name))->size();
+  const uint64_t found = files_.open_own(part_path(name))->size();
   if (found != size)
     throw Error(ErrorCode::kCorrupt, part_path(name) + " has " + std::to_string(found) +
                                          " bytes: expected " + std::to_string(size) +

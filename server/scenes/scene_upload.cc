@@ -67,7 +67,7 @@ SceneUpload::~SceneUpload() {
 
 bool SceneUpload::has_part() const {
   const std::string path = store_.part_path(name_);
-  return store_.files_.exists(path) && store_.files_.open_read(path)->size() >= first_;
+  return store_.files_.exists(path) && store_.files_.open_own(path)->size() >= first_;
 }
 
 void SceneUpload::write(std::string_view bytes) {

@@ -8,7 +8,7 @@
 namespace voxdag::server {
 
 std::shared_ptr<const FileTileSource> OpenTileSources::open(const std::string& path) {
-  const FileIdentity identity = files_.open_read(path)->identity();
+  const FileIdentity identity = files_.open_own(path)->identity();
   {
     const std::lock_guard lock(mutex_);
     if (const auto found = find(path, identity); found != entries_.end()) return found->file;
@@ -56,7 +56,7 @@ size_t OpenTileSources::size() const {
 bool OpenTileSources::is_current(const Entry& entry) const {
   try {
     return !entry.file->is_broken() &&
-           files_.open_read(entry.path)->identity() == entry.file->identity();
+           files_.open_own(entry.path)->identity() == entry.file->identity();
   } catch (const Error&) {
     return false;
   }

@@ -5,7 +5,9 @@
 #include <csignal>
 #include <filesystem>
 
+#include "core/base/clock.h"
 #include "tests/cli/command_line.h"
+#include "tests/support/image_files.h"
 
 namespace command_line {
 namespace {
@@ -59,6 +61,31 @@ TEST_F(Interrupt, StopsAndResumes) {
     }
     EXPECT_GT(caught, 0);
   }
+}
+
+// A JPEG of many scans takes long to decode. tests/long/signals.py sends signals at random moments
+// of every command.
+TEST_F(Interrupt, InsideAnImageDecoder) {
+  constexpr uint32_t kEdge = 2048;
+  put("late.jpg", voxdag::test::jpeg_of_scans(kEdge, kEdge,
+                                              std::string(size_t{3} * kEdge * kEdge, '\x60'), 400));
+  put("late.gltf", R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":60,"uri":
+    "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/"}],
+    "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":24}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+                 {"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"}],
+    "images":[{"uri":"late.jpg"}],"textures":[{"source":0}],
+    "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+    "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0}]}],
+    "nodes":[{"mesh":0}]})");
+  const pid_t pid =
+      start({"build", "late.gltf", "-r", "16", "-o", "late.vdag", "--color", "--memory", "1GiB"});
+  sleep_ms(1500);
+  const double start_s = voxdag::wall_seconds();
+  kill(pid, SIGTERM);
+  const Answer answer = wait_for(pid);
+  EXPECT_EQ(answer.status, 130) << answer.err;
+  EXPECT_LT(voxdag::wall_seconds() - start_s, 5);
 }
 
 // Stops extracts and exports after they have created their first file. A run may finish before its

@@ -121,17 +121,37 @@ std::unique_ptr<voxdag::WritableFile> FaultyFiles::open_write(const std::string&
   return std::make_unique<FaultyWriter>(*this, std::move(file));
 }
 
+// Not an operation of its own: create() follows.
+bool FaultyFiles::create_new(const std::string& path) {
+  std::lock_guard lock(mutex_);
+  if (!ForwardingFiles::create_new(path)) return false;
+  unsynced_names_[path] = "";
+  synced_[path] = "";
+  return true;
+}
+
+void FaultyFiles::rename_unsynced(const std::string& from, const std::string& to) {
+  std::lock_guard lock(mutex_);
+  if (exists(to) && !unsynced_names_.contains(to))
+    replaced_[to] = synced_.contains(to) ? synced_[to] : contents(to);
+  ForwardingFiles::rename(from, to);
+  unsynced_names_.erase(from);
+  unsynced_names_[to] = from;
+  synced_[to] = synced_[from];
+  synced_.erase(from);
+}
+
 void FaultyFiles::rename(const std::string& from, const std::string& to) {
+  operate([&] { rename_unsynced(from, to); });
+}
+
+bool FaultyFiles::rename_new(const std::string& from, const std::string& to) {
+  bool is_new = false;
   operate([&] {
-    std::lock_guard lock(mutex_);
-    if (exists(to) && !unsynced_names_.contains(to))
-      replaced_[to] = synced_.contains(to) ? synced_[to] : contents(to);
-    ForwardingFiles::rename(from, to);
-    unsynced_names_.erase(from);
-    unsynced_names_[to] = from;
-    synced_[to] = synced_[from];
-    synced_.erase(from);
+    is_new = !exists(to);
+    if (is_new) rename_unsynced(from, to);
   });
+  return is_new;
 }
 
 void FaultyFiles::remove(const std::string& path) {

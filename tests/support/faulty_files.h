@@ -43,7 +43,9 @@ class FaultyFiles : public voxdag::ForwardingFiles {
   std::unique_ptr<voxdag::ReadableFile> open_read(const std::string& path) override;
   std::unique_ptr<voxdag::WritableFile> create(const std::string& path) override;
   std::unique_ptr<voxdag::WritableFile> open_write(const std::string& path) override;
+  bool create_new(const std::string& path) override;
   void rename(const std::string& from, const std::string& to) override;
+  bool rename_new(const std::string& from, const std::string& to) override;
   void remove(const std::string& path) override;
   void sync_directory(const std::string& path) override;
 
@@ -63,6 +65,8 @@ class FaultyFiles : public voxdag::ForwardingFiles {
   template <class Operation, class Half, class Flipped>
   void write(const Operation& operation, const Half& half, const Flipped& flipped);
   void read();
+  // Renames a file and records this for a power cut.
+  void rename_unsynced(const std::string& from, const std::string& to);
   // Reverts files and names to their state at the last sync, then sends SIGKILL.
   void cut_power();
 

@@ -23,6 +23,11 @@ class MemoryFiles : public FileSystem {
     return std::make_unique<File>(path, found->second);
   }
   bool exists(const std::string& path) override { return contents.contains(path); }
+  std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
+    return open_read(path);
+  }
+  bool create_new(const std::string&) override { read_only(); }
+  bool rename_new(const std::string&, const std::string&) override { read_only(); }
   std::unique_ptr<WritableFile> create(const std::string&) override { read_only(); }
   std::unique_ptr<WritableFile> open_write(const std::string&) override { read_only(); }
   void rename(const std::string&, const std::string&) override { read_only(); }

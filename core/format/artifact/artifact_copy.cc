@@ -26,6 +26,7 @@ ArtifactIndex read_single_index(const ReadableFile& file, const ArtifactRef& ref
                                   " bytes: expected an artifact of " + std::to_string(ref.bytes) +
                                   " bytes at byte " + std::to_string(ref.offset) +
                                   " with its index at byte " + std::to_string(ref.index_offset));
+  check_index_bytes(ref, file.path());
   std::vector<std::byte> bytes(ref.offset + ref.bytes - ref.index_offset);
   file.read_at(ref.index_offset, bytes);
   ArtifactIndex index = decode_index(bytes, ref, file.path());
@@ -91,7 +92,7 @@ uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std
 
 CacheEntry read_cache_entry(FileSystem& files, const std::string& path) {
   CacheEntry entry;
-  entry.file = files.open_read(path);
+  entry.file = files.open_own(path);
   if (entry.file->size() < kSegmentHeaderBytes + kFooterBytes)
     corrupt_copy(path, "it has " + std::to_string(entry.file->size()) +
                            " bytes: expected at least " +

@@ -158,6 +158,13 @@ std::vector<std::byte> encode_index(const ArtifactIndex& index) {
   return bytes;
 }
 
+void check_index_bytes(const ArtifactRef& ref, const std::string& where) {
+  const uint64_t bytes = ref.offset + ref.bytes - ref.index_offset;
+  if (bytes > kMaxIndexBytes)
+    corrupt(where, "an index of " + std::to_string(bytes) + " bytes, expected at most " +
+                       std::to_string(kMaxIndexBytes));
+}
+
 ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& ref,
                            const std::string& where) {
   if (checksum64(bytes) != ref.checksum) corrupt(where, "the index fails its checksum");

@@ -25,6 +25,12 @@ struct ArtifactIndex {
   std::vector<ArtifactLevel> levels;  // from L-2 upwards
 };
 
+// Maximum size of the index of an artifact: enough for 3 * 10^10 rows.
+inline constexpr uint64_t kMaxIndexBytes = uint64_t{256} << 20;
+// Throws Error{kCorrupt} if the index of the artifact at `ref`, which a file of others may name, is
+// larger than kMaxIndexBytes. Call it before the index is read.
+void check_index_bytes(const ArtifactRef& ref, const std::string& where);
+
 std::vector<std::byte> encode_index(const ArtifactIndex& index);
 
 // Decodes the index of the artifact at `ref`. Throws Error{kCorrupt} or Error{kUnsupportedVersion}

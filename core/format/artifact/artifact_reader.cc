@@ -23,6 +23,7 @@ std::vector<std::byte> read_index(const ReadableFile& file, const ArtifactRef& r
                 where + ": " + std::to_string(ref.bytes) + " bytes, with the index at byte " +
                     std::to_string(ref.index_offset) + ": expected a part of the file, which has " +
                     std::to_string(size) + " bytes");
+  check_index_bytes(ref, where);
   std::vector<std::byte> bytes(ref.offset + ref.bytes - ref.index_offset);
   file.read_at(ref.index_offset, bytes);
   return bytes;

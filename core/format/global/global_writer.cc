@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <future>
+#include <optional>
 
 #include "core/base/background.h"
 #include "core/base/error.h"
@@ -11,6 +12,7 @@
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
 #include "core/io/overwrite.h"
+#include "core/io/temporary_paths.h"
 
 namespace voxdag {
 
@@ -113,15 +115,22 @@ struct GlobalFileWriter::State {
   bool level_open = false;
   uint64_t section_bytes = 0;  // bytes of the open section
   bool section_open = false;
-  bool retained = false;      // the partial file outlives the writer
+  bool retained = false;                         // the partial file outlives the writer
+  std::optional<TemporaryPath> registered = {};  // the partial file, until it is retained
   uint64_t end = kPageBytes;  // start of the open (or the next) level or section, or of the table
 
   uint32_t brick_level() const { return grid.levels - kBrickLevels; }
   // Returns the open level, or the next level to open.
   uint32_t current_level() const { return brick_level() - static_cast<uint32_t>(levels.size()); }
   bool complete() const { return levels.empty() || levels.size() == brick_level() + 1; }
+  void retain() {
+    retained = true;
+    registered.reset();
+  }
   void create_file() {
-    if (!file) file = files.create(partial_path);
+    if (file) return;
+    file = files.create(partial_path);
+    registered.emplace(partial_path);
   }
   // Pads a level or section that ends at byte `content_end` to complete pages.
   void pad(uint64_t content_end);
@@ -163,7 +172,7 @@ void GlobalFileWriter::resume(const GlobalFileProgress& progress) {
   State& s = *state_;
   uint64_t end = kPageBytes;
   for (const GlobalLevel& level : progress.levels) end += round_up_to_page(bytes_of(level));
-  const auto written = s.files.open_read(s.partial_path);
+  const auto written = s.files.open_own(s.partial_path);
   const uint64_t whole_blocks = (end - kPageBytes) / kChecksumBlockBytes;
   if (written->size() < end || progress.levels.size() > s.brick_level() + 1 ||
       progress.checksums.size() < whole_blocks)
@@ -181,14 +190,14 @@ void GlobalFileWriter::resume(const GlobalFileProgress& progress) {
   s.file = s.files.open_write(s.partial_path);
   s.levels = progress.levels;
   s.end = end;
-  s.retained = true;
+  s.retain();
 }
 
 void GlobalFileWriter::sync() {
   state_->create_file();
   state_->file->sync();
   state_->files.sync_directory(parent_directory(state_->path));
-  state_->retained = true;
+  state_->retain();
 }
 
 void GlobalFileWriter::begin_level(uint32_t level) {
@@ -346,7 +355,7 @@ HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
 std::string GlobalFileWriter::State::digest(const HeaderPage& header,
                                             std::span<const uint64_t> checksums, unsigned threads,
                                             const CancelToken& cancel) const {
-  const auto written = files.open_read(partial_path);
+  const auto written = files.open_own(partial_path);
   Sha256 digest;
   const auto add_expected = [&](uint64_t begin, std::span<const std::byte> expected) {
     read_through(*written, begin, begin + expected.size(), cancel,
@@ -421,7 +430,7 @@ void GlobalFileWriter::publish() {
   State& s = *state_;
   s.file->close();
   s.files.rename(s.partial_path, s.path);
-  s.retained = true;  // the file has its final name
+  s.retain();  // the file has its final name
   s.files.sync_directory(parent_directory(s.path));
 }
 

@@ -9,11 +9,11 @@
 
 #include <array>
 #include <cerrno>
-#include <cstring>
 #include <utility>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 
 extern char** environ;
 
@@ -21,7 +21,7 @@ namespace voxdag {
 namespace {
 
 [[noreturn]] void fail(const std::string& what, int error) {
-  throw Error(ErrorCode::kIo, what + ": " + std::strerror(error));
+  throw Error(ErrorCode::kIo, what + ": " + errno_text(error));
 }
 
 // A pipe, read from end 0 and written to end 1. Its destructor and exec() close both ends.
@@ -60,14 +60,12 @@ class FileActions {
 
 class Attributes {
  public:
-  // Resets SIGPIPE and SIGINT to their defaults in the started program, because this process may
-  // ignore these signals.
+  // Resets signals that this process may ignore to their defaults in the started program.
   Attributes() {
     posix_spawnattr_init(&attributes_);
     sigset_t defaults;
     sigemptyset(&defaults);
-    sigaddset(&defaults, SIGPIPE);
-    sigaddset(&defaults, SIGINT);
+    for (const int signal : {SIGPIPE, SIGXFSZ, SIGINT}) sigaddset(&defaults, signal);
     posix_spawnattr_setsigdefault(&attributes_, &defaults);
     posix_spawnattr_setpgroup(&attributes_, 0);
     // A separate process group, so that Ctrl-C does not kill the command.

@@ -36,7 +36,7 @@ void fields(Visitor& visit, Batch& batch) {
 namespace {
 
 constexpr std::string_view kBatchMagic = "vdbatch2";
-constexpr uint64_t kMaxHeaderBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxHeaderBytes = uint64_t{256} << 20;
 
 struct Prologue {
   char magic[8];
@@ -128,7 +128,7 @@ void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
   files.sync_directory(parent_directory(path));
 }
 
-BatchFile::BatchFile(FileSystem& files, const std::string& path) : file_(files.open_read(path)) {
+BatchFile::BatchFile(FileSystem& files, const std::string& path) : file_(files.open_own(path)) {
   const auto damaged = [&](const std::string& what) {
     return Error(ErrorCode::kCorrupt, path + ": " + what + ": expected the batch of a build");
   };

@@ -14,6 +14,7 @@ template <class Visitor>
 void fields(Visitor& visit, ExpectedSubvolume& subvolume) {
   visit("id", subvolume.id);
   fields(visit, subvolume.cube);
+  visit("triangles", subvolume.triangles);
 }
 
 template <class Visitor>
@@ -58,7 +59,7 @@ void fields(Visitor& visit, ClusterState& state) {
 
 namespace {
 
-constexpr uint64_t kMaxStateBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxStateBytes = uint64_t{256} << 20;
 
 }  // namespace
 
@@ -81,7 +82,7 @@ std::optional<ClusterState> read_cluster_state(FileSystem& files, const std::str
   const std::string path = ClusterFolder(work_folder).state_path();
   if (!files.exists(path)) return std::nullopt;
   try {
-    return decode_state(read_small_file(files, path, kMaxStateBytes));
+    return decode_state(read_own_file(files, path, kMaxStateBytes));
   } catch (const Error& error) {
     // A build that has just ended removed the file.
     if (error.code() == ErrorCode::kNotFound) return std::nullopt;

@@ -14,8 +14,12 @@
 
 namespace voxdag {
 
-// Maximum size of a record's file.
-inline constexpr uint64_t kMaxRecordBytes = uint64_t{1} << 30;
+// Maximum size of the record of a batch with this number of subvolumes.
+inline constexpr uint64_t max_record_bytes(uint64_t subvolumes) {
+  return (uint64_t{64} << 10) + 512 * subvolumes;
+}
+// Maximum size of the record of a failure.
+inline constexpr uint64_t kMaxFailureBytes = uint64_t{64} << 10;
 
 struct BuiltSubvolume {
   SubvolumeId id = 0;

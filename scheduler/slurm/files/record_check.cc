@@ -18,8 +18,23 @@ std::string describe(const Cube& cube) {
          ", " + std::to_string(cube.position[1]) + ", " + std::to_string(cube.position[2]) + ")";
 }
 
-void check_roots(const ArtifactReader& artifact, std::span<const ExpectedSubvolume> subvolumes,
-                 std::set<Cube> to_find) {
+// Compares the record with the numbers of triangles in the batch.
+void check_counts(const CompletionRecord& record, std::span<const ExpectedSubvolume> subvolumes) {
+  for (size_t i = 0; i < subvolumes.size(); ++i) {
+    const auto& triangles = subvolumes[i].triangles;
+    const uint64_t voxels = record.subvolumes[i].summary.voxels;
+    if (triangles && (*triangles > 0) != (voxels > 0))
+      refuse_record("it has " + std::to_string(voxels) + " voxels for the " +
+                    std::to_string(*triangles) + " triangles of the subvolume at " +
+                    describe(subvolumes[i].cube));
+  }
+}
+
+// Checks that the artifact has the roots of the cubes `to_find`, and that the voxels of its roots
+// add up to the voxels in the record.
+void check_roots(const ArtifactReader& artifact, const CompletionRecord& record,
+                 std::span<const ExpectedSubvolume> subvolumes, std::set<Cube> to_find) {
+  std::vector<uint64_t> voxels(subvolumes.size());
   for (const ArtifactRoot& root : artifact.roots()) {
     const auto owner = std::ranges::find_if(
         subvolumes, [&](const ExpectedSubvolume& s) { return contains(s.cube, root.cube); });
@@ -27,10 +42,16 @@ void check_roots(const ArtifactReader& artifact, std::span<const ExpectedSubvolu
       refuse_record("its artifact has the root of the cube at " + describe(root.cube) +
                     ": expected only cubes of the batch");
     to_find.erase(owner->cube);
+    voxels[static_cast<size_t>(owner - subvolumes.begin())] += root.voxels;
   }
   if (!to_find.empty())
     refuse_record("its artifact lacks the root of the subvolume at " + describe(*to_find.begin()) +
                   ": expected the roots of all subvolumes of the batch");
+  for (size_t i = 0; i < subvolumes.size(); ++i)
+    if (voxels[i] != record.subvolumes[i].summary.voxels)
+      refuse_record("its artifact has " + std::to_string(voxels[i]) +
+                    " voxels in the subvolume at " + describe(subvolumes[i].cube) + ": expected " +
+                    std::to_string(record.subvolumes[i].summary.voxels));
 }
 
 }  // namespace
@@ -39,7 +60,7 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
                                    const ClusterFolder::Entry& entry, const ClusterState& state,
                                    std::span<const ExpectedSubvolume> subvolumes) {
   const CompletionRecord record =
-      decode_record(read_small_file(files, entry.path, kMaxRecordBytes));
+      decode_record(read_own_file(files, entry.path, max_record_bytes(subvolumes.size())));
   if (record.program != state.program)
     throw Error(ErrorCode::kUnsupportedVersion, "it was written by voxdag " + record.program +
                                                     " on " + record.node + ": expected voxdag " +
@@ -53,6 +74,7 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
     refuse_record("its list of " + std::to_string(record.subvolumes.size()) +
                   " subvolumes differs from the batch's list of " +
                   std::to_string(subvolumes.size()) + ": expected the same subvolumes");
+  check_counts(record, subvolumes);
   std::set<Cube> to_find;
   for (size_t i = 0; i < subvolumes.size(); ++i)
     if (!record.subvolumes[i].summary.empty()) to_find.insert(subvolumes[i].cube);
@@ -61,7 +83,7 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
     refuse_record("it names segment " + std::to_string(record.artifact.segment) + ": expected " +
                   std::to_string(ClusterFolder::segment_of(record.batch)));
   const std::shared_ptr<ReadableFile> segment =
-      files.open_read(segment_of_record(files, folder, record));
+      files.open_own(segment_of_record(files, folder, record));
   if (segment->size() < record.segment_bytes)
     refuse_record("its segment has " + std::to_string(segment->size()) + " bytes: expected " +
                   std::to_string(record.segment_bytes));
@@ -71,7 +93,7 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
                   " grid levels and " + std::to_string(artifact.shape().hash_bits) +
                   " hash bits: expected " + std::to_string(state.shape.grid_levels) + " and " +
                   std::to_string(state.shape.hash_bits));
-  check_roots(artifact, subvolumes, std::move(to_find));
+  check_roots(artifact, record, subvolumes, std::move(to_find));
   return record;
 }
 

@@ -58,7 +58,7 @@ ColorStore::ColorStore(FileSystem& files, std::string path, double sync_interval
       sync_interval_s_(sync_interval_s),
       last_sync_s_(wall_seconds()) {
   if (!files_.exists(path_)) return;
-  reader_ = files_.open_read(path_);
+  reader_ = files_.open_own(path_);
   find_artifacts(progress, cancel);
 }
 
@@ -134,7 +134,7 @@ ColorStore::Place ColorStore::add(const Checksum128& key, uint64_t number, bool 
   const std::lock_guard lock(mutex_);
   if (!writer_) {
     writer_ = end_ > 0 ? files_.open_write(path_) : files_.create(path_);
-    reader_ = files_.open_read(path_);
+    reader_ = files_.open_own(path_);
   }
   const Place place{end_ + kHeaderBytes, part.size(), checksum};
   // The part is written before its header. So the bytes of every header's part exist, unless the
@@ -169,7 +169,7 @@ void ColorStore::keep_only(std::span<const Checksum128> keys, const CancelToken&
   files_.rename(copy_path, path_);
   files_.sync_directory(parent_directory(path_));
   found_ = std::move(retained);
-  reader_ = files_.open_read(path_);
+  reader_ = files_.open_own(path_);
   end_ = end;
 }
 

@@ -196,7 +196,7 @@ class Worker {
   void add_to_cache(const std::string& key, const ArtifactRef& artifact) {
     segment_.flush();
     if (!written_segment_)
-      written_segment_ = files_.open_read(segment_path(options_.segment_folder, segment_.id()));
+      written_segment_ = files_.open_own(segment_path(options_.segment_folder, segment_.id()));
     options_.cache->add(key, *written_segment_, artifact);
   }
 

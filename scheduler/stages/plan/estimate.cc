@@ -42,12 +42,12 @@ constexpr double kMaxCellsPerBrick = 32;
 constexpr double kMemoryBytesPerNode = 26;
 constexpr double kBaseMemoryBytes = 24e6;
 
-// Minimum levels of a build's grid for check_disk_space(): 4096 voxels per edge. A smaller build
-// fits any disk that can store its scene.
-constexpr uint32_t kMinLevelsToEstimate = 12;
-// The finer pilot of check_disk_space() has at least this many levels less than the build's grid,
-// so its cost is negligible.
-constexpr uint32_t kPilotLevelsBelow = 5;
+// Returns the number of grid levels of the finer of the two pilots. Large builds are extrapolated
+// from 13 levels (8192^3 voxels). This pilot takes one or two seconds. If the triangles do not fit
+// in memory on this grid, they are read again for a coarser pilot.
+uint32_t pilot_levels_of(uint32_t grid_levels) {
+  return std::clamp<uint32_t>(grid_levels - std::min<uint32_t>(grid_levels, 2), 12, 13);
+}
 
 // A pilot build: the complete scene as one subvolume on a coarser grid. Its output is counted and
 // discarded.
@@ -225,14 +225,14 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
 }  // namespace
 
 Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
-                        BuildScene& source, uint32_t pilot_levels, const StageContext& context) {
+                        BuildScene& source, const StageContext& context) {
   const MemoryBudget& budget = context.budget;
   Estimate estimate;
   estimate.triangles = scene.state.counts.triangles;
   estimate.subvolumes = scene.plan.size();
   for (const SubvolumePlan& subvolume : scene.plan) estimate.expected_bricks += subvolume.weight;
   estimate.free_memory = budget.limit();
-  const auto pilots = build_pilots(scene, pilot_levels, context);
+  const auto pilots = build_pilots(scene, pilot_levels_of(scene.state.grid.levels), context);
   if (pilots.empty()) {
     // There are too many triangles even for a small grid. Their expected voxels are an upper bound.
     estimate.voxels = {0, scene.state.counts.expected_voxels, scene.state.counts.expected_voxels};
@@ -281,16 +281,14 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
 bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
                       const std::string& work_folder, MemoryBudget& budget,
                       const BuildContext& context) {
-  const uint32_t levels = scene.state.grid.levels;
-  if (spec.run.force || levels < kMinLevelsToEstimate) return false;
+  if (spec.run.force) return false;
   const std::string output_folder = parent_directory(spec.run.output);
   const uint64_t free_bytes =
       std::min(context.files.free_space(work_folder), context.files.free_space(output_folder));
   const StageContext stage{context, spec.run.threads, budget};
   if (max_disk_bytes(spec.geometry, scene, source, stage) < static_cast<double>(free_bytes))
     return false;
-  const Estimate estimate =
-      estimate_build(spec.geometry, scene, source, levels - kPilotLevelsBelow, stage);
+  const Estimate estimate = estimate_build(spec.geometry, scene, source, stage);
   check_estimate(estimate, context.files, work_folder, output_folder, context.progress);
   return true;
 }

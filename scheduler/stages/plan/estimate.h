@@ -37,15 +37,15 @@ struct Estimate {
   uint64_t free_memory = 0;  // the memory budget in bytes
 };
 
-// Estimates the build of a prepared scene without changing it. The pilots have at most
-// 2^pilot_levels voxels per edge. Finer pilots give better estimates and take longer. The pilots
-// run on this thread, within the budget.
+// Estimates the build of a prepared scene without changing it. The pilots run on this thread,
+// within the budget.
 Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
-                        BuildScene& source, uint32_t pilot_levels, const StageContext& context);
+                        BuildScene& source, const StageContext& context);
 
-// Checks before a build that the disk has space for it. Throws Error{kNoSpace} if the build cannot
-// fit; warns if it may not fit. Does nothing if RunOptions::force is set or the resolution is below
-// 4096. Returns true if the check required an estimate, which runs pilot builds.
+// Checks before a build that the disk has space for it, including the decoded images. Throws
+// Error{kNoSpace} if the build cannot fit; warns if it may not fit. Does nothing if
+// RunOptions::force is set. Returns true if the check required an estimate, which runs pilot
+// builds.
 bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
                       const std::string& work_folder, MemoryBudget& budget,
                       const BuildContext& context);

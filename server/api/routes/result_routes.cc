@@ -118,7 +118,7 @@ Response get_dag(Context& context, Call& call) {
   auto permit = context.downloads.acquire(call.caller.client);
   if (!permit) throw busy("too many concurrent downloads: " + context.downloads.limits(), 5);
   Response response = answer_with_file(
-      call.request, context.files.open_read(context.dispatcher.folder(job.id).result()),
+      call.request, context.files.open_own(context.dispatcher.folder(job.id).result()),
       nlohmann::json::parse(job.result).at("sha256"), file_name(job));
   if (response.file) {
     response.permit = std::move(permit);
@@ -131,7 +131,7 @@ Response get_dag(Context& context, Call& call) {
 
 // Answers with a complete file, which is read while it is sent.
 Response stream_file(Context& context, const std::string& path, Response response) {
-  response.file = context.files.open_read(path);
+  response.file = context.files.open_own(path);
   response.pieces.push_back({"", {0, response.file->size()}});
   return response;
 }
@@ -140,7 +140,7 @@ Response get_report(Context& context, Call& call) {
   auto permit = context.answers.wait();
   const Job job = finished_job(context, call);
   auto report = nlohmann::ordered_json::parse(
-      read_small_file(context.files, context.dispatcher.folder(job.id).report(), kMaxReportBytes));
+      read_own_file(context.files, context.dispatcher.folder(job.id).report(), kMaxReportBytes));
   report["output"] = file_name(job);
   make_printable(report);
   Response response = json_response(200, json_text(report));
@@ -166,7 +166,7 @@ Response get_log(Context& context, Call& call) {
   Response response = make_response(200, "text/plain; charset=utf-8", "no-store");
   if (!context.files.exists(path)) return response;
   response.build_permit = context.answers.wait();
-  const auto file = context.files.open_read(path);
+  const auto file = context.files.open_own(path);
   const uint64_t size = file->size(), begin = size - std::min(size, max_bytes);
   response.body.resize(size - begin);
   file->read_at(begin, std::as_writable_bytes(std::span(response.body)));

@@ -9,11 +9,11 @@
 
 #include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <memory>
 #include <thread>
 
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 #include "server/http/connection/connection_table.h"
 
 namespace voxdag::server {
@@ -72,7 +72,7 @@ Listener::Listener(const std::string& address, int port) {
   setsockopt(socket_, IPPROTO_TCP, TCP_MAXSEG, &kMaxSegmentBytes, sizeof kMaxSegmentBytes);
   if (socket_ < 0 || bind(socket_, found->ai_addr, found->ai_addrlen) != 0 ||
       ::listen(socket_, kBacklog) != 0 || pipe2(wake_, O_CLOEXEC | O_NONBLOCK) != 0) {
-    const std::string reason = std::strerror(errno);
+    const std::string reason = errno_text(errno);
     if (socket_ >= 0) close(socket_);
     throw Error(ErrorCode::kIo,
                 "cannot listen on " + address + " port " + std::to_string(port) + ": " + reason);

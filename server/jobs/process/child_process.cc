@@ -9,15 +9,15 @@
 
 #include <cerrno>
 #include <csignal>
-#include <cstring>
 
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 
 namespace voxdag::server {
 namespace {
 
 constexpr int kTickMs = 100;
-constexpr size_t kMaxLineBytes = 4 << 20;
+constexpr size_t kMaxOutputLineBytes = 4 << 20;
 
 // Blocks all signals of this thread during the lifetime of this object. A child that is forked
 // during that time receives pending signals as soon as it unblocks them. So a stop request that is
@@ -61,7 +61,7 @@ void drop_signal_handlers() {
   sigemptyset(&none);
   sigprocmask(SIG_SETMASK, &none, nullptr);
   const int null = open("/dev/null", O_RDONLY);
-  const int log = open(log_file, O_WRONLY | O_CREAT | O_APPEND, 0640);
+  const int log = open(log_file, O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK, 0640);
   if (null < 0 || log < 0 || dup2(null, 0) < 0 || dup2(output, 1) < 0 || dup2(log, 2) < 0)
     _exit(127);
   close_range(3, ~0U, 0);
@@ -78,8 +78,7 @@ ChildProcess::ChildProcess(const Start& start) {
   arguments.push_back(nullptr);
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
-    throw Error(ErrorCode::kIo,
-                "cannot start a process: pipe: " + std::string(std::strerror(errno)));
+    throw Error(ErrorCode::kIo, "cannot start a process: pipe: " + errno_text(errno));
   const pid_t parent = getpid();
   int reason = 0;
   {
@@ -93,8 +92,7 @@ ChildProcess::ChildProcess(const Start& start) {
   output_ = ends[0];
   if (pid_ < 0) {
     close(output_);
-    throw Error(ErrorCode::kIo,
-                "cannot start a process: fork: " + std::string(std::strerror(reason)));
+    throw Error(ErrorCode::kIo, "cannot start a process: fork: " + errno_text(reason));
   }
 }
 
@@ -121,7 +119,7 @@ void ChildProcess::read_lines(const std::function<void(std::string_view)>& use,
     for (size_t end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1)
       use(std::string_view(text).substr(begin, end - begin));
     text.erase(0, begin);
-    if (text.size() > kMaxLineBytes) text.clear();
+    if (text.size() > kMaxOutputLineBytes) text.clear();
   }
 }
 

@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <new>
@@ -11,6 +10,7 @@
 #include <system_error>
 
 #include "core/base/error.h"
+#include "core/base/process_limits.h"
 #include "core/format/global/open_global.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
@@ -34,8 +34,7 @@ void raise_oom_score() { std::ofstream("/proc/self/oom_score_adj") << 500; }
 
 void enter(const std::string& folder) {
   if (chdir(folder.c_str()) != 0)
-    throw Error(ErrorCode::kIo,
-                "cannot enter the job's folder: " + std::string(std::strerror(errno)));
+    throw Error(ErrorCode::kIo, "cannot enter the job's folder: " + errno_text(errno));
 }
 
 // Links the uploads of a task into the working directory under their public names.
@@ -45,8 +44,8 @@ void link_uploads(const JobTask& task) {
     std::filesystem::remove(name, failure);
     if (!failure) std::filesystem::create_symlink(path, name, failure);
     if (failure)
-      throw Error(failure == std::errc::no_space_on_device ? ErrorCode::kNoSpace : ErrorCode::kIo,
-                  "cannot link the scene " + name + ": " + failure.message());
+      throw Error(code_of_errno(failure.value()),
+                  "cannot link the scene " + name + ": " + errno_text(failure.value()));
   }
 }
 
@@ -70,6 +69,7 @@ BuildSpec spec_of(const JobTask& task, const JobFolder& folder) {
   spec.run.work_folder = folder.work();
   if (spec.run.memory_bytes == 0) spec.run.memory_bytes = task.memory_bytes;
   if (spec.run.threads == 0) spec.run.threads = task.threads;
+  spec.run.min_free_bytes = task.min_free_bytes;
   if (task.cluster.engine != ClusterEngine::kNone) {
     spec.run.cluster = task.cluster;
     spec.run.cluster->program_version = VOXDAG_VERSION;
@@ -129,7 +129,7 @@ std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progre
 }  // namespace
 
 std::string finished_result(FileSystem& files, const JobFolder& folder) {
-  return result_json(read_small_file(files, folder.report(), kMaxReportBytes), folder.result());
+  return result_json(read_own_file(files, folder.report(), kMaxReportBytes), folder.result());
 }
 
 int run_job(FileSystem& files, const std::string& path, const CancelToken& cancel) {
@@ -149,13 +149,13 @@ int run_job(FileSystem& files, const std::string& path, const CancelToken& cance
   } catch (const RequestError& error) {
     return fail(ErrorCode::kInvalidInput, error.message());
   } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::kOutOfMemory,
-                "out of memory: the system refused an allocation, expected more free memory on "
-                "this machine");
-  } catch (const std::system_error&) {
-    return fail(ErrorCode::kOutOfMemory,
-                "the system has no threads or memory left for the job: expected fewer or smaller "
-                "concurrent jobs");
+    return fail(ErrorCode::kOutOfMemory, out_of_memory_error().message());
+  } catch (const std::system_error& error) {
+    // Clients do not see the message of other errors, which may contain paths.
+    const Error known = voxdag::error_of(error);
+    return fail(known.code(), known.code() == ErrorCode::kOutOfMemory
+                                  ? known.message()
+                                  : errno_text(error.code().value()));
   } catch (const std::exception&) {
     // The exception's text is not sent, because messages of libraries may contain paths.
     pipe.fail("internal",

@@ -16,6 +16,7 @@ void fields(Visitor& visit, JobTask& task) {
   visit("readable", task.readable);
   visit("memory_bytes", task.memory_bytes);
   visit("threads", task.threads);
+  visit("min_free_bytes", task.min_free_bytes);
   visit.object("cluster", [&](auto& cluster) {
     cluster("engine", task.cluster.engine);
     cluster("tasks", task.cluster.tasks);
@@ -33,7 +34,7 @@ void write_task(FileSystem& files, const std::string& path, const JobTask& task)
 
 JobTask read_task(FileSystem& files, const std::string& path) {
   constexpr uint64_t kMaxTaskBytes = uint64_t{4} << 20;
-  return record_from_text<JobTask>(read_small_file(files, path, kMaxTaskBytes),
+  return record_from_text<JobTask>(read_own_file(files, path, kMaxTaskBytes),
                                    path + ": expected a task of voxdag serve");
 }
 

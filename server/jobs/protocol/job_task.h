@@ -19,6 +19,7 @@ struct JobTask {
   std::vector<std::string> readable;  // files, and folders ending in '/', that scenes may refer to
   uint64_t memory_bytes = 0;          // memory limit if the request has none
   unsigned threads = 0;               // number of threads if the request has none
+  uint64_t min_free_bytes = 0;        // disk space that the job leaves free
   ClusterOptions cluster;             // as in ServerConfig
 };
 void write_task(FileSystem& files, const std::string& path, const JobTask& task);

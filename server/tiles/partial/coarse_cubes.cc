@@ -123,7 +123,7 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, dou
     try {
       if (!rows || rows->ref() != leaf.artifact)
         rows = std::make_unique<ArtifactRows>(
-            files.open_read(segment_path(work_folder, leaf.artifact.segment)), leaf.artifact);
+            files.open_own(segment_path(work_folder, leaf.artifact.segment)), leaf.artifact);
       cubes[leaf.id] = {leaf.cube, rows->coarse_brick(leaf.cube), leaf.artifact};
     } catch (const Error&) {
       rows.reset();

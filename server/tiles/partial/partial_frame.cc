@@ -61,7 +61,7 @@ nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, ui
   const uint32_t levels = levels_of_resolution(resolution);
   try {
     const auto plan =
-        nlohmann::json::parse(read_small_file(files, folder.subvolumes(), kMaxPlanBytes));
+        nlohmann::json::parse(read_own_file(files, folder.subvolumes(), kMaxPlanBytes));
     const GridPlace place{plan.at("origin"), plan.at("edge")};
     nlohmann::ordered_json frame = {{"origin", place.origin}, {"edge", place.edge}};
     PartialDag nodes(levels);

@@ -113,6 +113,38 @@ TEST_F(BuildProtection, TrianglesThatFitNowhereAreRefusedBeforeTheyAreRead) {
   EXPECT_NO_THROW(plan_build(tight, context()));
 }
 
+// A build leaves min_free_bytes of the disk free. If it cannot, it ends as on a full disk, and
+// continues later.
+TEST_F(BuildProtection, TheReserveStopsABuildThatResumes) {
+  BuildSpec reserved = spec();
+  reserved.run.force = true;
+  const uint64_t free_bytes = files_.free_space(folder_.path());
+  reserved.run.min_free_bytes = free_bytes + (uint64_t{1} << 30);
+  const Error error = error_of([&] {
+    write_spheres(scene(), 700000);
+    run_build(reserved, context());
+  });
+  EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
+  EXPECT_NE(error.message().find("reserved"), std::string::npos) << error.message();
+  EXPECT_FALSE(std::filesystem::exists(output()));
+  reserved.run.min_free_bytes = 0;
+  EXPECT_NO_THROW(run_build(reserved, context()));
+}
+
+// The estimate of `plan` decides at any resolution whether a build starts, and it counts the
+// reserve as used.
+TEST_F(BuildProtection, SmallBuildsAreRefusedByTheEstimateToo) {
+  files_.free_bytes = 1'000'000'000;
+  BuildSpec small = spec();
+  EXPECT_NO_THROW(run_build(small, context()));
+  small.run.restart = true;
+  small.run.min_free_bytes = files_.free_bytes - 1000;
+  const Error error = error_of([&] { run_build(small, context()); });
+  EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
+  EXPECT_NE(error.message().find("the build is estimated"), std::string::npos) << error.message();
+  EXPECT_EQ(plan_build(small, context()).free_disk, 1000u);
+}
+
 // Two folders are on the same disk if their devices are equal; equal free space does not matter.
 TEST_F(BuildProtection, DisksAreToldApartByTheirDevice) {
   BuildSpec large = spec();

@@ -26,6 +26,28 @@ struct StringSource : EncodedBytes {
   size_t at = 0;
 };
 
+// Cancels a token when byte `cancel_at` is read.
+struct CancelingSource : StringSource {
+  CancelingSource(std::string all, size_t cancel_at_byte)
+      : StringSource(std::move(all)), cancel_at(cancel_at_byte) {}
+  size_t read(std::span<std::byte> out) override {
+    const size_t size = StringSource::read(out);
+    if (at > cancel_at) cancel.cancel();
+    return size;
+  }
+  const size_t cancel_at;
+  CancelToken cancel;
+};
+
+// Decodes a file of which `cancel_at` bytes are read before the token is canceled.
+inline void decode_canceled(const std::string& file, size_t cancel_at) {
+  MemoryBudget budget(uint64_t{64} << 20);
+  CancelingSource source(file, cancel_at);
+  const auto reader = open_image(source, budget, ImageUse::kPixels, &source.cancel);
+  std::vector<std::byte> row(size_t{4} * static_cast<size_t>(reader->bits()) / 8 * reader->width());
+  for (uint32_t y = 0; y < reader->height(); ++y) reader->read_row(row);
+}
+
 struct Decoded {
   uint32_t width = 0, height = 0;
   int bits = 0;

@@ -11,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/image/png_writer.h"
+#include "tests/support/error_of.h"
 #include "tests/support/image_files.h"
 #include "tests/unit/core/image/image_source.h"
 
@@ -302,6 +303,24 @@ TEST(Images, DamagedAnywhere) {
 }
 
 // Errors of the source pass through the decoders.
+// A small file can take minutes to decode, so decoders stop when the token is canceled: also
+// between the scans and rows that need no more bytes of the file.
+TEST(Images, CancellationStopsDecoders) {
+  const uint32_t edge = 512;
+  PngFormat plain, interlaced;
+  plain.width = plain.height = interlaced.width = interlaced.height = edge;
+  interlaced.is_interlaced = true;
+  const std::string files[] = {png_file(plain, std::string(size_t{4} * edge * edge, 'x')),
+                               png_file(interlaced, std::string(size_t{4} * edge * edge, 'x')),
+                               jpeg_file(edge, edge, 3, gradient(edge, edge, 3)),
+                               jpeg_of_scans(edge, edge, gradient(edge, edge, 3), 100)};
+  for (const std::string& file : files)
+    for (const size_t cancel_at : {size_t{0}, size_t{1000}, file.size() / 2}) {
+      SCOPED_TRACE(testing::Message() << (&file - files) << " at " << cancel_at);
+      EXPECT_EQ(error_of([&] { decode_canceled(file, cancel_at); }).code(), ErrorCode::kCanceled);
+    }
+}
+
 TEST(Images, ErrorsOfTheSource) {
   struct Failing : StringSource {
     using StringSource::StringSource;

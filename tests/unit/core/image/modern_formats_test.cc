@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "tests/support/error_of.h"
 #include "tests/support/modern_image_files.h"
 #include "tests/unit/core/image/image_source.h"
 
@@ -99,6 +100,11 @@ TEST(Webp, DamagedAnywhere) {
     damaged[at] = static_cast<char>(damaged[at] ^ 0x55);
     EXPECT_NO_THROW(problem_of(damaged)) << at;
   }
+}
+
+TEST(Webp, CancellationIsChecked) {
+  const std::string file = webp_file(64, 64, noise(4 * 64 * 64));
+  EXPECT_EQ(error_of([&] { decode_canceled(file, 0); }).code(), ErrorCode::kCanceled);
 }
 #else
 TEST(Webp, IsNamed) {

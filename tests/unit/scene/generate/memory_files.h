@@ -26,11 +26,18 @@ class MemoryFiles : public voxdag::FileSystem {
     files[to] = std::move(files.at(from));
     files.erase(from);
   }
+  bool create_new(const std::string& path) override { return files.try_emplace(path).second; }
+  bool rename_new(const std::string& from, const std::string& to) override {
+    if (exists(to)) return false;
+    rename(from, to);
+    return true;
+  }
   void remove(const std::string& path) override { files.erase(path); }
   bool exists(const std::string& path) override { return files.contains(path); }
   void sync_directory(const std::string&) override {}
 
   std::unique_ptr<voxdag::ReadableFile> open_read(const std::string&) override { unexpected(); }
+  std::unique_ptr<voxdag::ReadableFile> open_own(const std::string&) override { unexpected(); }
   std::unique_ptr<voxdag::WritableFile> open_write(const std::string&) override { unexpected(); }
   void make_directories(const std::string&) override { unexpected(); }
   void remove_directory(const std::string&) override { unexpected(); }

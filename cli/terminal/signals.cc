@@ -1,0 +1,75 @@
+#include "cli/terminal/signals.h"
+
+#include <semaphore.h>
+
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <system_error>
+#include <thread>
+
+#include "core/base/error.h"
+#include "core/io/temporary_paths.h"
+
+namespace voxdag::cli {
+namespace {
+
+CancelToken* g_cancel = nullptr;
+sem_t g_signaled;
+std::atomic<bool> g_may_stop_slowly{false};
+
+void on_signal(int signal) {
+  if (g_cancel->canceled()) _Exit(128 + signal);
+  g_cancel->cancel();
+  const int before = errno;
+  sem_post(&g_signaled);
+  errno = before;
+}
+
+// Runs on its own thread. Ends the process if the command does not.
+void end_after_signal() {
+  while (sem_wait(&g_signaled) != 0) {
+  }
+  if (g_may_stop_slowly) return;
+  std::this_thread::sleep_for(std::chrono::duration<double>(kMaxStopS));
+  remove_temporary_paths();
+  std::fprintf(stderr, "voxdag: error: canceled; the last step was not completed\n");
+  _Exit(exit_status(ErrorCode::kCanceled));
+}
+
+void start_thread() {
+  try {
+    std::thread(end_after_signal).detach();
+  } catch (const std::system_error&) {
+    // The system has no more threads. The command checks the token itself.
+  }
+}
+
+}  // namespace
+
+void catch_signals(CancelToken& cancel) {
+  g_cancel = &cancel;
+  sem_init(&g_signaled, 0, 0);
+  start_thread();
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  // SIGHUP means that the terminal was closed. It remains ignored if nohup has set it to be
+  // ignored.
+  struct sigaction hangup {};
+  sigaction(SIGHUP, nullptr, &hangup);
+  if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
+  // Without these two lines, a write to a closed pipe or beyond the limit of file sizes would end
+  // the process. The write fails instead, so the error is reported.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+void allow_slow_stop() { g_may_stop_slowly = true; }
+
+}  // namespace voxdag::cli

@@ -1,0 +1,78 @@
+#include "core/io/outputs/guarded_outputs.h"
+
+#include "core/base/error.h"
+
+namespace voxdag {
+namespace {
+
+[[noreturn]] void refuse_to_replace(const std::string& path) {
+  throw Error(ErrorCode::kInvalidInput,
+              path +
+                  " was created or changed by another program during this command, so it is kept: "
+                  "expected a free name; move the file and run the same command again");
+}
+
+}  // namespace
+
+void GuardedOutputs::guard(const std::string& path) { set(path, file_at(path, false)); }
+
+void GuardedOutputs::guard_output(const std::string& path) {
+  guard(path);
+  guard(path + ".partial");
+}
+
+std::unique_ptr<WritableFile> GuardedOutputs::create(const std::string& path) {
+  const auto guarded = find(path);
+  if (!guarded) return ForwardingFiles::create(path);
+  if (!is_at(path, *guarded) && !create_new(path)) refuse_to_replace(path);
+  auto file = ForwardingFiles::create(path);
+  set(path, file_at(path, true));
+  return file;
+}
+
+void GuardedOutputs::rename(const std::string& from, const std::string& to) {
+  const auto guarded = find(to);
+  if (!guarded || is_at(to, *guarded))
+    ForwardingFiles::rename(from, to);
+  else if (!rename_new(from, to))
+    refuse_to_replace(to);
+  if (guarded) set(to, file_at(to, true));
+  if (find(from)) set(from, {});
+}
+
+void GuardedOutputs::remove(const std::string& path) {
+  const auto guarded = find(path);
+  if (guarded && !is_at(path, *guarded) && exists(path)) refuse_to_replace(path);
+  ForwardingFiles::remove(path);
+  if (guarded) set(path, {});
+}
+
+std::optional<GuardedOutputs::Replaceable> GuardedOutputs::find(const std::string& path) {
+  const std::lock_guard lock(mutex_);
+  const auto found = guarded_.find(path);
+  if (found == guarded_.end()) return std::nullopt;
+  return found->second;
+}
+
+void GuardedOutputs::set(const std::string& path, const Replaceable& replaceable) {
+  const std::lock_guard lock(mutex_);
+  guarded_[path] = replaceable;
+}
+
+GuardedOutputs::Replaceable GuardedOutputs::file_at(const std::string& path, bool is_own) {
+  try {
+    return {true, is_own, files().open_read(path)->identity()};
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+bool GuardedOutputs::is_at(const std::string& path, const Replaceable& expected) {
+  if (!expected.exists) return false;
+  const Replaceable found = file_at(path, expected.is_own);
+  const FileIdentity &a = found.identity, &b = expected.identity;
+  return found.exists && a.inode == b.inode &&
+         (expected.is_own || (a.bytes == b.bytes && a.modified_ns == b.modified_ns));
+}
+
+}  // namespace voxdag

@@ -1,0 +1,56 @@
+// Protects files at the output paths of a command that other programs create or change while the
+// command runs. A command checks its outputs at the start, and writes some of them only hours
+// later.
+//
+// The command guards its output paths, including the temporary names, then checks them, and writes
+// all outputs through this file system. create(), rename() and remove() of a guarded path accept
+// only the file that existed when the path was guarded, and files that this object created.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "core/io/forwarding_files.h"
+
+namespace voxdag {
+
+class GuardedOutputs : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+
+  // Guards `path` from now on. The file at `path`, if any, may be replaced.
+  void guard(const std::string& path);
+  // Guards `path` and its temporary name, `path` + ".partial".
+  void guard_output(const std::string& path);
+
+  std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
+    return files().open_own(path);
+  }
+  // These functions throw Error{kInvalidInput} if they would change a file of another program.
+  std::unique_ptr<WritableFile> create(const std::string& path) override;
+  void rename(const std::string& from, const std::string& to) override;
+  void remove(const std::string& path) override;
+
+ private:
+  // The file that may be replaced at a guarded path.
+  struct Replaceable {
+    bool exists = false;
+    bool is_own = false;  // created by this object: its size and times may change
+    FileIdentity identity;
+  };
+
+  std::optional<Replaceable> find(const std::string& path);
+  void set(const std::string& path, const Replaceable& replaceable);
+  // Returns the file at `path`, if it is a regular file that can be read.
+  Replaceable file_at(const std::string& path, bool is_own);
+  // True if `expected` still is the file at `path`.
+  bool is_at(const std::string& path, const Replaceable& expected);
+
+  std::mutex mutex_;
+  std::map<std::string, Replaceable> guarded_;
+};
+
+}  // namespace voxdag

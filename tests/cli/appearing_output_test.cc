@@ -1,0 +1,69 @@
+// No command replaces a file that another program creates at the output while the command runs.
+#include <signal.h>
+#include <time.h>
+
+#include <filesystem>
+
+#include "tests/cli/command_line.h"
+
+namespace command_line {
+namespace {
+
+class AppearingOutput : public CommandLine {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(run({"generate", "soup", "s.glb", "--triangles", "20000"}).status, 0);
+    ASSERT_EQ(run({"build", "s.glb", "-r", "1024", "-o", "s.vdag"}).status, 0);
+  }
+  static void sleep_ms(int ms) {
+    const timespec t{ms / 1000, ms % 1000 * 1000000};
+    nanosleep(&t, nullptr);
+  }
+  // Starts a command and creates `appears` once `sign`, which the command creates after its checks,
+  // exists. Expects an error, and that the file is kept.
+  void expect_kept(const std::string& appears, const std::string& sign,
+                   const std::vector<std::string>& args) {
+    SCOPED_TRACE(args[0] + ": " + appears);
+    const pid_t pid = start(args);
+    for (int i = 0; i < 30000 && !exists(sign) && kill(pid, 0) == 0; ++i) sleep_ms(1);
+    kill(pid, SIGSTOP);
+    const bool was_early = exists(sign) && !exists(appears);
+    if (was_early) put(appears, "theirs");
+    kill(pid, SIGCONT);
+    const Answer answer = wait_for(pid);
+    ASSERT_TRUE(was_early) << "the command was too fast for this test";
+    EXPECT_EQ(answer.status, 2) << answer.err;
+    EXPECT_NE(answer.err.find("another program"), std::string::npos) << answer.err;
+    EXPECT_EQ(contents(appears), "theirs");
+    std::filesystem::remove(folder_.file(appears));
+  }
+};
+
+TEST_F(AppearingOutput, IsKept) {
+  const std::vector<std::string> build = {"build", "s.glb",     "-r", "2048",        "-o",
+                                          "b",     "--threads", "1",  "--subvolume", "256"};
+  expect_kept("b", "b.work/job.db", build);
+  expect_kept("b.partial", "b.work/job.db", build);
+  EXPECT_EQ(run(build).status, 0);  // resumes
+  std::filesystem::remove(folder_.file("b.report.json"));
+  std::filesystem::remove(folder_.file("b"));
+  expect_kept("b.report.json", "b.work/job.db", build);
+  expect_kept("x", "x.lock", {"extract", "s.vdag", "-o", "x", "--threads", "1"});
+  expect_kept("e", "e.partial", {"export", "s.vdag", "--to", "ply", "-o", "e"});
+  expect_kept("g", "g.partial", {"generate", "soup", "g", "--triangles", "5000000"});
+}
+
+// The picture has no temporary file until it is complete.
+TEST_F(AppearingOutput, OfRenderIsKept) {
+  const pid_t pid = start({"render", "s.vdag", "-o", "r.png", "--size", "4096x4096", "--threads",
+                           "1", "--samples", "4"});
+  sleep_ms(1500);
+  put("r.png", "theirs");
+  const Answer answer = wait_for(pid);
+  EXPECT_EQ(answer.status, 2) << answer.err;
+  EXPECT_EQ(contents("r.png"), "theirs");
+  EXPECT_FALSE(exists("r.png.partial"));
+}
+
+}  // namespace
+}  // namespace command_line
