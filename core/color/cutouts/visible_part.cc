@@ -1,6 +1,7 @@
 #include "core/color/cutouts/visible_part.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/color/cutouts/hidden.h"
@@ -68,37 +69,48 @@ VisiblePart::VisiblePart(const FixedSurface& surface, const Cutouts& cutouts, ui
       texels_[i][a] = static_cast<double>(surface.corners[i].texture[a]) * (size[a] * 0x1p-24);
 }
 
+// Adds the part of `from` on the inner side of a plane to `inside`: the corners whose distance
+// along `axis` from the plane `bound`, in the direction `sign`, is >= 0.
+void VisiblePart::clip(const Polygon& from, int axis, double sign, double bound, Polygon& inside) {
+  inside.count = 0;
+  for (int i = 0; i < from.count && inside.count + 2 <= Polygon::kMaxPoints; ++i) {
+    const Point& point = from.points[i];
+    const Point& next = from.points[i + 1 == from.count ? 0 : i + 1];
+    const double before = sign * (point.at[axis] - bound), after = sign * (next.at[axis] - bound);
+    if (before >= 0) inside.points[inside.count++] = point;
+    if ((before >= 0) == (after >= 0)) continue;
+    const double share = before / (before - after);
+    Point& crossing = inside.points[inside.count++];
+    for (int a = 0; a < 3; ++a) crossing.at[a] = point.at[a] + share * (next.at[a] - point.at[a]);
+    for (int a = 0; a < 2; ++a)
+      crossing.texel[a] = point.texel[a] + share * (next.texel[a] - point.texel[a]);
+    crossing.at[axis] = bound;
+  }
+}
+
 // Returns the part of the triangle in a cube, which is enlarged by `margin` on all sides.
 VisiblePart::Polygon VisiblePart::part_in(const std::array<int64_t, 3>& low, int64_t edge,
                                           double margin) const {
-  Polygon part;
-  part.count = 3;
+  Polygon parts[2];
+  int current = 0;
+  parts[0].count = 3;
   for (size_t i = 0; i < 3; ++i) {
     for (size_t a = 0; a < 3; ++a)
-      part.points[i].at[a] = static_cast<double>(triangle_.v[i][a] - low[a]);
-    for (size_t a = 0; a < 2; ++a) part.points[i].texel[a] = texels_[i][a];
+      parts[0].points[i].at[a] = static_cast<double>(triangle_.v[i][a] - low[a]);
+    for (size_t a = 0; a < 2; ++a) parts[0].points[i].texel[a] = texels_[i][a];
   }
-  for (int side = 0; side < 6 && part.count > 0; ++side) {
+  for (int side = 0; side < 6; ++side) {
+    const Polygon& part = parts[current];
     const int axis = side / 2;
     const double sign = side % 2 == 0 ? 1 : -1;
     const double bound = side % 2 == 0 ? -margin : static_cast<double>(edge) + margin;
-    Polygon inside;
-    for (int i = 0; i < part.count && inside.count + 2 <= Polygon::kMaxPoints; ++i) {
-      const Point& from = part.points[i];
-      const Point& to = part.points[(i + 1) % part.count];
-      const double before = sign * (from.at[axis] - bound), after = sign * (to.at[axis] - bound);
-      if (before >= 0) inside.points[inside.count++] = from;
-      if ((before >= 0) == (after >= 0)) continue;
-      const double share = before / (before - after);
-      Point& crossing = inside.points[inside.count++];
-      for (int a = 0; a < 3; ++a) crossing.at[a] = from.at[a] + share * (to.at[a] - from.at[a]);
-      for (int a = 0; a < 2; ++a)
-        crossing.texel[a] = from.texel[a] + share * (to.texel[a] - from.texel[a]);
-      crossing.at[axis] = bound;
-    }
-    part = inside;
+    bool is_inside = true;  // then clip() would copy the part
+    for (int i = 0; i < part.count; ++i) is_inside &= sign * (part.points[i].at[axis] - bound) >= 0;
+    if (is_inside) continue;
+    clip(part, axis, sign, bound, parts[1 - current]);
+    current = 1 - current;
   }
-  return part;
+  return parts[current];
 }
 
 VisiblePart::Sight VisiblePart::sight(const Cube& cube) const {
@@ -160,11 +172,12 @@ bool VisiblePart::is_visible_in(const Cube& cube) const {
 }
 
 bool VisiblePart::covers(const Polygon& polygon, bool visible, double depth) const {
+  if (polygon.count == 0) return false;
   const uint32_t top = mask_->levels() - 1;
   double first[2] = {}, last[2] = {};
   const double size[2] = {static_cast<double>(mask_->width()),
                           static_cast<double>(mask_->height())};
-  for (int a = 0; a < 2 && polygon.count > 0; ++a) {
+  for (int a = 0; a < 2; ++a) {
     if (wrap_[static_cast<size_t>(a)] == Wrap::kClampToEdge) continue;
     double low = polygon.points[0].texel[a], high = low;
     for (int i = 1; i < polygon.count; ++i) {
@@ -178,14 +191,58 @@ bool VisiblePart::covers(const Polygon& polygon, bool visible, double depth) con
   }
   for (double v = first[1]; v <= last[1]; ++v)
     for (double u = first[0]; u <= last[0]; ++u) {
-      Polygon moved = polygon;
-      for (int i = 0; i < moved.count; ++i) {
-        moved.points[i].texel[0] = in_image(polygon.points[i].texel[0], u, size[0], wrap_[0]);
-        moved.points[i].texel[1] = in_image(polygon.points[i].texel[1], v, size[1], wrap_[1]);
-      }
-      if (covers(moved, visible, depth, top, 0, 0)) return true;
+      const Outline outline = outline_of(polygon, {u, v});
+      const Block block = block_around(outline);
+      if (covers(outline, visible, depth, block.level, block.x, block.y)) return true;
     }
   return false;
+}
+
+// Returns the outline of a polygon in the image of a period.
+VisiblePart::Outline VisiblePart::outline_of(const Polygon& polygon,
+                                             const std::array<double, 2>& period) const {
+  Outline out;
+  out.count = polygon.count;
+  const uint32_t size[2] = {mask_->width(), mask_->height()};
+  double at[Polygon::kMaxPoints][2];
+  for (size_t a = 0; a < 2; ++a) {
+    for (int i = 0; i < out.count; ++i)
+      at[i][a] = in_image(polygon.points[i].texel[a], period[a], size[a], wrap_[a]);
+    out.low[a] = out.high[a] = at[0][a];
+    for (int i = 1; i < out.count; ++i) {
+      out.low[a] = std::min(out.low[a], at[i][a]);
+      out.high[a] = std::max(out.high[a], at[i][a]);
+    }
+  }
+  for (int i = 0; i < out.count; ++i) {
+    const double* const from = at[i];
+    const double* const to = at[i + 1 == out.count ? 0 : i + 1];
+    Outline::Edge& edge = out.edges[i];
+    edge = {to[1] - from[1], from[0] - to[0], {from[0], from[1]}, 0, 0};
+    for (int k = 0; k < out.count; ++k) {
+      const double side = edge.nu * (at[k][0] - from[0]) + edge.nv * (at[k][1] - from[1]);
+      edge.least = std::min(edge.least, side);
+      edge.most = std::max(edge.most, side);
+    }
+  }
+  return out;
+}
+
+// Returns the smallest block that contains the polygon and a margin around it, or the block of the
+// last level. covers() gives the same answer for this block and for all blocks that contain it,
+// because a block that contains the polygon is not separated from it, whatever the depth.
+VisiblePart::Block VisiblePart::block_around(const Outline& outline) const {
+  const uint32_t size[2] = {mask_->width(), mask_->height()};
+  uint32_t first[2], last[2];
+  for (int a = 0; a < 2; ++a) {
+    const double low = outline.low[a] - kBoxMargin, high = outline.high[a] + kBoxMargin;
+    if (!(low >= 0 && high < size[a])) return {mask_->levels() - 1, 0, 0};
+    first[a] = static_cast<uint32_t>(low);
+    last[a] = static_cast<uint32_t>(high);
+  }
+  const auto level =
+      static_cast<uint32_t>(std::bit_width((first[0] ^ last[0]) | (first[1] ^ last[1])));
+  return {level, first[0] >> level, first[1] >> level};
 }
 
 // Returns the square of a block of texels, made smaller by `depth` on all sides.
@@ -204,43 +261,28 @@ VisiblePart::Box VisiblePart::square_of(uint32_t level, uint32_t x, uint32_t y,
   return box;
 }
 
-bool VisiblePart::covers(const Polygon& polygon, bool visible, double depth, uint32_t level,
+bool VisiblePart::covers(const Outline& outline, bool visible, double depth, uint32_t level,
                          uint32_t x, uint32_t y) const {
   const bool any = visible ? mask_->any_visible(level, x, y) : !mask_->all_visible(level, x, y);
-  const bool all = visible ? mask_->all_visible(level, x, y) : !mask_->any_visible(level, x, y);
-  if (!any || polygon.count == 0) return false;
+  if (!any) return false;
   const Box box = square_of(level, x, y, depth);
-  for (int a = 0; a < 2; ++a) {
-    bool is_below = true, is_above = true;
-    for (int i = 0; i < polygon.count; ++i) {
-      is_below &= polygon.points[i].texel[a] < box.low[a];
-      is_above &= polygon.points[i].texel[a] > box.high[a];
-    }
-    if (is_below || is_above) return false;
-  }
+  for (int a = 0; a < 2; ++a)
+    if (outline.high[a] < box.low[a] || outline.low[a] > box.high[a]) return false;
   // The polygon misses the box if an edge of the polygon separates them: the box is on one side of
   // the edge, and all corners of the polygon are on the other side.
-  for (int i = 0; i < polygon.count; ++i) {
-    const double* const from = polygon.points[i].texel;
-    const double* const to = polygon.points[(i + 1) % polygon.count].texel;
-    const double nu = to[1] - from[1], nv = from[0] - to[0];
+  for (int i = 0; i < outline.count; ++i) {
+    const auto& [nu, nv, from, least, most] = outline.edges[i];
     const double low = nu * ((nu > 0 ? box.low[0] : box.high[0]) - from[0]) +
                        nv * ((nv > 0 ? box.low[1] : box.high[1]) - from[1]);
     const double high = nu * ((nu > 0 ? box.high[0] : box.low[0]) - from[0]) +
                         nv * ((nv > 0 ? box.high[1] : box.low[1]) - from[1]);
-    double least = 0, most = 0;  // over the corners
-    for (int k = 0; k < polygon.count; ++k) {
-      const double side =
-          nu * (polygon.points[k].texel[0] - from[0]) + nv * (polygon.points[k].texel[1] - from[1]);
-      least = std::min(least, side);
-      most = std::max(most, side);
-    }
     if (low > most || high < least) return false;
   }
+  const bool all = visible ? mask_->all_visible(level, x, y) : !mask_->any_visible(level, x, y);
   if (all || level == 0) return true;
   for (uint32_t j = 2 * y; j < std::min(2 * y + 2, mask_->height(level - 1)); ++j)
     for (uint32_t i = 2 * x; i < std::min(2 * x + 2, mask_->width(level - 1)); ++i)
-      if (covers(polygon, visible, depth, level - 1, i, j)) return true;
+      if (covers(outline, visible, depth, level - 1, i, j)) return true;
   return false;
 }
 

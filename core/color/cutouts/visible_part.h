@@ -56,12 +56,31 @@ class VisiblePart {
     double low[2], high[2];
   };
 
+  // A polygon's corners in the image, with their box and their edges.
+  struct Outline {
+    // The edge's function nu * (u - from[0]) + nv * (v - from[1]) is 0 on the edge, and from
+    // `least` to `most` on the polygon.
+    struct Edge {
+      double nu, nv, from[2], least, most;
+    };
+    int count;
+    double low[2], high[2];
+    Edge edges[Polygon::kMaxPoints];
+  };
+  // A block of texels of a level of the mask.
+  struct Block {
+    uint32_t level, x, y;
+  };
+
+  static void clip(const Polygon& from, int axis, double sign, double bound, Polygon& inside);
   Polygon part_in(const std::array<int64_t, 3>& low, int64_t edge, double margin) const;
   Sight sight_of(const Polygon& polygon) const;
   // True if the polygon reaches `depth` into a visible texel or, without `visible`, a hidden texel.
   bool covers(const Polygon& polygon, bool visible, double depth) const;
-  bool covers(const Polygon& polygon, bool visible, double depth, uint32_t level, uint32_t x,
+  bool covers(const Outline& outline, bool visible, double depth, uint32_t level, uint32_t x,
               uint32_t y) const;
+  Outline outline_of(const Polygon& polygon, const std::array<double, 2>& period) const;
+  Block block_around(const Outline& outline) const;
   Box square_of(uint32_t level, uint32_t x, uint32_t y, double depth) const;
 
   FixedTriangle triangle_;

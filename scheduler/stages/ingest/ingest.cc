@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/page_buffer.h"
-#include "core/color/cutouts/visible_voxels.h"
+#include "core/color/patches/visible_patches.h"
 #include "core/color/snap_surface.h"
 #include "scene/textures/find_cutouts.h"
 #include "scheduler/stages/ingest/read_pieces.h"
@@ -40,7 +40,9 @@ class SnappedPiece {
         records_(budget, (cutouts ? 2 : 1) * kPieceTriangles * record_bytes,
                  "a piece of the scene"),
         tally_(top) {
-    if (cutouts_) charge_ = MemoryCharge(budget, kCutoutBytes, "a piece of the scene");
+    if (!cutouts_) return;
+    charge_ = MemoryCharge(budget, kCutoutBytes, "a piece of the scene");
+    divider_.emplace(grid.levels);
   }
 
   void read(TriangleCursor& cursor, uint64_t first, uint64_t count) {
@@ -54,18 +56,18 @@ class SnappedPiece {
     checksum_ = checksum128(records());
   }
 
-  // Adds the segments of the triangles in late_, which have too many segments for the piece. Calls
+  // Adds the patches of the triangles in late_, which have too many patches for the piece. Calls
   // flush() whenever the buffer of records() is full, and at the end.
   template <class Flush>
   void add_late(const Flush& flush) {
     for (const FixedSurface& surface : late_) {
       const VisiblePart part(surface, *cutouts_, grid_.levels);
-      VisibleVoxels(part, grid_.levels).for_each_segment([&](const FixedTriangle& segment) {
+      divider_->for_each(part, [&](const FixedTriangle& patch) {
         if (stored_ == records_.size() / record_bytes_) {
           flush();
           clear();
         }
-        add_segment(segment);
+        add_patch(patch);
         return true;
       });
     }
@@ -81,11 +83,11 @@ class SnappedPiece {
   TopTree::Tally& tally() { return tally_; }
 
  private:
-  // Maximum number of segments of a piece, and of one triangle. add_late() adds further segments.
-  static constexpr size_t kMaxSegments = kPieceTriangles;
+  // Maximum number of patches of a piece, and of one triangle. add_late() adds further patches.
+  static constexpr size_t kMaxPatches = kPieceTriangles;
   static constexpr uint64_t kCutoutBytes =
       kPieceTriangles * (kMaxSurfaceRecordBytes + 2 * sizeof(FixedSurface)) +
-      kMaxSegments * sizeof(FixedTriangle);
+      kMaxPatches * sizeof(FixedTriangle) + VisiblePatches::kBytes;
 
   void clear() {
     tally_.clear();
@@ -115,12 +117,12 @@ class SnappedPiece {
     ++stored_;
   }
 
-  // The checksum covers the triangles with their corners, not the segments, so that later stages
+  // The checksum covers the triangles with their corners, not the patches, so that later stages
   // can compare it with the scene.
   void read_surfaces(TriangleCursor& cursor, uint64_t first, uint64_t count) {
     late_.clear();
     identity_.clear();
-    segments_in_piece_ = 0;
+    patches_in_piece_ = 0;
     cursor.read_surfaces(first, count, [this](std::span<const SurfaceTriangle> batch) {
       for (const SurfaceTriangle& triangle : batch) add(triangle);
     });
@@ -140,27 +142,26 @@ class SnappedPiece {
     const VisiblePart part(surface, *cutouts_, grid_.levels);
     const VisiblePart::Sight sight = part.sight(Cube{});
     if (sight == VisiblePart::Sight::kVisible) store(surface.position, expected_work(snapped));
-    if (sight == VisiblePart::Sight::kMixed) add_segments(surface, part);
+    if (sight == VisiblePart::Sight::kMixed) add_patches(surface, part);
   }
 
-  void add_segments(const FixedSurface& surface, const VisiblePart& part) {
-    segments_.clear();
-    const bool is_complete =
-        VisibleVoxels(part, grid_.levels).for_each_segment([&](const FixedTriangle& segment) {
-          if (segments_in_piece_ + segments_.size() == kMaxSegments) return false;
-          segments_.push_back(segment);
-          return true;
-        });
+  void add_patches(const FixedSurface& surface, const VisiblePart& part) {
+    patches_.clear();
+    const bool is_complete = divider_->for_each(part, [&](const FixedTriangle& patch) {
+      if (patches_in_piece_ + patches_.size() == kMaxPatches) return false;
+      patches_.push_back(patch);
+      return true;
+    });
     if (!is_complete) return late_.push_back(surface);
-    segments_in_piece_ += segments_.size();
-    for (const FixedTriangle& segment : segments_) add_segment(segment);
+    patches_in_piece_ += patches_.size();
+    for (const FixedTriangle& patch : patches_) add_patch(patch);
   }
 
-  void add_segment(const FixedTriangle& segment) {
-    double voxels = 1;
-    for (int a = 0; a < 3; ++a)
-      voxels += static_cast<double>((segment.high(a) - segment.low(a)) >> kUnitBits);
-    store(segment, {voxels, 1 + voxels / 8});
+  void add_patch(const FixedTriangle& patch) {
+    SnappedTriangle snapped;
+    for (size_t i = 0; i < 3; ++i)
+      for (size_t a = 0; a < 3; ++a) snapped.v[i][a] = static_cast<double>(patch.v[i][a]);
+    store(patch, expected_work(snapped));
   }
 
   const Grid grid_;
@@ -168,10 +169,11 @@ class SnappedPiece {
   const Cutouts* const cutouts_;
   MemoryCharge charge_;
   PageBuffer<std::byte> records_;
-  size_t stored_ = 0;                    // number of records
-  std::vector<FixedTriangle> segments_;  // of one triangle
-  size_t segments_in_piece_ = 0;
-  std::vector<FixedSurface> late_;  // triangles with too many segments
+  size_t stored_ = 0;  // number of records
+  std::optional<VisiblePatches> divider_;
+  std::vector<FixedTriangle> patches_;  // of one triangle
+  size_t patches_in_piece_ = 0;
+  std::vector<FixedSurface> late_;  // triangles with too many patches
   std::vector<std::byte> identity_;
   IngestCounts counts_;
   std::optional<uint64_t> too_far_;

@@ -31,8 +31,8 @@ Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds);
 // Throws Error{kLimit} for a triangle that reaches into the grid and has a vertex beyond
 // kCoordinateLimit.
 //
-// With `cutouts`, a triangle that is cut out in part is replaced by segments through the voxels in
-// which it is visible (core/color/cutouts). A triangle that is cut out completely is not stored.
+// With `cutouts`, a triangle that is cut out in part is replaced by patches in the voxels in which
+// it is visible (core/color/patches). A triangle that is cut out completely is not stored.
 void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, TopTree& top,
             const StageContext& context, const AfterPiece& after_piece,
             const Cutouts* cutouts = nullptr);

@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "core/color/cutouts/visible_voxels.h"
+#include "core/color/patches/visible_patches.h"
 #include "core/geometry/overlap.h"
 
 namespace voxdag {
@@ -95,13 +95,14 @@ Voxels visible_voxels(const VisiblePart& part) {
   return all;
 }
 
-// Returns the voxels that the segments touch. Checks that no voxel is touched by two segments.
-Voxels voxels_of_segments(const VisiblePart& part) {
+// Returns the voxels that the patches touch.
+Voxels voxels_of_patches(const VisiblePart& part) {
+  static VisiblePatches patches(kLevels);  // reused, as in builds
   Voxels all;
-  VisibleVoxels(part, kLevels).for_each_segment([&](const FixedTriangle& segment) {
-    const Voxels touched = touched_voxels(segment);
+  patches.for_each(part, [&](const FixedTriangle& patch) {
+    const Voxels touched = touched_voxels(patch);
     EXPECT_FALSE(touched.empty());
-    for (const Voxel& voxel : touched) EXPECT_TRUE(all.insert(voxel).second);
+    all.insert(touched.begin(), touched.end());
     return true;
   });
   return all;
@@ -172,7 +173,7 @@ TEST(Cutouts, EqualPointsOfTheTriangle) {
 }
 
 // The search by cubes finds the same voxels as a test of each voxel.
-TEST(Cutouts, SegmentsTouchExactlyTheVisibleVoxels) {
+TEST(Cutouts, PatchesTouchExactlyTheVisibleVoxels) {
   std::mt19937 random(2);
   size_t visible = 0, hidden = 0;
   for (int round = 0; round < 150; ++round) {
@@ -183,7 +184,7 @@ TEST(Cutouts, SegmentsTouchExactlyTheVisibleVoxels) {
     });
     const VisiblePart part(random_surface(random, round % 5 == 0 ? 0.3 : 3), cutouts, kLevels);
     const Voxels all = visible_voxels(part);
-    ASSERT_EQ(voxels_of_segments(part), all) << round;
+    ASSERT_EQ(voxels_of_patches(part), all) << round;
     visible += all.size();
     hidden += touched_voxels(part.triangle()).size() - all.size();
     for (uint32_t level : {0u, 2u, 4u}) {
@@ -207,6 +208,54 @@ TEST(Cutouts, SegmentsTouchExactlyTheVisibleVoxels) {
   }
   EXPECT_GT(visible, 5000u);
   EXPECT_GT(hidden, 5000u);
+}
+
+// Patches that are not visited do not appear among the patches of the next triangle.
+TEST(Cutouts, PatchesCanBeLeftOut) {
+  std::mt19937 random(4);
+  const Cutouts cutouts = cutouts_of(8, 8, {Wrap::kRepeat, Wrap::kRepeat},
+                                     [](uint32_t x, uint32_t y) { return (x + y) % 3 == 0; });
+  VisiblePatches patches(kLevels);
+  for (int round = 0; round < 20; ++round) {
+    const VisiblePart part(random_surface(random, 1), cutouts, kLevels);
+    std::vector<FixedTriangle> all;
+    const auto add = [&](size_t limit) {
+      all.clear();
+      return patches.for_each(part, [&](const FixedTriangle& patch) {
+        all.push_back(patch);
+        return all.size() < limit;
+      });
+    };
+    ASSERT_TRUE(add(SIZE_MAX));
+    const size_t count = all.size();
+    if (count > 3) {
+      EXPECT_FALSE(add(count / 2));
+    }
+    ASSERT_TRUE(add(SIZE_MAX));
+    EXPECT_EQ(all.size(), count);
+  }
+}
+
+// A wall that fills blocks takes two patches for each layer of a block, for any direction.
+TEST(Cutouts, WallsAreFewPatches) {
+  constexpr uint32_t kFine = 8;
+  constexpr double kSide = 1 << kFine;
+  const Cutouts cutouts = cutouts_of(2, 1, {Wrap::kClampToEdge, Wrap::kClampToEdge},
+                                     [](uint32_t x, uint32_t) { return x == 0; });
+  for (size_t axis = 0; axis < 3; ++axis) {
+    double at[3][3];
+    for (size_t i = 0; i < 3; ++i) {
+      at[i][axis] = 100.5;
+      at[i][(axis + 1) % 3] = i == 1 ? 3 * kSide : -kSide;
+      at[i][(axis + 2) % 3] = i == 2 ? 3 * kSide : -kSide;
+    }
+    const FixedSurface surface = surface_of(at, {{0.2, 0}, {0.9, 0}, {0.2, 1}});
+    size_t patches = 0;
+    VisiblePatches(kFine).for_each(VisiblePart(surface, cutouts, kFine),
+                                   [&](const FixedTriangle&) { return ++patches > 0; });
+    EXPECT_GE(patches, 16u);
+    EXPECT_LE(patches, 32u);
+  }
 }
 
 TEST(Cutouts, VisibleAndHiddenImages) {
@@ -243,7 +292,7 @@ TEST(Cutouts, TrianglesWithoutArea) {
       cutouts_of(2, 1, {Wrap::kRepeat, Wrap::kRepeat}, [](uint32_t x, uint32_t) { return x == 1; });
   const FixedSurface segment = surface_of({{0.5, 3.5, 3.5}, {31.5, 3.5, 3.5}, {31.5, 3.5, 3.5}},
                                           {{0.1, 0.5}, {0.9, 0.5}, {0.9, 0.5}});
-  const Voxels voxels = voxels_of_segments(VisiblePart(segment, cutouts, kLevels));
+  const Voxels voxels = voxels_of_patches(VisiblePart(segment, cutouts, kLevels));
   EXPECT_GE(voxels.size(), 16u);
   EXPECT_LE(voxels.size(), 17u);
   EXPECT_TRUE(voxels.contains({31, 3, 3}));
@@ -251,7 +300,7 @@ TEST(Cutouts, TrianglesWithoutArea) {
   for (const double u : {0.25, 0.75}) {
     const FixedSurface point = surface_of({{7.5, 3.5, 3.5}, {7.5, 3.5, 3.5}, {7.5, 3.5, 3.5}},
                                           {{u, 0.5}, {u, 0.5}, {u, 0.5}});
-    EXPECT_EQ(voxels_of_segments(VisiblePart(point, cutouts, kLevels)).size(), u > 0.5 ? 1u : 0u);
+    EXPECT_EQ(voxels_of_patches(VisiblePart(point, cutouts, kLevels)).size(), u > 0.5 ? 1u : 0u);
   }
 }
 
