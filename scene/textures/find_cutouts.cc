@@ -105,6 +105,13 @@ Cutouts find_cutouts(FileSystem& files, const SceneMaterials& materials, unsigne
   return cutouts;
 }
 
+std::vector<SourceFile> cutout_files(const SceneMaterials& materials) {
+  std::vector<SourceFile> files;
+  for (const Material& material : materials.materials)
+    if (needs_mask(material)) files.push_back(materials.images[material.image].file);
+  return files;
+}
+
 bool may_have_cutouts(const SceneMaterials& materials) {
   return std::ranges::any_of(materials.materials, [](const Material& material) {
     return material.alpha_mode != AlphaMode::kOpaque;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/base/memory_budget.h"
 #include "core/color/cutouts/cutouts.h"
@@ -18,6 +19,10 @@ namespace voxdag {
 // Throws the errors of TextureSet::prepare().
 Cutouts find_cutouts(FileSystem& files, const SceneMaterials& materials, unsigned threads,
                      MemoryBudget& budget, const CancelToken& cancel, WarningList& problems);
+
+// Returns the files of the images that decide which parts of triangles are cut out. An image whose
+// file cannot be opened gives a file without identity.
+std::vector<SourceFile> cutout_files(const SceneMaterials& materials);
 
 // True if the alpha mode of a material allows it to cut out triangles or parts of triangles.
 bool may_have_cutouts(const SceneMaterials& materials);

@@ -19,6 +19,7 @@ import time
 import unittest
 from pathlib import Path
 
+from cutout_scene import write_cutouts
 from slurm_cluster import SlurmCluster, missing_programs
 from voxdag_service import Service
 
@@ -162,6 +163,17 @@ class ClusterTest(unittest.TestCase):
                 report, _ = self.finish(build, 512, "--color")
                 self.assertEqual(report["cluster"]["batches"], tasks)
                 self.assertGreater(report["colors"]["cells"], 100000)
+
+    def test_same_cutouts_from_any_number_of_tasks(self):
+        self.scene = self.folder / "cutouts.gltf"
+        write_cutouts(self.scene)
+        self.assertNotEqual(self.sha256(512), self.sha256(512, "--cutouts", "skip"))
+        # --color implies --cutouts skip.
+        for tasks, options in [(3, ["--cutouts", "skip"]), (4, ["--color"])]:
+            with self.subTest(tasks=tasks):
+                build = self.start(512, tasks, "--subvolume", "64", *options)
+                report, _ = self.finish(build, 512, *options)
+                self.assertEqual(report["cluster"]["batches"], tasks)
 
     def test_more_batches_than_an_array_holds(self):
         report, _ = self.finish(self.start(2048, 120, "--subvolume", "128"), 2048)

@@ -77,7 +77,8 @@ class Preparation {
     clock.finish("scan");
     open_store();
     if (state_.stage < IngestStage::kReady) ingest_and_plan();
-    prepared_.max_durable_bytes = max_durable_bytes(spec_, state_.declared_triangles);
+    prepared_.max_disk_bytes =
+        max_disk_bytes(spec_, state_.declared_triangles, prepared_.triangles->count(kSceneBin));
     clock.finish("ingest");
     return std::move(prepared_);
   }
@@ -85,15 +86,11 @@ class Preparation {
  private:
   void open() {
     WarningList warnings;
-    find_cutouts(warnings);
-    if (cutouts_) {
-      // The cutouts depend on images, whose changes a checkpoint does not detect.
-      checkpoint_.disable();
-      state_ = {};
-    } else if (!checkpoint_.matches(scene_.open().files())) {
+    if (!checkpoint_.matches(files())) {
       state_ = {};
       enable_checkpoints();
     }
+    find_cutouts(warnings);
     const TriangleSource& scene = scene_.open();
     state_.declared_triangles = scene.declared_triangles();
     if (state_.position == 0) checkpoint_.check_disk_space(scene);
@@ -101,6 +98,15 @@ class Preparation {
     // These come last, because enabling checkpoints can start over, which removes recorded
     // warnings.
     for (const Warning& warning : warnings.list()) context_.progress.warn_of_input(warning);
+  }
+
+  // Returns the files that decide the voxels.
+  std::vector<SourceFile> files() {
+    std::vector<SourceFile> all = scene_.open().files();
+    if (spec_.geometry.cutouts != CutoutRule::kSkip) return all;
+    for (SourceFile& file : cutout_files(scene_.open().materials()))
+      if (std::ranges::find(all, file) == all.end()) all.push_back(std::move(file));
+    return all;
   }
 
   // Finds the cutouts that the build leaves out. Adds a warning if it keeps cutouts.
@@ -135,13 +141,13 @@ class Preparation {
   void enable_checkpoints() {
     checkpoint_.forget();
     if (!checkpoint_.is_worthwhile(scene_.open())) return;
-    const int64_t wait_ns = trusted_from_ns(scene_.open().files()) - scene_.opened_ns();
+    const int64_t wait_ns = trusted_from_ns(files()) - scene_.opened_ns();
     if (wait_ns > 0 && wait_ns <= kMaxWaitNs) {
       std::this_thread::sleep_for(std::chrono::nanoseconds(wait_ns));
       scene_.close();
     }
-    const TriangleSource& scene = scene_.open();
-    checkpoint_.enable(scene, scene_.opened_ns());
+    std::vector<SourceFile> current = files();
+    checkpoint_.enable(scene_.open(), std::move(current), scene_.opened_ns());
   }
 
   void find_grid() {

@@ -22,7 +22,7 @@ struct PreparedScene {
   std::unique_ptr<MemoryBudget> triangle_budget;
   std::unique_ptr<TriangleStore> triangles;
   std::vector<SubvolumePlan> plan;  // empty if an earlier run partitioned the triangles
-  double max_durable_bytes = 0;     // max disk space of durable triangles (max_durable_bytes())
+  double max_disk_bytes = 0;        // max disk space of the stored triangles (max_disk_bytes())
 
   // Digest of the grid and the snapped triangles. It identifies the content.
   std::string digest() const { return state.digest.hex(); }

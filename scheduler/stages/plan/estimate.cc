@@ -150,8 +150,8 @@ double grow_as_dag(const std::vector<PilotCounts>& pilots, int doublings) {
 // while artifacts are written.
 EstimateRange triangles_on_disk(const PreparedScene& scene) {
   const double spilled = static_cast<double>(scene.triangles->file_bytes());
-  return {spilled, std::max(spilled, scene.max_durable_bytes / 2),
-          std::max(spilled, scene.max_durable_bytes)};
+  return {spilled, std::max(spilled, scene.max_disk_bytes / 2),
+          std::max(spilled, scene.max_disk_bytes)};
 }
 
 void add_colors(const ColorEstimate& colors, Estimate& estimate) {
@@ -259,8 +259,11 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
   estimate.disk_bytes =
       estimate.file_bytes + kArtifactBytesPerNode * artifact_nodes + triangles_on_disk(scene);
-  const double triangle_bytes = static_cast<double>(scene.triangles->record_bytes()) *
-                                static_cast<double>(scene.state.counts.triangles);
+  // Cutouts make more records than triangles.
+  const uint64_t records =
+      std::max(scene.state.counts.triangles, scene.triangles->count(kSceneBin));
+  const double triangle_bytes =
+      static_cast<double>(scene.triangles->record_bytes()) * static_cast<double>(records);
   estimate.memory_bytes = kMemoryBytesPerNode * estimate.dag_nodes + exactly(triangle_bytes);
   for (double* figure :
        {&estimate.memory_bytes.low, &estimate.memory_bytes.likely, &estimate.memory_bytes.high})

@@ -39,15 +39,20 @@ double copies_bytes(const BuildSpec& spec, uint64_t triangles) {
          static_cast<double>(triangle_record_bytes(is_wide(spec)));
 }
 
+double triangle_memory(const BuildSpec& spec) {
+  return static_cast<double>(MemoryPlan::divide(spec.run.memory_bytes).triangle_bytes);
+}
+
 bool fits_in_memory(const BuildSpec& spec, uint64_t triangles) {
-  return copies_bytes(spec, triangles) <=
-         static_cast<double>(MemoryPlan::divide(spec.run.memory_bytes).triangle_bytes);
+  return copies_bytes(spec, triangles) <= triangle_memory(spec);
 }
 
 }  // namespace
 
-double max_durable_bytes(const BuildSpec& spec, uint64_t triangles) {
-  return triangles < spec.run.durable_min_triangles ? 0 : copies_bytes(spec, triangles);
+double max_disk_bytes(const BuildSpec& spec, uint64_t triangles, uint64_t records) {
+  const double bytes = copies_bytes(spec, std::max(triangles, records));
+  if (triangles >= spec.run.durable_min_triangles) return bytes;
+  return std::max(0.0, bytes - triangle_memory(spec));
 }
 
 int64_t trusted_from_ns(const std::vector<SourceFile>& files) {
@@ -97,7 +102,7 @@ std::optional<IngestState> IngestCheckpoint::resume() {
 
 bool IngestCheckpoint::is_worthwhile(const TriangleSource& scene) const {
   const uint64_t triangles = scene.declared_triangles();
-  if (is_disabled_ || max_durable_bytes(spec_, triangles) == 0) return false;
+  if (is_disabled_ || triangles < spec_.run.durable_min_triangles) return false;
   return !fits_in_memory(spec_, triangles) ||
          kFreePerCopy * copies_bytes(spec_, triangles) <=
              static_cast<double>(context_.files.free_space(work_.path()));
@@ -108,8 +113,7 @@ void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
   if (spec_.run.force || spec_.geometry.bounds) return;
   const double bytes = static_cast<double>(scene.declared_triangles()) *
                        static_cast<double>(triangle_record_bytes(is_wide(spec_)));
-  const double memory =
-      static_cast<double>(MemoryPlan::divide(spec_.run.memory_bytes).triangle_bytes);
+  const double memory = triangle_memory(spec_);
   const double free = static_cast<double>(context_.files.free_space(work_.path()));
   if (bytes - memory > free)
     throw DoesNotFit("the scene has " + std::to_string(scene.declared_triangles()) +
@@ -120,9 +124,9 @@ void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
                      " MB: expected more free space");
 }
 
-void IngestCheckpoint::enable(const TriangleSource& scene, int64_t opened_ns) {
+void IngestCheckpoint::enable(const TriangleSource& scene, std::vector<SourceFile> files,
+                              int64_t opened_ns) {
   forget();
-  std::vector<SourceFile> files = scene.files();
   if (trusted_from_ns(files) > opened_ns) return;
   record_ = IngestRecord{request_of(spec_), std::move(files), {}};
   record_->state.declared_triangles = scene.declared_triangles();

@@ -5,7 +5,8 @@
 //
 // Invariants:
 //   1. The row refers only to bytes of the file that were synced before the row was written.
-//   2. A row is valid only for the same request, and if every file of the scene is unchanged: same
+//   2. A row is valid only for the same request, and if every file that decides the voxels (the
+//      scene's files, and the images of cutouts that are left out) is unchanged: same
 //      inode, size and times. When the scene was opened, the times must have been so old that any
 //      later change of a file gives it different times.
 //   3. An invalid or damaged row is removed, and the scene is read again.
@@ -51,8 +52,8 @@ class IngestCheckpoint {
   void check_disk_space(const TriangleSource& scene) const;
   // Enables checkpoints for a scene that was opened at Unix time `opened_ns`, and removes
   // checkpoints of other scenes. Leaves checkpoints disabled if a later change of a file might not
-  // change its times.
-  void enable(const TriangleSource& scene, int64_t opened_ns);
+  // change its times. `files`: all files that decide the voxels.
+  void enable(const TriangleSource& scene, std::vector<SourceFile> files, int64_t opened_ns);
   // True if checkpoints are enabled for a scene with exactly these files.
   bool matches(const std::vector<SourceFile>& files) const;
 
@@ -106,9 +107,11 @@ class IngestCheckpoint {
   std::future<void> pending_;  // while valid, its thread uses record_
 };
 
-// Returns the maximum disk space of the durable triangles of a scene, reached at the end of the
-// partition; 0 if the scene is too small for checkpoints.
-double max_durable_bytes(const BuildSpec& spec, uint64_t triangles);
+// Returns the maximum disk space of the stored triangles of a scene, reached at the end of the
+// partition: all of them if the scene is large enough for checkpoints, otherwise those that do not
+// fit in memory. `records`: stored triangles, which are more than the scene's if parts of triangles
+// are cut out.
+double max_disk_bytes(const BuildSpec& spec, uint64_t triangles, uint64_t records);
 // Returns the earliest Unix time, in nanoseconds, from which any change of these files is certain
 // to change their identities; INT64_MAX if an identity is unknown.
 int64_t trusted_from_ns(const std::vector<SourceFile>& files);
