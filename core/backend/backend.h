@@ -1,8 +1,11 @@
 // The contract of all backends. A backend makes the sub-DAG of one subvolume from its triangles.
 //
-//   1. A voxel is set iff triangle_touches_cube() (core/geometry/overlap.h) holds for the voxel's
-//      closed cube and at least one triangle. Triangles that miss the subvolume's cube have no
-//      effect.
+//   1. The task's rule (core/geometry/voxel_rule.h) decides which voxels are set. Triangles that
+//      miss the subvolume's cube have no effect.
+//        shell  A voxel is set iff triangle_touches_cube() (core/geometry/overlap.h) holds for the
+//               voxel's closed cube and at least one triangle.
+//        thin   A voxel is set iff a triangle crosses, within the voxel, one of the three rows
+//               through its center (core/geometry/crossing.h).
 //   2. The sub-DAG is unique: no two nodes are equal, and level arrays are in the total order
 //      (core/dag/level_array.h). The sub-DAG does not depend on the order of the triangles, the
 //      size of the budget, the backend's method, or its caches.
@@ -25,6 +28,7 @@
 #include "core/geometry/cube.h"
 #include "core/geometry/fixed_triangle.h"
 #include "core/geometry/solid_rule.h"
+#include "core/geometry/voxel_rule.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag {
@@ -51,9 +55,11 @@ struct SubvolumeTask {
   uint32_t grid_levels = 2;  // L: the grid has 2^L voxels per edge
   Cube cube;                 // its level is at most L-2
   uint32_t hash_bits = 64;   // 4 to 64
-  // Null for the shell. Otherwise also fills the interior (core/geometry/solid_rule.h); the entry
-  // has the views from the cube's low faces. Only the CPU backend fills solids.
+  // Null for the shell and for thin voxels. Otherwise also fills the interior
+  // (core/geometry/solid_rule.h); the entry has the views from the cube's low faces. Only the CPU
+  // backend fills solids.
   const SolidEntry* solid = nullptr;
+  VoxelRule rule = VoxelRule::kShell;  // `solid` needs kShell
 
   SubDagShape shape() const { return {cube.level, grid_levels, hash_bits}; }
 };

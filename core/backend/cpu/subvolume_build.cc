@@ -27,7 +27,7 @@ SubvolumeBuild::SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels
       triangles_(memory),
       tables_(memory, size_log2_of(task), expected),
       reducer_(tables_, kernels),
-      planes_(memory, tables_, reducer_, kernels) {
+      planes_(memory, tables_, reducer_, kernels, task.rule) {
   if (task_.solid != nullptr) solid_.emplace(task_, memory, tables_);
 }
 
@@ -201,22 +201,37 @@ Octants SubvolumeBuild::test_octants(Entry entry, const LatticeCube& cube) const
 }
 
 void SubvolumeBuild::draw(const WideTriangle& triangle, const LatticeCube& tile) {
-  if (is_narrow(triangle)) {
-    TileTriangle<int32_t> narrow;
-    if (narrow.set_up(narrowed(triangle), false, tile)) kernels_.draw(narrow, tile_);
-  } else {
-    TileTriangle<int64_t> wide;
-    if (wide.set_up(triangle, false, tile)) draw_wide(wide, tile_);
-  }
+  if (is_narrow(triangle))
+    draw_narrow(narrowed(triangle), false, tile);
+  else
+    draw_wide(triangle, false, tile);
 }
 
 void SubvolumeBuild::draw(Entry entry, const LatticeCube& tile) {
-  if (entry.wide()) {
-    TileTriangle<int64_t> wide;
-    if (wide.set_up(triangles_.wide(entry), entry.inside(), tile)) draw_wide(wide, tile_);
+  if (entry.wide())
+    draw_wide(triangles_.wide(entry), entry.inside(), tile);
+  else
+    draw_narrow(triangles_.narrow(entry), entry.inside(), tile);
+}
+
+void SubvolumeBuild::draw_narrow(const NarrowTriangle& triangle, bool inside,
+                                 const LatticeCube& tile) {
+  if (task_.rule == VoxelRule::kThin) {
+    ThinTriangle<int32_t> thin;
+    if (thin.set_up(triangle, inside, tile)) kernels_.draw_thin(thin, tile_);
   } else {
-    TileTriangle<int32_t> narrow;
-    if (narrow.set_up(triangles_.narrow(entry), entry.inside(), tile)) kernels_.draw(narrow, tile_);
+    TileTriangle<int32_t> touched;
+    if (touched.set_up(triangle, inside, tile)) kernels_.draw(touched, tile_);
+  }
+}
+
+void SubvolumeBuild::draw_wide(const WideTriangle& triangle, bool inside, const LatticeCube& tile) {
+  if (task_.rule == VoxelRule::kThin) {
+    ThinTriangle<int64_t> thin;
+    if (thin.set_up(triangle, inside, tile)) draw_thin_wide(thin, tile_);
+  } else {
+    TileTriangle<int64_t> touched;
+    if (touched.set_up(triangle, inside, tile)) cpu::draw_wide(touched, tile_);
   }
 }
 

@@ -59,6 +59,8 @@ class SubvolumeBuild {
   Octants test_octants(Entry entry, const LatticeCube& cube) const;
   void draw(const WideTriangle& triangle, const LatticeCube& tile);
   void draw(Entry entry, const LatticeCube& tile);
+  void draw_narrow(const NarrowTriangle& triangle, bool inside, const LatticeCube& tile);
+  void draw_wide(const WideTriangle& triangle, bool inside, const LatticeCube& tile);
   void reserve_entries(size_t count);
 
   const SubvolumeTask task_;

@@ -233,27 +233,35 @@ class Filler {
   std::map<Cell, int> views_;
 };
 
-// True if one of the triangles crosses the row along `axis` through the voxel's center, within the
-// voxel.
-bool crosses_voxel(const Triangle& triangle, const Point& low, int axis) {
-  Point p = low;
-  for (int k = 1; k < 3; ++k) p[(axis + k) % 3] += kUnits / 2;
-  return leg_crossing(triangle, p, axis, kUnits) != 0;
+// Sets the voxel in which the triangle crosses a row of voxels' centers. `at`: the first voxel of
+// the row.
+void mark_crossed(const Triangle& t, const Region& region, Cell at, int axis, Voxels& out) {
+  Point p;
+  for (int a = 0; a < 3; ++a)
+    p[a] = (region.low[a] + at[a]) * kUnits + (a == axis ? 0 : kUnits / 2);
+  Crossing low = crossing_of(t, p, axis);
+  if (!low.exists) return;
+  for (; at[axis] < region.edge; ++at[axis]) {
+    p[axis] += kUnits;
+    const Crossing high = crossing_of(t, p, axis);
+    if (!low.is_before && high.is_before) out.set(at[0], at[1], at[2]);
+    low = high;
+  }
 }
 
 }  // namespace
 
 Voxels voxelize_thin(const Triangles& triangles, const Region& region) {
   Voxels out(region.edge);
-  for (int x = 0; x < region.edge; ++x)
-    for (int y = 0; y < region.edge; ++y)
-      for (int z = 0; z < region.edge; ++z) {
-        const Point low = {(region.low[0] + x) * kUnits, (region.low[1] + y) * kUnits,
-                           (region.low[2] + z) * kUnits};
-        for (const Triangle& t : triangles)
-          for (int a = 0; a < 3; ++a)
-            if (crosses_voxel(t, low, a)) out.set(x, y, z);
-      }
+  for (const Triangle& t : triangles)
+    for (int a = 0; a < 3; ++a)
+      for (int i = 0; i < region.edge; ++i)
+        for (int j = 0; j < region.edge; ++j) {
+          Cell first{};
+          first[(a + 1) % 3] = i;
+          first[(a + 2) % 3] = j;
+          mark_crossed(t, region, first, a, out);
+        }
   return out;
 }
 

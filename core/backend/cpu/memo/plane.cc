@@ -1,5 +1,7 @@
 #include "core/backend/cpu/memo/plane.h"
 
+#include <algorithm>
+#include <cstdlib>
 #include <numeric>
 
 namespace voxdag::cpu {
@@ -20,23 +22,45 @@ bool Plane::fits(int size_log2) const {
   return rising() - falling() <= (int64_t{1} << 61) >> size_log2;
 }
 
+void Plane::set_rule(VoxelRule rule) {
+  const int64_t size = rising() - falling();
+  if (rule == VoxelRule::kThin) {
+    int dominant = 0;
+    for (int a = 1; a < 3; ++a)
+      if (std::abs(n[a]) > std::abs(n[dominant])) dominant = a;
+    for (int a = 0; a < 3; ++a)
+      if (a != dominant) c += static_cast<int128>(n[a]) * (kUnitsPerVoxel / 2);
+    if ((n[0] != 0 ? n[0] : n[1] != 0 ? n[1] : n[2]) < 0) c -= 1;
+    fractional = true;
+    up = std::max<int64_t>(n[dominant], 0);
+    width = std::abs(n[dominant]) - 1;
+    return;
+  }
+  // Over the corners x of voxel k, the maximum of n.x + f is n.k + f + rising, and the minimum is
+  // `size` less. The plane touches the voxel if the maximum is >= 0 and the minimum <= 0. If
+  // `fractional`, the exact value at each corner is greater than n.x + f by less than 1, so the
+  // minimum must be <= -1.
+  fractional = (c & (kUnitsPerVoxel - 1)) != 0;
+  up = rising();
+  width = size - (fractional ? 1 : 0);
+}
+
 bool Plane::crosses(int64_t f, int size_log2) const {
-  const int64_t size = int64_t{1} << size_log2;
-  return f + size * rising() >= 0 && f + size * falling() + (fractional ? 1 : 0) <= 0;
+  const int64_t last = (int64_t{1} << size_log2) - 1;
+  return f + up + last * rising() >= 0 && f + up + last * falling() <= width;
 }
 
 bool Plane::offset_from(const LatticeCube& cube, int size_log2, int64_t& f) const {
   int128 at_corner = c;
   for (int a = 0; a < 3; ++a) at_corner += static_cast<int128>(n[a]) * cube.low[a];
   const int128 floored = at_corner >> kUnitBits;
-  const int128 highest = floored + (static_cast<int128>(rising()) << size_log2);
-  const int128 lowest = floored + (static_cast<int128>(falling()) << size_log2);
-  if (highest < 0 || lowest + (fractional ? 1 : 0) > 0) return false;
+  const int128 last = (int128{1} << size_log2) - 1;
+  if (floored + up + last * rising() < 0 || floored + up + last * falling() > width) return false;
   f = static_cast<int64_t>(floored);
   return true;
 }
 
-Plane plane_of(const NarrowTriangle& t) {
+Plane plane_of(const NarrowTriangle& t, VoxelRule rule) {
   int64_t half[3][2];
   for (int a = 0; a < 3; ++a)
     for (int i = 0; i < 2; ++i) half[a][i] = (int64_t{t.v[a][i + 1]} - t.v[a][i]) / 2;
@@ -51,7 +75,7 @@ Plane plane_of(const NarrowTriangle& t) {
     plane.n[a] /= divisor;
     plane.c -= static_cast<int128>(plane.n[a]) * t.v[a][0];
   }
-  plane.fractional = (plane.c & (kUnitsPerVoxel - 1)) != 0;
+  plane.set_rule(rule);
   return plane;
 }
 

@@ -8,10 +8,16 @@
 #include "core/backend/cpu/raster/triangle_set.h"
 #include "core/base/integers.h"
 #include "core/dag/brick.h"
+#include "core/geometry/voxel_rule.h"
 
 namespace voxdag::cpu {
 
 // The plane n.p + c = 0 of lattice positions p. The components of n have no common divisor.
+//
+// This describes the rule kShell. The rule kThin sets the voxels k whose row along the dominant
+// axis crosses the plane (thin_triangle.h). This also depends on n.k + f alone, if c is the value
+// at the centers of these rows, and is 1 less if ties are below the plane. Voxel k is set iff
+//     0 <= n.k + f + up <= width.
 //
 // For a cube with low corner q, the offset of the plane is f = floor((n.q + c) / 256). Let k be the
 // position of a voxel corner in the cube, in voxels, so that its lattice position is q + 256 k. The
@@ -23,7 +29,12 @@ struct Plane {
   int128 c;
   // True if (n.q + c) / 256 is not an integer. This is the same for all cubes, because q is a
   // multiple of 256.
+  // For the rule kThin, it is always true.
   bool fractional;
+  int64_t up, width;
+
+  // Sets fractional, up and width from n and c. For the rule kThin, also adapts c.
+  void set_rule(VoxelRule rule);
 
   // rising() returns the sum of the positive components of n, falling() the sum of the negative
   // components.
@@ -34,57 +45,46 @@ struct Plane {
   //
   // True if all values n.k + f within a cube that the plane crosses fit in 62 bits.
   bool fits(int size_log2) const;
-  // True if a plane with this normal and with the offset f from a cube touches the cube. Requires
-  // fits().
+  // True if a plane with this normal and with the offset f from a cube sets voxels of the cube.
+  // Requires fits().
   bool crosses(int64_t f, int size_log2) const;
-  // Sets `f` to the plane's offset from the cube. Returns false if the plane misses the cube; `f`
-  // is then unchanged. Requires fits().
+  // Sets `f` to the plane's offset from the cube. Returns false if the plane sets no voxel of the
+  // cube; `f` is then unchanged. Requires fits().
   bool offset_from(const LatticeCube& cube, int size_log2, int64_t& f) const;
 };
 
 // Returns the plane of a triangle whose vertices have equal coordinates along an axis, and nullopt
 // for all other triangles. Unlike plane_of(), also accepts wide and degenerate triangles.
 template <class Int>
-std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t) {
+std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t, VoxelRule rule) {
   for (int a = 0; a < 3; ++a) {
     if (t.v[a][0] != t.v[a][1] || t.v[a][1] != t.v[a][2]) continue;
-    Plane plane{{0, 0, 0}, -static_cast<int128>(t.v[a][0]), true};
+    Plane plane{{0, 0, 0}, -static_cast<int128>(t.v[a][0]), true, 0, 0};
     plane.n[a] = 1;
+    plane.set_rule(rule);
     return plane;
   }
   return {};
 }
 
 // Returns the plane of a triangle, which must not be degenerate.
-Plane plane_of(const NarrowTriangle& t);
+Plane plane_of(const NarrowTriangle& t, VoxelRule rule);
 
-// The range of n.k for the voxels that a plane with offset f crosses: low <= n.k <= high, where k
-// is the position of the voxel's low corner in the cube, in voxels.
+// The range of n.k for the voxels that a plane with offset f sets: low <= n.k <= high, where k is
+// the position of the voxel's low corner in the cube, in voxels.
 struct PlaneRange {
   int64_t low, high;
 
-  PlaneRange(const int64_t (&n)[3], int64_t f, bool fractional) {
-    int64_t rising = 0, size = 0;
-    for (const int64_t x : n) {
-      rising += x > 0 ? x : 0;
-      size += x > 0 ? x : -x;
-    }
-    // Over the corners x of voxel k, the maximum of n.x + f is n.k + f + rising, and the minimum is
-    // `size` less. The plane crosses the voxel if the maximum is >= 0 and the minimum <= 0. If
-    // `fractional`, the exact value at each corner is greater than n.x + f by less than 1, so the
-    // minimum must be <= -1.
-    low = -(f + rising);
-    high = low + size - (fractional ? 1 : 0);
-  }
+  PlaneRange(int64_t up, int64_t width, int64_t f) : low(-(f + up)), high(low + width) {}
 };
 
-// Returns the voxels of a brick that a plane with offset f from the brick crosses.
-inline uint64_t plane_brick(const int64_t (&n)[3], int64_t f, bool fractional) {
-  const PlaneRange crossed(n, f, fractional);
+// Returns the voxels of a brick that a plane with offset f from the brick sets.
+inline uint64_t plane_brick(const Plane& plane, int64_t f) {
+  const PlaneRange crossed(plane.up, plane.width, f);
   uint64_t mask = 0;
   for (int voxel = 0; voxel < 64; ++voxel) {
     int64_t value = 0;
-    for (int a = 0; a < 3; ++a) value += n[a] * brick_coordinate(voxel, a);
+    for (int a = 0; a < 3; ++a) value += plane.n[a] * brick_coordinate(voxel, a);
     mask |= uint64_t{value >= crossed.low && value <= crossed.high} << voxel;
   }
   return mask;

@@ -9,6 +9,10 @@ namespace voxdag::cpu {
 
 void PlaneDirection::set_up(const Plane& plane) {
   std::copy(plane.n, plane.n + 3, n_);
+  up_ = plane.up;
+  width_ = plane.width;
+  min_offset_ = -up_ - 7 * plane.rising();
+  max_offset_ = width_ - up_ - 7 * plane.falling();
   int count = 0;
   for (int z = 0; z <= 8; ++z)
     for (int y = 0; y <= 8; ++y)
@@ -36,7 +40,7 @@ void PlaneDirection::set_up(const Plane& plane) {
 void PlaneDirection::make(int64_t f, SubDagTables& tables, const Kernels& kernels,
                           Known& known) const {
   const OctreeCounts before = tables.counts();
-  const PlaneRange crossed(n_, f, true);
+  const PlaneRange crossed(up_, width_, f);
   uint64_t masks[8];
   kernels.find_in_range(offsets_, 512, crossed.low, crossed.high, masks);
   NodeRef bricks[8];

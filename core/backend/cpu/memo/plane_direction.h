@@ -2,7 +2,8 @@
 // (plane.h) passes above or below a voxel corner k, depending on whether f >= -n.k. A cube of 8^3
 // voxels has 729 corners, so the sorted values -n.k divide all offsets f into at most 730
 // intervals. All planes with offsets in one interval produce the same node. This node is made once
-// and then looked up.
+// and then looked up. With the rule kThin, a voxel k changes only at the offsets -n.k and
+// -n.(k + e), where e is the unit vector along the dominant axis. So the same intervals are valid.
 #pragma once
 
 #include <cstdint>
@@ -35,9 +36,9 @@ class PlaneDirection {
   // Returns the values of n.k for the 512 voxels k of a node, in Morton order. The same values,
   // multiplied by 8, are n.k for the low corners k of the 512 nodes in a tile of 64^3 voxels.
   const int64_t* offsets() const { return offsets_; }
-  // A plane crosses a node iff its offset f is within [min_offset(), max_offset()].
-  int64_t min_offset() const { return values_[0]; }
-  int64_t max_offset() const { return values_[kCorners - 1] - 1; }
+  // A plane sets voxels of a node iff its offset f is within [min_offset(), max_offset()].
+  int64_t min_offset() const { return min_offset_; }
+  int64_t max_offset() const { return max_offset_; }
 
   // Returns the node at an offset within [min_offset(), max_offset()].
   const Known& node(int64_t f, SubDagTables& tables, const Kernels& kernels) {
@@ -63,6 +64,8 @@ class PlaneDirection {
   void make(int64_t f, SubDagTables& tables, const Kernels& kernels, Known& known) const;
 
   int64_t n_[3];
+  int64_t up_, width_;
+  int64_t min_offset_, max_offset_;
   double buckets_per_unit_;
   int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer
   int64_t offsets_[512];

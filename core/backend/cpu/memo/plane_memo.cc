@@ -32,8 +32,8 @@ bool PlaneMemo::build(const TriangleSet& triangles, Entry entry, const LatticeCu
                       int size_log2, NodeRef& node_out) {
   node_out = {};
   int64_t f;
-  if (const auto plane = entry.wide() ? axis_aligned_plane(triangles.wide(entry))
-                                      : axis_aligned_plane(triangles.narrow(entry))) {
+  if (const auto plane = entry.wide() ? axis_aligned_plane(triangles.wide(entry), rule_)
+                                      : axis_aligned_plane(triangles.narrow(entry), rule_)) {
     if (plane->offset_from(cube, size_log2, f)) node_out = small_node(*plane, f, size_log2);
     return true;
   }
@@ -49,8 +49,8 @@ bool PlaneMemo::build(const TriangleSet& triangles, Entry entry, const LatticeCu
 }
 
 bool PlaneMemo::has_plane(const TriangleSet& triangles, Entry entry) {
-  if (entry.wide()) return axis_aligned_plane(triangles.wide(entry)).has_value();
-  return axis_aligned_plane(triangles.narrow(entry)).has_value() ||
+  if (entry.wide()) return axis_aligned_plane(triangles.wide(entry), rule_).has_value();
+  return axis_aligned_plane(triangles.narrow(entry), rule_).has_value() ||
          find(triangles, entry, 0) != nullptr;
 }
 
@@ -67,7 +67,7 @@ const PlaneMemo::KnownPlane* PlaneMemo::find(const TriangleSet& triangles, Entry
       known += static_cast<uint32_t>(tiles);
       return nullptr;
     }
-    known = add_plane(plane_of(triangles.narrow(entry)));
+    known = add_plane(plane_of(triangles.narrow(entry), rule_));
   }
   return known == kNever ? nullptr : &planes_[known - kWorthwhile];
 }
@@ -137,8 +137,7 @@ NodeRef PlaneMemo::tile_node(PlaneDirection& direction, int64_t f, int size_log2
 
 NodeRef PlaneMemo::small_node(const Plane& plane, int64_t f, int size_log2) {
   if (!plane.crosses(f, size_log2)) return {};
-  if (size_log2 == kBrickLevels)
-    return tables_.add_brick(plane_brick(plane.n, f, plane.fractional));
+  if (size_log2 == kBrickLevels) return tables_.add_brick(plane_brick(plane, f));
   reserve_small_nodes();
   const uint64_t key = small_key(plane, f, size_log2);
   if (const SmallNode& known = small_slot(key); known.key == key) {

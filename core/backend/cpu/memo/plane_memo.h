@@ -26,8 +26,8 @@ namespace voxdag::cpu {
 class PlaneMemo {
  public:
   PlaneMemo(PooledMemory& memory, SubDagTables& tables, TileReducer& reducer,
-            const Kernels& kernels)
-      : memory_(memory), tables_(tables), reducer_(reducer), kernels_(kernels) {}
+            const Kernels& kernels, VoxelRule rule)
+      : memory_(memory), tables_(tables), reducer_(reducer), kernels_(kernels), rule_(rule) {}
 
   // log2 of the edge of the smallest cube for which build() is worthwhile.
   static constexpr int kSmallestLog2 = 4;
@@ -76,6 +76,7 @@ class PlaneMemo {
   SubDagTables& tables_;
   TileReducer& reducer_;
   const Kernels& kernels_;
+  const VoxelRule rule_;
   PooledArray<uint32_t> known_;  // by number of the narrow triangle
   PooledArray<KnownPlane> planes_;
   uint32_t plane_count_ = 0;

@@ -86,16 +86,41 @@ uint64_t brick_mask(const TileTriangle<Coordinate>& t,
   return mask;
 }
 
-// Returns false if the plane or an edge excludes the complete brick.
+// Returns the voxels of a brick that the rule kThin sets: the union of the crossings along the
+// three axes.
 template <class Coordinate>
-bool may_touch(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
+uint64_t thin_brick_mask(const ThinTriangle<Coordinate>& t,
+                         const VoxelOffsets<typename ThinTriangle<Coordinate>::Int>& offsets,
+                         const int (&brick)[3]) {
+  auto at_brick = t.normal[0] * (4 * brick[0]);
+  for (int a = 1; a < 3; ++a) at_brick += t.normal[a] * (4 * brick[a]);
+  if (t.inside) return plane_mask(offsets, at_brick + t.lowest, t.width);
+  uint64_t mask = 0;
+  for (int a = 0; a < 3; ++a) {
+    if (t.width_along[a] < 0) continue;
+    uint64_t along = plane_mask(offsets, at_brick + t.lowest_along[a], t.width_along[a]);
+    cut_by_edges(t.edges[a], a, brick, along);
+    mask |= along;
+  }
+  return mask;
+}
+
+// Returns false if the plane excludes the complete brick.
+template <class Coordinate>
+bool may_cross_plane(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
   auto low = t.lowest, high = t.lowest;
   for (int a = 0; a < 3; ++a) {
     const auto near = t.normal[a] * (4 * brick[a]), far = near + 3 * t.normal[a];
     low += std::min(near, far);
     high += std::max(near, far);
   }
-  if (high < 0 || low > t.width) return false;
+  return high >= 0 && low <= t.width;
+}
+
+// Returns false if the plane or an edge excludes the complete brick.
+template <class Coordinate>
+bool may_touch(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
+  if (!may_cross_plane(t, brick)) return false;
   if (t.inside) return true;
   for (int d = 0; d < 3; ++d)
     for (const auto& edge : t.edges[d])
@@ -106,30 +131,50 @@ bool may_touch(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
   return true;
 }
 
-}  // namespace
-
-template <class Coordinate>
-void draw_exactly(const TileTriangle<Coordinate>& t, TileBricks& tile) {
+// Calls visit(brick, index) for the bricks of the triangle's box.
+template <class Coordinate, class Visit>
+void for_each_brick(const TileTriangle<Coordinate>& t, Visit visit) {
   int first[3], last[3];
   for (int a = 0; a < 3; ++a) {
     first[a] = t.first_voxel[a] / 4;
     last[a] = t.last_voxel[a] / 4;
   }
-  const VoxelOffsets offsets(t.normal);
   int brick[3];
   for (brick[0] = first[0]; brick[0] <= last[0]; ++brick[0])
     for (brick[1] = first[1]; brick[1] <= last[1]; ++brick[1])
       for (brick[2] = first[2]; brick[2] <= last[2]; ++brick[2])
-        if (may_touch(t, brick))
-          tile.add(kSpread[brick[0]] << 2 | kSpread[brick[1]] << 1 | kSpread[brick[2]],
-                   brick_mask(t, offsets, brick));
+        visit(brick, kSpread[brick[0]] << 2 | kSpread[brick[1]] << 1 | kSpread[brick[2]]);
+}
+
+}  // namespace
+
+template <class Coordinate>
+void draw_exactly(const TileTriangle<Coordinate>& t, TileBricks& tile) {
+  const VoxelOffsets offsets(t.normal);
+  for_each_brick(t, [&](const int(&brick)[3], uint32_t index) {
+    if (may_touch(t, brick)) tile.add(index, brick_mask(t, offsets, brick));
+  });
+}
+
+template <class Coordinate>
+void draw_thin_exactly(const ThinTriangle<Coordinate>& t, TileBricks& tile) {
+  const VoxelOffsets offsets(t.normal);
+  for_each_brick(t, [&](const int(&brick)[3], uint32_t index) {
+    if (may_cross_plane(t, brick)) tile.add(index, thin_brick_mask(t, offsets, brick));
+  });
 }
 
 template void draw_exactly(const TileTriangle<int32_t>&, TileBricks&);
 template void draw_exactly(const TileTriangle<int64_t>&, TileBricks&);
+template void draw_thin_exactly(const ThinTriangle<int32_t>&, TileBricks&);
+template void draw_thin_exactly(const ThinTriangle<int64_t>&, TileBricks&);
 
 void draw_wide(const TileTriangle<int64_t>& triangle, TileBricks& tile) {
   draw_exactly(triangle, tile);
+}
+
+void draw_thin_wide(const ThinTriangle<int64_t>& triangle, TileBricks& tile) {
+  draw_thin_exactly(triangle, tile);
 }
 
 }  // namespace voxdag::cpu

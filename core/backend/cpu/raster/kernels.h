@@ -11,6 +11,7 @@
 
 #include <cstdint>
 
+#include "core/backend/cpu/raster/thin_triangle.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
 #include "core/backend/cpu/raster/tile_triangle.h"
 #include "core/backend/cpu/raster/triangle_set.h"
@@ -33,6 +34,8 @@ struct Kernels {
   const char* name;
   // Sets exactly the voxels of the tile that the triangle touches.
   void (*draw)(const TileTriangle<int32_t>& triangle, TileBricks& tile);
+  // Sets exactly the voxels of the tile that the rule kThin sets for the triangle.
+  void (*draw_thin)(const ThinTriangle<int32_t>& triangle, TileBricks& tile);
   // Finds the children of the cube that the triangle may touch. Requires that the triangle touches
   // the cube. `inside`: true if the triangle covers the cube (see Entry in triangle_set.h).
   Octants (*test_octants)(const NarrowTriangle& triangle, const LatticeCube& cube, bool inside);
@@ -68,8 +71,15 @@ void draw_avx2(const TileTriangle<int32_t>& triangle, TileBricks& tile);
 // Also requires AVX-512 F, BW, DQ, VL and VBMI.
 void draw_avx512(const TileTriangle<int32_t>& triangle, TileBricks& tile);
 
+// The rasterizers of the rule kThin, like those above.
+template <class Coordinate>
+void draw_thin_exactly(const ThinTriangle<Coordinate>& triangle, TileBricks& tile);
+void draw_thin_avx2(const ThinTriangle<int32_t>& triangle, TileBricks& tile);
+void draw_thin_avx512(const ThinTriangle<int32_t>& triangle, TileBricks& tile);
+
 // Wide triangles have a portable implementation only.
 void draw_wide(const TileTriangle<int64_t>& triangle, TileBricks& tile);
+void draw_thin_wide(const ThinTriangle<int64_t>& triangle, TileBricks& tile);
 Octants test_octants_wide(const WideTriangle& triangle, const LatticeCube& cube, bool inside);
 
 }  // namespace voxdag::cpu

@@ -83,8 +83,13 @@ void find_in_range(const int64_t* values, int count, int64_t low, int64_t high, 
   }
 }
 
-constexpr Kernels kPortable = {"portable",    draw_exactly<int32_t>, test_octants_narrow,
-                               find_in_range, list_blocks,           unpack};
+constexpr Kernels kPortable = {"portable",
+                               draw_exactly<int32_t>,
+                               draw_thin_exactly<int32_t>,
+                               test_octants_narrow,
+                               find_in_range,
+                               list_blocks,
+                               unpack};
 
 }  // namespace
 

@@ -16,7 +16,17 @@ template <class Coordinate>
 bool TileTriangle<Coordinate>::set_up(const Triangle<Coordinate>& triangle, bool is_inside,
                                       const LatticeCube& tile) {
   inside = is_inside;
-  int64_t v[3][3];
+  int64_t v[3][3], half[3][3];
+  if (!set_box(triangle, tile, v)) return false;
+  set_halves(v, half);
+  if (!set_plane(v, half, tile.edge >> kUnitBits)) return false;
+  if (!inside) set_edges(v, half);
+  return true;
+}
+
+template <class Coordinate>
+bool TileTriangle<Coordinate>::set_box(const Triangle<Coordinate>& triangle,
+                                       const LatticeCube& tile, int64_t (&v)[3][3]) {
   for (int a = 0; a < 3; ++a) {
     for (int i = 0; i < 3; ++i) v[a][i] = triangle.v[a][i] - tile.low[a];
     const int64_t last = (tile.edge >> kUnitBits) - 1;
@@ -26,24 +36,22 @@ bool TileTriangle<Coordinate>::set_up(const Triangle<Coordinate>& triangle, bool
     first_voxel[a] = static_cast<int>(low);
     last_voxel[a] = static_cast<int>(high);
   }
-  // Half-edges (the edge vectors, divided by 2), [axis][edge]. Edge i leads from vertex i.
-  int64_t half[3][3];
-  for (int a = 0; a < 3; ++a)
-    for (int i = 0; i < 3; ++i) half[a][i] = (v[a][i == 2 ? 0 : i + 1] - v[a][i]) / 2;
-  if (!set_plane(v, half, tile.edge >> kUnitBits)) return false;
-  if (!inside) set_edges(v, half);
   return true;
 }
 
 template <class Coordinate>
-bool TileTriangle<Coordinate>::set_plane(const int64_t (&v)[3][3], int64_t (&half)[3][3],
-                                         int64_t tile_voxels) {
+void TileTriangle<Coordinate>::set_halves(const int64_t (&v)[3][3], int64_t (&half)[3][3]) {
+  for (int a = 0; a < 3; ++a)
+    for (int i = 0; i < 3; ++i) half[a][i] = (v[a][i == 2 ? 0 : i + 1] - v[a][i]) / 2;
+}
+
+template <class Coordinate>
+void TileTriangle<Coordinate>::set_normal(int64_t (&half)[3][3], Int (&size)[3]) {
   for (int a = 0; a < 3; ++a) {
     const int b = (a + 1) % 3, c = (a + 2) % 3;
     normal[a] =
         static_cast<Int>(half[b][0]) * half[c][1] - static_cast<Int>(half[c][0]) * half[b][1];
   }
-  Int size[3];
   for (int a = 0; a < 3; ++a) size[a] = normal[a] < 0 ? -normal[a] : normal[a];
   dominant = size[1] > size[0] ? 1 : 0;
   if (size[2] > size[dominant]) dominant = 2;
@@ -55,6 +63,13 @@ bool TileTriangle<Coordinate>::set_plane(const int64_t (&v)[3][3], int64_t (&hal
       for (int i = 0; i < 3; ++i) half[a][i] = -half[a][i];
     }
   }
+}
+
+template <class Coordinate>
+bool TileTriangle<Coordinate>::set_plane(const int64_t (&v)[3][3], int64_t (&half)[3][3],
+                                         int64_t tile_voxels) {
+  Int size[3];
+  set_normal(half, size);
   int128 c = 0;
   for (int a = 0; a < 3; ++a) c -= static_cast<int128>(normal[a]) * v[a][0];
   const Int rising = positive(normal[0]) + positive(normal[1]) + positive(normal[2]);

@@ -54,6 +54,17 @@ struct TileTriangle {
   // Prepares a triangle. Returns false if it certainly touches no voxel of the tile.
   bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const LatticeCube& tile);
 
+ protected:
+  // Sets v[axis][vertex] to the vertices relative to the tile, and the range of voxels. Returns
+  // false if the triangle's box misses the tile.
+  bool set_box(const Triangle<Coordinate>& triangle, const LatticeCube& tile, int64_t (&v)[3][3]);
+  // Sets `half` to the half-edges (the edge vectors, divided by 2), [axis][edge]. Edge i leads from
+  // vertex i.
+  static void set_halves(const int64_t (&v)[3][3], int64_t (&half)[3][3]);
+  // Sets `normal` and `dominant`, and `size` to the magnitudes of the normal's components. If this
+  // negates the normal, also negates the half-edges.
+  void set_normal(int64_t (&half)[3][3], Int (&size)[3]);
+
  private:
   bool set_plane(const int64_t (&v)[3][3], int64_t (&half)[3][3], int64_t tile_voxels);
   void set_edges(const int64_t (&v)[3][3], const int64_t (&half)[3][3]);

@@ -13,6 +13,7 @@
 
 #include "core/backend/backend.h"
 #include "core/backend/parallel/space/space.h"
+#include "core/backend/parallel/voxelize/crossed_voxels.h"
 #include "core/backend/parallel/voxelize/triangle_cells.h"
 #include "core/dag/brick.h"
 
@@ -49,8 +50,9 @@ struct CubePlace {
 };
 
 // The count step: finds the parts of each pair's cube that the pair's triangle touches. The parts
-// are the cube's children (N = 2) or, if the cube is a brick, its voxels (N = 4).
-template <int N>
+// are the cube's children (N = 2) or, if the cube is a brick, its voxels (N = 4). With the rule
+// kThin, the voxels are those that the rule sets.
+template <int N, VoxelRule kRule>
 struct CountParts {
   CubePlace place;
   int shift;  // log2 of a part's edge in lattice units
@@ -62,7 +64,10 @@ struct CountParts {
   VOXDAG_HD void operator()(uint32_t i) const {
     int64_t low[3];
     place.low(codes[i], shift + (N == 2 ? 1 : 2), low);
-    parts[i] = touched_cells<N>(triangles[pair_triangles[i]], low, shift);
+    if constexpr (N == 4 && kRule == VoxelRule::kThin)
+      parts[i] = crossed_voxels(triangles[pair_triangles[i]], low);
+    else
+      parts[i] = touched_cells<N>(triangles[pair_triangles[i]], low, shift);
     counts[i] = static_cast<uint32_t>(popcount64(parts[i]));
   }
 };
@@ -130,6 +135,7 @@ class PairExpansion {
         place_(task),
         top_shift_(static_cast<int>(task.grid_levels - task.cube.level) + kUnitBits),
         to_voxels_(to_voxels),
+        rule_(task.rule),
         window_(window),
         slice_(space, 2) {
     for (int i = 0; i < depths + (to_voxels ? 1 : 0); ++i) frames_.emplace_back(space, window);
@@ -166,18 +172,23 @@ class PairExpansion {
   bool is_last(size_t depth) const { return depth + 1 == frames_.size(); }
   bool makes_voxels(size_t depth) const { return to_voxels_ && is_last(depth); }
 
-  template <int N>
+  template <int N, VoxelRule kRule = VoxelRule::kShell>
   void count_parts(Frame& f, int shift, uint32_t count) {
     space_.for_each(
-        count, CountParts<N>{place_, shift, triangles_, f.codes.data(), f.pair_triangles.data(),
-                             f.parts.data(), f.offsets.data()});
+        count, CountParts<N, kRule>{place_, shift, triangles_, f.codes.data(),
+                                    f.pair_triangles.data(), f.parts.data(), f.offsets.data()});
   }
 
   template <class Out>
   void descend(size_t depth, uint32_t count, Out& out) {
     Frame& f = frames_[depth];
     const int shift = top_shift_ - static_cast<int>(depth);
-    makes_voxels(depth) ? count_parts<4>(f, shift - 2, count) : count_parts<2>(f, shift - 1, count);
+    if (!makes_voxels(depth))
+      count_parts<2>(f, shift - 1, count);
+    else if (rule_ == VoxelRule::kThin)
+      count_parts<4, VoxelRule::kThin>(f, shift - 2, count);
+    else
+      count_parts<4>(f, shift - 2, count);
     space_.scan(f.offsets.data(), count);
     for (uint32_t first = 0; first < count;) {
       const PairSpan to = is_last(depth) ? out.span() : next_frame(depth);
@@ -212,6 +223,7 @@ class PairExpansion {
   const CubePlace place_;
   const int top_shift_;  // log2 of the subvolume's edge in lattice units
   const bool to_voxels_;
+  const VoxelRule rule_;
   const uint32_t window_;
   const FixedTriangle* triangles_ = nullptr;
   std::vector<Frame> frames_;

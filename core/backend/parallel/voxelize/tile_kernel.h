@@ -21,7 +21,24 @@ inline constexpr uint32_t kTileBricks = 1u << 3 * (kTileLevels - kBrickLevels);
 inline constexpr int kTileCodeBits =
     3 * (kTileLevels - kCellLevels);  // bits of a cell's code within its tile
 
-struct DrawTile {
+// The pairs of some tiles, and the arrays for their bricks.
+struct TileWave {
+  CubePlace place;
+  const FixedTriangle* triangles;
+  const uint64_t* codes;  // cells of the pairs, sorted by tile
+  const uint32_t* pair_triangles;
+  const uint32_t* tile_starts;  // first pair of each tile
+  uint32_t tile_count, pair_count, first_tile;
+
+  // The output arrays have space for kTileBricks bricks per thread block. Each thread block writes
+  // its number of bricks to `brick_counts`.
+  uint64_t* brick_codes;
+  uint64_t* brick_masks;
+  uint32_t* brick_counts;
+};
+
+template <VoxelRule kRule>
+struct DrawTile : TileWave {
   static constexpr uint32_t kThreads = 256;
   static constexpr int kMinResidentBlocks = 2;
   static constexpr int kPhases = 5;
@@ -36,19 +53,6 @@ struct DrawTile {
   // Returns the index of a brick in `masks`. There is one word of padding after each thread's run
   // of bricks, so that neighboring threads use different banks of the shared memory.
   VOXDAG_HD static uint32_t slot(uint32_t brick) { return brick + brick / kRun; }
-
-  CubePlace place;
-  const FixedTriangle* triangles;
-  const uint64_t* codes;  // cells of the pairs, sorted by tile
-  const uint32_t* pair_triangles;
-  const uint32_t* tile_starts;  // first pair of each tile
-  uint32_t tile_count, pair_count, first_tile;
-
-  // The output arrays have space for kTileBricks bricks per thread block. Each thread block writes
-  // its number of bricks to `brick_counts`.
-  uint64_t* brick_codes;
-  uint64_t* brick_masks;
-  uint32_t* brick_counts;
 
   VOXDAG_HD void operator()(int phase, uint32_t block, uint32_t thread, Shared& shared) const {
     switch (phase) {
@@ -78,7 +82,8 @@ struct DrawTile {
     place.low(cell, kUnitBits + kCellLevels, low);
     const uint64_t bricks = touched_cells<4>(triangle, low, kBrickShift);
     const uint32_t first = static_cast<uint32_t>(cell % (kTileBricks / 64)) * 64;
-    if (!is_narrow(triangle)) return draw_wide(triangle, low, bricks, first, shared);
+    if (kRule == VoxelRule::kThin || !is_narrow(triangle))
+      return draw_by_brick(triangle, low, bricks, first, shared);
     const TriangleOnLattice on_voxels(triangle, low, kUnitBits);
     for (uint64_t left = bricks; left != 0; left &= left - 1) {
       const int brick = lowest_bit(left);
@@ -87,17 +92,23 @@ struct DrawTile {
       draw(on_voxels.touched<4>(at), first + static_cast<uint32_t>(brick), shared);
     }
   }
-  VOXDAG_HD void draw_wide(const FixedTriangle& triangle, const int64_t (&low)[3], uint64_t bricks,
-                           uint32_t first, Shared& shared) const {
+  VOXDAG_HD void draw_by_brick(const FixedTriangle& triangle, const int64_t (&low)[3],
+                               uint64_t bricks, uint32_t first, Shared& shared) const {
     constexpr int kBrickShift = kUnitBits + kBrickLevels;
     for (; bricks != 0; bricks &= bricks - 1) {
       const int brick = lowest_bit(bricks);
       int64_t brick_low[3];
       for (int a = 0; a < 3; ++a)
         brick_low[a] = low[a] + (static_cast<int64_t>(brick_coordinate(brick, a)) << kBrickShift);
-      draw(touched_cells<4>(triangle, brick_low, kUnitBits), first + static_cast<uint32_t>(brick),
-           shared);
+      draw(voxels_of_brick(triangle, brick_low), first + static_cast<uint32_t>(brick), shared);
     }
+  }
+  VOXDAG_HD static uint64_t voxels_of_brick(const FixedTriangle& triangle,
+                                            const int64_t (&low)[3]) {
+    if constexpr (kRule == VoxelRule::kThin)
+      return crossed_voxels(triangle, low);
+    else
+      return touched_cells<4>(triangle, low, kUnitBits);
   }
   VOXDAG_HD void draw(uint64_t voxels, uint32_t brick, Shared& shared) const {
     or_shared(shared.masks[slot(brick)], voxels);

@@ -80,10 +80,14 @@ void draw_tiles(Space& space, const SubvolumeTask& task, const FixedTriangle* tr
   SpaceArray<Space, uint32_t> counts(space, wave + 1);
   for (uint32_t first = 0; first < tile_count; first += wave) {
     const uint32_t blocks = std::min(wave, tile_count - first);
-    space.for_each_thread_block(
-        blocks,
-        DrawTile{CubePlace(task), triangles, pairs.codes(), pairs.triangles(), starts.data(),
-                 tile_count, pairs.size(), first, codes.data(), masks.data(), counts.data()});
+    const auto draw = [&](const auto& kernel) { space.for_each_thread_block(blocks, kernel); };
+    const TileWave wave_of_tiles{CubePlace(task), triangles,    pairs.codes(), pairs.triangles(),
+                                 starts.data(),   tile_count,   pairs.size(),  first,
+                                 codes.data(),    masks.data(), counts.data()};
+    if (task.rule == VoxelRule::kThin)
+      draw(DrawTile<VoxelRule::kThin>{wave_of_tiles});
+    else
+      draw(DrawTile<VoxelRule::kShell>{wave_of_tiles});
     space.scan(counts.data(), blocks);
     const uint32_t count = space.value(counts.data() + blocks);
     const uint32_t at = bricks.reserve(count);

@@ -2,6 +2,7 @@
 #include <immintrin.h>
 
 #include "core/backend/cpu/raster/avx2/draw_by_columns.h"
+#include "core/backend/cpu/raster/avx2/thin_by_columns.h"
 #include "core/backend/cpu/raster/kernels.h"
 
 namespace voxdag::cpu {
@@ -65,6 +66,10 @@ class Spread {
 
 void draw_avx2(const TileTriangle<int32_t>& triangle, TileBricks& tile) {
   draw_by_columns<Spread>(triangle, tile);
+}
+
+void draw_thin_avx2(const ThinTriangle<int32_t>& triangle, TileBricks& tile) {
+  draw_thin_by_columns<Spread>(triangle, tile);
 }
 
 }  // namespace voxdag::cpu

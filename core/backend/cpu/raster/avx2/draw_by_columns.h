@@ -45,7 +45,10 @@ template <int D, class Spread>
 class ColumnWalk {
  public:
   VOXDAG_INLINE ColumnWalk(const TileTriangle<int32_t>& triangle, TileBricks& bricks)
-      : t(triangle), tile(bricks), footprint(triangle), heights(triangle) {}
+      : t(triangle),
+        tile(bricks),
+        footprint(triangle, FootprintColumns::kInside),
+        heights(triangle.normal, triangle.lowest, triangle.width) {}
 
   VOXDAG_INLINE void run() {
     const int first = t.first_voxel[D] / 4, last = t.last_voxel[D] / 4;
@@ -101,7 +104,7 @@ VOXDAG_INLINE uint32_t in_layer(uint32_t columns) {
 // the edge tests decide which voxels of the layer are set.
 template <int D>
 VOXDAG_INLINE void draw_flat(const TileTriangle<int32_t>& t, TileBricks& tile) {
-  const Footprint<D> footprint(t);
+  const Footprint<D> footprint(t, FootprintColumns::kInside);
   const int z = t.first_voxel[D];
   const uint32_t at_height = kBrickIndex<D>.of_height[z / 4];
   const uint64_t layer = kLayers.voxels[D][z % 4];

@@ -105,6 +105,10 @@ class EdgeBounds {
     const __m256d half = _mm256_set1_pd(0.5);
     const __m256d slope = _mm256_mul_pd(across, inverse);
     const __m256d start = _mm256_mul_pd(_mm256_add_pd(lanes.c, half), inverse);
+    // -(1.5 / |up| + (1 + |slope|) / 2)
+    const __m256d reach = _mm256_sub_pd(
+        _mm256_mul_pd(inverse, _mm256_set1_pd(1.5)),
+        _mm256_mul_pd(half, _mm256_add_pd(_mm256_set1_pd(1.0), _mm256_andnot_pd(sign, slope))));
     const __m256i order = _mm256_load_si256(
         reinterpret_cast<const __m256i*>(kBoundOrder.lane[_mm256_movemask_pd(up) & 7]));
     const __m256d slopes = permuted(_mm256_blend_pd(slope, _mm256_setzero_pd(), 0b1000), order);
@@ -113,6 +117,16 @@ class EdgeBounds {
                       _mm256_setr_pd(below_more, below_more, over_more, over_more));
     spread(slopes, slope_);
     spread(starts, start_);
+    spread(permuted(_mm256_blend_pd(reach, _mm256_setzero_pd(), 0b1000), order), reach_);
+  }
+
+  // Returns the bounds of the closed voxels, if these bounds are for the voxels' centers: the
+  // integer c of the closed test is at most 1.5 + (|across| + |up|) / 2 more than the other test's.
+  // These bounds may be up to 3 / |up| wider than necessary.
+  VOXDAG_INLINE EdgeBounds widened() const {
+    EdgeBounds out = *this;
+    for (int i = 0; i < 4; ++i) out.start_[i] = _mm256_add_pd(start_[i], reach_[i]);
+    return out;
   }
 
   // below() returns the largest y of the edges that bound x from below, over() the largest y of the
@@ -137,7 +151,7 @@ class EdgeBounds {
     out[3] = _mm256_permute4x64_pd(lanes, 0xff);
   }
 
-  __m256d slope_[4], start_[4];
+  __m256d slope_[4], start_[4], reach_[4];
 };
 
 }  // namespace

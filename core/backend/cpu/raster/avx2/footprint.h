@@ -18,14 +18,20 @@
 namespace voxdag::cpu {
 namespace {
 
+// The two rules differ in the edges (tile_triangle.h, thin_triangle.h) and in the list of columns.
+enum class FootprintColumns {
+  kInside,   // columns of bricks that have a voxel column inside
+  kTouched,  // also those that the triangle touches outside the rows through the columns' centers
+};
+
 template <int D>
 struct Footprint {
-  ColumnList columns;  // columns of bricks that have a voxel column inside
+  ColumnList columns;
   // inside[q][p] is the set of voxel columns inside the footprint, in the column of bricks (p, q).
   // Bit i + 4 j is voxel column (i, j). Only rows q that occur in `columns` are set.
   alignas(32) uint16_t inside[16][16];
 
-  VOXDAG_INLINE explicit Footprint(const TileTriangle<int32_t>& t) {
+  VOXDAG_INLINE Footprint(const TileTriangle<int32_t>& t, FootprintColumns listed) {
     const int first = t.first_voxel[Q] / 4, last = t.last_voxel[Q] / 4;
     if (t.inside) {
       for (int q = first; q <= last; ++q) {
@@ -35,6 +41,7 @@ struct Footprint {
       return;
     }
     const EdgeBounds bounds(t.edges[D], (D + 1) % 3 == P, 1, 64);
+    const EdgeBounds touching = bounds.widened();
     const __m256d low = _mm256_set1_pd(t.first_voxel[P]);
     const __m256d high = _mm256_set1_pd(63 - t.last_voxel[P]);
     const __m256d low_q = _mm256_set1_pd(t.first_voxel[Q]);
@@ -42,16 +49,20 @@ struct Footprint {
     const __m256i ones = _mm256_set1_epi8(-1);
     for (int q = first; q <= last; ++q) {
       const __m256d k = load_doubles(kDoubles.of + 4 * q);
-      const __m256i from = count(_mm256_max_pd(bounds.below(k), low));
-      const __m256i over = count(_mm256_max_pd(bounds.over(k), high));
       const __m256d in_box =
           _mm256_and_pd(_mm256_cmp_pd(k, low_q, _CMP_GE_OQ), _mm256_cmp_pd(k, high_q, _CMP_LE_OQ));
-      const __m256i voxels = _mm256_and_si256(
-          _mm256_castpd_si256(in_box),
-          _mm256_and_si256(_mm256_sllv_epi64(ones, from), _mm256_srlv_epi64(ones, over)));
-      const __m256i bytes = bytes_of_bricks(voxels);
+      const auto bytes_within = [&](const EdgeBounds& edges) __attribute__((always_inline)) {
+        const __m256i from = count(_mm256_max_pd(edges.below(k), low));
+        const __m256i over = count(_mm256_max_pd(edges.over(k), high));
+        return bytes_of_bricks(_mm256_and_si256(
+            _mm256_castpd_si256(in_box),
+            _mm256_and_si256(_mm256_sllv_epi64(ones, from), _mm256_srlv_epi64(ones, over))));
+      };
+      const __m256i bytes = bytes_within(bounds);
+      const __m256i listed_bytes =
+          listed == FootprintColumns::kTouched ? bytes_within(touching) : bytes;
       const uint32_t empty = static_cast<uint32_t>(
-          _mm256_movemask_epi8(_mm256_cmpeq_epi8(bytes, _mm256_setzero_si256())));
+          _mm256_movemask_epi8(_mm256_cmpeq_epi8(listed_bytes, _mm256_setzero_si256())));
       const uint32_t present = ~(empty & empty >> 16) & 0xffff;
       // The triangle is convex. So all columns of bricks between the first and the last one that
       // has voxel columns inside also have voxel columns inside.

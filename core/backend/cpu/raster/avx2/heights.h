@@ -48,22 +48,25 @@ VOXDAG_INLINE int64_t magnitude(int64_t a) { return a < 0 ? -a : a; }
 template <int D>
 class Heights {
  public:
-  VOXDAG_INLINE explicit Heights(const TileTriangle<int32_t>& triangle) : t(triangle) {
-    const int64_t np = t.normal[P], nq = t.normal[Q];
-    const double inverse = 1.0 / static_cast<double>(t.normal[D]);
+  // The plane touches the voxels k with 0 <= normal.k + lowest <= width. The reference must outlive
+  // this object.
+  VOXDAG_INLINE Heights(const int64_t (&normal)[3], int64_t lowest, int64_t width)
+      : normal_(normal), lowest_(lowest), width_(width) {
+    const int64_t np = normal[P], nq = normal[Q];
+    const double inverse = 1.0 / static_cast<double>(normal[D]);
     const double column_unit = inverse * static_cast<double>(int64_t{1} << kColumnBits);
     step_p_ = static_cast<int64_t>(-4.0 * static_cast<double>(np) * column_unit);
     step_q_ = static_cast<int64_t>(-4.0 * static_cast<double>(nq) * column_unit);
-    const int64_t lowest = t.lowest + 3 * (clamp_to_zero(np) + clamp_to_zero(nq));
-    origin_ = static_cast<int64_t>(-static_cast<double>(lowest) * column_unit -
+    const int64_t at_origin = lowest + 3 * (clamp_to_zero(np) + clamp_to_zero(nq));
+    origin_ = static_cast<int64_t>(-static_cast<double>(at_origin) * column_unit -
                                    kLowered * (int64_t{1} << (kColumnBits - kHeightBits)));
     const double unit = inverse * (1 << kHeightBits);
     const float sp = static_cast<float>(static_cast<double>(magnitude(np)) * unit);
     const float sq = static_cast<float>(static_cast<double>(magnitude(nq)) * unit);
-    const float width = static_cast<float>(static_cast<double>(t.width) * unit);
-    reach_ = static_cast<int64_t>(3.0f * (sp + sq) + width + kTopRaised + 2.0f)
+    const float width_units = static_cast<float>(static_cast<double>(width) * unit);
+    reach_ = static_cast<int64_t>(3.0f * (sp + sq) + width_units + kTopRaised + 2.0f)
              << (kColumnBits - kHeightBits);
-    set_lanes(np > 0, sp, nq > 0, sq, width);
+    set_lanes(np > 0, sp, nq > 0, sq, width_units);
   }
 
   // The heights at which the plane passes a column of bricks.
@@ -75,7 +78,7 @@ class Heights {
   };
   // Returns the column of bricks (p, q), limited to the bricks from `first` to `last`.
   VOXDAG_INLINE Column column(int p, int q, int first, int last) const {
-    const int64_t height = origin_ + step_p_ * p + step_q_ * q;
+    const int64_t height = height_of(p, q);
     const int64_t from = (height + (int64_t{1} << kColumnBits)) >> (kColumnBits + 2);
     const int64_t to = (height + reach_) >> (kColumnBits + 2);
     return {p,
@@ -84,6 +87,14 @@ class Heights {
             to < last ? to : last,
             static_cast<int>(height >> (kColumnBits + 2)),
             static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1)};
+  }
+
+  // Returns the column of bricks of another plane with the same normal, with `within` of this
+  // plane. This plane's height must be at most half a voxel above the other plane's.
+  VOXDAG_INLINE Column in_bricks_of(Column c) const {
+    c.within = static_cast<int>(height_of(c.p, c.q) >> (kColumnBits - kHeightBits)) -
+               c.brick * (4 << kHeightBits);
+    return c;
   }
 
   // Returns the HeightBounds (sides.h) of the 16 voxel columns. Voxel columns whose lane of `outer`
@@ -108,6 +119,10 @@ class Heights {
 
  private:
   static constexpr int P = kP<D>, Q = kQ<D>;
+
+  VOXDAG_INLINE int64_t height_of(int p, int q) const {
+    return origin_ + step_p_ * p + step_q_ * q;
+  }
 
   // Safety margins in units of a lane. With them, `below` and `top` in bounds() never exclude a
   // touched voxel. They allow for three roundings (a column's base is truncated to a whole unit,
@@ -146,15 +161,15 @@ class Heights {
   [[gnu::noinline]] void divide_exactly(int p, int q, int brick, __m256i doubtful, __m256i& below,
                                         __m256i& top) const {
     const __m256i certain = _mm256_cmpeq_epi16(doubtful, _mm256_setzero_si256());
-    const int64_t n = t.normal[D];
+    const int64_t n = normal_[D];
     // The mask has two bits per lane, of which 0x55555555 selects one.
     for (uint32_t rest = ~static_cast<uint32_t>(_mm256_movemask_epi8(certain)) & 0x55555555u;
          rest != 0; rest &= rest - 1) {
       const int column = __builtin_ctz(rest) / 2;
-      const int64_t at_zero = t.lowest + t.normal[P] * (4 * p + column_p(column)) +
-                              t.normal[Q] * (4 * q + column_q(column));
+      const int64_t at_zero = lowest_ + normal_[P] * (4 * p + column_p(column)) +
+                              normal_[Q] * (4 * q + column_q(column));
       const int64_t exact_below = floor_divide(-at_zero - 1, n) - 4 * brick;
-      const int64_t exact_top = floor_divide(t.width - at_zero, n) - 4 * brick;
+      const int64_t exact_top = floor_divide(width_ - at_zero, n) - 4 * brick;
       const __m256i lane = load(kLanes.only[column]);
       const auto put = [lane](__m256i& into, int64_t height) {
         into = _mm256_blendv_epi8(
@@ -170,7 +185,8 @@ class Heights {
     return quotient - (quotient * b > a ? 1 : 0);
   }
 
-  const TileTriangle<int32_t>& t;
+  const int64_t (&normal_)[3];
+  const int64_t lowest_, width_;
   // The height of the column of bricks (p, q) is origin_ + step_p_ p + step_q_ q, with kColumnBits
   // bits for the fraction of a voxel. This is the y of its lowest voxel column, minus kLowered
   // units of a lane. The error is less than 2^-30 voxel after 16 columns of bricks.

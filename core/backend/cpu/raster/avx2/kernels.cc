@@ -102,7 +102,8 @@ void find_in_range(const int64_t* values, int count, int64_t low, int64_t high, 
   }
 }
 
-constexpr Kernels kAvx2 = {"avx2", draw_avx2, test_octants, find_in_range, list_blocks, unpack};
+constexpr Kernels kAvx2 = {"avx2",        draw_avx2,   draw_thin_avx2, test_octants,
+                           find_in_range, list_blocks, unpack};
 
 }  // namespace
 

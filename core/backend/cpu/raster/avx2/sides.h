@@ -67,12 +67,23 @@ class Sides {
   }
 
   VOXDAG_INLINE HeightBounds bounds(int p, int q, int brick) const {
-    const __m256i floors = _mm256_broadcastsi128_si256(
-        _mm_load_si128(reinterpret_cast<const __m128i*>(kBrickFloors.byte[brick + kLowestBrick])));
-    return _mm256_subs_epu8(_mm256_max_epu8(by_q_[q], by_p_[p]), floors);
+    return from_floor(_mm256_max_epu8(by_q_[q], by_p_[p]), brick);
+  }
+  // The bounds from one projection only.
+  VOXDAG_INLINE HeightBounds bounds_of_q(int q, int brick) const {
+    return from_floor(by_q_[q], brick);
+  }
+  VOXDAG_INLINE HeightBounds bounds_of_p(int p, int brick) const {
+    return from_floor(by_p_[p], brick);
   }
 
  private:
+  static VOXDAG_INLINE HeightBounds from_floor(__m256i bounds, int brick) {
+    const __m256i floors = _mm256_broadcastsi128_si256(
+        _mm_load_si128(reinterpret_cast<const __m128i*>(kBrickFloors.byte[brick + kLowestBrick])));
+    return _mm256_subs_epu8(bounds, floors);
+  }
+
   template <int Axis>
   static VOXDAG_INLINE void set_rows(const TileTriangle<int32_t>& t, const Edge (&edges)[3],
                                      bool bound_first, int of_p, __m256i box, __m256i (&rows)[16]) {

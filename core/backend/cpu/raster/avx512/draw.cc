@@ -3,6 +3,7 @@
 #include <immintrin.h>
 
 #include "core/backend/cpu/raster/avx2/draw_by_columns.h"
+#include "core/backend/cpu/raster/avx2/thin_by_columns.h"
 #include "core/backend/cpu/raster/kernels.h"
 
 namespace voxdag::cpu {
@@ -59,6 +60,10 @@ class Spread512 {
 
 void draw_avx512(const TileTriangle<int32_t>& triangle, TileBricks& tile) {
   draw_by_columns<Spread512>(triangle, tile);
+}
+
+void draw_thin_avx512(const ThinTriangle<int32_t>& triangle, TileBricks& tile) {
+  draw_thin_by_columns<Spread512>(triangle, tile);
 }
 
 }  // namespace voxdag::cpu

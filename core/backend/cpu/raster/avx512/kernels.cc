@@ -43,6 +43,7 @@ const Kernels* avx512_kernels() {
     Kernels table = *avx2_kernels();
     table.name = "avx512";
     table.draw = draw_avx512;
+    table.draw_thin = draw_thin_avx512;
     table.list_blocks = list_blocks;
     table.unpack = unpack;
     return table;

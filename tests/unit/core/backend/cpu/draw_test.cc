@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "tests/oracle/solid/rules.h"
 #include "tests/unit/core/backend/cpu/tiles.h"
 
 namespace voxdag::cpu {
@@ -23,14 +24,23 @@ void for_many_triangles(int rounds, Check check) {
     }
 }
 
-// Every kernel sets exactly the voxels that the oracle's separating-axis test sets.
+// Compares every kernel, for both rules, with the oracle.
+void expect_right(const oracle::Triangle& t, bool inside, const oracle::Region& region) {
+  const Padded<int32_t> narrow(t);
+  const oracle::Voxels shell = oracle::voxelize({t}, region);
+  const oracle::Voxels thin = oracle::voxelize_thin({t}, region);
+  for (const Kernels* kernels : all_kernels()) {
+    EXPECT_TRUE(drawn(narrow.triangle, inside, region, kernels->draw) == shell) << kernels->name;
+    EXPECT_TRUE(drawn<ThinTriangle>(narrow.triangle, inside, region, kernels->draw_thin) == thin)
+        << kernels->name;
+  }
+}
+
+// Every kernel sets exactly the voxels that the oracle's separating-axis test sets, and the rule
+// kThin exactly those of the oracle's crossings.
 TEST(Draw, KernelsEqualOracle) {
   for_many_triangles(120, [](const oracle::Triangle& t, const oracle::Region& region) {
-    if (!is_narrow(t)) return;
-    const Padded<int32_t> narrow(t);
-    const oracle::Voxels truth = oracle::voxelize({t}, region);
-    for (const Kernels* kernels : all_kernels())
-      EXPECT_TRUE(drawn(narrow.triangle, false, region, kernels->draw) == truth) << kernels->name;
+    if (is_narrow(t)) expect_right(t, false, region);
   });
 }
 
@@ -42,6 +52,8 @@ TEST(Draw, WideEqualsOracle) {
     const Padded<int64_t> wide(t);
     wide_ones += !is_narrow(t);
     EXPECT_TRUE(drawn(wide.triangle, false, region, draw_wide) == oracle::voxelize({t}, region));
+    EXPECT_TRUE(drawn<ThinTriangle>(wide.triangle, false, region, draw_thin_wide) ==
+                oracle::voxelize_thin({t}, region));
   });
   EXPECT_GT(wide_ones, 50);
 }
@@ -66,10 +78,8 @@ TEST(Draw, AmbiguousHeightsAreExact) {
       t[i][(up + 2) % 3] = (region.low[(up + 2) % 3] * 256 + z) | 1;
     }
     SCOPED_TRACE(testing::Message() << "round " << round);
-    const Padded<int32_t> narrow(t);
-    const oracle::Voxels truth = oracle::voxelize({t}, region);
-    for (const Kernels* kernels : all_kernels())
-      ASSERT_TRUE(drawn(narrow.triangle, false, region, kernels->draw) == truth) << kernels->name;
+    expect_right(t, false, region);
+    if (HasFailure()) return;
   }
 }
 
@@ -91,10 +101,31 @@ TEST(Draw, AmbiguousEdgesAreExact) {
       t[2][a] = (corner + random.between(-length, length)) | 1;
     }
     SCOPED_TRACE(testing::Message() << "round " << round);
-    const Padded<int32_t> narrow(t);
-    const oracle::Voxels truth = oracle::voxelize({t}, region);
-    for (const Kernels* kernels : all_kernels())
-      ASSERT_TRUE(drawn(narrow.triangle, false, region, kernels->draw) == truth) << kernels->name;
+    expect_right(t, false, region);
+    if (HasFailure()) return;
+  }
+}
+
+// The same, for rows of the rule kThin: planes and edges pass through centers of voxels, faces and
+// edges, or just miss them.
+TEST(Draw, AmbiguousCentersAreExact) {
+  oracle::Random random(5);
+  const int64_t middle = int64_t{1} << 19;
+  const oracle::Region region{{middle, middle, middle}, 16};
+  for (int round = 0; round < 3000; ++round) {
+    const int64_t length = int64_t{1} << random.between(4, 20);
+    oracle::Triangle t;
+    for (int a = 0; a < 3; ++a) {
+      const int64_t at = middle * 256 + 128 * random.between(0, 32);
+      const int64_t half = random.between(-length, length) | 1;
+      const int64_t other = random.coin() ? half : random.coin() ? -half : random.odd(-500, 500);
+      t[0][a] = at - half;
+      t[1][a] = at + half + (random.coin() ? 0 : 2 * random.between(-1, 1));
+      t[2][a] = middle * 256 + 128 * random.between(0, 32) + other;
+    }
+    SCOPED_TRACE(testing::Message() << "round " << round);
+    expect_right(t, false, region);
+    if (HasFailure()) return;
   }
 }
 
@@ -118,9 +149,7 @@ TEST(Draw, InsideIsThePlaneOnly) {
         ++covered;
         oracle::Region child{region.low, region.edge / 2};
         for (int a = 0; a < 3; ++a) child.low[a] += (c >> (2 - a) & 1) * child.edge;
-        const oracle::Voxels truth = oracle::voxelize({t}, child);
-        for (const Kernels* kernels : all_kernels())
-          EXPECT_TRUE(drawn(narrow.triangle, true, child, kernels->draw) == truth) << kernels->name;
+        expect_right(t, true, child);
       }
     }
   }

@@ -12,8 +12,11 @@ namespace {
 
 // The tables of a build, with the reducer and the plane memo.
 struct Workshop {
-  explicit Workshop(const Kernels& kernels)
-      : tables(memory, 10), reducer(tables, kernels), planes(memory, tables, reducer, kernels) {}
+  Workshop(const Kernels& kernels, VoxelRule its_rule)
+      : tables(memory, 10),
+        reducer(tables, kernels),
+        planes(memory, tables, reducer, kernels, its_rule),
+        rule(its_rule) {}
 
   MemoryBudget budget{uint64_t{256} << 20};
   PagePool pool;
@@ -21,6 +24,7 @@ struct Workshop {
   SubDagTables tables;
   TileReducer reducer;
   PlaneMemo planes;
+  VoxelRule rule;
 };
 
 // Returns the node of a cube that the triangle covers, made by drawing tile by tile.
@@ -32,8 +36,13 @@ NodeRef drawn_node(Workshop& shop, const NarrowTriangle& t, const LatticeCube& b
       children[c] = drawn_node(shop, t, box.child(c), size_log2 - 1, tile);
     return shop.tables.add_node(size_log2, children);
   }
-  TileTriangle<int32_t> in_tile;
-  if (in_tile.set_up(t, true, box)) portable_kernels().draw(in_tile, tile);
+  if (shop.rule == VoxelRule::kThin) {
+    ThinTriangle<int32_t> in_tile;
+    if (in_tile.set_up(t, true, box)) portable_kernels().draw_thin(in_tile, tile);
+  } else {
+    TileTriangle<int32_t> in_tile;
+    if (in_tile.set_up(t, true, box)) portable_kernels().draw(in_tile, tile);
+  }
   return shop.reducer.reduce_bricks(tile, size_log2);
 }
 
@@ -85,7 +94,7 @@ int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, con
 
 // Nodes, hashes and counts from the memo equal the results of drawing the same planes: walls,
 // planes with small normals, and others.
-TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
+void expect_memo_equals_drawing(VoxelRule rule) {
   oracle::Random random(6);
   const auto tile = std::make_unique<TileBricks>();
   int compared = 0;
@@ -101,8 +110,8 @@ TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
     SCOPED_TRACE(testing::Message() << "round " << round << ", normal " << n[0] << ' ' << n[1]
                                     << ' ' << n[2] << ", edge " << region.edge);
     const std::vector<const Kernels*> kernels = all_kernels();
-    Workshop by_memo(*kernels[static_cast<size_t>(round) % kernels.size()]);
-    Workshop by_drawing(portable_kernels());
+    Workshop by_memo(*kernels[static_cast<size_t>(round) % kernels.size()], rule);
+    Workshop by_drawing(portable_kernels(), rule);
     TriangleSet set(by_memo.memory);
     set.add(axis_major(oracle::fixed(t)));
     // A triangle's plane is added once the triangle has covered enough tiles. A plane through
@@ -112,17 +121,20 @@ TEST(Planes, NodesFromTheMemoEqualDrawnOnes) {
     for (int i = 0; i < 40 && !found; ++i)
       found = by_memo.planes.build(set, {0}, box_of(region), size_log2, node);
     if (found) compared += compare(by_memo, by_drawing, set, box_of(region), size_log2, *tile);
-    if (HasFailure()) return;
+    if (testing::Test::HasFailure()) return;
   }
   EXPECT_GT(compared, 500);
 }
+
+TEST(Planes, NodesFromTheMemoEqualDrawnOnes) { expect_memo_equals_drawing(VoxelRule::kShell); }
+TEST(Planes, ThinNodesFromTheMemoEqualDrawnOnes) { expect_memo_equals_drawing(VoxelRule::kThin); }
 
 // The memo does not use a plane for large cubes in which values of the plane exceed 62 bits.
 TEST(Planes, HugeNormalsAreNotUsedForLargeCubes) {
   const oracle::Triangle t{
       {{1, 1, 100000001}, {(1 << 28) - 1, 3, 7}, {5, (1 << 28) - 3, 100000007}}};
   const Padded<int32_t> narrow(t);
-  const Plane plane = plane_of(narrow.triangle);
+  const Plane plane = plane_of(narrow.triangle, VoxelRule::kShell);
   EXPECT_TRUE(plane.fits(kTileLog2 - 1));
   EXPECT_FALSE(plane.fits(12));
 }

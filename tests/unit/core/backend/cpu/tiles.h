@@ -64,12 +64,13 @@ inline oracle::Voxels voxels_of(TileBricks& tile, int edge) {
   return voxels;
 }
 
-// Draws a triangle into an empty tile, and returns the tile's voxels.
-template <class Coordinate, class Draw>
+// Draws a triangle into an empty tile, and returns the tile's voxels. `Prepared` is the triangle's
+// form for the rule of `draw`.
+template <template <class> class Prepared = TileTriangle, class Coordinate, class Draw>
 oracle::Voxels drawn(const Triangle<Coordinate>& triangle, bool inside,
                      const oracle::Region& region, Draw draw) {
   const auto tile = std::make_unique<TileBricks>();
-  TileTriangle<Coordinate> in_tile;
+  Prepared<Coordinate> in_tile;
   if (in_tile.set_up(triangle, inside, box_of(region))) draw(in_tile, *tile);
   return voxels_of(*tile, region.edge);
 }
