@@ -28,6 +28,7 @@ struct VerifyCommand {
   SceneOptions scene_options;
   std::string cutouts;
   std::string solid;
+  bool thin = false;
   uint64_t seed = 1;
   std::string memory;
   unsigned threads = default_threads();
@@ -67,7 +68,8 @@ Sample check_against(const VerifyCommand& command, const voxdag_reader::File& fi
   const std::optional<Cutouts> found = cutouts_of(command, file, *scene, budget, context);
   const Cutouts* const cutouts = found ? &*found : nullptr;
   const auto boxes =
-      query::sample_surface(*scene, grid, command.seed, progress, context.cancel, cutouts);
+      query::sample_surface(*scene, grid, command.seed, progress, context.cancel, cutouts,
+                            command.thin ? VoxelRule::kThin : VoxelRule::kShell);
   Sample sample;
   with_reader_errors([&] {
     const SolidRule rule = command.solid.empty()        ? SolidRule::kNone
@@ -159,6 +161,7 @@ void declare(Command& command, VerifyCommand& state) {
       .one_of({"skip", "keep"});
   command.option("--solid", state.solid, "winding or parity, as in the build")
       .one_of({"winding", "parity"});
+  command.flag("--thin", state.thin, "the build set thin voxels (--thin)");
   command.option("--point-radius", state.scene_options.point_radius,
                  "half edge of the cube that replaces each point, as in the build");
   command.option("--columns", state.scene_options.columns,

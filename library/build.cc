@@ -20,6 +20,7 @@ BuildSpec spec_of(const BuildOptions& options) {
   geometry.bounds = options.bounds;
   geometry.voxel_size = options.voxel_size;
   geometry.skip_invalid = options.skip_invalid;
+  geometry.thin = options.thin;
   geometry.cutouts = options.cutouts;
   geometry.point_radius = options.point_radius;
   geometry.columns = options.columns;

@@ -44,7 +44,7 @@ BuildSpec checked(const BuildSpec& spec) {
                 "no scene was given: expected at least one " + list_scene_endings() + " file");
   check_options(spec);
   choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that cannot be a grid
-  check_backend(r);
+  check_backend(r, g.rule());
   if (solid_rule_of(g) != SolidRule::kNone) check_solid(r);
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = default_threads();

@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/color/cutouts/visible_part.h"
 #include "core/color/snap_surface.h"
+#include "core/geometry/crossing.h"
 #include "core/geometry/overlap.h"
 
 namespace voxdag::query {
@@ -155,6 +156,37 @@ SampleBox box_around(const std::array<int64_t, 3>& voxel, const Grid& grid, Rand
   return box;
 }
 
+size_t bit_of(const SampleBox& box, int64_t x, int64_t y, int64_t z) {
+  return static_cast<size_t>(((x - box.low[0]) * kBoxEdge + (y - box.low[1])) * kBoxEdge +
+                             (z - box.low[2]));
+}
+
+// Sets the voxels of the box in which the triangle crosses a row along `axis` through their
+// centers. `test` is a RowTest (crossing.h).
+template <class Test>
+void mark_rows(const Test& test, int axis, SampleBox& box) {
+  const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+  const auto center = [](int64_t voxel) { return voxel * kUnitsPerVoxel + kUnitsPerVoxel / 2; };
+  int64_t at[3];
+  for (at[b] = box.low[b]; at[b] < box.low[b] + box.edge; ++at[b])
+    for (at[c] = box.low[c]; at[c] < box.low[c] + box.edge; ++at[c]) {
+      if (!test.crosses(center(at[b]), center(at[c]))) continue;
+      at[axis] = test.first_beyond(center(at[b]), center(at[c]), kUnitBits) - 1;
+      if (at[axis] >= box.low[axis] && at[axis] < box.low[axis] + box.edge)
+        box.set.set(bit_of(box, at[0], at[1], at[2]));
+    }
+}
+
+// Sets the voxels of the box that the rule kThin sets for the triangle.
+void mark_thin(const FixedTriangle& t, SampleBox& box) {
+  for (int a = 0; a < 3; ++a)
+    if (t.high(a) < box.low[a] * kUnitsPerVoxel ||
+        t.low(a) > (box.low[a] + box.edge) * kUnitsPerVoxel)
+      return;
+  for (int axis = 0; axis < 3; ++axis)
+    with_row_test(t, axis, [&](const auto& test) { mark_rows(test, axis, box); });
+}
+
 // Sets the voxels of the box that the triangle touches, and in which it is visible. `part` is null
 // if the triangle is not cut out.
 void mark(const FixedTriangle& t, const VisiblePart* part, SampleBox& box) {
@@ -170,8 +202,7 @@ void mark(const FixedTriangle& t, const VisiblePart* part, SampleBox& box) {
     for (int64_t y = first[1]; y <= last[1]; ++y)
       for (int64_t z = first[2]; z <= last[2]; ++z) {
         const int64_t low[3] = {x * kUnitsPerVoxel, y * kUnitsPerVoxel, z * kUnitsPerVoxel};
-        const size_t bit = static_cast<size_t>(
-            ((x - box.low[0]) * kBoxEdge + (y - box.low[1])) * kBoxEdge + (z - box.low[2]));
+        const size_t bit = bit_of(box, x, y, z);
         if (!box.set[bit] && triangle_touches_cube(t, low, kUnitsPerVoxel) &&
             (!part || part->is_visible({x, y, z})))
           box.set.set(bit);
@@ -182,7 +213,7 @@ void mark(const FixedTriangle& t, const VisiblePart* part, SampleBox& box) {
 
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
                                       Progress& progress, const CancelToken& cancel,
-                                      const Cutouts* cutouts) {
+                                      const Cutouts* cutouts, VoxelRule rule) {
   const SnappedScene snapped(scene, grid, progress, cancel);
   progress.begin_stage("sample", 2 * scene.declared_triangles(), "triangles");
   Random random(seed);
@@ -207,7 +238,8 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
     std::optional<VisiblePart> part;
     if (surface) part.emplace(*surface, *cutouts, grid.levels);
     for (; box != boxes.end() && box->low[0] <= last; ++box)
-      mark(triangle, part ? &*part : nullptr, *box);
+      rule == VoxelRule::kThin ? mark_thin(triangle, *box)
+                               : mark(triangle, part ? &*part : nullptr, *box);
   };
   if (cutouts)
     snapped.for_each_surface([&](const FixedSurface& surface) {
@@ -237,8 +269,8 @@ SampleReport compare_with_sample(const voxdag_reader::File& file,
           if (wrong++ == 0)
             first_wrong = std::to_string(box.low[0] + x) + " " + std::to_string(box.low[1] + y) +
                           " " + std::to_string(box.low[2] + z) +
-                          (expected ? " is not set, but a triangle touches it"
-                                    : " is set, but no triangle touches it");
+                          (expected ? " is not set, but a triangle sets it"
+                                    : " is set, but no triangle sets it");
         }
   if (wrong > 0)
     throw Error(ErrorCode::kCorrupt, file.path() + ": " + std::to_string(wrong) + " of " +

@@ -14,6 +14,7 @@
 #include "core/color/cutouts/cutouts.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/geometry/grid.h"
+#include "core/geometry/voxel_rule.h"
 #include "scene/triangle_source.h"
 #include "voxdag/cancel_token.h"
 
@@ -29,10 +30,12 @@ struct SampleBox {
 };
 
 // Computes a sample. Returns at most kSampleBoxes boxes, and none if no triangle touches the grid.
-// `cutouts`: the cutouts that the file leaves out, or null.
+// `cutouts`: the cutouts that the file leaves out, or null. `rule`: the rule of the build; cutouts
+// need kShell.
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
                                       Progress& progress, const CancelToken& cancel,
-                                      const Cutouts* cutouts = nullptr);
+                                      const Cutouts* cutouts = nullptr,
+                                      VoxelRule rule = VoxelRule::kShell);
 
 struct SampleReport {
   uint64_t boxes = 0;

@@ -22,6 +22,7 @@ void BatchTable::resume(const std::string& scene_digest, const DagShape& shape) 
   const auto earlier = read_cluster_state(cluster_.files(), cluster_.job.work.path());
   const bool has_cluster = cluster_.job.spec.run.cluster.has_value();
   if (earlier && earlier->scene_digest == scene_digest && earlier->shape == shape &&
+      earlier->rule == cluster_.job.spec.geometry.rule() &&
       (earlier->program == cluster_.options.program_version || !has_cluster)) {
     state_ = *earlier;
   } else {
@@ -51,6 +52,7 @@ void BatchTable::start_new(const std::string& scene_digest, const DagShape& shap
   state_.program = cluster_.options.program_version;
   state_.scene_digest = scene_digest;
   state_.shape = shape;
+  state_.rule = cluster_.job.spec.geometry.rule();
 }
 
 bool BatchTable::is_valid(const OpenBatch& batch) const {
@@ -89,6 +91,7 @@ void BatchTable::add(std::span<const StoredSubvolume> subvolumes, std::span<cons
   batch.program = state_.program;
   batch.build = state_.build;
   batch.shape = state_.shape;
+  batch.rule = state_.rule;
   batch.wide = triangles.record_bytes() == triangle_record_bytes(true);
   batch.backend = run.backend;
   batch.method = run.method;

@@ -159,7 +159,7 @@ class Task {
                                                 : default_memory();
     options.backend = batch.backend;
     options.method = batch.method;
-    check_backend(options);
+    check_backend(options, batch.rule);
     MemoryBudget budget(options.memory_bytes);
     TemporaryFolder temporary(
         files, run_.temporary_folder.empty() ? temporary_parent() : run_.temporary_folder);
@@ -200,9 +200,10 @@ class Task {
     std::vector<QueuedSubvolume> queue;
     for (size_t i = 0; i < plan.size(); ++i) queue.push_back({plan[i], bins[i]});
 
-    const BackendChoice backend = choose_backend(run_options, context_.progress);
+    const BackendChoice backend = choose_backend(run_options, batch.rule, context_.progress);
     ExecutorOptions options;
     options.shape = batch.shape;
+    options.rule = batch.rule;
     options.threads = std::min(run_options.threads, backend.max_workers);
     options.longest_edge = batch.longest_edge;
     options.open_backend = backend.open;

@@ -54,6 +54,8 @@ void fields(Visitor& visit, GeometryOptions& g) {
             .or_unset(),
         g.solid);
   visit(option("skip_invalid", "drop and count invalid triangles").key(true), g.skip_invalid);
+  visit(option("thin", "set fewer voxels: the thinnest surface without holes between faces"),
+        g.thin);
   visit(option("cutouts", "leave out voxels whose surfaces are cut out by alpha, or keep them")
             .unset_means("skip with colors, otherwise keep")
             .or_unset()

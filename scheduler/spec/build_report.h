@@ -8,6 +8,7 @@
 
 #include "core/base/warning.h"
 #include "core/geometry/grid.h"
+#include "core/geometry/voxel_rule.h"
 #include "merge/merge.h"
 #include "scheduler/spec/stage_clock.h"
 #include "scheduler/spec/stage_totals.h"
@@ -30,6 +31,7 @@ struct BuildReport {
   std::string sha256;
   Grid grid;
   uint32_t hash_bits = 64;
+  VoxelRule rule = VoxelRule::kShell;
   uint64_t bytes = 0;
   MergeReport merge;
   uint64_t triangles = 0;  // triangles that may touch the grid

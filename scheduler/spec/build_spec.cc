@@ -73,6 +73,12 @@ void check_options(const BuildSpec& spec) {
     json_fields::refuse("solid", "no color and no attributes at the same time");
   if (g.solid != SolidName::kNone && g.cutouts == CutoutRule::kSkip)
     json_fields::refuse("solid", "no cutouts that are skipped, because they are holes");
+  if (g.solid != SolidName::kNone && g.thin)
+    json_fields::refuse("thin", "no solid at the same time");
+  if (g.thin && g.attributes.any())
+    json_fields::refuse("thin", "no color and no attributes at the same time");
+  if (g.thin && g.cutouts == CutoutRule::kSkip)
+    json_fields::refuse("thin", "no cutouts at the same time");
   if (g.color_resolution && !g.attributes.any())
     json_fields::refuse("color_resolution", "color or attributes as well");
   if (g.color_resolution > g.resolution)

@@ -13,6 +13,7 @@
 #include "core/color/attribute_set.h"
 #include "core/geometry/grid.h"
 #include "core/geometry/solid_rule.h"
+#include "core/geometry/voxel_rule.h"
 #include "core/io/file_system.h"
 #include "voxdag/build.h"
 #include "voxdag/cancel_token.h"
@@ -40,6 +41,7 @@ struct GeometryOptions {
   std::optional<std::array<double, 4>> bounds;  // X, Y, Z of the low corner, EDGE
   std::optional<double> voxel_size;
   bool skip_invalid = false;
+  bool thin = false;  // the rule kThin
   CutoutRule cutouts = CutoutRule::kDefault;
   std::optional<double> point_radius;         // half edge of the cube that replaces each point
   std::string columns;                        // names of the columns of text files with points
@@ -50,6 +52,8 @@ struct GeometryOptions {
   // Cells per edge of the color grid, a power of two from 4 to the resolution; 0: the build chooses
   // it.
   uint64_t color_resolution = 0;
+
+  VoxelRule rule() const { return thin ? VoxelRule::kThin : VoxelRule::kShell; }
 };
 
 inline SolidRule solid_rule_of(const GeometryOptions& options) {

@@ -92,6 +92,7 @@ void fields(Visitor& visit, BuildReport& report) {
   visit("sha256", report.sha256);
   visit_grid(visit, report.grid);
   visit("hash_bits", report.hash_bits);
+  visit("rule", report.rule);
   visit("voxels", report.merge.voxels);
   visit("svo_nodes", report.merge.svo_nodes);
   visit("dag_nodes", report.merge.dag_nodes);

@@ -80,6 +80,8 @@ std::optional<std::string> ArtifactCache::key(const SubvolumeTask& task, Triangl
   Sha256 digest;
   const uint64_t head[] = {kContentVersion, task.grid_levels - task.cube.level, task.hash_bits};
   digest.add(std::as_bytes(std::span(head)));
+  if (task.rule != VoxelRule::kShell)
+    digest.add(std::as_bytes(std::span(std::string_view(traits_of(task.rule).name))));
   digest.add(std::as_bytes(std::span(content)));
   triangles.rewind();
   return digest.finish();

@@ -3,10 +3,10 @@
 //
 // The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube
 // (corners sorted within each triangle, triangles sorted, duplicates removed), the cube's edge, the
-// hash bits, and a version that increases whenever artifacts change. The cache is a folder with one
-// file per entry. When the limit is exceeded, the least recently used entries are removed. Several
-// builds may share the cache: entries appear atomically, by renaming, and a removed or damaged
-// entry is a miss. Thread-safe.
+// hash bits, the rule, and a version that increases whenever artifacts change. The cache is a
+// folder with one file per entry. When the limit is exceeded, the least recently used entries are
+// removed. Several builds may share the cache: entries appear atomically, by renaming, and a
+// removed or damaged entry is a miss. Thread-safe.
 #pragma once
 
 #include <atomic>

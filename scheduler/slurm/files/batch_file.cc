@@ -26,6 +26,7 @@ void fields(Visitor& visit, Batch& batch) {
   visit("build", batch.build);
   visit("grid_levels", batch.shape.grid_levels);
   visit("hash_bits", batch.shape.hash_bits);
+  visit("rule", batch.rule);
   visit("wide", batch.wide);
   visit("backend", batch.backend);
   visit("method", batch.method);

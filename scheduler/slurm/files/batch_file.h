@@ -17,6 +17,7 @@
 #include "core/base/memory_budget.h"
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
+#include "core/geometry/voxel_rule.h"
 #include "core/io/file_system.h"
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/state/job_store.h"
@@ -39,6 +40,7 @@ struct Batch {
   std::string program;  // voxdag version that wrote the file; no other version may build it
   std::string build;    // random id of the build
   DagShape shape;
+  VoxelRule rule = VoxelRule::kShell;
   bool wide = false;  // records have 64 bits per coordinate
   BackendName backend = BackendName::kAuto;
   MethodName method = MethodName::kDefault;

@@ -50,6 +50,7 @@ void fields(Visitor& visit, ClusterState& state) {
   visit("scene_digest", state.scene_digest);
   visit("grid_levels", state.shape.grid_levels);
   visit("hash_bits", state.shape.hash_bits);
+  visit(Field("rule").omit_empty(), state.rule);  // missing in states of earlier versions
   visit("submitted_s", state.submitted_s);
   visit("next_batch", state.next_batch);
   visit("split", state.totals.split);

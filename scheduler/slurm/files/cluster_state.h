@@ -12,6 +12,7 @@
 
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
+#include "core/geometry/voxel_rule.h"
 #include "core/io/file_system.h"
 #include "scheduler/slurm/commands/slurm.h"
 #include "scheduler/spec/stage_totals.h"
@@ -56,6 +57,7 @@ struct ClusterState {
   std::string build;    // random; part of the tasks' names
   std::string scene_digest;
   DagShape shape;
+  VoxelRule rule = VoxelRule::kShell;
   double submitted_s = 0;  // Unix time of the first submission
   uint32_t next_batch = 0;
   std::vector<OpenBatch> open;  // sorted by number

@@ -52,10 +52,13 @@ std::string fault_of(const Gpus& gpus, int device) {
 
 }  // namespace
 
-void check_backend(const RunOptions& options) {
+void check_backend(const RunOptions& options, VoxelRule rule) {
   const std::string backend = name_of(options.backend), method = name_of(options.method);
   const bool parallel =
       options.backend == BackendName::kParallelHost || options.backend == BackendName::kCuda;
+  if (parallel && !traits_of(rule).is_parallel)
+    refuse_backend("backend " + backend + ": it does not have the rule '" + traits_of(rule).name +
+                   "'; expected --backend cpu or auto");
   const bool is_given = options.method != MethodName::kDefault;
   if (is_given && parallel == (options.method == MethodName::kConsing))
     refuse_backend("method '" + method + "': backend " + backend +
@@ -65,14 +68,15 @@ void check_backend(const RunOptions& options) {
     throw Error(ErrorCode::kDevice, "backend cuda: " + cuda_device_problem());
 }
 
-BackendChoice choose_backend(const RunOptions& options, Progress& progress) {
+BackendChoice choose_backend(const RunOptions& options, VoxelRule rule, Progress& progress) {
   const Method method = method_of(options);
   if (options.backend == BackendName::kParallelHost)
     return {"parallel-host", [method] { return make_parallel_host_backend(method); }};
   if (options.backend == BackendName::kCuda) return gpu_choice(cuda_gpus(method));
   // If a method is given, `auto` means the CPU backend, because check_backend() accepts only the
   // CPU's methods with `auto`.
-  if (options.backend == BackendName::kCpu || options.method != MethodName::kDefault)
+  if (options.backend == BackendName::kCpu || options.method != MethodName::kDefault ||
+      !traits_of(rule).is_parallel)
     return cpu_choice();
   return choose_automatically(cuda_gpus(method), options.memory_bytes, progress);
 }

@@ -18,15 +18,15 @@ struct BackendChoice {
   unsigned max_workers = 256;  // more workers do not make the build faster
 };
 
-// Throws Error{kInvalidInput} for a method that the backend does not have, or Error{kDevice} for
-// `cuda` on a machine without a usable GPU.
-void check_backend(const RunOptions& options);
+// Throws Error{kInvalidInput} for a method or a rule that the backend does not have, or
+// Error{kDevice} for `cuda` on a machine without a usable GPU.
+void check_backend(const RunOptions& options, VoxelRule rule);
 
 // Returns the backend for options that passed check_backend() and whose memory_bytes is set. `auto`
 // uses the GPUs if the budget is large enough for them, and if each GPU builds a few test
 // subvolumes exactly like the CPU backend. Otherwise it uses the CPU, with a warning if the machine
-// has a GPU.
-BackendChoice choose_backend(const RunOptions& options, Progress& progress);
+// has a GPU that the rule could use.
+BackendChoice choose_backend(const RunOptions& options, VoxelRule rule, Progress& progress);
 
 // The machine's GPUs. Tests pass simulated GPUs.
 struct Gpus {

@@ -107,7 +107,8 @@ class Worker {
     const int64_t edge = subvolume.cube.edge_voxels(options_.shape.grid_levels);
     if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(queued);
     progress_.subvolume_begun(subvolume.id);
-    const SubvolumeTask task{options_.shape.grid_levels, subvolume.cube, options_.shape.hash_bits};
+    SubvolumeTask task{options_.shape.grid_levels, subvolume.cube, options_.shape.hash_bits};
+    task.rule = options_.rule;
     const auto triangles = triangles_.open(queued.bin);
     std::optional<std::string> key;
     if (options_.cache) {

@@ -28,6 +28,7 @@ struct QueuedSubvolume {
 
 struct ExecutorOptions {
   DagShape shape;
+  VoxelRule rule = VoxelRule::kShell;
   unsigned threads = 1;
   uint64_t built = 0;  // subvolumes built by earlier runs, for the progress
   // Subvolumes with longer edges are split without an attempt to build them.

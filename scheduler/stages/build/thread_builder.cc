@@ -16,6 +16,7 @@ ExecutorOptions executor_options(BuildJob& job, const BackendChoice& backend) {
   const RunOptions& run = job.spec.run;
   ExecutorOptions options;
   options.shape = job.shape();
+  options.rule = job.spec.geometry.rule();
   options.threads = std::min(run.threads, backend.max_workers);
   options.open_backend = backend.open;
   if (run.subvolume_edge) options.longest_edge = static_cast<int64_t>(run.subvolume_edge);
@@ -61,7 +62,7 @@ void ThreadBuilder::build(PreparedScene& scene, std::span<const StoredSubvolume>
   Progress& progress = job_.context.progress;
   RunOptions run = job_.spec.run;
   if (job_.rows) run.backend = BackendName::kCpu;  // the only backend that fills solids
-  const BackendChoice backend = choose_backend(run, progress);
+  const BackendChoice backend = choose_backend(run, job_.spec.geometry.rule(), progress);
   job_.report.backend = backend.name;
   const ExecutorOptions options = executor_options(job_, backend);
   progress.begin_stage("build", options.built + queue.size(), "subvolumes");

@@ -82,7 +82,7 @@ void merge_artifacts(BuildJob& job, GlobalFileWriter& out) {
     job.context.progress.warn_of_input(
         {"no-voxels", job.spec.geometry.scenes.front(),
          "none of the " + std::to_string(report.triangles) +
-             " triangles near the grid touches it: the file will have no nodes"});
+             " triangles near the grid sets a voxel: the file will have no nodes"});
   job.clock.finish("merge");
 }
 

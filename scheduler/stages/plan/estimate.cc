@@ -72,13 +72,13 @@ class CountingSink : public SubDagSink {
 // Builds a pilot of 2^levels voxels per edge. `triangles` are snapped to a grid that is finer by
 // `shift` levels (0: to the pilot's grid). Returns nullopt if the build does not fit the budget.
 std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t shift,
-                                       uint32_t levels, Backend& backend, MemoryBudget& budget,
-                                       const CancelToken& cancel) {
+                                       uint32_t levels, VoxelRule rule, Backend& backend,
+                                       MemoryBudget& budget, const CancelToken& cancel) {
   const double start = thread_cpu_seconds();
   const auto stream = triangles.open(shift);
   CountingSink sink;
   SubDagSummary summary;
-  if (backend.build({levels, Cube{}, 64}, *stream, budget, cancel, sink, summary) ==
+  if (backend.build({levels, Cube{}, 64, nullptr, rule}, *stream, budget, cancel, sink, summary) ==
       BuildOutcome::kNeedsSplit)
     return std::nullopt;
   PilotCounts counts;
@@ -95,7 +95,7 @@ std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t
 // Returns the coarser pilot first. Returns fewer than two pilots if too many resolutions do not
 // fit.
 std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
-                                      const StageContext& context) {
+                                      VoxelRule rule, const StageContext& context) {
   const auto backend = make_cpu_backend();
   MemoryBudget share(MemoryPlan::pilot_bytes(context.budget.available()), &context.budget);
   MemoryBudget triangle_share(share.limit() / 2, &share);
@@ -111,8 +111,8 @@ std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot
       triangle_levels = levels;
     }
     if (!triangles->is_complete()) continue;
-    const auto pilot = build_pilot(*triangles, triangle_levels - levels, levels, *backend, share,
-                                   context.build.cancel);
+    const auto pilot = build_pilot(*triangles, triangle_levels - levels, levels, rule, *backend,
+                                   share, context.build.cancel);
     if (pilot) pilots.insert(pilots.begin(), *pilot);
   }
   return pilots;
@@ -232,7 +232,8 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   estimate.subvolumes = scene.plan.size();
   for (const SubvolumePlan& subvolume : scene.plan) estimate.expected_bricks += subvolume.weight;
   estimate.free_memory = budget.limit();
-  const auto pilots = build_pilots(scene, pilot_levels_of(scene.state.grid.levels), context);
+  const auto pilots =
+      build_pilots(scene, pilot_levels_of(scene.state.grid.levels), options.rule(), context);
   if (pilots.empty()) {
     // There are too many triangles even for a small grid. Their expected voxels are an upper bound.
     estimate.voxels = {0, scene.state.counts.expected_voxels, scene.state.counts.expected_voxels};

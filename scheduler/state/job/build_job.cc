@@ -44,6 +44,7 @@ BuildJob::BuildJob(const BuildSpec& spec_of_build, BuildScene& scene_of_build,
     cache.emplace(context.files, spec.run.cache_folder, spec.run.cache_bytes);
   report.output = spec.run.output;
   report.hash_bits = spec.geometry.hash_bits;
+  report.rule = spec.geometry.rule();
   report.threads = spec.run.threads;
   report.memory_bytes = spec.run.memory_bytes;
 }

@@ -27,6 +27,7 @@ class Fields {
         (name) => this.number({step: "any", "aria-label": `Bounds: ${name}`, placeholder: name}));
     this.flags = {
       skip_invalid: this.checkBox("skip-invalid"),
+      thin: this.checkBox("thin"),
       color: this.checkBox("color"),
       strict: this.checkBox("strict"),
       allow_empty: this.checkBox("allow-empty"),
@@ -102,7 +103,7 @@ export class JobOptions {
             "Required extensions of glTF files to read without."),
         field("Cutouts", options.cutouts, "Parts of surfaces that alpha makes invisible."),
         field("Interior", options.solid, "Also sets the voxels inside the surface."),
-        checkRow(flags.skip_invalid, "Skip invalid triangles"),
+        checkRow(flags.skip_invalid, "Skip invalid triangles"), checkRow(flags.thin, "Thin voxels"),
         checkRow(flags.color, "Colors of the scene"),
         attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,
         field("Hash bits", options.hash_bits));

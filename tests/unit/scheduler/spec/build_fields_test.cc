@@ -34,6 +34,17 @@ struct OneOption {
   void object(const char*, const auto&) {}
 };
 
+// Builds without the option have the same identity as before the option existed.
+TEST(BuildFields, ThinIsInTheKeyOnlyIfGiven) {
+  GeometryOptions options;
+  options.resolution = 64;
+  EXPECT_EQ(geometry_json(options).find("thin"), std::string::npos);
+  EXPECT_EQ(options.rule(), VoxelRule::kShell);
+  options.thin = true;
+  EXPECT_NE(geometry_json(options).find(R"("thin":true)"), std::string::npos);
+  EXPECT_EQ(options.rule(), VoxelRule::kThin);
+}
+
 TEST(BuildFields, ZeroAndEmptyMeanTheDefault) {
   BuildSpec spec;
   spec.geometry.resolution = 64;

@@ -101,7 +101,7 @@ TEST(ChooseBackend, RefusesWhatDoesNotGoTogether) {
     if (!parse_text("backend", backend, options.backend)) return true;
     if (!method.empty() && !parse_text("method", method, options.method)) return true;
     try {
-      check_backend(options);
+      check_backend(options, VoxelRule::kShell);
       return false;
     } catch (const Error& error) {
       return error.code() == ErrorCode::kInvalidInput;
