@@ -10,7 +10,7 @@ namespace {
 constexpr size_t kMaxWarnings = 100;
 constexpr size_t kMaxStages = 64;
 // Limits for texts of the job's process, so that a job has a bounded size in memory and in answers.
-constexpr size_t kMaxNameBytes = 64;
+constexpr size_t kMaxLabelBytes = 64;
 constexpr size_t kMaxPlaceBytes = 1024;
 constexpr size_t kMaxTextBytes = 4096;
 constexpr size_t kMaxWarningBytes = 32 << 10;  // all warnings of a job
@@ -24,7 +24,7 @@ std::string bounded(const std::string& text, size_t max_bytes) {
 }
 
 Warning bounded(const Warning& warning) {
-  return {bounded(warning.code, kMaxNameBytes), bounded(warning.place, kMaxPlaceBytes),
+  return {bounded(warning.code, kMaxLabelBytes), bounded(warning.place, kMaxPlaceBytes),
           bounded(warning.message, kMaxTextBytes), warning.count};
 }
 
@@ -40,7 +40,7 @@ std::map<std::string, uint64_t> bounded(const std::map<std::string, uint64_t>& n
   std::map<std::string, uint64_t> kept;
   for (const auto& [name, count] : nodes) {
     if (kept.size() == kMaxNodes) break;
-    kept[bounded(name, kMaxNameBytes)] += count;
+    kept[bounded(name, kMaxLabelBytes)] += count;
   }
   return kept;
 }
@@ -79,8 +79,8 @@ void LiveJob::apply(const Message& message) {
   const double now = wall_seconds();
   if (const auto* begun = std::get_if<StageBegun>(&message)) {
     if (stages_.size() == kMaxStages) stages_.erase(stages_.begin());
-    stages_.push_back({.name = bounded(begun->stage, kMaxNameBytes),
-                       .unit = bounded(begun->unit, kMaxNameBytes),
+    stages_.push_back({.name = bounded(begun->stage, kMaxLabelBytes),
+                       .unit = bounded(begun->unit, kMaxLabelBytes),
                        .total = begun->total,
                        .start_s = now});
   }
@@ -104,7 +104,7 @@ void LiveJob::apply(const Message& message) {
       reported && warnings_.size() < kMaxWarnings && bytes_of(warnings_) < kMaxWarningBytes)
     warnings_.push_back(bounded(reported->warning));
   if (const auto* failure = std::get_if<Failure>(&message))
-    failure_ = {bounded(failure->code, kMaxNameBytes), bounded(failure->text, kMaxTextBytes)};
+    failure_ = {bounded(failure->code, kMaxLabelBytes), bounded(failure->text, kMaxTextBytes)};
   if (const auto* result = std::get_if<Result>(&message);
       result && result->json.size() <= kMaxResultBytes)
     result_ = result->json;

@@ -15,7 +15,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr const char* kDagType = "application/octet-stream";
-constexpr uint64_t kMaxReportBytes = uint64_t{1} << 20;
+constexpr uint64_t kMaxSentReportBytes = uint64_t{1} << 20;
 const Parameter kMaxLogBytes = {"max_bytes", "maximum size of the answer", "",
                                 IntegerRange{1, 1 << 20, 65536}};
 
@@ -139,8 +139,8 @@ Response stream_file(Context& context, const std::string& path, Response respons
 Response get_report(Context& context, Call& call) {
   auto permit = context.answers.wait();
   const Job job = finished_job(context, call);
-  auto report = nlohmann::ordered_json::parse(
-      read_own_file(context.files, context.dispatcher.folder(job.id).report(), kMaxReportBytes));
+  auto report = nlohmann::ordered_json::parse(read_own_file(
+      context.files, context.dispatcher.folder(job.id).report(), kMaxSentReportBytes));
   report["output"] = file_name(job);
   make_printable(report);
   Response response = json_response(200, json_text(report));

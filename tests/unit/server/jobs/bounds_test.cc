@@ -11,10 +11,8 @@
 namespace voxdag::server {
 namespace {
 
-using nlohmann::json;
-
 // Returns true if the request is refused as invalid.
-bool is_refused(const json& body) {
+bool refuses_request(const nlohmann::json& body) {
   try {
     parse_job_request(body.dump());
   } catch (const RequestError& error) {
@@ -28,12 +26,13 @@ TEST(JobBounds, NamesWithControlCharactersAreRefused) {
        {"\n", "\x1b", "\x7f", "\u0085", "\u009b", "\u2028", "\u202e", "\u2066", "\u200f"}) {
     SCOPED_TRACE(testing::PrintToString(std::string(control)));
     const std::string name = std::string("a") + control + "b";
-    EXPECT_TRUE(is_refused({{"scene", "a.glb"}, {"resolution", 64}, {"name", name}}));
-    EXPECT_TRUE(is_refused({{"scene", "/srv/" + name + ".glb"}, {"resolution", 64}}));
-    EXPECT_TRUE(is_refused(
+    EXPECT_TRUE(refuses_request({{"scene", "a.glb"}, {"resolution", 64}, {"name", name}}));
+    EXPECT_TRUE(refuses_request({{"scene", "/srv/" + name + ".glb"}, {"resolution", 64}}));
+    EXPECT_TRUE(refuses_request(
         {{"scene", "a.glb"}, {"resolution", 64}, {"options", {{"columns", "x,y,z" + name}}}}));
   }
-  EXPECT_FALSE(is_refused({{"scene", "a.glb"}, {"resolution", 64}, {"name", "Gr\u00fc\u00dfe"}}));
+  EXPECT_FALSE(
+      refuses_request({{"scene", "a.glb"}, {"resolution", 64}, {"name", "Gr\u00fc\u00dfe"}}));
 }
 
 TEST(JobBounds, TextsOfTheProcessAreCutAndPrintable) {
