@@ -99,7 +99,8 @@ class Child {
     output_ = ends[0];
     if (pid_ < 0) {
       close(output_);
-      throw Error(ErrorCode::kIo, "cannot start a process: fork: " + reason);
+      throw Error(ErrorCode::kIo,
+                  "cannot start the process that converts the file: fork: " + reason);
     }
   }
   ~Child() {

@@ -20,8 +20,8 @@ class BlockCache {
   // The caches of all readers together take at most 1/kShareOfFree of the free budget.
   static constexpr uint64_t kShareOfFree = 8;
 
-  // Makes one of `readers` caches for `count` elements. They divide 1/kShareOfFree of the free
-  // budget.
+  // Makes a cache for `count` elements, one of `readers` caches of equal size. It takes at most
+  // 1/(kShareOfFree * readers) of the free budget, but at least one block.
   BlockCache(MemoryBudget& budget, uint64_t count, unsigned readers, std::string_view what)
       : count_(count) {
     constexpr uint64_t kBlockBytes = kBlockSize * sizeof(Value);

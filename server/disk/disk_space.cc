@@ -30,8 +30,9 @@ void DiskSpace::reserve(uint64_t bytes, uint64_t expected) {
   if (free_bytes < kept + needed)
     throw Error(ErrorCode::kNoSpace,
                 folder_ + ": the disk has not enough free space for " + std::to_string(needed) +
-                    " more bytes: " + std::to_string(free_bytes) + " bytes are free, of which " +
-                    std::to_string(kept) + " are reserved");
+                    " more bytes: " + std::to_string(free_bytes) + " bytes are free, expected " +
+                    std::to_string(kept + needed) + ", because " + std::to_string(kept) +
+                    " are reserved");
   reserved_bytes_ += bytes;
 }
 

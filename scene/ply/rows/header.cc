@@ -161,7 +161,8 @@ class HeaderParser {
     const char* const end = words[2].data() + words[2].size();
     const auto parsed = std::from_chars(words[2].data(), end, element.count);
     if (parsed.ec != std::errc() || parsed.ptr != end)
-      refuse("has the count " + printable(words[2]) + ", expected a number below 2^64");
+      refuse("has the count " + printable(words[2]) +
+             ", expected a whole number below 2^64, in digits");
     for (const Element& other : header_.elements)
       if (other.name == element.name)
         refuse("repeats the name of an element, " + printable(other.name) +

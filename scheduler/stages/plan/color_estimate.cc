@@ -21,7 +21,8 @@ constexpr double kPrefixBytesPerCell = 0.03;
 constexpr EstimateRange kFileSpread = {0.95, 1, 1.25};
 // Header, tables and padding of a section.
 constexpr EstimateRange kFixedFileBytes = {0, 4096, 12288};
-// An artifact also has checksums and lengths of regions.
+// Bytes of the colors in the artifacts, divided by their bytes in the file. An artifact also has
+// checksums and lengths of regions.
 constexpr double kArtifactOverFile = 1.02;
 // Bytes of the record of a surface with an image and without vertex colors.
 constexpr double kExpectedSurfaceBytes = 65;

@@ -24,7 +24,8 @@ class OutsideRows {
   void read(TriangleSource& scene, const Grid& grid, const StageContext& context);
   void add(const FixedTriangle& triangle);
 
-  // The rows of a tile's closed square along an axis; null if none is crossed outside the grid.
+  // Returns the crossings outside the grid on the rows along `axis` that meet a tile, also at its
+  // border; null if there are none. (first, second): the tile's position on the other two axes.
   const OutsideTile* find(int axis, int first, int second) const;
   // Calls visit(axis, first, second, tile) for all tiles with rows that are crossed.
   template <class Visit>

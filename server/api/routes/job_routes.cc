@@ -226,7 +226,8 @@ JobFilter filter_of(const Call& call) {
     const auto state = parse_state(std::string_view(states).substr(begin, end - begin));
     if (!state)
       throw bad_request("'state' is '" + printable(states) +
-                        "': expected a comma-separated list of job states");
+                        "': expected a comma-separated list of queued, running, suspended, "
+                        "canceling, canceled, failed and succeeded");
     filter.states.push_back(*state);
     begin = end + 1;
   }

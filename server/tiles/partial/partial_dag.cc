@@ -117,10 +117,10 @@ uint64_t PartialDag::add_words(uint32_t level, std::vector<uint32_t> words) {
   std::vector<uint32_t>& all = levels_[level];
   const uint64_t offset = all.size();
   if (offset + words.size() > kMaxWords)
-    throw Error(ErrorCode::kLimit, "the nodes of the built subvolumes have " +
-                                       std::to_string(offset + words.size()) +
-                                       " words: expected at most " + std::to_string(kMaxWords) +
-                                       ", the limit of a preview");
+    throw Error(ErrorCode::kLimit,
+                "level " + std::to_string(level) + " of the preview would have " +
+                    std::to_string(offset + words.size()) + " words: expected at most " +
+                    std::to_string(kMaxWords) + " per level");
   // The words are appended before their offset is recorded in known_. So every recorded offset has
   // its words, even if a later step throws.
   all.insert(all.end(), words.begin(), words.end());

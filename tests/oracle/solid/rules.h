@@ -15,9 +15,9 @@ enum class SolidRule { kWinding, kParity, kEnclosed };
 struct Solid {
   Voxels voxels;          // the shell and the interior
   uint64_t interior = 0;  // voxels that are not in the shell
-  // Numbers of sample rows that have a crossing (rows), whose signs do not sum to 0 (open_rows),
-  // and that have an odd number of crossings (odd_rows). `disputed` counts the interior voxels of
-  // units whose views differ. All are 0 for kEnclosed.
+  // Counts of sample rows: those with a crossing (rows), those whose signs of crossings do not sum
+  // to 0 (open_rows), and those with an odd number of crossings (odd_rows). `disputed` counts the
+  // interior voxels of units whose directions do not all agree. All are 0 for kEnclosed.
   uint64_t rows = 0, open_rows = 0, odd_rows = 0, disputed = 0;
 };
 

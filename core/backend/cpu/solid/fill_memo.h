@@ -13,7 +13,8 @@ namespace voxdag::cpu {
 
 class FillMemo {
  public:
-  // The views from the corners of a block, in the order of child indices.
+  // The sum of the three views (core/geometry/solid_rule.h) from each corner of a block, in the
+  // order of child indices.
   struct Views {
     int32_t of[8];
     bool operator==(const Views&) const = default;
