@@ -25,7 +25,9 @@ add_executable(test_cuda_sim ${conformance_sources} ${cuda_sim_tests})
 target_link_libraries(test_cuda_sim PRIVATE voxdag_cuda_sim voxdag_backend_cpu voxdag_oracle
                       GTest::gmock GTest::gtest_main)
 voxdag_compile_quickly(test_cuda_sim)
+# A precompiled header is only used with the same definitions as in other tests.
 target_compile_definitions(test_cuda_sim PRIVATE
+  $<TARGET_PROPERTY:test_support,INTERFACE_COMPILE_DEFINITIONS>
   VOXDAG_SHARED_SCENES="${PROJECT_SOURCE_DIR}/../shared/scenes"
   VOXDAG_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 # The tests that take minutes on the simulated device run in tools/test-long.

@@ -18,7 +18,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kMaxWaitS = 600;
+constexpr double kMaxKillWaitS = 600;
 
 // Returns the number of kills.
 int rounds() {
@@ -46,7 +46,7 @@ class KilledService : public testing::Test {
             folder_.file("config.json").c_str(), nullptr);
       _exit(127);
     }
-    const double deadline = wall_seconds() + kMaxWaitS;
+    const double deadline = wall_seconds() + kMaxKillWaitS;
     constexpr std::string_view kMark = "listening on ";
     for (;;) {
       const std::string text = contents(log).substr(before);
@@ -132,7 +132,7 @@ TEST_F(KilledService, FinishesEveryJob) {
   std::map<int, std::string> expected;  // SHA-256 by resolution
   for (const auto& [id, resolution] : jobs_) {
     SCOPED_TRACE("resolution " + std::to_string(resolution));
-    const double deadline = wall_seconds() + kMaxWaitS;
+    const double deadline = wall_seconds() + kMaxKillWaitS;
     while (state(id) != "succeeded" && state(id) != "failed" && wall_seconds() < deadline)
       usleep(20000);
     const Json job = Json::parse(http_->get("/api/v1/jobs/" + id).body);
@@ -155,7 +155,7 @@ TEST_F(KilledService, DrainsAndResumes) {
   prepare();
   post_jobs();
   const std::string id = jobs_.back().id;
-  const double deadline = wall_seconds() + kMaxWaitS;
+  const double deadline = wall_seconds() + kMaxKillWaitS;
   while (state(jobs_.front().id) == "queued" && wall_seconds() < deadline) usleep(2000);
   EXPECT_EQ(end(SIGTERM), 0);
   EXPECT_NE(contents(folder_.file("log")).find("stopped"), std::string::npos);
@@ -187,7 +187,7 @@ TEST_F(KilledService, FewOpenFilesLeaveConnections) {
       http_->send("POST", "/api/v1/jobs", Json{{"scene", "s.glb"}, {"resolution", 64}}.dump());
   ASSERT_EQ(posted.status, 202) << posted.body;
   const std::string id = Json::parse(posted.body)["id"];
-  const double deadline = start + kMaxWaitS;
+  const double deadline = start + kMaxKillWaitS;
   while (state(id) != "succeeded" && state(id) != "failed" && wall_seconds() < deadline)
     usleep(20000);
   EXPECT_EQ(state(id), "succeeded");
@@ -201,7 +201,7 @@ TEST_F(KilledService, DataIsForTheServiceAlone) {
       http_->send("POST", "/api/v1/jobs", Json{{"scene", "s.glb"}, {"resolution", 64}}.dump());
   ASSERT_EQ(posted.status, 202) << posted.body;
   const std::string id = Json::parse(posted.body)["id"];
-  const double deadline = wall_seconds() + kMaxWaitS;
+  const double deadline = wall_seconds() + kMaxKillWaitS;
   while (state(id) != "succeeded" && wall_seconds() < deadline) usleep(20000);
   namespace fs = std::filesystem;
   constexpr fs::perms kOfOthers = fs::perms::group_all | fs::perms::others_all;
