@@ -202,6 +202,7 @@ class Run:
             subprocess.run(["rm", "-rf", self.folder / name], check=True)
 
     def interrupt(self, command):
+        before = self.names()  # an interrupted build may have left its work folder
         process = self.start(command.arguments)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.communicate(timeout=self.random.uniform(0, command.seconds))
@@ -213,18 +214,18 @@ class Run:
         process.send_signal(number)
         _, err = process.communicate()
         command.waits.append(time.monotonic() - begin)
-        self.check(command, process.returncode, number, err)
+        self.check(command, before, process.returncode, number, err)
         if self.random.random() < 0.5:
             self.clean()  # otherwise the next build resumes
         return None
 
-    def check(self, command, status, number, err):
+    def check(self, command, before, status, number, err):
         # A signal may come before the program catches signals, or after its last check of them.
         if status not in (130, 0, -number):
             self.failures.append(f"{command.name}: status {status}: {err.decode(errors='replace')}")
         if status == 0:
             return
-        left = self.names() - self.inputs - command.kept
+        left = self.names() - before - command.kept
         left = {n for n in left if not any(n.startswith(k) for k in command.kept)}
         if left:
             self.failures.append(f"{command.name}: left {sorted(left)}")
