@@ -61,7 +61,8 @@ void expect_equals(const Built& built, const oracle::Dag& truth, const Subvolume
 // Builds with the backend and with the oracle, and compares the results.
 void expect_right(Backend& backend, const SubvolumeTask& task, const oracle::Triangles& triangles);
 
-// Returns the voxels that a sub-DAG of `cube` sets in a region of the cube.
+// Returns the voxels that a sub-DAG of `cube` sets in a region of the cube. The region consists of
+// complete bricks.
 oracle::Voxels voxels_of(const SubDag& dag, const Cube& cube, uint32_t grid_levels,
                          const oracle::Region& region);
 

@@ -37,7 +37,7 @@ class MemoryFiles : public FileSystem {
   std::vector<DirectoryEntry> list(const std::string&) override { read_only(); }
   void touch(const std::string&) override { read_only(); }
   void sync_directory(const std::string&) override { read_only(); }
-  uint64_t free_space(const std::string&) override { return 0; }
+  uint64_t free_space(const std::string&) override { return uint64_t{1} << 40; }
   uint64_t device(const std::string&) override { return 0; }
   std::unique_ptr<FileLock> try_lock(const std::string&) override { read_only(); }
   bool is_locked(const std::string&) override { read_only(); }

@@ -158,9 +158,9 @@ TEST(Las, BrokenHeadersAreNamed) {
   EXPECT_THAT(message_with<uint64_t>(247, UINT64_MAX),
               HasSubstr("18446744073709551615 LAS points"));
   EXPECT_THAT(message_with<uint32_t>(107, UINT32_MAX, 2), HasSubstr("4294967295 LAS points"));
-  EXPECT_THAT(message_with<double>(139, 0), HasSubstr("scale factor of Y"));
-  EXPECT_THAT(message_with<double>(147, std::nan("")), HasSubstr("scale factor of Z"));
-  EXPECT_THAT(message_with<double>(155, HUGE_VAL), HasSubstr("offset of X"));
+  EXPECT_THAT(message_with<double>(139, 0), HasSubstr("scale factor 0 of Y"));
+  EXPECT_THAT(message_with<double>(147, std::nan("")), HasSubstr("scale factor nan of Z"));
+  EXPECT_THAT(message_with<double>(155, HUGE_VAL), HasSubstr("offset inf of X"));
 }
 
 // A point is invalid if the scale makes a coordinate infinite. The error contains its number.
