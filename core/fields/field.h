@@ -237,9 +237,9 @@ std::string expectation(const Field& field) {
   } else if constexpr (NameSet<T>) {
     return "names out of " + joined(NameSetTraits<T>::all());
   } else if constexpr (std::is_same_v<T, std::string>) {
-    return field.is_line
-               ? "1 to " + std::to_string(*field.max) + " characters without control characters"
-               : "a text";
+    return field.is_line ? "1 to " + std::to_string(*field.max) +
+                               " characters of UTF-8 without control characters"
+                         : "a text";
   } else if constexpr (IsVector<T>::value) {
     const std::string item = expectation<typename T::value_type>(field);
     return field.max_items ? "1 to " + std::to_string(field.max_items) + " items, each " + item

@@ -80,7 +80,7 @@ TEST_F(Interrupt, InsideAnImageDecoder) {
     "nodes":[{"mesh":0}]})");
   const pid_t pid =
       start({"build", "late.gltf", "-r", "16", "-o", "late.vdag", "--color", "--memory", "1GiB"});
-  sleep_ms(1500);
+  sleep_ms(500);
   const double start_s = voxdag::wall_seconds();
   kill(pid, SIGTERM);
   const Answer answer = wait_for(pid);
