@@ -141,7 +141,7 @@ def test_a_mesh_needs_no_file(tmp_path, mesh):
 def test_output_that_cannot_be_written(tmp_path, mesh):
     with pytest.raises(voxdag.Error) as refused:
         voxdag.build(mesh, resolution=64, output=tmp_path / ("n" * 250 + ".vdag"))
-    assert refused.value.code == "io"
+    assert refused.value.code == "invalid_input"
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)
     before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 12, limit[1]))

@@ -255,7 +255,7 @@ TEST_F(Client, Health) {
   EXPECT_EQ(answer.out, server_->url() + ": ready\n");
   put("full.json", R"({"jobs": {"min_free_disk": "1000TiB"}})");
   start_server({"--config", folder_.file("full.json")});
-  expect_error(6, "less free space", {"health"});
+  expect_error(6, "expected at least jobs.min_free_disk", {"health"});
   const std::string url = server_->url();
   EXPECT_EQ(server_->stop(), 0);
   server_.reset();

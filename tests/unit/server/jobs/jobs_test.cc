@@ -101,7 +101,7 @@ struct FormFinder {
   void operator()(const Field& field, T&) {
     SCOPED_TRACE(field.name);
     const std::string name = field.name;
-    EXPECT_THAT(page, ContainsRegex("[ {]" + name + ": "));
+    EXPECT_THAT(page, ContainsRegex("[ {]" + name + ":[ \n]"));
     using Value = typename OptionalValue<T>::type;
     if constexpr (NamedEnum<Value>) {
       for (const std::string& choice : choices_of<Value>())

@@ -94,6 +94,9 @@ TEST_F(ViewedFilesTest, AreOpenedAgainIfTheyCouldNotBeRead) {
     std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
       return std::make_unique<Reader>(ForwardingFiles::open_read(path));
     }
+    std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
+      return open_read(path);
+    }
   } same(system_files());
   OpenTileSources files(same, 4);
   const auto first = files.open(path_);
