@@ -55,7 +55,7 @@ TEST_F(AppearingOutput, IsKept) {
 // The picture has no temporary file until it is complete.
 TEST_F(AppearingOutput, OfRenderIsKept) {
   const pid_t pid = start(
-      {"render", "s.vdag", "-o", "r.png", "--size", "512x512", "--threads", "1", "--samples", "4"});
+      {"render", "s.vdag", "-o", "r.png", "--size", "256x256", "--threads", "1", "--samples", "4"});
   sleep_ms(1500);
   put("r.png", "theirs");
   const Answer answer = wait_for(pid);
