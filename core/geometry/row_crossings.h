@@ -60,6 +60,9 @@ struct SampleRows {
   int pitch_log2;
   int blocks;  // the cube's edge, in multiples of the distance
 
+  // Returns the position of a row's number (solid_rule.h) among those of the cube along one axis.
+  size_t index(int i, int j) const { return static_cast<size_t>(i * (blocks + 1) + j); }
+
   // Calls visit(i, j, block, sign) for every crossing of the triangle with a row along `axis`. (i,
   // j) are the row's indices along first_row_axis() and second_row_axis(). The crossing is between
   // the points `block` and `block + 1` of the row, which are 2^pitch_log2 units apart and are

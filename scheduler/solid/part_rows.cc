@@ -1,22 +1,11 @@
 #include "scheduler/solid/part_rows.h"
 
-#include <array>
-
+#include "core/backend/for_each_triangle.h"
 #include "core/geometry/overlap.h"
 #include "scheduler/solid/row_sums.h"
 
 namespace voxdag {
 namespace {
-
-template <class Visit>
-void for_each_triangle(TriangleStream& triangles, const CancelToken& cancel, Visit visit) {
-  triangles.rewind();
-  std::array<FixedTriangle, 256> batch;
-  while (const size_t n = triangles.read(batch)) {
-    cancel.check();
-    for (size_t i = 0; i < n; ++i) visit(batch[i]);
-  }
-}
 
 // The views from a part's low faces: the whole's views, and the crossings between the low faces of
 // the whole and of the part.
@@ -24,7 +13,6 @@ class PartEntry {
  public:
   PartEntry(const SolidEntry& whole_entry, const SampleRows& whole, const SampleRows& part)
       : rule_(whole_entry.rule), part_(part) {
-    const int stride = whole.blocks + 1;
     int first[3];  // the part's position, in blocks
     for (int a = 0; a < 3; ++a)
       first[a] = static_cast<int>((part.low[a] - whole.low[a]) >> part.pitch_log2);
@@ -33,7 +21,7 @@ class PartEntry {
       const int f = first[first_row_axis(a)], s = first[second_row_axis(a)];
       for (int i = 0; i <= part.blocks; ++i)
         for (int j = 0; j <= part.blocks; ++j)
-          views_[a].push_back(whole_entry.views[a][static_cast<size_t>((f + i) * stride + s + j)]);
+          views_[a].push_back(whole_entry.views[a][whole.index(f + i, s + j)]);
     }
   }
   void add(const FixedTriangle& triangle) {
@@ -41,7 +29,7 @@ class PartEntry {
       if (blocks_before_[a] != 0)
         part_.for_each_crossing(triangle, a, [&](int i, int j, int64_t block, int sign) {
           if (block >= 0 || block < -blocks_before_[a]) return;
-          int32_t& view = views_[a][static_cast<size_t>(i * (part_.blocks + 1) + j)];
+          int32_t& view = views_[a][part_.index(i, j)];
           view = view_after(rule_, view, sign);
         });
   }
@@ -69,6 +57,7 @@ void add_part_rows(SolidRows& rows, const Cube& whole, std::span<const Cube> par
     PartEntry views(entry, whole_rows, part_rows);
     SubvolumeRows added;
     added.unit = SolidUnit::kEmptyUnit;
+    triangles.rewind();
     for_each_triangle(triangles, cancel, [&](const FixedTriangle& triangle) {
       if (added.unit != SolidUnit::kShell && triangle_touches_cube(triangle, part_rows.low, edge))
         added.unit = SolidUnit::kShell;
@@ -81,14 +70,14 @@ void add_part_rows(SolidRows& rows, const Cube& whole, std::span<const Cube> par
 }
 
 UnitViews views_of_empty(const SolidEntry& entry, const Cube& cube, uint32_t grid_levels) {
-  const int blocks = sample_rows_of(cube, grid_levels).blocks;
+  const SampleRows rows = sample_rows_of(cube, grid_levels);
   UnitViews unit;
   for (int c = 0; c < 8; ++c) {
     int64_t views = 0;
     for (int a = 0; a < 3; ++a) {
-      const int i = child_coordinate(c, first_row_axis(a)) * blocks;
-      const int j = child_coordinate(c, second_row_axis(a)) * blocks;
-      views += entry.views[a][static_cast<size_t>(i * (blocks + 1) + j)];
+      const int i = child_coordinate(c, first_row_axis(a)) * rows.blocks;
+      const int j = child_coordinate(c, second_row_axis(a)) * rows.blocks;
+      views += entry.views[a][rows.index(i, j)];
     }
     unit.add(views);
   }

@@ -32,7 +32,7 @@ void RowSums::add(const FixedTriangle& triangle) {
     if (triangle.high(a) < rows_.low[a] || triangle.low(a) > rows_.low[a] + edge_) continue;
     rows_.for_each_crossing(triangle, a, [&](int i, int j, int64_t block, int sign) {
       if (block < 0 || block >= rows_.blocks) return;
-      add_crossing(numbers_[a][static_cast<size_t>(i * (rows_.blocks + 1) + j)], sign);
+      add_crossing(numbers_[a][rows_.index(i, j)], sign);
     });
   }
 }

@@ -3,8 +3,8 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/format/bytes.h"
 #include "core/format/checksum.h"
+#include "core/format/cube_bytes.h"
 #include "scheduler/solid/row_sums.h"
 
 namespace voxdag {
@@ -16,21 +16,11 @@ constexpr uint64_t kHeaderBytes = 64;
 void put(ByteSink& sink, const RowExtent& extent) {
   for (const uint64_t word : {extent.offset, extent.bytes, extent.checksum}) sink.put(word);
 }
-void put(ByteSink& sink, const Cube& cube) {
-  sink.put(cube.level);
-  for (const uint32_t p : cube.position) sink.put(p);
-}
 RowExtent get_extent(ByteSource& source) {
   RowExtent extent;
   for (uint64_t* word : {&extent.offset, &extent.bytes, &extent.checksum})
     *word = source.get<uint64_t>();
   return extent;
-}
-Cube get_cube(ByteSource& source) {
-  Cube cube;
-  cube.level = source.get<uint32_t>();
-  for (uint32_t& p : cube.position) p = source.get<uint32_t>();
-  return cube;
 }
 
 std::vector<std::byte> header_of(const RowExtent& index) {
@@ -125,13 +115,13 @@ std::vector<std::byte> SolidRows::encode_index() const {
   for (const uint64_t count : {counts.rows, counts.open, counts.odd}) sink.put(count);
   sink.put(static_cast<uint64_t>(cubes_.size()));
   for (const auto& [cube, rows] : cubes_) {
-    put(sink, cube);
+    put_cube(sink, cube);
     sink.put(static_cast<uint32_t>(rows.unit));
     for (const RowExtent& views : rows.views) put(sink, views);
   }
   sink.put(static_cast<uint64_t>(full_cubes.size()));
   for (const FullCube& full : full_cubes) {
-    put(sink, full.cube);
+    put_cube(sink, full.cube);
     sink.put(static_cast<uint32_t>(full.is_disputed));
   }
   return bytes;

@@ -1,11 +1,11 @@
 #include "core/backend/cpu/subvolume_build.h"
 
+#include "core/backend/for_each_triangle.h"
 #include "core/base/host_device.h"
 
 namespace voxdag::cpu {
 namespace {
 
-constexpr size_t kBatch = 256;  // triangles per read
 // Max triangles of a tile for which the plane memo may be faster than drawing.
 constexpr size_t kFewTriangles = 4;
 
@@ -54,34 +54,27 @@ SubDagSummary SubvolumeBuild::run(TriangleStream& stream, SubDagSink& sink) {
 
 NodeRef SubvolumeBuild::build_streamed(TriangleStream& stream) {
   const LatticeCube box = box_of(task_);
-  std::vector<FixedTriangle> batch(kBatch);
-  const auto for_each_triangle = [&](const auto& visit) {
+  const auto visit_all = [&](const auto& visit) {
     stream.rewind();
-    while (const size_t count = stream.read(batch)) {
-      cancel_.check();
-      for (size_t i = 0; i < count; ++i) visit(batch[i]);
-    }
+    for_each_triangle(stream, cancel_, visit);
   };
   if (solid_) solid_->begin_tile(box);
-  for_each_triangle([&](const FixedTriangle& triangle) {
+  visit_all([&](const FixedTriangle& triangle) {
     draw(axis_major(triangle), box);
     if (solid_) solid_->add(triangle);
   });
-  if (solid_ && !solid_->fill_tile(tile_, size_log2_of(task_), for_each_triangle))
+  if (solid_ && !solid_->fill_tile(tile_, size_log2_of(task_), visit_all))
     return finish_solid_root({{}, true});
   return reducer_.reduce_bricks(tile_, size_log2_of(task_));
 }
 
 void SubvolumeBuild::read(TriangleStream& stream) {
   const LatticeCube box = box_of(task_);
-  std::vector<FixedTriangle> batch(kBatch);
   stream.rewind();
-  while (const size_t count = stream.read(batch)) {
-    cancel_.check();
-    for (size_t i = 0; i < count; ++i)
-      if (const WideTriangle triangle = axis_major(batch[i]); !box.misses(triangle))
-        triangles_.add(triangle);
-  }
+  for_each_triangle(stream, cancel_, [&](const FixedTriangle& fixed) {
+    if (const WideTriangle triangle = axis_major(fixed); !box.misses(triangle))
+      triangles_.add(triangle);
+  });
   const uint32_t narrow = triangles_.narrow_count(), wide = triangles_.wide_count();
   entries_used_ = size_t{narrow} + wide;
   reserve_entries(entries_used_);
@@ -136,7 +129,7 @@ SubvolumeBuild::SolidNode SubvolumeBuild::build_solid(int size_log2, const Latti
 SubvolumeBuild::SolidNode SubvolumeBuild::build_solid_tile(int size_log2, const LatticeCube& cube,
                                                            size_t first, size_t count) {
   cancel_.check();
-  const auto for_each_triangle = [&](const auto& visit) {
+  const auto visit_all = [&](const auto& visit) {
     for (size_t i = first; i < first + count; ++i) {
       const Entry entry = entries_[i];
       visit(entry.wide() ? vertex_major(triangles_.wide(entry))
@@ -145,8 +138,8 @@ SubvolumeBuild::SolidNode SubvolumeBuild::build_solid_tile(int size_log2, const 
   };
   solid_->begin_tile(cube);
   for (size_t i = first; i < first + count; ++i) draw(entries_[i], cube);
-  for_each_triangle([&](const FixedTriangle& triangle) { solid_->add(triangle); });
-  if (!solid_->fill_tile(tile_, size_log2, for_each_triangle)) return {{}, true};
+  visit_all([&](const FixedTriangle& triangle) { solid_->add(triangle); });
+  if (!solid_->fill_tile(tile_, size_log2, visit_all)) return {{}, true};
   return {reducer_.reduce_bricks(tile_, size_log2), false};
 }
 

@@ -2,8 +2,8 @@
 
 #include "core/base/error.h"
 #include "core/dag/node_hash.h"
-#include "core/format/bytes.h"
 #include "core/format/checksum.h"
+#include "core/format/cube_bytes.h"
 
 namespace voxdag {
 namespace {
@@ -22,8 +22,7 @@ void check_version(uint32_t version, const std::string& where) {
 }
 
 void put_root(ByteSink& sink, const ArtifactRoot& root) {
-  sink.put(root.cube.level);
-  for (const uint32_t p : root.cube.position) sink.put(p);
+  put_cube(sink, root.cube);
   sink.put(root.index);
   sink.put(uint32_t{0});
   sink.put(root.hash);
@@ -33,8 +32,7 @@ void put_root(ByteSink& sink, const ArtifactRoot& root) {
 
 ArtifactRoot get_root(ByteSource& source, const std::string& where) {
   ArtifactRoot root;
-  root.cube.level = source.get<uint32_t>();
-  for (uint32_t& p : root.cube.position) p = source.get<uint32_t>();
+  root.cube = get_cube(source);
   root.index = source.get<uint32_t>();
   if (const uint32_t reserved = source.get<uint32_t>(); reserved != 0)
     corrupt(where, "the reserved field of the root at row " + std::to_string(root.index) + " is " +

@@ -5,6 +5,7 @@
 #include <map>
 #include <mutex>
 
+#include "core/backend/for_each_triangle.h"
 #include "core/base/parallel_for.h"
 #include "core/geometry/morton.h"
 #include "scheduler/solid/row_sums.h"
@@ -95,11 +96,8 @@ class RowsStage {
     const Cube& cube = cubes_[i].cube;
     RowSums sums(cube, rows_.grid_levels(), context_.budget);
     const auto stream = triangles_.open(cubes_[i].bin);
-    std::array<FixedTriangle, 256> batch;
-    while (const size_t n = stream->read(batch)) {
-      context_.build.cancel.check();
-      for (size_t t = 0; t < n; ++t) sums.add(batch[t]);
-    }
+    for_each_triangle(*stream, context_.build.cancel,
+                      [&](const FixedTriangle& triangle) { sums.add(triangle); });
     sums_[i] = {cube, sums.is_occupied(), {}};
     for (int a = 0; a < 3; ++a) sums_[i].numbers[a] = sums_file_.append_rows(sums.numbers(a));
   }

@@ -7,11 +7,6 @@ namespace {
 
 constexpr int64_t kHalfVoxel = kUnitsPerVoxel / 2;
 
-template <class Int>
-Int rising_part(Int x) {
-  return x > 0 ? x : 0;
-}
-
 }  // namespace
 
 template <class Coordinate>
@@ -39,13 +34,14 @@ bool ThinTriangle<Coordinate>::set_planes(const int64_t (&v)[3][3], const Int (&
   int128 lowest_of[3];
   for (int a = 0; a < 3; ++a) {
     const Int across = n[(a + 1) % 3] + n[(a + 2) % 3];
-    lowest_of[a] =
-        ((origin + static_cast<int128>(across) * kHalfVoxel) >> kUnitBits) + rising_part(n[a]);
+    lowest_of[a] = ((origin + static_cast<int128>(across) * kHalfVoxel) >> kUnitBits) +
+                   this->positive_part(n[a]);
     width_along[a] = size[a] - 1;
   }
   const int up = this->dominant;
   const int128 base = lowest_of[up], span = tile_voxels - 1;
-  const Int rising = rising_part(n[0]) + rising_part(n[1]) + rising_part(n[2]);
+  const Int rising =
+      this->positive_part(n[0]) + this->positive_part(n[1]) + this->positive_part(n[2]);
   const Int falling = rising - (size[0] + size[1] + size[2]);
   if (base + span * rising < 0 || base + span * falling > width_along[up]) return false;
   for (int a = 0; a < 3; ++a) lowest_along[a] = static_cast<Int>(lowest_of[a]);

@@ -3,14 +3,6 @@
 #include <algorithm>
 
 namespace voxdag::cpu {
-namespace {
-
-template <class Int>
-Int positive(Int x) {
-  return x > 0 ? x : 0;
-}
-
-}  // namespace
 
 template <class Coordinate>
 bool TileTriangle<Coordinate>::set_up(const Triangle<Coordinate>& triangle, bool is_inside,
@@ -72,7 +64,7 @@ bool TileTriangle<Coordinate>::set_plane(const int64_t (&v)[3][3], int64_t (&hal
   set_normal(half, size);
   int128 c = 0;
   for (int a = 0; a < 3; ++a) c -= static_cast<int128>(normal[a]) * v[a][0];
-  const Int rising = positive(normal[0]) + positive(normal[1]) + positive(normal[2]);
+  const Int rising = positive_part(normal[0]) + positive_part(normal[1]) + positive_part(normal[2]);
   const Int total = size[0] + size[1] + size[2];
   width = total - ((c & (kUnitsPerVoxel - 1)) != 0 ? 1 : 0);
   const int128 base = (c >> kUnitBits) + rising;

@@ -55,6 +55,7 @@ struct TileTriangle {
   bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const LatticeCube& tile);
 
  protected:
+  static Int positive_part(Int x) { return x > 0 ? x : 0; }
   // Sets v[axis][vertex] to the vertices relative to the tile, and the range of voxels. Returns
   // false if the triangle's box misses the tile.
   bool set_box(const Triangle<Coordinate>& triangle, const LatticeCube& tile, int64_t (&v)[3][3]);

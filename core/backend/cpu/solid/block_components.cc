@@ -30,26 +30,24 @@ void exchange_order(uint64_t (&words)[8]) {
   }
 }
 
+// Extends `reached` along lines of eight voxels, whose bits are kStep apart, in both directions.
+// `up_free` and `down_free`: voxels that a step upward or downward may reach.
+template <int kStep>
+void fill_lines(uint64_t& reached, uint64_t up_free, uint64_t down_free) {
+  uint64_t up = reached, down = reached;
+  for (int step = kStep; step < 8 * kStep; step *= 2) {
+    up |= up_free & up << step;
+    up_free &= up_free << step;
+    down |= down_free & down >> step;
+    down_free &= down_free >> step;
+  }
+  reached = up | down;
+}
+
 // Extends `reached` along z and y, in both directions, as far as `empty` goes.
 void fill_slice(uint64_t& reached, uint64_t empty) {
-  uint64_t up = reached, up_free = empty & ~kLowZ;
-  uint64_t down = reached, down_free = empty & ~(kLowZ << 7);
-  for (int step = 1; step < 8; step *= 2) {
-    up |= up_free & up << step;
-    up_free &= up_free << step;
-    down |= down_free & down >> step;
-    down_free &= down_free >> step;
-  }
-  reached = up | down;
-  up = down = reached;
-  up_free = down_free = empty;
-  for (int step = 8; step < 64; step *= 2) {
-    up |= up_free & up << step;
-    up_free &= up_free << step;
-    down |= down_free & down >> step;
-    down_free &= down_free >> step;
-  }
-  reached = up | down;
+  fill_lines<1>(reached, empty & ~kLowZ, empty & ~(kLowZ << 7));
+  fill_lines<8>(reached, empty, empty);
 }
 
 }  // namespace
