@@ -2,6 +2,7 @@
 
 #include "cli/cluster.h"
 #include "cli/option_fields.h"
+#include "cli/output.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
@@ -65,7 +66,7 @@ void run(const BuildCommand& command, CommandContext& context) {
     }
   });
   if (command.json)
-    std::printf("%s\n", printable_json(report_json(report)).c_str());
+    print_json_text(report_json(report));
   else
     print(report);
 }

@@ -13,12 +13,12 @@ namespace {
 
 template <class Json>
 void print_line(const Json& json) {
-  const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  std::printf("%s\n", printable_json(text).c_str());
+  print_json_text(json.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 }  // namespace
 
+void print_json_text(const std::string& json) { std::printf("%s\n", printable_json(json).c_str()); }
 void print_json(const nlohmann::ordered_json& json) { print_line(json); }
 void print_json(const nlohmann::json& json) { print_line(json); }
 

@@ -2,9 +2,9 @@
 
 #include "cli/cluster.h"
 #include "cli/option_fields.h"
+#include "cli/output.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
-#include "core/base/text/printable.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/spec/build_fields.h"
 #include "scheduler/stages/plan/cluster_plan.h"
@@ -61,14 +61,14 @@ void run(const PlanCommand& command, CommandContext& context) {
   });
   if (command.cluster.engine == ClusterEngine::kNone) {
     if (command.json)
-      std::printf("%s\n", printable_json(estimate_json(estimate)).c_str());
+      print_json_text(estimate_json(estimate));
     else
       print(estimate);
     return;
   }
   const ClusterPlan plan = plan_cluster(estimate, command.cluster.tasks);
   if (command.json) {
-    std::printf("%s\n", printable_json(cluster_plan_json(estimate, plan)).c_str());
+    print_json_text(cluster_plan_json(estimate, plan));
   } else {
     print(estimate);
     print(plan);

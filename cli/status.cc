@@ -4,6 +4,7 @@
 
 #include "cli/cluster.h"
 #include "cli/command.h"
+#include "cli/output.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
 #include "scheduler/state/job_status.h"
@@ -47,10 +48,7 @@ void run(const StatusCommand& command, CommandContext& context) {
     if (!first && !context.files.exists(WorkFolder::store_path(command.work_folder))) return;
     const JobStatus status = read_job_status(context.files, command.work_folder);
     if (command.json)
-      std::printf("%s\n",
-                  printable_json(
-                      status_json(status, cluster_status_json(context.files, command.work_folder)))
-                      .c_str());
+      print_json_text(status_json(status, cluster_status_json(context.files, command.work_folder)));
     else
       print(status, context.files, command.work_folder);
     std::fflush(stdout);
