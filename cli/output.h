@@ -15,7 +15,7 @@ namespace voxdag::cli {
 // bytes that are not UTF-8.
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
-// The same for JSON text of one line.
+// Prints JSON text, with escapes for characters that are not printable.
 void print_json_text(const std::string& json);
 
 // Returns the resolution, the number of cells and the bytes of a section with colors or another
