@@ -21,8 +21,9 @@ BuildSpec checked(const BuildSpec& spec);
 void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
                       std::span<const std::string> outputs, const BuildContext& context);
 
-// Throws Error{kInvalidInput} if the output could not be written at the end of the build, or if the
-// build would overwrite a scene or a file not created by voxdag.
+// Throws Error{kInvalidInput} if the output path is missing or names a folder, if the cache folder
+// is the work folder, or if the build would overwrite a scene or a file not created by voxdag.
+// Creates the output's parent folder and the cache folder.
 void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& context);
 
 }  // namespace voxdag

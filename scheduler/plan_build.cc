@@ -22,8 +22,8 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& caller) {
   BuildScene source(full.geometry, folder, budget, context);
   refuse_own_files(full, source, folder, {}, context);
   WorkFolder work(context, folder, full.run.lock_wait_s);
-  // Removes the temporary folder, or the spilled triangles in the user's work folder. A job in that
-  // work folder is left unchanged.
+  // Removes the temporary folder, or the spilled triangles in the user's work folder. The job store
+  // in the user's folder is left unchanged.
   struct Cleanup {
     WorkFolder& work;
     const bool own_folder;

@@ -30,11 +30,12 @@ namespace {
 // Version of the formats of artifacts and job store, and of the rule for scene digests. A job with
 // a different version is refused.
 constexpr int64_t kWorkFormatVersion = 4;
-// The scene is read at most kMaxReads times, and the artifacts are merged at most kMaxMerges times.
-// Damage of the stored triangles or of artifacts causes repeats.
+// The scene is read at most kMaxReads times if stored triangles are damaged. The artifacts are
+// merged at most kMaxMerges times if they are damaged.
 constexpr int kMaxReads = 3, kMaxMerges = 3;
 
-// Refuses a job with other geometry options before the scene is read.
+// Refuses a stored job with another format version or other geometry options before the scene is
+// read.
 void refuse_other_options(const BuildJob& job) {
   const auto stored = job.store->job();
   if (!stored) return;
@@ -250,7 +251,7 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted) {
     return true;
   } catch (const Error& error) {
     // DamagedTriangles reports damage of a spill file in the work folder, not of the scene. The
-    // next call of this function writes the file again.
+    // next call of this function writes a new spill file.
     const bool is_scratch = dynamic_cast<const DamagedTriangles*>(&error) != nullptr;
     if ((reads_scene && !is_scratch) || !error.is_corruption() ||
         !recover(job, error, has_restarted))
@@ -307,8 +308,8 @@ void run_stages(BuildJob& job, SubvolumeBuilder& builder, double start_s) {
   remove_finished_work(job);
 }
 
-// True if the work folder has a job. Also true if it has the checkpoint of a partly read scene,
-// unless the scene caused the error.
+// True if the work folder has something to resume: a job, or the checkpoint of a partly read scene.
+// The checkpoint does not count if the scene caused the error.
 bool is_worth_resuming(BuildJob& job, const Error& error) {
   const bool scene_is_at_fault =
       error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;
@@ -325,7 +326,8 @@ std::string advice(const BuildJob& job, ErrorCode code) {
   return "";
 }
 
-// Runs stages. If one fails, its finished work remains for the next run.
+// Runs `stages`. If they fail, keeps the finished work for the next run. If there is nothing to
+// resume, removes the work folder.
 void resumable(BuildJob& job, const std::function<void()>& stages) {
   try {
     stages();

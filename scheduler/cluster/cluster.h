@@ -1,6 +1,6 @@
 // The interface through which other folders run cluster builds. scheduler/slurm/ implements these
-// functions. With VOXDAG_CLUSTER=OFF, without_cluster.cc implements them instead: the program
-// refuses cluster options and leaves the tasks of earlier builds alone.
+// functions. With VOXDAG_CLUSTER=OFF, without_cluster.cc implements them instead: they refuse
+// cluster options and cannot stop the tasks of earlier builds.
 #pragma once
 
 #include <memory>
@@ -22,7 +22,7 @@ void check_cluster_support();
 // would refuse the build's tasks, or if the build has a cache folder.
 void check_cluster(const BuildSpec& spec, const BuildContext& context);
 
-// True if this process is the merge job.
+// True if this process runs as the merge job (see MergeJob).
 inline bool is_merge_job(const BuildSpec& spec) {
   return spec.run.cluster && spec.run.cluster->is_merge_job;
 }
@@ -40,19 +40,20 @@ std::unique_ptr<ClusterBuilder> make_cluster_builder(BuildJob& job);
 // A cluster build whose merge is also a job of the cluster (`--cluster-merge`). The submitting
 // process submits the tasks and a merge job that depends on them, and unlocks the work folder. Then
 // it follows the merge job. The merge job runs the same voxdag command: it resumes the work folder
-// as any later run does, resubmits failed batches, waits for their tasks and merges. The process
-// that follows the merge job may be stopped, and the same command starts it again. This command
-// also submits the merge job again if Slurm has lost the job. A process finds a running merge job
-// by the job's name, which contains the id of the build in cluster.json. It finds an ended merge
-// job by the report next to the output, which contains the job's request().
+// as any later run does, resubmits failed batches, waits for their tasks and merges. If the process
+// that follows the merge job is stopped, the same command follows the job again. It also submits
+// the merge job again if Slurm has lost it. A process finds a running merge job by the job's name,
+// which contains the id of the build in cluster.json. It finds an ended merge job by the report
+// next to the output, which contains the job's request().
 class MergeJob {
  public:
   virtual ~MergeJob() = default;
 
-  // Digest of the geometry options and of the scene's files with their sizes and times, taken when
-  // this object is made. Image files are included if the build has attributes.
+  // Digest of the geometry options and of the paths, sizes and modification times of the scene's
+  // files, taken when this object is made. Image files are included if the build has attributes.
   virtual const std::string& request() const = 0;
-  // Returns the report of a finished merge job with the same request whose output exists.
+  // Returns the report of a finished merge job with the same request(), if its output exists and
+  // has the size in the report.
   virtual std::optional<BuildReport> finished() const = 0;
   // True if the work folder still has a job store although the build does not keep its work folder.
   // Then the merge job is still removing the folder, or it was stopped before it did so.
@@ -72,14 +73,14 @@ class MergeJob {
 std::unique_ptr<MergeJob> make_merge_job(const BuildSpec& spec, const TriangleSource& scene,
                                          const BuildContext& context);
 
-// Every build calls the following functions, because an earlier run in the same work folder may
-// have started tasks.
+// Builds with and without cluster options call the following functions, because an earlier run in
+// the same work folder may have started tasks.
 
 // Records the results of tasks that an earlier run started for the scene with this digest. Throws
 // Error{kInvalidInput} if there are such tasks and this program has no cluster support.
 void accept_earlier_tasks(BuildJob& job, const std::string& scene_digest);
-// Stops running tasks of the work folder and removes their files. If Slurm cannot stop a task, only
-// warns: the task will fail because its batch file is missing.
+// Stops the cluster tasks of the work folder and removes their files. Only warns if Slurm does not
+// accept the request: a remaining task will fail because its batch file is missing.
 void remove_tasks(BuildJob& job);
 // Stops the merge job of an earlier build, because that job may have locked the output and the work
 // folder. Only warns if the job cannot be stopped.

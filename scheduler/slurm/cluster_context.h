@@ -22,7 +22,8 @@ struct ClusterContext {
   Slurm slurm;
 };
 
-// Returns the command runner that the options name, or else the system's. Only tests name one.
+// Returns the command runner in the spec's cluster options, else system_commands(). Only tests set
+// one in the options.
 CommandRunner& commands_of(const BuildSpec& spec);
 // Returns `path` in the form that tasks on other machines need: absolute and normalized.
 std::string absolute_path(const std::string& path);

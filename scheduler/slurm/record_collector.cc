@@ -72,7 +72,7 @@ void RecordCollector::read_record(const ClusterFolder::Entry& entry) {
     accept(record);
   } catch (const Error& error) {
     // Anything can have the name of a record: a pipe, a folder, a file of another user or of any
-    // size. It does not count, and the build goes on.
+    // size. Such a file is rejected, and the build continues.
     const bool is_foreign = error.code() == ErrorCode::kInvalidInput ||
                             error.code() == ErrorCode::kLimit || error.code() == ErrorCode::kIo;
     if (!error.is_corruption() && (is_read || !is_foreign)) throw;

@@ -38,9 +38,11 @@ class RecordCollector {
 
   ClusterContext& cluster_;
   BatchTable& batches_;
-  // Records that cannot be read yet, or whose segment is not visible yet.
+  // Paths of records that cannot be read yet or whose segment is not visible yet, each with the
+  // time of the first attempt to read it.
   std::map<std::string, Seconds> incomplete_since_;
-  // Rejected records and failures. Some of them, such as folders, cannot be removed.
+  // Paths of rejected record and failure files. collect() skips them, because some cannot be
+  // removed, such as a folder with the name of a record.
   std::set<std::string> rejected_;
 };
 

@@ -1,6 +1,7 @@
 // One task of a cluster build. It builds the subvolumes of a batch, merges their artifacts into
-// one, and writes a segment and a completion record to the shared disk. All other files are
-// temporary and on this machine. Several attempts at the same batch may run concurrently.
+// one, and writes a segment and a completion record to the shared disk. All its other files are
+// temporary files on the task's own machine. Several attempts at the same batch may run
+// concurrently.
 #pragma once
 
 #include <cstdint>

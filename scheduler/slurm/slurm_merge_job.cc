@@ -16,7 +16,7 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMaxReportBytes = uint64_t{1} << 24;
-// Pause between two searches for files.
+// Pause between two searches for the merge job's files.
 constexpr double kFilesPauseS = 0.5;
 // Maximum time until an NFS client sees a new file, if it looked for the file before the file
 // existed (acdirmax, nfs(5)). Includes a margin.

@@ -7,8 +7,9 @@
 namespace voxdag {
 namespace {
 
-// The views from a part's low faces: the whole's views, and the crossings between the low faces of
-// the whole and of the part.
+// Computes the views (core/geometry/solid_rule.h) from a part's low faces: starts with the views
+// from the low faces of the split subvolume, and adds the crossings between those faces and the
+// part's faces.
 class PartEntry {
  public:
   PartEntry(const SolidEntry& whole_entry, const SampleRows& whole, const SampleRows& part)

@@ -11,7 +11,7 @@
 namespace voxdag {
 
 void encode_rows(std::span<const int32_t> numbers, std::vector<std::byte>& out);
-// Fills `out`. Returns false for bytes that encode_rows() did not make from as many numbers.
+// Decodes `bytes` into `out`. Returns false unless they decode to exactly out.size() numbers.
 bool decode_rows(std::span<const std::byte> bytes, std::span<int32_t> out);
 
 }  // namespace voxdag

@@ -1,4 +1,5 @@
-// A file of compressed rows (row_codec.h). Only its writer knows where they are. Thread-safe.
+// A file of compressed rows (row_codec.h). The caller keeps the extents of its rows; the file does
+// not list them. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +13,14 @@
 
 namespace voxdag {
 
-// The place of some bytes in a file.
+// The position, size and checksum of some bytes in a file.
 struct RowExtent {
   uint64_t offset = 0, bytes = 0, checksum = 0;
 };
 
 class RowFile {
  public:
-  // Creates an empty file, or opens a file whose bytes before `end` are kept.
+  // Opens `path` to append from offset `first_byte`. Keeps the bytes before it.
   RowFile(FileSystem& files, const std::string& path, uint64_t first_byte);
 
   RowExtent append(std::span<const std::byte> bytes);

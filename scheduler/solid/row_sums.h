@@ -10,22 +10,22 @@
 
 namespace voxdag {
 
-// The low corner of a cube, in lattice units, and its sample rows.
+// Returns the sample rows of a cube. Their `low` is the cube's low corner, in lattice units.
 SampleRows sample_rows_of(const Cube& cube, uint32_t grid_levels);
-// Returns the number of sample rows along one axis of a closed cube.
+// Returns the number of a cube's sample rows along one axis, including the rows on its faces.
 uint64_t rows_per_axis(const Cube& cube, uint32_t grid_levels);
-// Bytes of one number for each sample row of a closed cube.
+// Bytes of one int32_t for each sample row of a cube, along all three axes.
 inline uint64_t row_bytes(const Cube& cube, uint32_t grid_levels) {
   return 3 * rows_per_axis(cube, grid_levels) * sizeof(int32_t);
 }
 
-// The same for an edge in voxels, in a grid of at least 8^3 voxels.
+// Returns row_bytes() of a cube with this edge in voxels, in a grid of at least 8^3 voxels.
 constexpr uint64_t solid_row_bytes(int64_t edge) {
   const auto side = static_cast<uint64_t>(edge / 8 + 1);
   return 3 * side * side * sizeof(int32_t);
 }
 
-// The numbers of one row: the sum of the signs of its crossings, times 2, plus 1 if there are any.
+// The number of a row: twice the sum of the signs of its crossings, plus 1 if it has a crossing.
 constexpr int32_t row_sum(int32_t number) { return number >> 1; }
 constexpr bool has_crossing(int32_t number) { return (number & 1) != 0; }
 inline void add_crossing(int32_t& number, int sign) { number = (number + 2 * sign) | 1; }

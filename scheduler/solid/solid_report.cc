@@ -9,8 +9,8 @@
 namespace voxdag {
 namespace {
 
-// Parts of the sample rows that may be open without a warning, and beyond which the surface is more
-// likely a scene than an object.
+// Fractions of the sample rows. If more rows than kClosed are open, a warning says that the surface
+// is not closed; if more than kScene are, that it is more likely a scene than an object.
 constexpr double kClosed = 0.001, kScene = 0.05;
 
 std::string percent_text(double part) {

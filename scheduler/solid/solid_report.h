@@ -11,14 +11,15 @@
 
 namespace voxdag {
 
-// Returns the report without the volume. `interior` and `disputed`: voxels of the subvolumes; the
-// function adds the full cubes of `rows`.
+// Returns the report without the volume. `interior` and `disputed` count the voxels of subvolumes;
+// the function adds the voxels of rows.full_cubes.
 SolidReport solid_report(const SolidRows& rows, uint64_t interior, uint64_t disputed);
 
-// Returns the volume of voxels, in units of the scene.
+// Returns the volume of these voxels, in cubic units of the scene.
 double solid_volume(const Grid& grid, uint64_t voxels);
 
-// Returns a warning if the surface is unlikely to be what the rule expects.
+// Returns a warning if the surface is open, if its faces are oriented inconsistently, or if they
+// cancel each other.
 std::optional<Warning> solid_warning(const SolidReport& report, const std::string& scene);
 
 }  // namespace voxdag

@@ -1,5 +1,5 @@
-// The durable state of a solid between the stages `rows`, `build` and `merge`: for each subvolume
-// the views from its low faces, and the empty cubes above the subvolumes that are inside.
+// The durable state of a solid between the stages `rows`, `build` and `merge`: the views from the
+// low faces of each subvolume, and the full cubes.
 //
 //   header    magic, place of the last index, checksum
 //   rows      compressed views of one subvolume along one axis
@@ -7,7 +7,7 @@
 //
 // Bins of built subvolumes are freed, so the views cannot be computed again once a subvolume is
 // built. save() makes everything durable: it appends an index, and then replaces the header, which
-// refers to it. Thread-safe, except load() and start().
+// has the place of the last index. Thread-safe, except load() and start().
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,8 @@
 
 namespace voxdag {
 
-// What a subvolume is for the rules of a solid.
+// State of a subvolume in a solid. A unit is a maximal cube without voxels of the shell; it is
+// filled or left empty as one piece (core/geometry/solid_rule.h).
 enum class SolidUnit : uint32_t {
   kShell,      // it has voxels of the shell
   kEmptyUnit,  // it has none, but the cube around it does: it is one unit
@@ -37,7 +38,7 @@ struct SubvolumeRows {
   RowExtent views[3];
 };
 
-// A maximal empty cube above the subvolumes that is inside.
+// A unit that is larger than any subvolume in it, and inside the solid.
 struct FullCube {
   Cube cube;
   bool is_disputed = false;
@@ -52,7 +53,7 @@ struct RowCounts {
 
 class SolidRows {
  public:
-  // `identity` names the job; rows of other jobs are not used.
+  // `identity` identifies the job: load() ignores rows that were saved with another identity.
   SolidRows(FileSystem& files, std::string path, SolidRule rule, uint32_t grid_levels,
             std::string identity);
   ~SolidRows();
@@ -71,7 +72,7 @@ class SolidRows {
   RowFile& file() { return *file_; }
   void add(const Cube& cube, const SubvolumeRows& rows);
   SubvolumeRows find(const Cube& cube) const;
-  // Reads the views from a subvolume's low faces, row_bytes() in memory.
+  // Reads the views from a subvolume's low faces. The caller charges their row_bytes().
   SolidEntry read_entry(const Cube& cube) const;
 
   std::vector<FullCube> full_cubes;

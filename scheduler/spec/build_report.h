@@ -61,7 +61,7 @@ struct BuildReport {
 // Path of the build report of an output file.
 inline std::string report_path(const std::string& output) { return output + ".report.json"; }
 
-// One JSON object; docs/cli.md lists its names.
+// Returns one JSON object; docs/cli.md lists its members.
 std::string report_json(const BuildReport& report);
 // Throws Error{kCorrupt} for a text not created by report_json(). Fields missing from the text have
 // their defaults.

@@ -104,8 +104,8 @@ struct RunOptions {
   MethodName method = MethodName::kDefault;
   std::string cache_folder;  // "": no cache
   uint64_t cache_bytes = uint64_t{16} << 30;
-  // Disk space that the build leaves free. If it is used up, the build ends with Error{kNoSpace}
-  // and can be resumed.
+  // Disk space that the build leaves free. If less would remain, the build ends with
+  // Error{kNoSpace} and can be resumed.
   uint64_t min_free_bytes = 0;
   // Seconds between checkpoints: CPU time during the merge, wall time in the stages before it.
   double checkpoint_interval_s = 2;

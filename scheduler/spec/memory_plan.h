@@ -90,8 +90,8 @@ struct MemoryPlan {
 
 // Memory of the workers of the color stage.
 struct ColorMemory {
-  // kRegionBytes is the minimum: a large region of the color grid is then baked in pieces.
-  // kSolidRegionBytes is enough to bake any region in one piece.
+  // Memory for baking one region of the color grid. With the minimum, kRegionBytes, a large region
+  // is baked in pieces. kSolidRegionBytes is enough to bake any region in one piece.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
   static constexpr uint64_t kSolidRegionBytes = uint64_t{46} << 20;
   // Memory for the attributes other than color in a region. Includes kValueSumBytes for the sums of
@@ -133,7 +133,8 @@ struct WorkerMemory {
   unsigned workers = 1;
   uint64_t share_bytes = 0;  // bytes per worker for Backend::build()
 
-  // Returns `wanted` workers, or fewer if their shares could not hold the smallest subvolume.
+  // Returns `wanted` workers, at most kMaxWorkers. Returns fewer, but at least one, if their shares
+  // could not hold the smallest subvolume.
   static constexpr WorkerMemory divide(uint64_t free_bytes, unsigned wanted) {
     constexpr uint64_t kMinBytes = kSmallestBudget + kOutsideShareBytes;
     const uint64_t workers =

@@ -61,7 +61,7 @@ class JobProgress : public Progress {
   JobStore* store_;
 };
 
-// Throws Error{kInvalidInput}: the warning, which is an error in a strict build.
+// Throws the warning as Error{kInvalidInput}. Used in a strict build.
 [[noreturn]] void refuse_warning(const Warning& warning);
 
 // Returns a subvolume in the form that Progress reports.

@@ -41,8 +41,8 @@ bool is_scratch(const DirectoryEntry& entry) {
 // NFS gives such a name to a removed file that a process still has open.
 bool is_left_by_nfs(std::string_view name) { return name.starts_with(".nfs"); }
 
-// Files and folders of a cluster build; slurm/files/cluster_folder.h lists them. Anything may have
-// the name of a record; the build warns about it.
+// Files and folders of a cluster build; slurm/files/cluster_folder.h lists them. Any entry, even a
+// folder or a pipe, may have the name of a record; the build warns about it.
 bool is_of_cluster(const DirectoryEntry& entry) {
   const std::string_view name = entry.name;
   if (name.starts_with("batch-") && name.ends_with(".json")) return true;
@@ -223,7 +223,8 @@ void WorkFolder::remove() {
   released_.clear();
   try {
     // The lock file is removed last, so that no other build uses the folder before it is empty. The
-    // sample rows of a solid are removed after the job store, because its report needs them.
+    // sample rows of a solid are removed after the job store: a build that resumes with this store
+    // needs them for its report.
     std::vector<std::string> others = scratch_files();
     for (const DirectoryEntry& entry : files_.list(path_))
       if (is_ours(entry) && !entry.is_directory && entry.name != kLockName &&

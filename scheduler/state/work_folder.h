@@ -52,7 +52,8 @@ class WorkFolder {
   // Returns an unused id for this process's segments: one more than the largest existing id below
   // kFirstClusterSegment.
   uint32_t next_segment_id() const;
-  // Returns the bytes of all files in the folder, without released parts. For reports.
+  // Returns the bytes of the files in the work folder and in its folders `merge` and `cluster`,
+  // without released parts. For reports.
   uint64_t bytes() const;
 
   // Frees the disk space of a part of a segment that is no longer needed. Not thread-safe.

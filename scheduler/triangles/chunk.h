@@ -20,7 +20,7 @@ namespace voxdag {
 
 inline constexpr size_t kMaxTriangleRecordBytes = 72;
 size_t triangle_record_bytes(bool wide);
-// `out` has room for one record of `record_bytes`.
+// Writes the record of a triangle to `out`, which has room for `record_bytes` bytes.
 void encode_triangle(const FixedTriangle& triangle, size_t record_bytes, std::byte* out);
 
 struct Chunk {

@@ -48,7 +48,7 @@ class TriangleStore {
   virtual void add_cube_bins(std::span<const Cube> cubes) = 0;
   virtual const std::vector<CubeBin>& cube_bins() const = 0;
   // Creates a bin for a part of a split subvolume. The caller copies triangles from the bin `whole`
-  // to it. The store retains `whole` until the part is released.
+  // to it. A DurableStore retains `whole` until the part is released.
   virtual BinId add_part(BinId whole) = 0;
 
   virtual void add_chunk(BinId bin, std::span<const std::byte> records) = 0;
@@ -56,8 +56,8 @@ class TriangleStore {
   // Reads the bin's triangles, starting at index `first`. The store must outlive the stream.
   virtual std::unique_ptr<TriangleStream> open(BinId bin, uint64_t first = 0) const = 0;
 
-  // Returns true if references remain. The caller must then call release() when the bin's artifact
-  // is durable.
+  // Ends this run's reading of the bin. Returns true if references remain. The caller must then
+  // call release() when the bin's artifact is durable.
   virtual bool drop(BinId bin) = 0;
   // Adds one reference.
   virtual void retain(BinId bin) = 0;

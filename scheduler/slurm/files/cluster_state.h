@@ -23,8 +23,8 @@ namespace voxdag {
 struct ExpectedSubvolume {
   SubvolumeId id = 0;
   Cube cube;
-  // The batch's number of triangles in the cube. Each of them sets a voxel. Unknown in the state of
-  // an earlier version.
+  // Number of the batch's triangles in the cube; each of them sets at least one voxel. nullopt in a
+  // state written by an earlier version.
   std::optional<uint64_t> triangles;
 
   bool operator==(const ExpectedSubvolume&) const = default;

@@ -18,7 +18,7 @@ std::string describe(const Cube& cube) {
          ", " + std::to_string(cube.position[1]) + ", " + std::to_string(cube.position[2]) + ")";
 }
 
-// Compares the record with the numbers of triangles in the batch.
+// Checks that the record has voxels in exactly the subvolumes that have triangles.
 void check_counts(const CompletionRecord& record, std::span<const ExpectedSubvolume> subvolumes) {
   for (size_t i = 0; i < subvolumes.size(); ++i) {
     const auto& triangles = subvolumes[i].triangles;

@@ -19,7 +19,7 @@ constexpr size_t kHeaderBytes = 56;
 constexpr size_t kReadBytes = 256 << 10;
 // Flag in `part` of a header: this part is the last part of its artifact.
 constexpr uint64_t kLastPart = uint64_t{1} << 63;
-// keep_only() does nothing while unused artifacts take at most this much more than used ones.
+// keep_only() does nothing while unused artifacts take at most this many bytes more than used ones.
 constexpr uint64_t kTolerableBytes = 64 << 10;
 
 struct Header {

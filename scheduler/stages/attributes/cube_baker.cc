@@ -182,8 +182,8 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
   if (most >= kManyRecordBytes) sink.take(sink.records);
 }
 
-// Returns false if the cube has more than `max_cells` cells, or if the sums of its normals and
-// materials do not fit in memory.
+// Bakes the cells of a cube. Returns false if the cube has more than `max_cells` cells, or if the
+// sums of its normals and materials do not fit in memory.
 template <class AddSurfaces>
 bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces) {
   bool is_complete = true;

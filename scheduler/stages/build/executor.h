@@ -1,7 +1,7 @@
 // Builds subvolumes on worker threads. Each worker repeatedly takes the heaviest remaining
 // subvolume and builds it with its own backend. It appends the artifact to its own segment file and
-// passes it to its CommitQueue. A worker splits a subvolume that needs more memory than its share
-// into octants, which are queued instead.
+// passes it to its CommitQueue. A worker splits a subvolume that needs more memory than the
+// worker's share into octants, which are queued instead.
 #pragma once
 
 #include <cstdint>

@@ -95,7 +95,7 @@ class SnappedPiece {
     counts_.expected_voxels = 0;
   }
 
-  // Returns true if the triangle is in the grid. Counts it otherwise.
+  // Returns true if the triangle is in the grid. Otherwise counts it, or sets too_far_.
   bool is_inside(SnapResult result) {
     if (result == SnapResult::kOutside) ++counts_.dropped_outside;
     if (result == SnapResult::kTooFar && !too_far_)

@@ -19,8 +19,8 @@
 namespace voxdag {
 namespace {
 
-// Maximum expected bricks per subvolume: a fraction of a second of work, with tables that fit in
-// the processor's caches.
+// Maximum expected bricks per subvolume. Building that many takes a fraction of a second, and their
+// tables fit in the processor's caches.
 constexpr double kMaxBricksPerSubvolume = 4e6;
 // A small build has about kMinSubvolumes subvolumes, or fewer if each would have less than
 // kMinBricksPerSubvolume expected bricks.
@@ -33,7 +33,7 @@ constexpr int64_t kMaxWaitNs = 200'000'000;
 constexpr size_t kMaxBins = 8192;
 
 // Returns the longest edge of a subvolume. A worker holds all sample rows of a solid's subvolume,
-// so they limit its edge.
+// so the memory for them limits the edge.
 int64_t longest_edge(const BuildSpec& spec) {
   if (solid_rule_of(spec.geometry) == SolidRule::kNone) return INT64_MAX;
   int64_t edge = kSmallestEdge;
@@ -95,12 +95,12 @@ class Preparation {
     state_.declared_triangles = scene.declared_triangles();
     if (state_.position == 0) checkpoint_.check_disk_space(scene);
     for (const Warning& warning : scene.warnings()) context_.progress.warn_of_input(warning);
-    // These come last, because enabling checkpoints can start over, which removes recorded
-    // warnings.
+    // Reported last, because enable_checkpoints() above removes all recorded warnings.
     for (const Warning& warning : warnings.list()) context_.progress.warn_of_input(warning);
   }
 
-  // Returns the files that decide the voxels.
+  // Returns the files that determine the voxels: the scene's files, and the images of cutouts that
+  // are left out.
   std::vector<SourceFile> files() {
     std::vector<SourceFile> all = scene_.open().files();
     if (spec_.geometry.cutouts != CutoutRule::kSkip) return all;

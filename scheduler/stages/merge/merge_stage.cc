@@ -31,8 +31,8 @@ class StoredCheckpoint : public Checkpoint {
   BuildJob& job_;
 };
 
-// Writes an artifact of the empty cubes above the subvolumes that are inside a solid. No row of the
-// job store names it: a resumed merge writes it again.
+// Writes an artifact of the solid's full cubes (SolidRows::full_cubes). No row of the job store
+// names it: a resumed merge writes it again.
 ArtifactRef write_full_cubes(BuildJob& job) {
   SegmentWriter segment(job.context.files, job.work.path(), job.work.next_segment_id(), job.budget);
   std::vector<Cube> cubes;

@@ -22,9 +22,9 @@ constexpr double kLateGrowth = 2.5;
 constexpr double kGrowthDecay = 0.75;
 // Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
 constexpr double kSpreadPerDoubling = 1.12;
-// Bytes of the global file per node. A pilot's file has fewer, because coarse levels repeat more.
-// So its number is multiplied by kBytesGrowthPerDoubling with each doubling of R, up to
-// kMaxBytesPerNode.
+// Bytes of the global file per node. A pilot's file has fewer bytes per node, because coarse levels
+// repeat more. So its number is multiplied by kBytesGrowthPerDoubling with each doubling of R, up
+// to kMaxBytesPerNode.
 constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;
 // Measured on real scenes: nodes of all artifacts per node of the global DAG, and compressed bytes
@@ -49,8 +49,8 @@ uint32_t pilot_levels_of(uint32_t grid_levels) {
   return std::clamp<uint32_t>(grid_levels - std::min<uint32_t>(grid_levels, 2), 12, 13);
 }
 
-// A pilot build: the complete scene as one subvolume on a coarser grid. Its output is counted and
-// discarded.
+// Results of a pilot build. A pilot builds the complete scene as one subvolume on a coarser grid;
+// its output is counted and discarded.
 struct PilotCounts {
   uint32_t levels = 0;  // levels of the pilot's grid
   double voxels = 0;
@@ -205,7 +205,7 @@ void check_disk(const char* what, const EstimateRange& bytes, const std::string&
 
 // Compares the estimate with the free space on the disks of the work folder and the output folder.
 // Throws Error{kNoSpace} with the estimate if even the low end does not fit. Warns if the high end
-// may not fit.
+// does not fit.
 void check_estimate(const Estimate& estimate, FileSystem& files, const std::string& work_folder,
                     const std::string& output_folder, Progress& progress) {
   const uint64_t work_free = files.free_space(work_folder);
@@ -260,7 +260,7 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
   estimate.disk_bytes =
       estimate.file_bytes + kArtifactBytesPerNode * artifact_nodes + triangles_on_disk(scene);
-  // Cutouts make more records than triangles.
+  // With cutouts, patches can replace a triangle, so there can be more records than triangles.
   const uint64_t records =
       std::max(scene.state.counts.triangles, scene.triangles->count(kSceneBin));
   const double triangle_bytes =

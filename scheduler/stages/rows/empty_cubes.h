@@ -1,4 +1,4 @@
-// The maximal empty cubes of the octree above a set of cubes.
+// Finds the maximal empty cubes of the octree.
 #pragma once
 
 #include <span>
@@ -8,8 +8,8 @@
 
 namespace voxdag {
 
-// Returns the largest cubes that contain none of `occupied`, which are disjoint, but whose parents
-// do. Returns the grid if `occupied` is empty.
+// Returns the largest cubes that contain no cube of `occupied`: the parent of each contains one.
+// The cubes of `occupied` are disjoint. Returns the grid if `occupied` is empty.
 std::vector<Cube> maximal_empty_cubes(std::span<const Cube> occupied);
 
 }  // namespace voxdag

@@ -1,10 +1,10 @@
 // The sample rows of a column of subvolumes along an axis.
 //
-// The column's square is the square of its largest subvolume; smaller ones are in parts of it. The
-// rows are stored by tiles of the square, each with the rows on all its borders: where squares of
-// different subvolumes meet, each has its own copy, which advances with its own subvolumes. A
-// crossing on a border is in the subvolumes on both sides, so all copies of a row have the same
-// total.
+// The square of a cube is its projection along the axis. The column's square is the square of its
+// largest subvolume and contains the squares of the others. The rows are stored by tiles of the
+// square, each with the rows on all its borders. A row on a border of tiles has a copy in each of
+// them, which changes with the subvolumes of that tile. A crossing on a border is in the subvolumes
+// on both sides, so all copies of a row have the same total.
 //
 // Subvolumes and empty cubes are visited in Morton order. In this order everything in front of a
 // cube, seen along any axis, comes before the cube.
@@ -21,7 +21,8 @@
 
 namespace voxdag {
 
-// Positions on the grid in tiles: cubes of 64^3 voxels, or the grid if that is smaller.
+// Converts positions on the grid to tiles. A tile is a cube of 64^3 voxels, or the grid if the grid
+// is smaller.
 struct TileGrid {
   explicit TileGrid(uint32_t grid_levels);
   int tiles_along(const Cube& cube) const { return 1 << (levels - cube.level); }
@@ -33,7 +34,7 @@ struct TileGrid {
   int blocks;       // blocks along a tile's edge, at most 8
 };
 
-// The crossings of the rows of a tile's closed square outside the grid.
+// The crossings outside the grid on the rows of a tile's square, including the rows on its border.
 struct OutsideTile {
   int32_t before[81] = {};  // sums of the signs of the crossings in front of the grid
   int32_t total[81] = {};   // numbers (row_sums.h) of all crossings outside the grid
@@ -44,15 +45,16 @@ class RowColumn {
   static constexpr int kRows = 9;
   static constexpr int kSquare = kRows * kRows;
 
-  // `square`: a cube whose square is the column's. Charges the column's memory to `budget`.
+  // `square`: the largest subvolume of the column; its square is the column's square. Charges the
+  // column's memory to `budget`.
   RowColumn(const TileGrid& grid, SolidRule rule, int axis, const Cube& square,
             MemoryBudget& budget);
   static uint64_t bytes(const TileGrid& grid, const Cube& square);
 
-  // First call add_total() for all subvolumes of the column, then begin(), then for the subvolumes
-  // in Morton order entry() and advance().
+  // Order of calls: add_total() for all subvolumes of the column and add_outside(), then begin(),
+  // then entry() and advance() for each subvolume in Morton order.
   void add_total(const Cube& cube, const std::vector<int32_t>& numbers);
-  // Adds the column's rows to the counts; each row of the grid counts once.
+  // Adds the column's rows to the counts; each row of the grid counts once. Call it before begin().
   void count(RowCounts& counts) const;
   // Adds the rows of one tile; `number` returns a row's number (row_sums.h).
   template <class Number>
@@ -61,10 +63,11 @@ class RowColumn {
   void begin();
   // Adds the crossings of a tile's rows outside the grid. Call it before begin().
   void add_outside(int first, int second, const OutsideTile& outside);
-  // Sets the views from the subvolume's low face.
+  // Sets `views` to the views from the subvolume's low face.
   void entry(const Cube& cube, std::vector<int32_t>& views) const;
   void advance(const Cube& cube, const std::vector<int32_t>& numbers);
-  // Returns the view from corner c of an empty cube, after the cubes before it were visited.
+  // Returns the view from corner `c` of an empty cube. Call it after advance() of all subvolumes
+  // before the cube in Morton order.
   int32_t corner(const Cube& cube, int c) const;
 
  private:

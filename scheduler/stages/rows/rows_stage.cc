@@ -28,7 +28,8 @@ struct EmptyCorner {
   int corner;
 };
 
-// A column of subvolumes along an axis: the cubes whose squares are in the square of `square`.
+// A column of subvolumes along an axis: the subvolumes whose squares (row_column.h) are in the
+// square of the cube `square`.
 struct Column {
   int axis = 0;
   Cube square;
@@ -70,7 +71,8 @@ class RowsStage {
   }
 
  private:
-  // Returns the number of threads if each needs `bytes`.
+  // Returns the number of threads for `items` if each thread needs `bytes`. All together use at
+  // most half of the free memory.
   unsigned threads_for(uint64_t bytes, size_t items) const {
     const uint64_t fit = context_.budget.available() / 2 / std::max<uint64_t>(bytes, 1);
     return static_cast<unsigned>(
@@ -117,7 +119,7 @@ class RowsStage {
   static Square square_of(const Cube& cube, int axis) {
     return {cube.level, cube.position[first_row_axis(axis)], cube.position[second_row_axis(axis)]};
   }
-  // Returns the largest square around `square` that is in `known`; null if none is.
+  // Returns the value of the largest square in `known` that contains `square`; null if none does.
   static const size_t* largest(const std::map<Square, size_t>& known, const Square& square) {
     for (uint32_t level = 0; level <= square[0]; ++level) {
       const uint32_t up = square[0] - level;
@@ -164,7 +166,8 @@ class RowsStage {
                     grid_.blocks;
     empty_views_[e] += view_of(rows_.rule(), outside->before[row], row_sum(outside->total[row]));
   }
-  // Counts the rows of tiles that are in no column.
+  // Assigns tiles with crossings outside the grid to their columns. Counts the rows of tiles that
+  // are in no column.
   void count_outside() {
     outside_->for_each([&](int axis, int first, int second, const OutsideTile& tile) {
       const Square square{grid_.levels, static_cast<uint32_t>(first),
@@ -176,7 +179,7 @@ class RowsStage {
             grid_, first, second, [&](int row) { return tile.total[row]; }, rows_.counts);
     });
   }
-  // Returns the square of the tile in the corner of a cube.
+  // Returns the square of the tile in corner `c` of a cube.
   Square tile_at(const Cube& cube, int c, int axis) const {
     const auto position = [&](int along) {
       return static_cast<uint32_t>(grid_.low(cube, along) +

@@ -1,5 +1,5 @@
 // The rows stage of a solid: from the bins of all subvolumes to the views from their low faces, and
-// to the empty cubes above the subvolumes that are inside.
+// to the full cubes (SolidRows::full_cubes).
 //
 //   1. Each subvolume: the crossings of its triangles with its own sample rows (RowSums).
 //   2. Each column of subvolumes along each axis (row_column.h): the totals of its rows, then the
