@@ -68,8 +68,8 @@ struct ServerConfig {
 // Applies a JSON file to `config`. Throws Error{kInvalidInput} with the file and the member that is
 // unknown or has a wrong value.
 void read_config(FileSystem& files, const std::string& path, ServerConfig& config);
-// Throws Error{kInvalidInput} for an invalid combination: no data folder, a certificate without its
-// key, or no tokens for an address that is not the loopback.
+// Throws Error{kInvalidInput} for a value outside its range, and for an invalid combination: no
+// data folder, a certificate without its key, or no tokens for an address that is not the loopback.
 void check_config(const ServerConfig& config);
 
 }  // namespace voxdag::server

@@ -26,9 +26,9 @@ class DiskSpace {
   // The disk space of one upload, reserved during the lifetime of this object. Used by one thread.
   class Reservation {
    public:
-    // `announced`: the expected number of bytes, 0 if unknown. Throws Error{kNoSpace} if this
-    // number of bytes is not free now. Only a part of it is reserved, so others may use the space
-    // before the bytes arrive.
+    // `announced`: the expected number of bytes, 0 if unknown. Throws Error{kNoSpace} unless this
+    // number of bytes is free in addition to the space that is kept free or already reserved.
+    // Reserves only a part of it, so others may use the rest before the bytes arrive.
     Reservation(DiskSpace& disk, uint64_t announced);
     ~Reservation();
     Reservation(const Reservation&) = delete;
@@ -56,11 +56,12 @@ class DiskSpace {
   }
   // Removes the ballast. Returns false if it does not exist.
   bool drop_ballast();
-  // Restores the ballast if the disk has space for it.
+  // Restores the ballast if it is missing and at least 4 MiB are free.
   void restore_ballast();
 
  private:
-  // Reserves `bytes`. Throws Error{kNoSpace} unless max(bytes, expected) bytes are free.
+  // Reserves `bytes`. Throws Error{kNoSpace} unless max(bytes, expected) bytes are free in addition
+  // to min_free_bytes_ and reserved_bytes_.
   void reserve(uint64_t bytes, uint64_t expected);
 
   FileSystem& files_;

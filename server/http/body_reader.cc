@@ -7,9 +7,9 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxLineBytes = 4096;
-// Free bytes in the line of a chunk with content: the longest size in hex. Content pays for them,
-// because it is at least one byte per line. All other bytes outside the content count against
-// kMaxExtraBytes: extensions, the line of the last chunk, and trailers with their line ends.
+// Bytes in the line of a chunk with content that do not count against kMaxExtraBytes: enough for
+// the longest size in hex. They need no limit, because at least one byte of content follows each
+// such line. Extensions, the line of the last chunk, and trailers with their line ends count.
 constexpr size_t kMaxSizeDigits = 16;
 constexpr size_t kMaxExtraBytes = 16384;
 constexpr size_t kLineEndBytes = 2;

@@ -16,7 +16,7 @@ class Exchange {
   Exchange(Connection& connection, const std::string& address);
 
   // Reads the head of the request. Request::read_body reads the body. Throws Problem if the head is
-  // malformed, too large or too slow.
+  // malformed, too large or too slow, or has a Content-Encoding.
   Request& read_request(size_t max_header_bytes);
   // Sends the answer. `last`: no other request may follow. Returns true if another request may
   // follow on the connection.

@@ -35,7 +35,7 @@ namespace voxdag::server {
 
 class Dispatcher {
  public:
-  // Called when a job's process has ended, with the job's state at that time.
+  // Called after a job's process has ended and the job's new state was recorded.
   using OnRunEnded = std::function<void(const Job&)>;
 
   // Repairs the queue and the folders after a crash of the previous service, then starts jobs.
@@ -75,9 +75,9 @@ class Dispatcher {
     // True if the worker will still record the job's outcome.
     bool is_running() const { return !recorded && !done; }
   };
-  // Reserves the files of an ended job for one thread that removes them. While this object
-  // exists, other removals of these files wait, and the job does not start even if a client
-  // retries it.
+  // Reserves the files of a job without a process for one thread, which removes files or stops
+  // cluster tasks. While this object exists, other removals of these files wait, and the job does
+  // not start even if a client retries it.
   class FilesLock {
    public:
     FilesLock(Dispatcher& dispatcher, const std::string& id);

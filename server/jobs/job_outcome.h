@@ -9,7 +9,7 @@
 namespace voxdag::server {
 
 // Returns the pause in seconds after `attempts` failed attempts. The pause doubles with each
-// attempt.
+// attempt, up to limits.max_backoff_s.
 double pause_s(const JobLimits& limits, unsigned attempts);
 
 // Changes the job, which may have been suspended, resumed or canceled since it started:

@@ -32,7 +32,8 @@ class TaskResolver {
   uint64_t memory_of(const JobRequest& request) const;
 
  private:
-  // Adds the scene to the task's uploads and to the paths that the task may read.
+  // Adds an uploaded scene to the task's uploads. Adds the scene, or the root that contains it, to
+  // the paths that the task may read.
   void add_scene(const std::string& scene, JobTask& task);
 
   const ServerConfig& config_;

@@ -1,4 +1,5 @@
-// Access control: checks the Host, Origin, rate and token of every request. Thread-safe.
+// Access control. Limits the rate of every client's requests and checks their tokens. Without a
+// token file, checks the Host and Origin of requests instead. Thread-safe.
 #pragma once
 
 #include <optional>

@@ -177,7 +177,7 @@ void add_plan(Json& all) {
   all["Plan"] = object(members);
 }
 
-// Returns the members of every manifest.
+// Returns the members that all manifests have.
 std::vector<Member> manifest_members() {
   Json root = object({{"level", count()}, {"offset", count()}});
   root["type"] = {"object", "null"};

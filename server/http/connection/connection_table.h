@@ -17,8 +17,8 @@ namespace voxdag::server {
 
 class ConnectionTable {
  public:
-  // What a connection waits for its client to do: nothing, to send the head of a request, to send a
-  // short body, or to send or receive the rest of an exchange.
+  // The action of its client for which a connection waits: none, sending the head of a request,
+  // sending a short body, or sending or receiving the rest of an exchange.
   enum class Waiting { kNot, kForRequest, kForShortBody, kInExchange };
 
  private:
@@ -36,7 +36,7 @@ class ConnectionTable {
 
   // Maximum memory of the answers of all connections.
   static constexpr size_t kMaxAnswerBytes = 64 << 20;
-  // The same for the connections of one client. The loopback (a proxy) is exempt.
+  // Maximum memory of the answers of one client's connections. The loopback (a proxy) is exempt.
   static constexpr size_t kMaxAnswerBytesPerClient = kMaxAnswerBytes / 2;
 
   explicit ConnectionTable(const HttpLimits& limits) : limits_(limits) {}

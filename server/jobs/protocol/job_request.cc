@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-// Sets the options in the body of a request.
+// Parses the body of a request into `options`. Returns the body as JSON.
 template <class Options>
 FieldJson read_body(std::string_view body, Options& options) {
   FieldJson json = FieldJson::parse(body, nullptr, false);
