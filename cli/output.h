@@ -25,8 +25,8 @@ nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section)
 // also has the names of the materials.
 void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json);
 
-// True if voxdag wrote the file and the file has the type that the command is about to write. Such
-// a file may be replaced without --force.
+// Returns true if voxdag wrote the file and the file has the type that the command is about to
+// write. Such a file may be replaced without --force.
 using IsOwnFile = std::function<bool(const ReadableFile& file)>;
 
 // A file to write, and the option --force.

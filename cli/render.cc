@@ -99,7 +99,7 @@ void check_outputs(const RenderCommand& command, GuardedOutputs& files) {
   if (command.depth.empty()) return;
   const OutputFile depth{command.depth, command.output.force};
   depth.guard(files);
-  // An array does not record the program that wrote it.
+  // A .npy file does not record the program that wrote it, so only --force replaces it.
   depth.check(files, command.input, [](const ReadableFile&) { return false; });
 }
 

@@ -11,8 +11,8 @@ namespace voxdag::client {
 class RetryPolicy {
  public:
   explicit RetryPolicy(const CancelToken& cancel) : cancel_(cancel) {}
-  // Waits before the next attempt, for at least `min_wait_s` seconds (five minutes if that is
-  // shorter), and returns true. Returns false without waiting if the total time for retries is used
+  // Waits before the next attempt, for at least `min_wait_s` seconds but not longer than five
+  // minutes, and returns true. Returns false without waiting if the total time for retries is used
   // up. Throws Error{kCanceled}.
   bool wait(double min_wait_s = 0);
   // Restarts the delays. Call it after an attempt that made progress.

@@ -15,7 +15,8 @@ class Maker {
     for (int a = 0; a < 3; ++a) low_[a] = cube.position[a] * edge_;
   }
 
-  // Vertices up to `reach` apart, somewhere in the cube.
+  // A triangle whose vertices are within `reach` units, along each axis, of a random point of the
+  // cube.
   FixedTriangle near(int64_t reach) {
     FixedTriangle t;
     for (int a = 0; a < 3; ++a) {

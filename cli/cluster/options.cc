@@ -47,8 +47,8 @@ ClusterOptions::MergeJobOptions merge_job(const BuildClusterOptions& cluster,
   return job;
 }
 
-// For the process of a merge job: sets memory and threads, if the user did not give them, to the
-// values of the job's Slurm allocation.
+// Called in the process of a merge job. Sets memory and threads, if the user did not give them, to
+// the values of the job's Slurm allocation.
 void take_allocation(RunOptions& run) {
   const Allocation given = slurm_allocation();
   if (run.memory_bytes == 0 && given.memory_bytes > 0)

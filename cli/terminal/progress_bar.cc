@@ -22,7 +22,8 @@ constexpr int kBarWidth = 24;
 constexpr size_t kNameWidth = 11;
 constexpr const char* kClearLine = "\r\033[K";
 
-// Returns a count with three or more digits and a unit prefix: 1234567 becomes "1.23 M".
+// Returns a count with a unit prefix and two decimals: 1234567 becomes "1.23 M". A count below 1000
+// has neither.
 std::string short_count(double count) {
   const char* suffix = "";
   for (const char* larger : {"k", "M", "G", "T"}) {

@@ -1,5 +1,5 @@
-// Caches the most recently used manifests by digest. It outlives the open files, because computing
-// the cameras of a manifest takes longer than reopening a file. Thread-safe.
+// Caches the most recently used manifests by digest. The cache outlives the open files, because
+// computing the cameras of a manifest takes longer than reopening a file. Thread-safe.
 #pragma once
 
 #include <list>

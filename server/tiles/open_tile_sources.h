@@ -1,6 +1,6 @@
 // Keeps the files that viewers requested last open, so that a request need not open and check them
-// again. A file that was removed or replaced is closed by the next request for it, by close(), or
-// by close_stale(). The owner must call close_stale() periodically. A file with an unreadable part
+// again. The next request for a replaced file closes the old file. close_stale() closes removed,
+// replaced and idle files, so the owner must call it periodically. A file with an unreadable part
 // is opened again. Manifests remain in memory longer than files remain open. Thread-safe.
 #pragma once
 

@@ -18,7 +18,8 @@ class PartialViews {
 
   // Returns the built subvolumes as JSON (docs/api.md). Throws Error{kNotFound} if the subvolumes
   // are not planned yet or the folder is removed during the call. Throws RequestError{kBusy} if all
-  // remembered jobs were requested in the last seconds, and the errors of CoarseCubes::refresh().
+  // remembered jobs were requested in the last ten seconds, and the errors of
+  // CoarseCubes::refresh().
   std::string json(const std::string& job, const JobFolder& folder, uint64_t resolution);
   // Returns the built subvolumes as the tiles of a DAG of the job's grid. Throws like json().
   std::shared_ptr<const TileSource> tiles(const std::string& job, const JobFolder& folder,
