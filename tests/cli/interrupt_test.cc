@@ -63,8 +63,8 @@ TEST_F(Interrupt, StopsAndResumes) {
   }
 }
 
-// A JPEG of many scans takes long to decode. tests/long/signals.py sends signals at random moments
-// of every command.
+// A JPEG of many scans takes long to decode. SIGTERM ends the build within 5 s nevertheless.
+// tests/long/signals.py sends signals at random moments of every command.
 TEST_F(Interrupt, InsideAnImageDecoder) {
   constexpr uint32_t kEdge = 2048;
   put("late.jpg", voxdag::test::jpeg_of_scans(kEdge, kEdge,
@@ -97,7 +97,8 @@ class InterruptExport : public Interrupt {
     ASSERT_EQ(run({"build", "s.glb", "-r", "1024", "-o", "s.vdag"}).status, 0);
     std::signal(SIGHUP, SIG_DFL);  // whatever runs the tests
   }
-  // Sends the signal once the file `first` exists. Returns the result of the run.
+  // Runs the command and sends the signal once the file `first` exists. If the run ends before the
+  // signal, tries again, up to ten times. Returns the result of the last run.
   Answer interrupt_at(const std::string& first, int signal, const std::vector<std::string>& args) {
     Answer answer;
     for (int attempt = 0; attempt < 10; ++attempt) {

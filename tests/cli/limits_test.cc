@@ -43,7 +43,8 @@ TEST_F(Limits, OpenFilesAreNamed) {
   EXPECT_NE(answer.err.find("ulimit -n, is "), std::string::npos) << answer.err;
 }
 
-// Lowers the limit until the build fails. Below that, the libraries themselves do not start.
+// Lowers the limit until the build fails, with an error that names the limit. Below that, the
+// libraries themselves do not start.
 TEST_F(Limits, AddressSpaceIsNamed) {
   if (VOXDAG_SANITIZED) GTEST_SKIP() << "sanitizers need the address space";
   Answer answer;

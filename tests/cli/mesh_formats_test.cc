@@ -115,7 +115,7 @@ std::string withheld_las() {
   return las.file();
 }
 
-// The mesh has an unknown weight for a morph target that does not exist.
+// The mesh has a weight for a morph target that does not exist.
 std::string morphed_glb() {
   voxdag::test::SceneBuilder scene = voxdag::test::one_triangle();
   scene.root["meshes"][0]["weights"] = {1};

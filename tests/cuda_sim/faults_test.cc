@@ -75,7 +75,7 @@ TEST_P(Faults, EveryOtherCall) {
   expect_equals(build(*backend, kTask, scene()), truth, kTask);
 }
 
-// A release that fails changes nothing of the result.
+// A failed release does not change the result.
 TEST_P(Faults, EveryRelease) {
   const auto backend = open();
   const oracle::Dag truth = expected();

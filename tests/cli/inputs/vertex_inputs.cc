@@ -16,7 +16,7 @@ WorldTriangles joined(WorldTriangles a, const WorldTriangles& b) {
   return a;
 }
 
-// A joint moves the mesh. `weights` has the weights of each vertex, one after the other.
+// A joint moves the mesh by kByJoint. `weights` has four weights per vertex.
 template <class T>
 SceneBuilder skinned(int type, const std::vector<T>& weights) {
   SceneBuilder scene = band_scene();

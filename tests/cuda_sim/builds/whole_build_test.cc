@@ -74,7 +74,8 @@ TEST_F(SimulatedBuild, HasTheBytesOfTheCpuBackend) {
   }
 }
 
-// A build is killed at some of its disk operations, and resumed on the device or on the CPU.
+// A build is killed at some of its disk operations, and resumed on the device or on the CPU. The
+// resumed build writes the expected bytes.
 TEST_F(SimulatedBuild, ResumesAfterAKill) {
   crash::FaultyFiles counting({});
   run(spec(BackendName::kCuda, MethodName::kDefault), counting);
