@@ -19,8 +19,8 @@ class AppearingOutput : public CommandLine {
     const timespec t{ms / 1000, ms % 1000 * 1000000};
     nanosleep(&t, nullptr);
   }
-  // Starts a command and creates `appears` once `sign`, which the command creates after its checks,
-  // exists. Expects an error, and that the file is kept.
+  // Starts a command. Creates the file `appears` once the command has created `sign`, which it does
+  // after its checks. Expects that the command fails and that the file is kept.
   void expect_kept(const std::string& appears, const std::string& sign,
                    const std::vector<std::string>& args) {
     SCOPED_TRACE(args[0] + ": " + appears);
@@ -52,7 +52,8 @@ TEST_F(AppearingOutput, IsKept) {
   expect_kept("g", "g.partial", {"generate", "soup", "g", "--triangles", "5000000"});
 }
 
-// The picture has no temporary file until it is complete.
+// render creates no file until the picture is complete, so the test waits 1.5 s instead of for a
+// file. The command fails, and the file of the other program is kept.
 TEST_F(AppearingOutput, OfRenderIsKept) {
   const pid_t pid = start(
       {"render", "s.vdag", "-o", "r.png", "--size", "256x256", "--threads", "1", "--samples", "4"});

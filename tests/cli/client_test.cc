@@ -71,7 +71,8 @@ class Client : public CommandLine {
   std::unique_ptr<ServeProcess> server_;
 };
 
-// From a local scene to a verified file: the file has the bytes of a local build.
+// Submits a local scene, and downloads and verifies the result. The file has the bytes of a local
+// build.
 TEST_F(Client, BuildsTheSameBytesAsTheBuildCommand) {
   const Json job = run_json({"submit", "m.glb", "-r", "128", "--hash-bits", "16", "--name",
                              "sponge", "--memory", "256MiB", "--wait"});

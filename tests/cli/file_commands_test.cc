@@ -34,7 +34,8 @@ TEST_F(FileCommands, InfoNamesAndCounts) {
   EXPECT_NE(plain.out.find("128"), std::string::npos);
 }
 
-// A valid file passes, with and without its scene; any damage is exit status 4.
+// A valid file passes, with and without its scene. Damage gives exit status 4, or 5 if it changes
+// the format version.
 TEST_F(FileCommands, Verify) {
   EXPECT_EQ(run_json({"verify", "m.vdag"})["ok"], true);
   EXPECT_EQ(run_json({"verify", "m.vdag", "--against", "m.glb"})["ok"], true);

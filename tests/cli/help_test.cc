@@ -34,7 +34,7 @@ TEST_F(Help, OfEveryCommand) {
   }
 }
 
-// Finds the options of a description in a help text.
+// Checks that a help text has the options of the commands up to `scope`, and no others.
 struct OptionFinder {
   template <class T>
   void operator()(const voxdag::Field& field, T&) {

@@ -16,7 +16,8 @@ TEST(SimulatedDevice, EndsProgramsThatBreakARule) {
     EXPECT_DEATH(program.run(), std::string("cuda_sim: .*") + program.violation) << program.name;
 }
 
-// The access is also found in code that is not instrumented, such as this test.
+// The simulation also detects an access of the host in code that is not instrumented, such as this
+// test.
 TEST(SimulatedDevice, EndsAHostThatTouchesDeviceMemory) {
   testing::GTEST_FLAG(death_test_style) = "fast";
   EXPECT_DEATH(static_cast<void>(words_of_the_device()[0]), "the host touched device memory");

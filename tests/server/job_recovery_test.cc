@@ -93,7 +93,8 @@ TEST_F(JobRecovery, AJobWhoseDeletionFailedIsNotTriedAgain) {
   EXPECT_FALSE(std::filesystem::exists(data("jobs/" + id + ".deleted")));
 }
 
-// The same for a job that succeeded: its result is gone, although it is still listed.
+// A job that succeeded is deleted, but the deletion fails halfway. Its result is gone, although the
+// job is still listed.
 TEST_F(JobRecovery, AResultWhoseDeletionFailedIsNotFound) {
   start();
   const std::string id = posted_job();
@@ -107,7 +108,8 @@ TEST_F(JobRecovery, AResultWhoseDeletionFailedIsNotFound) {
   EXPECT_EQ(http_->get("/api/v1/jobs/" + id).status, 404);
 }
 
-// Only the marked folder is deleted. The job's new folder and the job's record are kept.
+// At its start, the service deletes only the marked folder of a job. The job's new folder and its
+// record are kept.
 TEST_F(JobRecovery, AMarkedFolderTakesNoOtherAlong) {
   start();
   const std::string id = posted_job(), waiting = posted_job();

@@ -121,7 +121,7 @@ std::unique_ptr<voxdag::WritableFile> FaultyFiles::open_write(const std::string&
   return std::make_unique<FaultyWriter>(*this, std::move(file));
 }
 
-// Not an operation of its own: create() follows.
+// Does not count as an operation, because create() follows.
 bool FaultyFiles::create_new(const std::string& path) {
   std::lock_guard lock(mutex_);
   if (!ForwardingFiles::create_new(path)) return false;

@@ -64,7 +64,8 @@ std::vector<Input> meshopt_inputs() { return {}; }
 
 #ifdef VOXDAG_HAS_DRACO
 
-// Sequential, without quantization: the coordinates are exact.
+// Encodes the mesh with Draco sequentially and without quantization, so that the coordinates are
+// exact.
 std::vector<char> draco_data() {
   draco::Mesh mesh;
   const auto points = static_cast<uint32_t>(band().vertices.size());

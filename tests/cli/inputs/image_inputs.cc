@@ -12,7 +12,7 @@ std::string data_uri(const std::string& image) {
   return "data:application/octet-stream;base64," + voxdag::test::base64(image);
 }
 
-// The image is the base color of the mesh, or `texture` of its material.
+// Returns the mesh with the image at `uri` as its base color.
 SceneBuilder textured(const std::string& uri) {
   SceneBuilder scene = band_scene();
   scene.root["images"] = {{{"uri", uri}}};
@@ -25,7 +25,7 @@ SceneBuilder textured(const std::string& uri) {
   return scene;
 }
 
-// The texture names the image by an extension alone.
+// The texture names the image only in this extension, not in `source`.
 std::string by_extension(const std::string& extension, const std::string& uri) {
   SceneBuilder scene = textured(uri);
   scene.root["textures"] = {{{"extensions", {{extension, {{"source", 0}}}}}}};

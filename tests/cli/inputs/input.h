@@ -40,7 +40,7 @@ struct Input {
   std::string file;                               // the scene
   std::map<std::string, std::string> more_files;  // files that the scene refers to
   WorldTriangles triangles = band().world();      // the scene's triangles
-  // The voxels are those of these triangles, if they are not those of `triangles`.
+  // Triangles that set the expected voxels; nullopt if `triangles` do.
   std::optional<WorldTriangles> visible = {};
   std::optional<Color> color = {};  // color of all cells; builds with --color
   std::string warning = "";         // the code of the only warning

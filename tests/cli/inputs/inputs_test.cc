@@ -1,5 +1,5 @@
 // Builds each file that the other files of this folder generate. Compares the number of voxels with
-// the oracle, and all colors.
+// the oracle's, and all colors with the expected color.
 #include <filesystem>
 
 #include "tests/cli/command_line.h"

@@ -225,7 +225,8 @@ void cubs_storage_is_in_use() {
   session.wait();
 }
 
-// The sort's second buffer begins at word 128.
+// The storage, which begins at word 130, overlaps the sort's second buffer, which begins at word
+// 128.
 void cubs_storage_is_written() {
   const Session session;
   session.fill();

@@ -33,7 +33,8 @@ uint64_t upload_then_change(uint64_t value);
 // Returns the address of device memory, after removing the access rights of the host.
 const volatile uint32_t* words_of_the_device();
 
-// Allocates device memory and does not release it. Returns the bytes that remain in use.
+// Allocates 100 bytes of device memory. Returns the bytes in use after all other memory was
+// released. Releases the 100 bytes before it returns.
 uint64_t forget_an_allocation();
 
 }  // namespace voxdag::cuda_sim

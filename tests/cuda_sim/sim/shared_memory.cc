@@ -7,7 +7,7 @@
 
 namespace voxdag::cuda {
 
-// What the kernels declare as their dynamic shared memory.
+// The array that kernels declare as their dynamic shared memory.
 extern unsigned char block_memory[];
 alignas(16) unsigned char block_memory[cuda_sim::kMaxSharedBytes];
 

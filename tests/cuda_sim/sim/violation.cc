@@ -12,7 +12,8 @@ namespace {
 
 const char* g_operation = nullptr;
 
-// Device memory has no access rights while the host runs.
+// Handles the fault of a host that accesses device memory, which has no access rights while the
+// host runs.
 void on_fault(int signal, siginfo_t* info, void*) {
   if (device_memory().contains(info->si_addr))
     violation("the host touched device memory outside of a copy");

@@ -12,7 +12,7 @@
 
 namespace voxdag {
 
-// Writes FOLDER/leaf.png. Texels are hidden in stripes, one of `period`.
+// Writes FOLDER/leaf.png. One column of texels in every `period` columns is hidden.
 inline void write_leaf_image(const std::string& folder, int period) {
   constexpr int kSize = 16;
   std::string pixels;

@@ -1,5 +1,5 @@
-// Files in the shared folder of a cluster build that no task of the build wrote: they do not count,
-// and the build goes on.
+// Files in the shared folder of a cluster build that no task of the build wrote. The build rejects
+// them and continues.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

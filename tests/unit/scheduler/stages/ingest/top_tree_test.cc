@@ -117,7 +117,8 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
   }
 }
 
-// Tests the same for the parts of a split cube, with triangles that extend beyond the cube.
+// CubeTree finds the parts of a split cube that each triangle touches, even for triangles that
+// extend beyond the cube.
 TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
   const Cube whole{2, {1, 2, 1}};
   std::vector<SubvolumePlan> parts;
