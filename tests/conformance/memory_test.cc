@@ -1,5 +1,5 @@
-// The memory guarantees of a backend. A cube that does not fit in the budget gives the outcome that
-// it must be split. The smallest cube always fits.
+// The memory guarantees of a backend. The outcome for a cube that does not fit in the budget is
+// kNeedsSplit. The smallest cube always fits.
 #include <malloc.h>
 
 #include <atomic>

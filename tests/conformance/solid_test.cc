@@ -22,7 +22,7 @@ oracle::SolidRule oracle_rule(SolidRule rule) {
   return rule == SolidRule::kWinding ? oracle::SolidRule::kWinding : oracle::SolidRule::kParity;
 }
 
-// Returns the views from the low faces of a cube, from all triangles of the scene.
+// Returns the views from the low faces of a cube, computed from all triangles of the scene.
 SolidEntry entry_of(const oracle::Triangles& scene, const Cube& cube, uint32_t levels,
                     SolidRule rule) {
   const int64_t edge = cube.edge_voxels(levels);

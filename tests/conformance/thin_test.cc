@@ -86,8 +86,8 @@ TEST_P(Thin, LargeFlatSurfaces) {
   }
 }
 
-// All triangles are degenerate, parallel to the rows that they could meet, or between the rows: the
-// subvolume is empty, although voxels of it are touched.
+// The triangles are a point, a segment, and a triangle between the rows of voxel centers. They
+// touch voxels, but the subvolume is empty.
 TEST_P(Thin, SubvolumesMayBeEmpty) {
   const auto backend = open();
   const oracle::Triangles nothing = {

@@ -42,7 +42,7 @@ TEST_P(WholeGrid, EqualsTheOracleOnMixedScenes) {
   }
 }
 
-// All 2^18 voxels are set, so each level has only one node, which occurs many times.
+// All 2^18 voxels are set, so the DAG has only one node per level.
 TEST_P(WholeGrid, FullGridIsOneNodeALevel) {
   oracle::Triangles scene;
   for (int64_t x = 128 + 1; x < 64 * 256; x += 256) {

@@ -18,7 +18,7 @@ uint64_t fold(uint64_t a, uint64_t b) {
   return (a * b) ^ high;
 }
 
-// The nodes of one octree level: for the cell (x, y, z), the node's index in the level array.
+// The nodes of one octree level: for the cell (x, y, z), the index of its node in the level array.
 struct Places {
   explicit Places(int edge_) : edge(edge_), node(static_cast<size_t>(edge_) * edge_ * edge_) {}
   uint32_t& at(int x, int y, int z) { return node[(static_cast<size_t>(x) * edge + y) * edge + z]; }
@@ -53,8 +53,8 @@ Node node_above(Places& below, const std::vector<uint64_t>& hashes, int x, int y
   return node;
 }
 
-// Sorts the keys of `wanted`, and returns them. Sets each place of a key to the key's index in this
-// order.
+// Returns the keys of `wanted` in order. `wanted` has the cells of each key, as indices into
+// places.node. Sets each of these cells to the index of its key in the result.
 template <class Key>
 std::vector<Key> number(const std::map<Key, std::vector<size_t>>& wanted, Places& places) {
   std::vector<Key> sorted;
@@ -65,7 +65,7 @@ std::vector<Key> number(const std::map<Key, std::vector<size_t>>& wanted, Places
   return sorted;
 }
 
-// Calls visit(place, x, y, z) for every place of a level.
+// Calls visit(place, x, y, z) for every cell of a level; `place` is the index of the cell.
 template <class Visit>
 void for_each_place(int edge, const Visit& visit) {
   size_t place = 0;

@@ -32,7 +32,7 @@ FileDag read_dag(const voxdag_reader::File& file);
 // looks up every voxel by its position.
 void expect_file_equals(const std::string& path, const oracle::Voxels& voxels, int hash_bits);
 
-// The bytes of a file.
+// Returns the bytes of a file.
 std::string contents(const std::string& path);
 
 // Writes scenes to a temporary folder, and builds them there.

@@ -32,7 +32,7 @@ void for_each_solid(Visit visit) {
 
 using SolidBuilds = Reference;
 
-// The bounds are the grid's, so triangles beyond it count as well.
+// The build's bounds are the grid. Triangles outside it count as well.
 TEST_F(SolidBuilds, EqualTheOracle) {
   for_each_solid([&](oracle::SolidKind kind) {
     for (const int edge : {4, 8, 16, 32})
@@ -57,7 +57,8 @@ TEST_F(SolidBuilds, EqualTheOracle) {
   });
 }
 
-// In a grid of 256 the subvolumes and the empty cubes above them are smaller than the grid.
+// A grid of 256 voxels per edge is built as one subvolume and as many. The bytes and the counts of
+// the solid are the same.
 TEST_F(SolidBuilds, RunOptionsNeverShow) {
   for_each_solid([&](oracle::SolidKind kind) {
     for (const SolidName rule : kSolids) {
@@ -84,7 +85,7 @@ TEST_F(SolidBuilds, RunOptionsNeverShow) {
   });
 }
 
-// Subvolumes that exceed their share of the memory are split.
+// Subvolumes that exceed their share of the memory are split. The bytes are the same.
 TEST_F(SolidBuilds, SplittingNeverShows) {
   Triangles scene = oracle::make_scene(oracle::SceneKind::kSpanning, 3, {{0, 0, 0}, 1024}, 400);
   for (const auto& t : oracle::make_solid(oracle::SolidKind::kTorus, 1, 1024)) scene.push_back(t);
@@ -130,7 +131,8 @@ TEST_F(SolidBuilds, BoxFillsTheGrid) {
   }
 }
 
-// The empty cubes in a large box are inside, above and within the subvolumes.
+// All voxels of a large box are set. The empty cubes in its interior are subvolumes, larger cubes,
+// and cubes in subvolumes.
 TEST_F(SolidBuilds, CubesInABoxAreFull) {
   BuildSpec spec = spec_for(cube_mesh(256 * 100 + 1, 256 * 900 - 1), 1024);
   spec.geometry.solid = SolidName::kWinding;
@@ -138,7 +140,7 @@ TEST_F(SolidBuilds, CubesInABoxAreFull) {
   EXPECT_EQ(run(spec).merge.voxels, 800u * 800 * 800);
 }
 
-// Whoever looks at the report learns what is wrong with the surface.
+// The report has the warning for each defect of the surface.
 TEST_F(SolidBuilds, Warnings) {
   const auto code = [&](const Triangles& scene, SolidName rule) -> std::string {
     BuildSpec spec = spec_for(scene, 64);

@@ -22,7 +22,7 @@ inline void expect(bool right, const char* what) {
 
 class Digest {
  public:
-  // Adds a cell, or one of the cell's six faces (1 to 6).
+  // Adds a cell (face 0) or one of its six faces (1 to 6).
   void add(int64_t x, int64_t y, int64_t z, uint64_t face = 0) {
     if ((x | y | z) >> 20 != 0) fail("a cell outside the grid");
     const uint64_t key = face << 60 | static_cast<uint64_t>(x) << 40 |

@@ -1,12 +1,12 @@
 // Prints the digest of all voxels of a file:
 //
-//     digest_voxels vdag|faces FILE.vdag [X0 Y0 Z0 X1 Y1 Z1]    of a region, by the reader header
+//     digest_voxels vdag|faces FILE.vdag [X0 Y0 Z0 X1 Y1 Z1]
 //     digest_voxels FORMAT FILE ORIGIN_X ORIGIN_Y ORIGIN_Z VOXEL LEVELS
 //
-// With a region, vdag and faces use only the voxels in the region. `faces` counts the faces between
-// voxels and empty cells, which are the contents of a glb file. Prints the number of voxels or
-// faces, and the hashes. The exit status is 1 for a file that breaks its format, 2 for a format
-// without a decoder.
+// vdag and faces read the file with voxdag_reader.h. With a region, they use only the voxels in the
+// region. `faces` counts the faces between voxels and empty cells, which are the contents of a glb
+// file. Prints the number of voxels or faces, and the hashes. The exit status is 1 for a file that
+// breaks its format, 2 for a format without a decoder.
 #include <algorithm>
 
 #include "core/format/global/voxdag_reader.h"

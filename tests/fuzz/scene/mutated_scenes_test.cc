@@ -18,8 +18,8 @@ namespace {
 // A mutation may declare a huge number of instances. Scenes with more triangles are not read.
 constexpr uint64_t kMaxTriangles = 200000;
 
-// Truncates the file, or changes one to eight bytes: to a random byte, to a digit, or to another
-// byte of the file.
+// Changes the file one to eight times: changes a byte to a random byte, to a digit or to another
+// byte of the file, flips a bit, or rarely truncates the file.
 std::string mutate(std::string file, std::mt19937& random) {
   const size_t changes = 1 + random() % 8;
   for (size_t i = 0; i < changes && !file.empty(); ++i) {

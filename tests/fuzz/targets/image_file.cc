@@ -1,6 +1,6 @@
-// Images: without changes, and PNG also with corrected checksums of its chunks, so
-// that a mutation reaches the code that follows. Any bytes give either pixels, which are the same
-// each time, or a problem.
+// Images: without changes, and PNG also with corrected checksums of its chunks, so that a mutation
+// reaches the code that follows. Any bytes give either pixels, which are the same each time, or an
+// error.
 #include <zlib.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ class BytesSource : public EncodedBytes {
   std::span<const std::byte> bytes_;
 };
 
-// A checksum of the pixels, or the error.
+// Returns a checksum of the pixels, or the error.
 std::string decode(std::span<const std::byte> bytes) {
   MemoryBudget budget(kMemoryBytes);
   std::string result;

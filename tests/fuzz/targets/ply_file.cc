@@ -1,5 +1,4 @@
-// PLY files: the header, the rows, and the triangles. Every input begins like a
-// PLY file.
+// PLY files: the header, the rows, and the triangles. Every input begins like a PLY file.
 #include "tests/fuzz/targets/scene_triangles.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

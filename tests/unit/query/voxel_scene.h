@@ -20,8 +20,8 @@ class VoxelScene {
     if (!voxels.empty()) add(0, {voxels.begin(), voxels.end()});
   }
 
-  // Returns the DAG of all voxels with x == `plane`. It has one node per level, which is shared by
-  // four children of its parent.
+  // Returns the DAG of all voxels with x == `plane`. It has one node per level, and the four
+  // children of a node are the same node.
   static VoxelScene wall(uint32_t grid_levels, int64_t plane) {
     VoxelScene scene(grid_levels, {});
     for (uint32_t level = 0; level + 2 < grid_levels; ++level) {

@@ -50,8 +50,8 @@ class FileNumbers {
   size_t at_;
 };
 
-// Returns the color of each voxel in a .vox file. Position (x, y, z) in the file is (x, -z, y) in
-// voxdag.
+// Returns the color of each voxel in a .vox file. Position (x, y, z) in the file is (x, z, -y) in
+// voxdag, relative to the middle of the floor.
 inline std::map<Cell3, Color3> decode_vox(const std::string& bytes, int64_t resolution) {
   struct Model {
     int64_t edge = 0;
@@ -114,8 +114,9 @@ inline std::map<Cell3, Color3> decode_vox(const std::string& bytes, int64_t reso
   return cells;
 }
 
-// Returns the color of each face in a .glb file of one mesh, by the face's cell and direction (x:
-// 0, -x: 1, y: 2, ...). Colors are the stored 16-bit values.
+// Returns the color of each face in a .glb file of one mesh, by the cell and the direction of the
+// face (x: 0, -x: 1, y: 2, ...). Colors are the stored 16-bit values. Sets `rectangles` to the
+// number of rectangles.
 inline std::map<std::pair<Cell3, int>, Color3> decode_glb(const std::string& bytes,
                                                           const Cell3& region_low,
                                                           size_t& rectangles) {

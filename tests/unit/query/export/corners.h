@@ -10,7 +10,7 @@
 
 namespace voxdag::query {
 
-// Writes a level with this number of nodes and these words.
+// Writes a level of `nodes` nodes, whose words are `words`.
 inline void write_level(GlobalFileWriter& writer, uint32_t level, uint64_t nodes,
                         const std::vector<uint32_t>& words) {
   writer.begin_level(level);

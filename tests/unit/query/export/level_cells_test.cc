@@ -13,7 +13,7 @@ constexpr uint64_t kNoLimit = ~uint64_t{0};
 
 class LevelCellsTest : public testing::TestWithParam<uint64_t> {
  protected:
-  // Levels of over `narrow_words` words are wide.
+  // Writes the file from random voxels. Levels of over GetParam() words are wide.
   void write(uint64_t seed) {
     const oracle::Voxels voxels = random_voxels(seed, 1 << kCellLevels);
     write_global(path_, oracle::build_dag(voxels, 64), grid_of(1 << kCellLevels), 64, GetParam());

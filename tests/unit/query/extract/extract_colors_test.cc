@@ -11,7 +11,8 @@ namespace {
 
 using Color3 = SectionDecoder::Color3;
 
-// Convert between sRGB and linear light (IEC 61966-2-1), from 0 to 255.
+// Convert between a stored sRGB value, from 0 to 255, and linear light, from 0 to 1 (IEC
+// 61966-2-1).
 double linear_of(int stored) {
   const double s = stored / 255.0;
   return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);

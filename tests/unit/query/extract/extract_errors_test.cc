@@ -166,7 +166,7 @@ TEST_F(ExtractErrors, ExistingOutput) {
   expect_files({"in.vdag", "out.vdag"});
 }
 
-// Cancels when a stage begins.
+// Cancels when the stage `stage` begins.
 class CancelAt : public NoProgress {
  public:
   CancelAt(std::string stage, CancelToken& cancel) : stage_(std::move(stage)), cancel_(cancel) {}

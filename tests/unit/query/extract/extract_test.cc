@@ -17,7 +17,7 @@ oracle::Voxels noise(uint64_t seed, int edge) {
   return voxels;
 }
 
-// Returns an octree-aligned cube or a random box in a grid of 2^levels cells per edge.
+// Returns a random box that is not empty, in a grid of 2^levels cells per edge.
 Region any_region(oracle::Random& random, uint32_t levels) {
   const int64_t edge = int64_t{1} << levels;
   Region region;
