@@ -55,11 +55,11 @@ struct SubvolumeTask {
   uint32_t grid_levels = 2;  // L: the grid has 2^L voxels per edge
   Cube cube;                 // its level is at most L-2
   uint32_t hash_bits = 64;   // 4 to 64
-  // Null for the shell and for thin voxels. Otherwise also fills the interior
-  // (core/geometry/solid_rule.h); the entry has the views from the cube's low faces. Only the CPU
-  // backend fills solids.
+  // If not null, also fills the interior of the solid (core/geometry/solid_rule.h). The entry has
+  // the views, as that file defines them, at the cube's low faces. Null for the shell and for thin
+  // voxels. Only the CPU backend fills solids.
   const SolidEntry* solid = nullptr;
-  VoxelRule rule = VoxelRule::kShell;  // `solid` needs kShell
+  VoxelRule rule = VoxelRule::kShell;  // must be kShell if `solid` is set
 
   SubDagShape shape() const { return {cube.level, grid_levels, hash_bits}; }
 };

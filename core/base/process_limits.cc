@@ -115,7 +115,7 @@ struct ProcessLimit {
   int reason;
   __rlimit_resource resource;
   const char* name;
-  bool is_size;  // in bytes, otherwise a number
+  bool is_size;  // true: a size in bytes, false: a number
 };
 
 constexpr ProcessLimit kLimits[] = {

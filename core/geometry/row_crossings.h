@@ -50,17 +50,17 @@ class FirstBeyond {
 
   const int axis_;
   double vertex_[3];
-  double slope_[3];  // by which the crossing moves back along the axis
+  double slope_[3];  // slope_[b]: distance by which the crossing moves back per unit of axis b
 };
 
-// The sample rows of a closed cube: lattice lines at a distance of 2^pitch_log2 units, which
-// divides the cube's low corner.
+// The sample rows of a closed cube: lattice lines at a distance of 2^pitch_log2 units. The
+// coordinates of the cube's low corner are multiples of this distance.
 struct SampleRows {
   int64_t low[3];  // the cube's low corner, in lattice units
   int pitch_log2;
   int blocks;  // the cube's edge, in multiples of the distance
 
-  // Returns the position of a row's number (solid_rule.h) among those of the cube along one axis.
+  // Returns the index of row (i, j) in the list of the cube's rows along one axis (solid_rule.h).
   size_t index(int i, int j) const { return static_cast<size_t>(i * (blocks + 1) + j); }
 
   // Calls visit(i, j, block, sign) for every crossing of the triangle with a row along `axis`. (i,

@@ -56,7 +56,7 @@ VOXDAG_HD constexpr int64_t views_after(SolidRule rule, int64_t views, int64_t c
   return (crossings & 1) != 0 ? 6 - views : views;
 }
 
-// The views from the corners of a unit.
+// The sum of the views from the corners of a unit, and the number of these corners.
 struct UnitViews {
   int64_t sum = 0;
   int corners = 0;

@@ -12,7 +12,7 @@ enum class ImageDecoder { kNone, kPng, kJpeg, kWebp, kAvif };
 struct ImageFormat {
   const char* name;                            // "a GIF image"
   const char* remedy = "";                     // how a user gets a readable image
-  ImageDecoder decoder = ImageDecoder::kNone;  // decoder of the format, perhaps not in this program
+  ImageDecoder decoder = ImageDecoder::kNone;  // the format's decoder; this program may lack it
   bool is_image = true;
 };
 

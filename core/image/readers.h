@@ -13,9 +13,9 @@ namespace voxdag {
 
 // A source of bytes whose first bytes (up to kImageHeadBytes) can be seen in advance with head().
 // read() returns all bytes, including the first. read() stores an exception of the source instead
-// of throwing it, because exceptions must not pass through a decoder written in C. In this case
-// read() returns fewer bytes, and rethrow() throws the exception. A canceled token also ends the
-// bytes.
+// of throwing it, because exceptions must not pass through a decoder written in C. If there is an
+// exception, or if `cancel` was canceled, read() returns fewer bytes, and rethrow() then throws the
+// exception or Error{kCanceled}.
 class PeekedSource {
  public:
   PeekedSource(EncodedBytes& source, const CancelToken* cancel) : source_(source), cancel_(cancel) {

@@ -51,8 +51,8 @@ class WritableFile {
   // Frees the disk space of a range whose contents are no longer needed. The range then reads as
   // zeros, or as before if the file system does not support this.
   virtual void release(uint64_t /*offset*/, uint64_t /*bytes*/) {}
-  // Returns after all written data is on the disk. A process that ends during this call does not
-  // wait for all of the data.
+  // Returns after all written data is on the disk. If the process is killed during this call, it
+  // ends soon, without waiting until all data is on the disk.
   virtual void sync() = 0;
   // Closes the file without syncing it. Throws an Error if the system's close() fails. The
   // destructor also closes the file, but ignores errors.
@@ -91,7 +91,8 @@ class FileSystem {
   virtual bool create_new(const std::string& path) = 0;
   virtual bool exists(const std::string& path) = 0;
   virtual void rename(const std::string& from, const std::string& to) = 0;
-  // Renames `from` to `to` in one step, unless anything exists at `to`. Returns false if so.
+  // Renames `from` to `to` in one step. If anything exists at `to`, returns false and renames
+  // nothing.
   virtual bool rename_new(const std::string& from, const std::string& to) = 0;
   virtual void remove(const std::string& path) = 0;
   // Creates the directory and its missing parents. Throws Error{kInvalidInput} if the directory or

@@ -36,8 +36,9 @@ bool begins_with(const ReadableFile& file, std::string_view bytes);
 // Renames `from` to `to` in one step, unless anything exists at `to`. Returns 0, EEXIST, or another
 // value of errno.
 int rename_without_replacing(const std::string& from, const std::string& to);
-// Does the same by a second name, for file systems without renameat2(RENAME_NOREPLACE), such as
-// NFS. On a file system that also has no hard links, the check and the rename are two steps.
+// Does the same by creating a hard link `to` and removing `from`, for file systems without
+// renameat2(RENAME_NOREPLACE), such as NFS. Without hard links, the check and the rename are two
+// steps.
 int rename_by_link(const std::string& from, const std::string& to);
 
 }  // namespace voxdag

@@ -115,7 +115,7 @@ SubvolumeBuild::SolidNode SubvolumeBuild::build_solid(int size_log2, const Latti
     const LatticeCube child = cube.child(c);
     children[c] = build_solid(size_log2 - 1, child, entries.first[c], entries.counts[c]);
     is_empty &= children[c].is_empty;
-    // Later children advance the rows, so the views are read now.
+    // Building the next children advances the running rows, so the views are read now.
     if (children[c].is_empty) views[c] = solid_->empty_cube(child);
   }
   entries_used_ = below;

@@ -34,8 +34,9 @@ class SubvolumeBuild {
   // Returns the node of a cube with an edge of 2^size_log2 voxels. The triangles that may touch the
   // cube are entries_[first, first + count).
   NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);
-  // The node of a cube of a solid. If the cube has no voxel of the shell, it has no node yet: its
-  // views decide, unless the cube around it has no voxel of the shell either.
+  // The node of a cube of a solid. A cube without voxels of the shell (is_empty) has no node yet.
+  // Its parent chooses the node from the cube's views, or, if the parent is also empty, has no node
+  // itself.
   struct SolidNode {
     NodeRef node;
     bool is_empty = false;
@@ -45,7 +46,8 @@ class SubvolumeBuild {
   SolidNode build_solid_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   NodeRef finish_solid_root(const SolidNode& root);
 
-  // A cube's entries, divided among its children: the child's entries begin at first[c].
+  // The entries of a cube's children: those of child c are entries_[first[c], first[c] +
+  // counts[c]).
   struct ChildEntries {
     size_t first[8];
     size_t counts[8] = {};

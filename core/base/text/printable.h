@@ -1,7 +1,7 @@
-// Makes text of others safe to show: names, messages and paths that come from a scene, a request, a
-// file name or another program. Such text could otherwise control a terminal, forge a line of a
-// log, or show its characters in another order. Messages are converted where they leave the
-// program. Pure functions.
+// Makes text from other sources safe to show: names, messages and paths that come from a scene, a
+// request, a file name or another program. Such text could otherwise control a terminal, forge a
+// line of a log, or show its characters in another order. Messages are converted where they leave
+// the program. Pure functions.
 //
 // Not printable are
 //   - control characters: U+0000 to U+001F, U+007F to U+009F;

@@ -17,7 +17,8 @@ constexpr double kDepth = 0x1p-16;
 constexpr double kCubeMargin = 0x1p-4, kBoxMargin = 0x1p-10;
 // If rounding leaves no polygon in a voxel, the voxel is enlarged by this many lattice units.
 constexpr double kVoxelMargin = 0x1p-6;
-// A polygon that spans this many repetitions of the image along an axis covers all texels.
+// A polygon that spans more than this many repetitions of the image is treated as covering all
+// texels.
 constexpr double kMaxPeriods = 16;
 // Texels at the border of a clamped image extend without end; here, to this coordinate.
 constexpr double kEndless = 0x1p45;
@@ -104,7 +105,7 @@ VisiblePart::Polygon VisiblePart::part_in(const std::array<int64_t, 3>& low, int
     const int axis = side / 2;
     const double sign = side % 2 == 0 ? 1 : -1;
     const double bound = side % 2 == 0 ? -margin : static_cast<double>(edge) + margin;
-    bool is_inside = true;  // then clip() would copy the part
+    bool is_inside = true;  // if true, clip() would only copy the part
     for (int i = 0; i < part.count; ++i) is_inside &= sign * (part.points[i].at[axis] - bound) >= 0;
     if (is_inside) continue;
     clip(part, axis, sign, bound, parts[1 - current]);

@@ -11,7 +11,8 @@ namespace {
 
 using Sight = VisiblePart::Sight;
 
-// Rectangles of more rows are two patches; rectangles of fewer rows are one segment for each row.
+// A rectangle of up to this many rows becomes one segment per row; a larger rectangle, two
+// triangles.
 constexpr size_t kMaxSegments = 2;
 
 // Returns an odd coordinate near the middle of a voxel.

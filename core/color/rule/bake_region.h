@@ -300,7 +300,7 @@ class RegionBaker {
   const std::span<const Material> materials_;
   Textures& textures_;
   const Cutouts* const cutouts_;
-  uint32_t spread_[3][64];  // per axis, the bits of a coordinate in a code
+  uint32_t spread_[3][64];  // [axis][coordinate]: the coordinate's bits in a code
   std::span<const FixedSurface> triangles_;
   uint32_t max_cells_ = 0;
   int64_t first_[3] = {}, last_[3] = {};  // cells of the region

@@ -27,8 +27,8 @@ struct ArtifactIndex {
 
 // Maximum size of the index of an artifact: enough for 3 * 10^10 rows.
 inline constexpr uint64_t kMaxIndexBytes = uint64_t{256} << 20;
-// Throws Error{kCorrupt} if the index of the artifact at `ref`, which a file of others may name, is
-// larger than kMaxIndexBytes. Call it before the index is read.
+// Throws Error{kCorrupt} if the index of the artifact at `ref` is larger than kMaxIndexBytes. Call
+// it before the index is read, because `ref` may come from a file that voxdag did not write.
 void check_index_bytes(const ArtifactRef& ref, const std::string& where);
 
 std::vector<std::byte> encode_index(const ArtifactIndex& index);

@@ -44,8 +44,8 @@ class SegmentWriter {
   void sync_written();
   // Returns the number of bytes flushed to the file so far.
   uint64_t written() const { return written_; }
-  // Frees the disk space after a flush that failed because the disk was full. The flush may have
-  // written a part of the buffered bytes.
+  // Call it after a flush that failed because the disk was full. Frees the disk space of the
+  // buffered bytes that the flush has written.
   void release_unwritten();
 
  private:

@@ -12,7 +12,7 @@ namespace voxdag {
 
 // Statistics of color differences. The difference of a channel is in sRGB steps, 0 to 255.
 struct ColorDiff {
-  uint32_t levels = 0;            // the compared cells are of level `levels`
+  uint32_t levels = 0;            // level of the compared cells
   uint64_t cells = 0;             // cells that are set in both files
   uint64_t different_cells = 0;   // cells whose colors differ
   uint32_t largest = 0;           // largest difference of a channel

@@ -10,8 +10,8 @@
 // the machine.
 //
 // Checksums are computed from the words and bytes that the caller passes in, not from the file.
-// (resume() reads the last incomplete checksum block back, but first compares it with its saved
-// checksum.) seal() reads the file back and compares it with these checksums. seal()
+// (Exception: resume() reads the last, incomplete checksum block from the file, and compares it
+// with its saved checksum.) seal() reads the file back, compares it with these checksums, and
 // throws Error{kCorrupt} if the disk returns wrong bytes.
 //
 // Only one thread may use a writer, except that other threads may call write_words() and sync().

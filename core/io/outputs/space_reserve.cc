@@ -9,7 +9,8 @@
 namespace voxdag {
 namespace {
 
-// The free space is read again after this number of written bytes.
+// use() reads the free space again after this many written bytes, and near the reserve at every
+// write.
 constexpr uint64_t kCheckBytes = uint64_t{1} << 20;
 
 }  // namespace
@@ -47,7 +48,7 @@ uint64_t SpaceReserve::free_space(const std::string& path) {
 
 void SpaceReserve::use(const std::string& path, uint64_t bytes) {
   if (unchecked_bytes_.fetch_add(bytes) + bytes < kCheckBytes) return;
-  // The folder, because the file itself may have no name any more.
+  // Asks for the free space of the folder, because the file's name may already have been removed.
   const uint64_t free_bytes = free_space(parent_directory(path));
   if (free_bytes < bytes)
     throw Error(ErrorCode::kNoSpace, "write " + path + ": the disk has " + size_text(free_bytes) +

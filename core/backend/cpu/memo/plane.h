@@ -14,22 +14,22 @@ namespace voxdag::cpu {
 
 // The plane n.p + c = 0 of lattice positions p. The components of n have no common divisor.
 //
-// This describes the rule kShell. The rule kThin sets the voxels k whose row along the dominant
-// axis crosses the plane (thin_triangle.h). This also depends on n.k + f alone, if c is the value
-// at the centers of these rows, and is 1 less if ties are below the plane. Voxel k is set iff
-//     0 <= n.k + f + up <= width.
-//
 // For a cube with low corner q, the offset of the plane is f = floor((n.q + c) / 256). Let k be the
 // position of a voxel corner in the cube, in voxels, so that its lattice position is q + 256 k. The
-// value of n.p + c at this corner is >= 0 iff n.k + f >= 0, because for an integer i and any x,
-// 256 i + x >= 0 <=> i + floor(x / 256) >= 0. So the set voxels of the cube depend only on n, on f
-// and on `fractional`.
+// value of n.p + c at this corner is >= 0 iff n.k + f >= 0, because for an integer i and any x, 256
+// i + x >= 0 <=> i + floor(x / 256) >= 0. So the set voxels of the cube depend only on n, on f and
+// on `fractional`. The voxel with low corner k is set iff
+//     0 <= n.k + f + up <= width.
+//
+// With the rule kThin, this means that the row through the voxel's center along the dominant axis
+// crosses the plane within the voxel (thin_triangle.h). For this rule, set_rule() makes c the value
+// on this row instead of the value at the voxel's corner, and subtracts 1 if ties are below the
+// plane.
 struct Plane {
   int64_t n[3];
   int128 c;
   // True if (n.q + c) / 256 is not an integer. This is the same for all cubes, because q is a
-  // multiple of 256.
-  // For the rule kThin, it is always true.
+  // multiple of 256. With the rule kThin, it is always true.
   bool fractional;
   int64_t up, width;
 

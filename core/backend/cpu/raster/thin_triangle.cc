@@ -27,8 +27,8 @@ template <class Coordinate>
 bool ThinTriangle<Coordinate>::set_planes(const int64_t (&v)[3][3], const Int (&size)[3],
                                           int64_t tile_voxels) {
   const auto& n = this->normal;
-  // A value of 0 has the sign of the normal's first component that is not 0. If it is negative, 1
-  // less gives the value the right sign.
+  // If the value is 0, its sign is the sign of the normal's first component that is not 0. If this
+  // component is negative, subtracting 1 makes the value negative.
   int128 origin = (n[0] != 0 ? n[0] : n[1] != 0 ? n[1] : n[2]) < 0 ? -1 : 0;
   for (int a = 0; a < 3; ++a) origin -= static_cast<int128>(n[a]) * v[a][0];
   int128 lowest_of[3];

@@ -8,10 +8,10 @@
 //   edge    the row crosses the triangle, in the projection along a
 //                                   <=>   a k_p + b k_q + c >= 0 for the edges of edges[a]
 //
-// Moved by an infinitely small vector, the value of n.(p - v0) at the voxel's center is F, and F is
-// never a tie. The plane crosses the row along a within the voxel iff |F| < 128 |n_a|. So what the
-// plane test excludes along the dominant axis is excluded along all axes, and in each voxel column
-// along the dominant axis, exactly one voxel passes the plane test.
+// Let F be the value of n.(p - v0) at the voxel's center, moved by an infinitely small vector so
+// that F is never 0. The plane crosses the row along a within the voxel iff |F| < 128 |n_a|. So if
+// the plane test along the dominant axis excludes a voxel, the tests along all axes exclude it. In
+// each voxel column along the dominant axis, exactly one voxel passes the plane test.
 //
 // If the triangle covers the tile (triangle_set.h), all rows along the dominant axis cross it. Then
 // the plane test along this axis decides alone.

@@ -1,7 +1,7 @@
 // The 6-connected components of the empty voxels of a voxel block, found with bit operations.
 //
-// Slices store a block's voxels with x as the number of the word, and bit 8 y + z in it. A step
-// along z or y is then a shift within a word, and a step along x is a step to the next word.
+// Slices store a block's 512 voxels in eight words: voxel (x, y, z) is bit 8 y + z of word x. A
+// step along z or y is then a shift within a word, and a step along x is a step to the next word.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
-// A cache of filled voxel blocks. A block's interior depends on the block's voxels and on the views
-// from its eight corners, and most blocks of a flat surface occur more than once.
+// A cache of filled voxel blocks. The block's interior depends on the block's voxels and on the
+// views (core/geometry/solid_rule.h) from its eight corners. Most blocks of a flat surface occur
+// repeatedly.
 //
 // The cache is direct-mapped. The complete input is compared, so a hit is exact. Not thread-safe.
 #pragma once

@@ -27,8 +27,9 @@ class SolidFill {
   bool fill_tile(TileBricks& bricks, int size_log2,
                  const TileFiller::ForEachTriangle& for_each_triangle);
 
-  // Returns the views of a cube without voxels of the shell, of at least tile size. The tiles
-  // before and in the cube are finished, and no later ones.
+  // Returns the views of a cube without voxels of the shell. The cube is at least as large as a
+  // tile. The tiles before the cube and in the cube must be finished, and no later tile may have
+  // begun.
   UnitViews empty_cube(const LatticeCube& cube);
   // Returns the node of an empty cube that is a unit: full if it is inside, otherwise none.
   NodeRef decide(const UnitViews& unit, int size_log2);

@@ -9,7 +9,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// Components without a corner that wait for their walks; they share a pass over the triangles.
+// Max blind components (solid_rule.h) that are collected before one pass over the tile's triangles
+// computes the walks to all of them.
 constexpr size_t kMaxBlind = 256;
 
 uint64_t count_voxels(const Slices& slices) {

@@ -1,6 +1,6 @@
-// Fills the voxels of a tile that are inside a solid (core/geometry/solid_rule.h). The tile has the
-// voxels of the shell. Units of the tile: its maximal empty cubes, and the components of the empty
-// voxels of its other blocks. Not thread-safe.
+// Fills the voxels of a tile that are inside a solid (core/geometry/solid_rule.h). At first the
+// tile has only the voxels of the shell. Its units, each filled completely or not at all, are the
+// maximal empty cubes and the components of the other blocks' empty voxels. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace voxdag::cpu {
 // Voxels of units that are inside.
 struct FilledVoxels {
   uint64_t filled = 0;
-  uint64_t disputed = 0;  // those whose directions disagree
+  uint64_t disputed = 0;  // voxels of `filled` whose unit is_disputed()
 
   void add(const UnitViews& unit, uint64_t voxels) {
     filled += voxels;

@@ -33,9 +33,9 @@ class BrickList {
   uint64_t* codes() { return codes_.data(); }
   uint64_t* masks() { return masks_.data(); }
 
-  // Reserves `count` places after the last brick and returns the position of the first place;
-  // commit() adds the bricks written there. If the arrays are full, merges duplicate bricks. If
-  // this frees too little, the list grows.
+  // Makes space for `count` bricks after the last brick, and returns the position of the first of
+  // them; commit() adds the bricks that were written there. If the arrays are full, first merges
+  // duplicate bricks. If this frees too little space, the list grows.
   uint32_t reserve(uint32_t count) {
     if (size_ + uint64_t{count} <= codes_.size()) return size_;
     merge();
@@ -43,8 +43,8 @@ class BrickList {
     if (needed > codes_.size() / 4 * 3) grow(std::max(2 * needed, kMinSize));
     return size_;
   }
-  // Adds `count` bricks, which were written to the reserved places. `sorted`: true if their codes
-  // ascend without duplicates and are all above the codes of earlier bricks.
+  // Adds `count` bricks, which were written at the position that reserve() returned. `sorted`: true
+  // if their codes ascend without duplicates and are all above the codes of earlier bricks.
   void commit(uint32_t count, bool sorted) {
     sorted_ = sorted_ && sorted;
     size_ += count;

@@ -15,9 +15,9 @@
 // The bounds are for triangles of less than 2^28 units in each axis ("narrow") and lattices of at
 // most 2^28 units (the largest grid). Half edges are < 2^27, quarter normals n_a < 2^55. If the
 // triangle and the lattice overlap in an axis, |low - v| < 2^29 in this axis, so edge constants are
-// below 2^58. The constants of the plane need 128 bits. Clamping a constant changes no sign as long
-// as the added terms are smaller: with N = 4, these are below 2^30 for edges (8 half edges) and
-// 12 max |n_a| for the plane. Larger triangles are tested cell by cell.
+// below 2^58. The constants of the plane need 128 bits. A clamped constant keeps its sign in a test
+// as long as its magnitude exceeds the terms that are added: with N = 4, these are below 2^30 for
+// edges (8 half edges) and 12 max |n_a| for the plane. Larger triangles are tested cell by cell.
 #pragma once
 
 #include <cstdint>

@@ -120,9 +120,9 @@ class EdgeBounds {
     spread(permuted(_mm256_blend_pd(reach, _mm256_setzero_pd(), 0b1000), order), reach_);
   }
 
-  // Returns the bounds of the closed voxels, if these bounds are for the voxels' centers: the
-  // integer c of the closed test is at most 1.5 + (|across| + |up|) / 2 more than the other test's.
-  // These bounds may be up to 3 / |up| wider than necessary.
+  // Requires bounds for the voxels' centers; returns the bounds for the closed voxels. The integer
+  // c of the test for closed voxels exceeds the c of the test for centers by at most 1.5 +
+  // (|across| + |up|) / 2. So the returned bounds may be up to 3 / |up| wider than necessary.
   VOXDAG_INLINE EdgeBounds widened() const {
     EdgeBounds out = *this;
     for (int i = 0; i < 4; ++i) out.start_[i] = _mm256_add_pd(start_[i], reach_[i]);

@@ -18,10 +18,11 @@
 namespace voxdag::cpu {
 namespace {
 
-// The two rules differ in the edges (tile_triangle.h, thin_triangle.h) and in the list of columns.
+// The rules kShell and kThin differ in the edges (tile_triangle.h, thin_triangle.h) and in the
+// columns of bricks that they list: kShell lists kInside, kThin lists kTouched.
 enum class FootprintColumns {
   kInside,   // columns of bricks that have a voxel column inside
-  kTouched,  // also those that the triangle touches outside the rows through the columns' centers
+  kTouched,  // also columns that the triangle touches only beside the voxel columns' centers
 };
 
 template <int D>

@@ -89,8 +89,8 @@ class Heights {
             static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1)};
   }
 
-  // Returns the column of bricks of another plane with the same normal, with `within` of this
-  // plane. This plane's height must be at most half a voxel above the other plane's.
+  // Converts a column of bricks of another plane with the same normal: replaces `within` by this
+  // plane's value. This plane's height must be at most half a voxel above the other plane's height.
   VOXDAG_INLINE Column in_bricks_of(Column c) const {
     c.within = static_cast<int>(height_of(c.p, c.q) >> (kColumnBits - kHeightBits)) -
                c.brick * (4 << kHeightBits);

@@ -6,8 +6,8 @@
 //   - it passes the plane test and the edge tests along one of the other axes.
 //
 // The second condition only matters where the first one fails, which is near the triangle's edges.
-// The voxel is the only one of its column that can pass, so the tests along the other axes need no
-// heights of their own: a voxel column is set if the test's bounds leave any voxel.
+// This voxel is the only one of its column that the triangle can set. So the tests along the other
+// axes do not compute heights: the voxel is set if their bounds leave any voxel of the column.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
