@@ -15,7 +15,8 @@ namespace {
 // artifact has over 2^32 rows, the limit of its format.
 constexpr uint64_t kMaxArtifactRows = uint64_t{1} << 32;
 
-// Merges in passes until all artifacts fit in one pass, then into the global file or an artifact.
+// Runs merge passes until all artifacts fit in one pass. The last pass then writes the global file
+// or one artifact.
 class Merger {
  public:
   Merger(const MergeInputs& inputs, const MergeContext& context, uint64_t narrow_words,

@@ -6,8 +6,8 @@
 //
 //   load     the rows of all runs with a hash in the partition are read, and their children are
 //            replaced by their positions in the merged level below (rewiring)
-//   sort     the rows are divided into buckets by the next bits of the hash; several threads sort
-//            one bucket each and deduplicate its rows
+//   sort     the rows are divided into buckets, which are equal ranges of hashes; several threads
+//            sort one bucket each and deduplicate its rows
 //   output   buckets are written in the order of their hashes, and the position of every row is
 //            stored for the level above
 //

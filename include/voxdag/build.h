@@ -67,7 +67,7 @@ struct BuildOptions {
   // without them, with a warning.
   std::vector<std::string> ignore_extension;
   bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
-  // Sets fewer voxels: the thinnest surface that no path along the axes passes (docs/solid.md).
+  // Sets only voxels in which a triangle crosses a row through the voxel's center (docs/solid.md).
   bool thin = false;
   CutoutRule cutouts = CutoutRule::kDefault;
   uint32_t hash_bits = 64;  // bits of the node hash, 4 to 64

@@ -9,7 +9,8 @@
 namespace voxdag {
 namespace {
 
-// Minimum number of bytes per call of release(). Fewer bytes are not worth a call.
+// Minimum size, in bytes, of a range passed to Checkpoint::release(). A shorter range waits for a
+// later call that also covers the next levels.
 constexpr uint64_t kMinReleasedBytes = uint64_t{32} << 10;
 
 }  // namespace

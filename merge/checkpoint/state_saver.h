@@ -49,8 +49,8 @@ class StateSaver {
             std::function<void()> sync, std::vector<SegmentRange> merged);
   // Waits for the running save and rethrows its error.
   void wait();
-  // Like wait(), at the end of the merge. The running save skips the input ranges that it has not
-  // released yet, because the input files are removed soon.
+  // Like wait(), at the end of the merge. The running save releases no further input ranges,
+  // because the caller removes the input files soon.
   void finish();
 
  private:

@@ -15,7 +15,7 @@ struct GroupRun {
   size_t run = 0;
   uint64_t first_row = 0;  // first row of the group in the run
   uint64_t rows = 0;
-  uint64_t begin_word = 0, end_word = 0;  // in the scratch file
+  uint64_t begin_word = 0, end_word = 0;  // the rows' words in the scratch file
 };
 
 class GroupFile {

@@ -4,8 +4,8 @@
 //   columns:   [slice of run 0] [slice of run 1] ...
 //   buckets:   the interval, divided into shares of 2^bucket_bits hashes
 //
-// A slice consists of complete frames of a run, so a few rows at its ends may be outside the
-// interval.
+// A slice is the part of a run that is in the partition. It consists of complete frames, so a few
+// rows at its ends may be outside the interval.
 //
 // Within a slice rows are in the order of their hashes, so each bucket is a contiguous part of
 // every slice: from bucket_begin(b, slice) to bucket_begin(b + 1, slice). Usually one partition is
@@ -41,8 +41,8 @@ struct RowOffset {
   uint32_t word = 0;
 };
 
-// The memory of a partition's columns. The next partition reuses it, because zeroing new pages
-// takes the system as long as reading rows into them.
+// The memory of a partition's columns. The next partition reuses it, because zeroing the pages of
+// new memory would take the system as long as the merge takes to fill them with rows.
 class PartitionMemory {
  public:
   // Makes space for `count` rows, each with `position_words` words for its position. The previous

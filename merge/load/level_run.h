@@ -26,8 +26,8 @@ struct FrameSpan {
 class LevelRun {
  public:
   virtual ~LevelRun() = default;
-  // Decodes a frame. Several threads may call it concurrently, each with a separate `out`. Children
-  // are row indices in the run's level below, or words of positions if is_rewired().
+  // Decodes a frame. Several threads may call it concurrently, each with a separate `out`. A child
+  // is a row index in the next deeper level of the same artifact, or a position if is_rewired().
   virtual void read_frame(size_t index, Frame& out) const = 0;
 
   std::span<const FrameInfo> frames() const { return frames_; }

@@ -9,8 +9,8 @@
 namespace voxdag {
 namespace {
 
-// Frames per work item if the maps are in memory: enough that the run's map remains in the thread's
-// cache.
+// Frames per work item if the maps are in memory. With this number of frames in a row, the thread
+// finds most of the run's map in its cache.
 constexpr size_t kFramesPerItem = 16;
 
 // Looks up the positions of the rows `children` in `map` and writes them to `out`, as two words
@@ -135,8 +135,8 @@ class HashPartition::Loader {
     return (hash >> partition_.bucket_bits_) - (interval.first >> partition_.bucket_bits_) + 1;
   }
 
-  // Sets the begins of the buckets whose lowest hash is above the first hash of this frame, and at
-  // most the first hash of the next frame. The slice's first frame also sets the begins of all
+  // Sets the begins of the buckets whose lowest hash is above the first hash of this frame but not
+  // above the first hash of the next frame. The slice's first frame also sets the begins of all
   // earlier buckets, and its last frame the begins of all later buckets.
   void mark_bucket_begins(size_t slice_index, const LevelRun& run, size_t f, const Frame& frame) {
     const RunSlice& slice = partition_.slices_[slice_index];

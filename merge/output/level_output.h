@@ -19,7 +19,8 @@ struct LevelExtent {
   uint64_t nodes = 0;
   uint64_t positions = 0;
 
-  // Throws Error{kLimit} with the level if the file's format cannot have so many positions.
+  // Adds the size of a part. Throws Error{kLimit}, which names the level, if the sum exceeds the
+  // limit of the file's format: 2^40 words in a global file, 2^32 rows in an artifact.
   void add(const LevelExtent& part, uint32_t level, bool in_words) {
     nodes += part.nodes;
     positions += part.positions;

@@ -8,7 +8,7 @@
 
 namespace voxdag {
 
-// Returns the memory of the workers, in addition to the partition and the maps.
+// Returns the bytes that all workers need together, without the partition and the maps.
 uint64_t bytes_for_workers(const MergeMemory& plan);
 
 // Merges the level of `task`. Adds its numbers of partitions, streamed groups and rows to the

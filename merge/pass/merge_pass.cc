@@ -85,8 +85,8 @@ class Pass {
     return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }
 
-  // Reserves memory for the largest level, if the budget allows it. Otherwise the memory is
-  // allocated again for each partition that does not fit in it.
+  // Allocates memory for a partition that can hold the largest level, if the budget allows it.
+  // Otherwise each partition that is larger than the memory so far allocates it again.
   void reserve_memory() {
     std::vector<RowCount> levels(task_.shape.grid_levels);
     for (const ArtifactReader& artifact : task_.artifacts)
@@ -103,7 +103,8 @@ class Pass {
       memory_.reserve(max, 0, context_.budget);
   }
 
-  // Returns the memory for a level in addition to its partition.
+  // Returns the bytes that merging a level needs without the partition: the workers' memory and one
+  // level's position maps.
   uint64_t bytes_besides_partition() const {
     return bytes_for_workers(context_.plan) + context_.plan.resident_bytes;
   }

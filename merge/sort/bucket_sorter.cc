@@ -9,8 +9,8 @@ namespace {
 // Maximum number of rows with equal digits (see distribute()) that only the insertion sort orders.
 // More rows are first sorted by comparison.
 constexpr uint32_t kMaxInsertionRows = 32;
-// In a bucket every slice has a few rows, and the slices are at scattered addresses. Rows are
-// prefetched this many slices ahead.
+// Each slice has only a few rows in a bucket, and the slices are at scattered addresses. The rows
+// are prefetched this many slices ahead.
 constexpr size_t kSlicesAhead = 8;
 
 template <class T>
