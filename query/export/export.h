@@ -20,7 +20,7 @@ struct ExportJob;
 
 struct ExportReport {
   std::vector<std::string> files;  // all written files; the requested file is first
-  uint64_t bytes = 0;              // of all files
+  uint64_t bytes = 0;              // total size of all files
   uint64_t voxels = 0;
   std::vector<std::string> notes;  // usage notes for the files, one sentence each
 };

@@ -44,10 +44,10 @@ class ExportFile {
   const std::string path_;
   std::unique_ptr<WritableFile> file_;
   std::vector<std::byte> buffer_;
-  uint64_t buffer_offset_ = 0;  // in the file
+  uint64_t buffer_offset_ = 0;  // offset of buffer_ in the file
   uint64_t size_ = 0;
   bool published_ = false;
-  std::optional<TemporaryPath> registered_;  // until it is published
+  std::optional<TemporaryPath> registered_;  // the partial file, until it is published
 };
 
 }  // namespace voxdag::query

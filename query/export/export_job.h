@@ -106,7 +106,7 @@ void require_space(const ExportJob& job, uint64_t bytes);
 
 // Throws Error{code} with a message such as "OUTPUT: PROBLEM. --level 11 fits", where 11 is the
 // finest coarser level that fits. If no coarser level fits, the message ends with "Expected a
-// smaller --region". `fits` must return true for a grid that fits.
+// smaller --region". fits(grid_levels) returns true if the selection fits on that coarser grid.
 [[noreturn]] void refuse_size(const ExportJob& job, const std::string& problem,
                               const std::function<bool(uint32_t grid_levels)>& fits,
                               ErrorCode code = ErrorCode::kLimit);

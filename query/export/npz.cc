@@ -51,7 +51,7 @@ class Crc32 {
 struct NpzMember {
   std::string name;
   uint64_t bytes = 0;
-  uint64_t offset = 0;  // of its local header
+  uint64_t offset = 0;  // offset of the member's local header in the file
   uint32_t crc = 0;
 };
 

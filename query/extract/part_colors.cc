@@ -33,8 +33,8 @@ constexpr uint64_t kWorkerBytes =
     kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) +
     CheckedReader::kBlockBytes;
 // Returns an upper bound on the size of an encoded region, in bytes. A color takes half a byte (16
-// bytes per 32 cells), another value value_bytes(). The factors 3/4 and 5/4 are larger, because a
-// region also has its coarser cells (up to 1/7 as many) and prefixes (docs/format.md).
+// bytes per 32 cells), another value value_bytes(). The factors are 3/4 and 5/4 instead of 1/2 and
+// 1, because a region also has its coarser cells (up to 1/7 as many) and prefixes (docs/format.md).
 uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
   if (traits_of(attribute).is_color()) return kMaxRegionCells * 3 / 4;
   return kMaxRegionCells * 5 / 4 *

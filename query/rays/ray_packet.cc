@@ -54,7 +54,7 @@ uint64_t RayPacket::cast(std::span<const Ray> rays, Hit* hits) {
 }
 
 // Mirrors and inverts the rays like MirroredRay, but with several divisions per operation. If there
-// are fewer than kRays rays, the remaining places get the numbers of the first ray.
+// are fewer than kRays rays, the first ray is also stored at the unused indices.
 void RayPacket::load(std::span<const Ray> rays) {
   const double edge = static_cast<double>(dag_.resolution());
   for (size_t i = 0; i < kRays; ++i) {

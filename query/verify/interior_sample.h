@@ -1,6 +1,7 @@
-// A random sample of voxels of a solid, compared with the scene. Every voxel is decided by its own
-// winding number: the crossings of the three rows through its center with the triangles of the
-// scene. This shares only the crossing predicate with the code that builds solids.
+// Compares a random sample of a solid's voxels with the scene. A voxel's winding number is the sum
+// of the signs of the crossings before its center, on one of the three rows through the center. It
+// is computed for each voxel separately; only the crossing predicate is shared with the builder of
+// solids.
 //
 // On a closed surface the winding number is the same along all rows and decides every voxel that no
 // triangle touches. If a sampled row is open, the surface is not closed; then a solid depends on
