@@ -49,15 +49,15 @@ class TriangleCursor {
 
 // The place where an image of a scene is stored. open_scene() does not read the image, so the image
 // may be damaged or of any format. The range [offset, offset + size) of `file` holds bytes, or
-// base64 or percent-encoded characters. The first `skip` of these bytes do not belong to the image.
-// The following `bytes` bytes are the image.
+// characters that encode bytes in base64 or by percent-encoding. The first `skip` bytes, counted
+// after decoding, do not belong to the image. The following `bytes` bytes are the image.
 struct ImageSource {
   std::string name;  // name in messages: the image and its scene file
   SourceFile file;
   uint64_t offset = 0, size = 0;
   // The range holds characters that encode bytes. Some of them may be escaped by JSON.
   bool is_base64 = false;
-  bool is_data_uri = false;  // after the first comma: base64, or percent-encoded if not is_base64
+  bool is_data_uri = false;  // true: the characters follow the first comma of a data: URI
   uint64_t skip = 0;
   uint64_t bytes = UINT64_MAX;  // fewer if the range ends earlier
   std::string problem;          // why the image cannot be read, if known; otherwise ""

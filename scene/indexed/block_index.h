@@ -1,6 +1,7 @@
-// Records the place of every n-th element of a file whose elements vary in size, within a fixed
-// amount of memory. To find any other element, a reader starts at the last recorded element before
-// it. n is 1024 at first. When the index is full, it drops every second entry and doubles n.
+// Records the position (an Entry) of every n-th element of a file whose elements vary in size,
+// within a fixed amount of memory. To find any other element, a reader starts at the last recorded
+// element before it. n is 1024 at first. When the index is full, it drops every second entry and
+// doubles n.
 #pragma once
 
 #include <algorithm>

@@ -66,7 +66,7 @@ class ObjMesh : public IndexedMesh {
   FaceReader faces_;
   Positions positions_;
   bool has_surfaces_ = false;
-  FaceReader::Surfaces surfaces_;  // of the last read_corners()
+  FaceReader::Surfaces surfaces_;  // surfaces of the triangles of the last read_corners()
   std::optional<Cached<Colors, Colors::Color>> colors_;
   std::optional<Cached<TextureCoordinates, TextureCoordinates::Coordinates>> texcoords_;
 };

@@ -31,7 +31,7 @@ class VertexReader : public PositionSource {
 
   const PlyFile& ply_;
   const std::vector<size_t> properties_;
-  std::unique_ptr<Rows> rows_;  // for vertices that vary in size
+  std::unique_ptr<Rows> rows_;  // reader of vertices that vary in size
   // For vertices of a fixed size: the offset of each property in a row.
   std::optional<FileWindow> window_;
   std::vector<size_t> offsets_;

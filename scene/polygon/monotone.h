@@ -24,7 +24,7 @@ class MonotoneTriangulation {
  private:
   struct Entry {
     uint32_t corner;
-    bool is_lower;  // in the lower chain, from the leftmost to the rightmost corner
+    bool is_lower;  // true: the corner is in the lower chain
   };
 
   bool merge_chains(std::span<const uint32_t> ring);

@@ -41,7 +41,7 @@ class PolygonReader {
   const std::array<double, 3>& vertex(size_t triangle, size_t k) const;
   // True if the polygon is only read as a fan because its edges cross each other (triangulator.h).
   bool is_doubtful() const { return vertices_.size() > 3 && triangulator_.is_doubtful(); }
-  // Return the place of the first vertex.
+  // Return the offset in the file of the polygon's first vertex, and the number of its line.
   uint64_t offset() const { return offset_; }
   uint64_t line() const { return line_; }
 

@@ -10,7 +10,7 @@
 namespace voxdag::stl {
 namespace {
 
-// Maximum number of recorded places, which take 24 bytes each.
+// Maximum number of recorded positions of polygons (PolygonPlace), which take 24 bytes each.
 constexpr size_t kMaxPlaces = size_t{1} << 17;
 
 // Number of polygons between two checks for cancellation.

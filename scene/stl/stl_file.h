@@ -1,5 +1,5 @@
-// An open STL file and its number of triangles. One pass over an ASCII file also records the place
-// of every n-th polygon (block_index.h).
+// An open STL file and its number of triangles. One pass over an ASCII file also records the
+// position of every n-th polygon in the file (block_index.h).
 #pragma once
 
 #include <cstdint>

@@ -11,7 +11,7 @@
 namespace voxdag {
 
 // Opens the first of these paths that can be opened, relative to the folder of `from`. If none can,
-// throws the Error about the first path. There must be a path.
+// throws the Error about the first path. `paths` must not be empty.
 std::unique_ptr<ReadableFile> open_first(FileSystem& files, const std::string& from,
                                          std::span<const std::string> paths);
 

@@ -107,7 +107,8 @@ void add_deltas(unsigned mode, const std::array<uint8_t, 4>& delta, uint8_t* ele
 
 bool is_channel_mode(uint8_t mode) { return (mode & 15) == 2 || mode < 2; }
 
-// Reads a block of `count` elements. `last` is the element before the block, then its last element.
+// Reads a block of `count` elements. `last` is the element before the block; read_block() replaces
+// it by the block's last element.
 void read_block(Input& in, size_t stride, std::span<const uint8_t> channel_modes, size_t count,
                 Element& last, std::byte* out) {
   Block deltas;

@@ -8,7 +8,7 @@
 namespace voxdag::gltf {
 
 // Marks the meshes that nodes of the scene draw. Checks these meshes and the nodes' skins and
-// instances. Places compressed primitives. Throws Error{kInvalidInput}.
+// instances. Calls place_draco_primitive() for compressed primitives. Throws Error{kInvalidInput}.
 void check_drawn_meshes(Document& document);
 
 // Returns the buffer of decoded Draco data that a checked primitive's positions are in, or null.

@@ -13,7 +13,7 @@ enum class ExtensionSupport {
 
 struct ExtensionInfo {
   ExtensionSupport support = ExtensionSupport::kUnknown;
-  const char* purpose = "";  // of a harmless extension: "it describes materials"
+  const char* purpose = "";  // purpose of a harmless extension: "it describes materials"
 };
 
 ExtensionInfo extension_info(std::string_view name);

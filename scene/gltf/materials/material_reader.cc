@@ -77,8 +77,9 @@ bool exists(const std::vector<T>& all, int index) {
   return index >= 0 && static_cast<size_t>(index) < all.size();
 }
 
-// Returns the texture's image. If that index is not an image of the model, returns the index that
-// the first of four extensions gives for another file format. The result may also not be an image.
+// Returns the index of the texture's image. If the model has no such image, returns the index in
+// the first of four extensions for other file formats. The model may have no image with this index
+// either.
 int image_of(const tinygltf::Model& model, const tinygltf::Texture& texture) {
   int image = texture.source;
   for (const char* name :

@@ -12,8 +12,8 @@ namespace voxdag::gltf {
 
 constexpr size_t kInfluencesOfSet = 4;
 
-// True if the weights are used unchanged. Floats that were rounded when they were stored add up to
-// less than 1e-5 from 1. A sum of 16-bit integers that is wrong by one unit is off by more.
+// True if the weights are used unchanged. The sum of weights that were rounded to floats differs
+// from 1 by less than 1e-5. A sum of 16-bit integers that is wrong by one unit differs by more.
 inline bool is_normalized(double sum) { return std::abs(sum - 1) <= 1e-5; }
 
 // Reads the weights of all skinned primitives of the scene. Adds a warning for each primitive that

@@ -18,7 +18,7 @@ struct Corner {
   int64_t texture = 0;  // 0: none
 };
 
-// Removes an integer from the beginning of the text. Larger magnitudes than 2^53 are reduced to it.
+// Removes an integer from the beginning of the text. A magnitude above 2^53 is replaced by 2^53.
 // Returns false if the text does not begin with an integer.
 inline bool next_integer(std::string_view& text, int64_t& out) {
   constexpr int64_t kMax = int64_t{1} << 53;
@@ -57,8 +57,8 @@ inline bool has_texture(std::string_view arguments) {
   return has_word(arguments) && next_corner(arguments, corner) && corner.texture != 0;
 }
 
-// Returns the index from 0 for an index of the file. `before` is the number of v or vt statements
-// before the face.
+// Converts an index of the file, which counts from 1 or from the end, to an index that counts from
+// 0. `before` is the number of v or vt statements before the face.
 inline uint32_t resolve(int64_t index, uint64_t before) {
   const int64_t from_0 = index > 0 ? index - 1 : static_cast<int64_t>(before) + index;
   return index != 0 && from_0 >= 0 && from_0 < kNoIndex ? static_cast<uint32_t>(from_0) : kNoIndex;

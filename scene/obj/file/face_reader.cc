@@ -50,7 +50,7 @@ void FaceReader::seek(uint64_t triangle) {
   while (triangle >= face_end()) load(face_end());
 }
 
-// Reads the next face, whose first triangle is given.
+// Reads the next face. `first_triangle` is the number of the face's first triangle.
 void FaceReader::load(uint64_t first_triangle) {
   is_loaded_ = false;
   polygons_.next();

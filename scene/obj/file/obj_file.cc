@@ -15,7 +15,7 @@
 namespace voxdag::obj {
 namespace {
 
-// Maximum number of recorded places. They take at most 7 MiB in total.
+// Maximum numbers of recorded positions of lines and of faces. They take at most 7 MiB in total.
 constexpr size_t kMaxLinePlaces = size_t{1} << 17;
 constexpr size_t kMaxFacePlaces = size_t{1} << 16;
 // Number of statements between two checks for cancellation.
@@ -26,7 +26,7 @@ constexpr size_t kMaxLibraries = 1024;
 struct IgnoredStatements {
   uint64_t count = 0;
   uint64_t first_line = 0;
-  std::string keyword;  // of the first one
+  std::string keyword;  // keyword of the first such statement
 
   void add(const Statement& statement, uint64_t line) {
     if (count++ > 0) return;

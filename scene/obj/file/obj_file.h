@@ -1,8 +1,8 @@
 // An open OBJ file after one pass over it. It has the numbers of vertices, texture coordinates,
-// faces and triangles, the places of every n-th of them (block_index.h), and the names of materials
-// and libraries. A face of n corners has n - 2 triangles (scene/polygon); a face with fewer than
-// three corners has none. If there are faces of more than three corners, a second pass finds the
-// blocks of faces with concave polygons.
+// faces and triangles, the position in the file of every n-th of them (block_index.h), and the
+// names of materials and libraries. A face of n corners has n - 2 triangles (scene/polygon); a face
+// with fewer than three corners has none. If there are faces of more than three corners, a second
+// pass finds the blocks of faces with concave polygons.
 #pragma once
 
 #include <cstdint>
@@ -50,7 +50,7 @@ class ObjFile {
   const BlockIndex<LinePlace>& vertex_index() const { return vertex_index_; }
   const BlockIndex<LinePlace>& texcoord_index() const { return texcoord_index_; }
   const BlockIndex<FacePlace>& face_index() const { return face_index_; }
-  // True if some faces have other triangles than their fan.
+  // True if some faces are not divided into the fan around their first corner.
   bool has_splits() const { return has_splits_; }
   // True if a vertex has a color.
   bool has_colors() const { return has_colors_; }

@@ -45,7 +45,7 @@ class UsedMaterials {
   const std::deque<Use>& all() const { return uses_; }
 
  private:
-  static constexpr uint64_t kNodeBytes = 64;  // of the hash table
+  static constexpr uint64_t kNodeBytes = 64;  // bytes of a hash table's node
 
   GrowingCharge charge_;
   std::deque<Use> uses_;

@@ -6,8 +6,8 @@
 namespace voxdag::obj {
 namespace {
 
-// An option of a map statement, which takes numbers or one word. The lookup is the lookup of a
-// texel.
+// An option of a map statement. Its value is one or more numbers, or one word. Some values change
+// how texels of the image are looked up.
 struct MapOption {
   std::string_view name;
   size_t max_numbers;             // 0: the option takes a word

@@ -79,7 +79,7 @@ class LibraryList {
                        "); its materials are white"});
   }
 
-  static constexpr uint64_t kNodeBytes = 96;  // of the hash table
+  static constexpr uint64_t kNodeBytes = 96;  // bytes of a hash table's node
 
   FileSystem& files_;
   const ObjFile& obj_;

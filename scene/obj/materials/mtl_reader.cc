@@ -32,7 +32,7 @@ class LibraryReader {
 
  private:
   static constexpr size_t kNone = ~size_t{0};
-  static constexpr uint64_t kNodeBytes = 96;  // of the hash table
+  static constexpr uint64_t kNodeBytes = 96;  // bytes of a hash table's node
 
   void begin_material(std::string_view name) {
     const auto [place, is_new] = numbers_.try_emplace(std::string(name), materials_.size());

@@ -50,8 +50,8 @@ bool resembles_keyword(std::string_view word) {
   });
 }
 
-// Returns the index of the item with this name. Otherwise ignores upper and lower case and returns
-// the first match. Returns the number of items if no name matches.
+// Returns the index of the item with this name. If there is none, ignores upper and lower case and
+// returns the first match. Returns the number of items if no name matches.
 template <class Item>
 size_t find_named(const std::vector<Item>& items, std::string_view name) {
   auto found = std::ranges::find(items, name, &Item::name);

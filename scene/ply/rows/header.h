@@ -44,8 +44,8 @@ struct Element {
   uint64_t count = 0;
   std::vector<Property> properties;
 
-  // Returns the index of the property with this name. Otherwise ignores upper and lower case and
-  // returns the first match. Returns the number of properties if no name matches.
+  // Returns the index of the property with this name. If there is none, ignores upper and lower
+  // case and returns the first match. Returns the number of properties if no name matches.
   size_t find(std::string_view property) const;
 };
 
