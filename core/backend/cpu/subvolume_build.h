@@ -46,8 +46,7 @@ class SubvolumeBuild {
   SolidNode build_solid_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   NodeRef finish_solid_root(const SolidNode& root);
 
-  // The entries of a cube's children: those of child c are entries_[first[c], first[c] +
-  // counts[c]).
+  // The entries of a cube's child c are entries_[first[c], first[c] + counts[c]).
   struct ChildEntries {
     size_t first[8];
     size_t counts[8] = {};

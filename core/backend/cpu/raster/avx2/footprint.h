@@ -22,7 +22,7 @@ namespace {
 // columns of bricks that they list: kShell lists kInside, kThin lists kTouched.
 enum class FootprintColumns {
   kInside,   // columns of bricks that have a voxel column inside
-  kTouched,  // also columns that the triangle touches only beside the voxel columns' centers
+  kTouched,  // also columns that the triangle touches away from the voxel columns' centers
 };
 
 template <int D>
