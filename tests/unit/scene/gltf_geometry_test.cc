@@ -120,7 +120,7 @@ TEST(GltfGeometry, UnusualStrides) {
   }
 }
 
-// The indices and values of sparse accessors may also have such strides.
+// The indices and values of sparse accessors may also have a byteStride that glTF does not allow.
 TEST(GltfGeometry, SparseStrides) {
   SceneBuilder scene = one_triangle();
   scene.root["accessors"][0]["sparse"] = {

@@ -138,7 +138,7 @@ TEST(Surfaces, TextureCoordinatesOfOtherTypesAndSets) {
   use["extensions"] = {{"KHR_texture_transform", {{"texCoord", 2}, {"offset", {0, 0.5}}}}};
   EXPECT_EQ(corner(1), (std::array<int64_t, 2>{0, kOneImage / 2 * 3}));
   EXPECT_EQ(corner(2), (std::array<int64_t, 2>{(kOneImage + 2) / 5, kOneImage / 2}));
-  // A set that the primitive lacks: the factor alone.
+  // If the primitive lacks the set, the material keeps only its factor.
   use["extensions"] = {{"KHR_texture_transform", {{"texCoord", 3}}}};
   OpenScene open(scene.glb());
   const SceneMaterials scene_materials = open.source->materials();

@@ -302,7 +302,6 @@ TEST(Images, DamagedAnywhere) {
   }
 }
 
-// Errors of the source pass through the decoders.
 // A small file can take minutes to decode, so decoders stop when the token is canceled: also
 // between the scans and rows that need no more bytes of the file.
 TEST(Images, CancellationStopsDecoders) {
@@ -321,6 +320,7 @@ TEST(Images, CancellationStopsDecoders) {
     }
 }
 
+// Errors of the source pass through the decoders, and no memory remains charged.
 TEST(Images, ErrorsOfTheSource) {
   struct Failing : StringSource {
     using StringSource::StringSource;

@@ -70,7 +70,7 @@ TEST_F(GuardedOutputsTest, OtherPathsAreNotGuarded) {
   EXPECT_EQ(get(folder_.file("other")), "new");
 }
 
-// The two ways of renaming, with and without renameat2().
+// Both ways of renaming, with and without renameat2(), rename a file but never replace one.
 TEST_F(GuardedOutputsTest, RenamesWithoutReplacing) {
   for (const auto rename : {rename_without_replacing, rename_by_link}) {
     put(partial_, "ours");

@@ -140,7 +140,7 @@ TEST_F(ExportHuge, HashDagCountsWordsWith32Bits) {
 }
 
 // Below its top levels, HashDAG stores counts of voxels with 24 bits. In the top levels, a node has
-// an index of 24 bits in this place.
+// an index of 24 bits instead of the count.
 TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
   std::vector<GlobalLevel> levels = chain(17);
   const uint64_t others = 9;

@@ -111,7 +111,7 @@ TEST(GltfMeshopt, QuantizedPositionsAndStrips) {
   EXPECT_EQ(triangles, triangles_of_file(plain.glb()));
 }
 
-// EXPONENTIAL stores 24 bits of mantissa below 8 bits of exponent.
+// The filter EXPONENTIAL is decoded: 24 bits of mantissa are below 8 bits of exponent.
 TEST(GltfMeshopt, ExponentialFilter) {
   std::vector<uint32_t> encoded;
   std::vector<float> decoded;
@@ -145,7 +145,7 @@ TEST(GltfMeshopt, VertexStreamsOfVersion1) {
   EXPECT_EQ(triangles_of_file(khr_meshopt_glb(scene)), triangles_of_file(plain.glb()));
 }
 
-// COLOR stores Y, Co, Cg and alpha, which decode to red, green, blue and alpha.
+// The filter COLOR is decoded: from Y, Co, Cg and alpha to red, green, blue and alpha.
 TEST(GltfMeshopt, ColorFilter) {
   const auto read = [](int view, SceneBuilder& scene, int type, const std::string& file) {
     Json& primitive = scene.root["meshes"][0]["primitives"][0];
@@ -186,7 +186,7 @@ TEST(GltfMeshopt, ColorFilter) {
   EXPECT_EQ(compressed(encoded16, kU16, "KHR"), plain(decoded16, kU16));
 }
 
-// Rotations of instances, which decode to quaternions of 16 bits.
+// The filter QUATERNION is decoded: rotations of instances become quaternions of 16 bits.
 TEST(GltfMeshopt, QuaternionFilterOfInstances) {
   const std::vector<int16_t> encoded{100, 200, -300, 0x7ff0 | 3, -500, 0, 900, 0x7ff0 | 1};
   std::vector<int16_t> decoded = encoded;

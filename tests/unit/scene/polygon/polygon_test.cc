@@ -84,7 +84,7 @@ TEST(Polygon, CollinearCornersAreCovered) {
   check_all_ways({{3, 3}, {3, 3}, {3, 3}, {3, 3}});
 }
 
-// A bridge connects the outline with each hole, so its two edges coincide.
+// Outlines with holes are covered. The two edges of the bridge to each hole coincide.
 TEST(Polygon, HolesWithBridgesAreCovered) {
   check_all_ways({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {3, 3}, {3, 6}, {6, 6}, {6, 3}, {3, 3}});
   Outline plate = {{0, 0}, {410, 0}, {410, 10}};

@@ -106,8 +106,8 @@ TEST(Draw, AmbiguousEdgesAreExact) {
   }
 }
 
-// The same, for rows of the rule kThin: planes and edges pass through centers of voxels, faces and
-// edges, or just miss them.
+// The kernels also equal the oracle for the rule kThin if planes and edges pass through centers of
+// voxels, faces and edges, or just miss them.
 TEST(Draw, AmbiguousCentersAreExact) {
   oracle::Random random(5);
   const int64_t middle = int64_t{1} << 19;
