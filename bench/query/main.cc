@@ -26,8 +26,8 @@ constexpr size_t kReaderBoxes = 20;
 // OctoMap takes some 5 GB for Sponza on a grid of 2048^3.
 constexpr uint32_t kMaxOtherLevels = 11;
 
-// Prints a timing. Reports a different `found` than in `expected`, the timing of the first library;
-// `expected` is null if the two libraries need not find the same.
+// Prints a timing, and whether its `found` differs from expected->found. `expected` is the timing
+// of the first library; null if the two libraries need not find the same.
 void print(const char* who, const char* what, const Timing& timing,
            const Timing* expected = nullptr) {
   std::printf("  %-22s %-22s %10.4f M/s   found %llu%s\n", who, what, timing.per_second / 1e6,

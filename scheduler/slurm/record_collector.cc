@@ -86,7 +86,7 @@ void RecordCollector::read_record(const ClusterFolder::Entry& entry) {
 void RecordCollector::reject(const ClusterFolder::Entry& entry, OpenBatch& batch,
                              const Error& error) {
   cluster_.progress().warn("the record " + entry.path + " is rejected: " + error.message());
-  // The record may come from an earlier attempt, so the current task may still be running.
+  // false: the task may still be running, because the record may come from an earlier attempt.
   if (!batch.error) batch.error = {error.message(), false};
   rejected_.insert(entry.path);
   remove_attempt(entry);

@@ -62,7 +62,7 @@ struct MemoryPlan {
   // piece of the scene, and the piece's counts for the top tree. The vertices of indexed meshes are
   // not included (first row of the table).
   static constexpr uint64_t kIngestWorkerBytes = uint64_t{6} << 20;
-  // Half-filled chunks while a subvolume is split; not charged.
+  // Memory of half-filled chunks while a subvolume is split. It is not charged.
   static constexpr uint64_t kSplitBufferBytes = uint64_t{512} << 10;
 
   uint64_t top_tree_bytes = 0;          // counters of the top tree

@@ -113,8 +113,8 @@ class JobStore {
   // the triangles of built subvolumes were released.
   void mark_for_rebuild(const StoredSubvolume& lost);
 
-  // Returns the progress of scan, ingest and partition that save_ingest() stored, for the present
-  // or the next job. Throws Error{kCorrupt} if it does not match its checksum.
+  // Returns the progress of scan, ingest and partition that save_ingest() stored: of the stored job
+  // or of the next one. Throws Error{kCorrupt} if it does not match its checksum.
   std::optional<std::vector<std::byte>> ingest();
   void save_ingest(std::span<const std::byte> record);
   // Removes the progress of ingest, and the warnings. Does not write if the store has neither.

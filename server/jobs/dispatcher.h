@@ -62,7 +62,8 @@ class Dispatcher {
   std::shared_ptr<LiveJob> live(const std::string& id) const;
   // Returns the number of running job processes.
   size_t running() const;
-  // Returns the sums over all running jobs. Sets only `waiting`, `failed_attempts` and `running`.
+  // Returns the numbers of cluster tasks of all running jobs together. Sets only `waiting`,
+  // `failed_attempts` and `running`.
   ClusterTasks cluster_tasks() const;
   JobFolder folder(const std::string& id) const;
 

@@ -31,7 +31,8 @@ struct ExecutorOptions {
   VoxelRule rule = VoxelRule::kShell;
   unsigned threads = 1;
   uint64_t built = 0;  // subvolumes built by earlier runs, for the progress
-  // Subvolumes with longer edges are split without an attempt to build them.
+  // In voxels. A subvolume with a longer edge is split without an attempt to build it, unless its
+  // edge is at most kSmallestEdge.
   int64_t longest_edge = INT64_MAX;
   std::function<std::unique_ptr<Backend>()> open_backend;
   std::string segment_folder;

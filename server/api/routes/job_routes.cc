@@ -67,7 +67,7 @@ IdempotencyKey key_of(const Request& request, const JobRequest& job) {
   return {key, sha256_hex(job.text + '\n' + std::to_string(job.priority) + '\n' + job.name)};
 }
 
-// Returns an answer with the job that get() returns.
+// Waits for a permit to build an answer, and returns an answer with the job that get() returns.
 template <class Get>
 Response job_response_of(Context& context, int status, const Get& get) {
   auto permit = context.answers.wait();

@@ -56,7 +56,7 @@ std::optional<uint64_t> GrowingDag::add(const CoarseCubes& cubes, uint32_t level
   std::optional<uint64_t> root;
   if (nodes_) root = nodes_->dag.add(parts);
   if (nodes_ && nodes_->dag.word_count() <= nodes_->max_words) return root;
-  // If this throws, the old nodes and their digest remain.
+  // If the new nodes cannot be made, the old nodes and their digest remain.
   auto nodes = std::make_unique<Nodes>(
       levels, sha256_hex("partial " + job_ + random_id()).substr(0, kDagDigits));
   root = nodes->dag.add(parts);

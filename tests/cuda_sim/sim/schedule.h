@@ -17,7 +17,7 @@ struct Schedule {
 void set_schedule(const Schedule& schedule);
 Schedule schedule();
 
-// The next random number below `end`.
+// Returns the next random number below `end`.
 uint32_t random_below(uint32_t end);
 
 // Visits each number from 0 to n - 1 once. Begins at a random number and adds a random stride

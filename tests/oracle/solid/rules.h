@@ -17,7 +17,7 @@ struct Solid {
   uint64_t interior = 0;  // voxels that are not in the shell
   // Counts of sample rows: those with a crossing (rows), those whose signs of crossings do not sum
   // to 0 (open_rows), and those with an odd number of crossings (odd_rows). `disputed` counts the
-  // interior voxels of units whose directions do not all agree. All are 0 for kEnclosed.
+  // interior voxels of units (rules.cc) whose directions do not all agree. All are 0 for kEnclosed.
   uint64_t rows = 0, open_rows = 0, odd_rows = 0, disputed = 0;
 };
 

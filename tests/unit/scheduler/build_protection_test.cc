@@ -176,10 +176,9 @@ TEST_F(BuildProtection, ALockOfTheOutputHasAName) {
   EXPECT_FALSE(std::filesystem::exists(OutputLock::path_of(output())));
 }
 
-// A build holds the lock of its output from its first stage until the output has its final
-// name.
+// A build holds the lock of its output from its first stage until the output has its final name.
 TEST_F(BuildProtection, ABuildHoldsItsOutputUntilItEnds) {
-  // Checks at the begin and the end of each stage that another build cannot get the lock.
+  // Checks at the beginning and the end of each stage that another build cannot get the lock.
   class Looking : public NoProgress {
    public:
     explicit Looking(const std::string& output) : path_(OutputLock::path_of(output)) {}

@@ -132,8 +132,7 @@ TEST_F(ColorArtifacts, WhatIsDamagedIsBakedAgain) {
   EXPECT_EQ(warnings_.text, "");
 }
 
-// Stored cubes of earlier scenes are dropped when they outnumber the cubes of this
-// scene.
+// Stored cubes of earlier scenes are dropped when they outnumber the cubes of this scene.
 TEST_F(ColorArtifacts, DoNotGrowWithoutEnd) {
   BuildSpec s = spec();
   s.run.keep_work = true;

@@ -25,7 +25,7 @@ FixedTriangle triangle_near(std::mt19937_64& random, int64_t size_units) {
   return t;
 }
 
-// Tests each leaf with the exact overlap test.
+// Returns the leaves that the triangle touches. Tests each leaf with the exact overlap test.
 std::vector<size_t> touched_by_brute_force(const FixedTriangle& t,
                                            const std::vector<SubvolumePlan>& leaves) {
   std::vector<size_t> touched;
