@@ -49,8 +49,8 @@ void refuse_other_options(const BuildJob& job) {
 }
 
 // Prepares the work folder for this job. Removes the state of an earlier job if the build starts
-// over; otherwise refuses an earlier job with other geometry options. Removes spilled triangles in
-// either case.
+// over; otherwise refuses an earlier job with another format version or other geometry options.
+// Removes spilled triangles in either case.
 void prepare_work_folder(BuildJob& job) {
   if (job.start_over) {
     job.checkpoint.forget();
