@@ -72,7 +72,7 @@ uint32_t commonest(std::span<const uint32_t> children);
 struct AttributeTraits {
   Attribute attribute;
   const char* name;    // name in options, JSON and messages
-  const char* plural;  // name in arrays, sections and messages
+  const char* plural;  // plural of the name, in arrays, sections and messages
   Encoding encoding;
   bool uses_images = false;       // depends on the scene's textures
   const char* ply_properties[3];  // names of a value's components

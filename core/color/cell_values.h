@@ -14,7 +14,7 @@ struct CellValues {
   uint32_t material = 0;  // an index into the list of the scene's materials
 };
 
-// Returns the bytes of a list of names in the global file, without the padding after it.
+// Returns the size in bytes of a list of names in the global file, without the padding after it.
 inline uint64_t list_bytes(std::span<const std::string> names) {
   uint64_t bytes = sizeof(uint32_t);
   for (const std::string& name : names) bytes += sizeof(uint32_t) + name.size();

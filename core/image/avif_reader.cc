@@ -20,8 +20,9 @@ constexpr uint64_t kAvifStateBytes = uint64_t{16} << 20;
 // Bytes of memory per pixel, for channels of up to 8 bits and of more bits: the decoder's planes,
 // its state per block, and a second set of planes for images that consist of several tiles.
 constexpr uint64_t kBytesPerPixel = 16, kBytesPerWidePixel = 28;
-// The decoder's limit of pixels is the image's size, but at least this number. A damaged file can
-// make the decoder allocate memory for as many pixels as the limit allows.
+// The decoder gets a limit for the number of pixels: the number in the image, but at least
+// kMinSizeLimit. A damaged file can make the decoder allocate memory for as many pixels as the
+// limit allows.
 constexpr uint32_t kMinSizeLimit = 1 << 16;
 
 struct DestroyDecoder {

@@ -70,7 +70,7 @@ Vec tone_map(const Vec& light) {
   return out;
 }
 
-// Takes samples * samples samples of a pixel.
+// Takes samples^2 samples of the pixel (x, y) and combines them.
 GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighting& lighting,
                           Albedo& albedo, int samples, int x, int y) {
   constexpr int kSkyRays = 4;

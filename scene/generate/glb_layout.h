@@ -42,7 +42,7 @@ class GlbLayout : public BlockSink {
   enum class Kind : uint8_t { kMesh, kPart, kInstances };
   struct Block {
     Kind kind;
-    uint32_t part;    // part that a block of instances places
+    uint32_t part;    // number of the part that a block of instances places
     uint32_t first;   // number of vertices or of instances
     uint32_t second;  // number of indices
     Float3 low, high;

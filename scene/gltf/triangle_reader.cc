@@ -19,7 +19,8 @@ uint64_t largest_vertex_count(const Document& document) {
   return largest;
 }
 
-// If a vertex is not finite, all its coordinates are NaN. So one coordinate of each is tested.
+// If a vertex is not finite, all its coordinates are NaN. So only the first coordinate of each
+// vertex is tested.
 bool is_finite(const RealTriangle& triangle) {
   return !std::isnan(triangle.v[0][0]) && !std::isnan(triangle.v[1][0]) &&
          !std::isnan(triangle.v[2][0]);

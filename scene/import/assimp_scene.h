@@ -13,7 +13,8 @@ namespace voxdag {
 
 class AssimpScene {
  public:
-  // Throws Error{kInvalidInput} with assimp's message if it cannot read the file, std::bad_alloc.
+  // Throws Error{kInvalidInput} with assimp's message if assimp cannot read the file. May also
+  // throw std::bad_alloc.
   explicit AssimpScene(const std::string& path);
 
   const std::string& path() const { return path_; }

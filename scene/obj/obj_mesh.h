@@ -41,7 +41,7 @@ class ObjMesh : public IndexedMesh {
   }
 
  private:
-  // Values of v or vt statements.
+  // Caches the values of v or vt statements.
   template <class Reader, class Value>
   class Cached {
    public:

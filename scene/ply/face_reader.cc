@@ -88,7 +88,7 @@ uint64_t FaceReader::face_end() const {
   return first_triangle_ + (corners < 3 ? 0 : corners - 2);
 }
 
-// Returns the position in the face of a corner of a triangle.
+// Returns which corner of its face is corner `k` of a triangle.
 size_t FaceReader::corner_of(uint64_t triangle, size_t k) const {
   return polygon::position_of_corner(split_, static_cast<size_t>(triangle - first_triangle_), k);
 }

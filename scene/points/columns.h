@@ -63,7 +63,7 @@ class Columns {
   void finish();
 
   std::array<size_t, kValues> place_;  // number of the column of each value
-  std::vector<size_t> value_in_;       // value of each column up to the last used column
+  std::vector<size_t> value_in_;       // value number of each column, up to the last used column
 };
 
 // Returns the number of fields of a row if all of them are numbers, otherwise 0.

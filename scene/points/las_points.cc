@@ -77,7 +77,7 @@ class LasFile : public PointFile {
   const LasHeader las_;
   uint64_t count_;  // points that are not withheld
   uint16_t max_color_ = 255;
-  std::deque<uint64_t> kept_before_;  // kept points before each block of records
+  std::deque<uint64_t> kept_before_;  // number of kept points before each block of records
   GrowingCharge charge_;              // charge for kept_before_
 };
 

@@ -1,5 +1,5 @@
-// The rows of a text file with points: their columns, their number, and the place of every 1024th
-// row.
+// The rows of a text file with points: their columns, their number, and the position in the file of
+// every 1024th row.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,8 @@ class RowIndex {
   static constexpr uint64_t kBlockRows = 1024;
 
   // `columns` names the columns (SceneOptions::columns); if it is empty, the first row decides.
-  // Throws Error{kInvalidInput} if `columns` is invalid, Error{kOutOfMemory} if the places do not
-  // fit the budget.
+  // Throws Error{kInvalidInput} if `columns` is invalid, Error{kOutOfMemory} if the positions of
+  // the rows do not fit the budget.
   RowIndex(const ReadableFile& file, const std::string& columns, MemoryBudget& budget,
            const CancelToken& cancel);
 
@@ -29,7 +29,7 @@ class RowIndex {
   // Value of a color's full intensity: 1 or 255.
   double full_color() const { return full_color_; }
   uint64_t rows() const { return rows_; }
-  // The places of every kBlockRows-th row.
+  // The positions of the rows 0, kBlockRows, 2 * kBlockRows, ...
   const std::deque<RowReader::Place>& blocks() const { return blocks_; }
 
  private:

@@ -26,7 +26,8 @@ struct Projection {
 bool is_clear_fan(std::span<const double> xyz);
 
 // Multiplies the coordinates by a power of two, so that the largest magnitude is from 1/2 to 1.
-// `xyz` holds three finite coordinates per corner. Returns false if a coordinate is not finite.
+// `xyz` holds three coordinates per corner. Returns false, and changes nothing, if a coordinate is
+// not finite.
 bool normalize(std::span<double> xyz);
 
 // Returns the projection of a normalized polygon.

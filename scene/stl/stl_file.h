@@ -18,7 +18,7 @@ namespace voxdag::stl {
 class StlFile {
  public:
   // Throws Error{kInvalidInput} for a file that is cut off, Error{kLimit} for a line that is too
-  // long, Error{kOutOfMemory}.
+  // long, and Error{kOutOfMemory} if the budget is too small.
   StlFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
   // A polygon of an ASCII file: the word "vertex" of its first vertex, and its first triangle.

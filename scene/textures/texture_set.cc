@@ -26,7 +26,7 @@ namespace {
 // Converts rows of pixels to texels: linear light by a table, alpha unchanged.
 class TexelRow {
  public:
-  // `cut_by`: a material with a mask of this image, or null.
+  // `cut_by`: a material whose mask was made from this image, or null.
   TexelRow(const ImageReader& image, const Material* cut_by, MemoryBudget& budget)
       : cut_by_(cut_by),
         is_wide_(image.bits() == 16),
@@ -48,7 +48,8 @@ class TexelRow {
   }
 
  private:
-  // Multiplies a texel by its visible part.
+  // Returns 0 for a hidden texel. In mode kMask, makes any other texel opaque; otherwise multiplies
+  // its color by its alpha.
   uint64_t visible(uint64_t texel) const {
     const uint32_t alpha = color::channel(texel, 3);
     if (color::is_hidden(*cut_by_, alpha)) return 0;
@@ -80,7 +81,7 @@ std::string user_of(const SceneMaterials& materials, uint32_t image) {
   return ", the base color of material " + numbered(index, found->name);
 }
 
-// Unreadable images with the same problem.
+// The images that cannot be read because of the same problem.
 struct UnreadableImages {
   std::string problem;
   std::string first;  // the first of the images, and a material that uses it
@@ -328,7 +329,7 @@ class TextureSet::Builder {
     expect_unchanged(files_, materials_.images[i]);
   }
 
-  // Returns a material with a mask of the image, or null.
+  // Returns a material whose mask was made from this image, or null if there is none.
   const Material* cut_by(uint32_t image) const {
     for (uint32_t m = 0; cutouts_ && m < materials_.materials.size(); ++m)
       if (materials_.materials[m].image == image && cutouts_->mask(m))

@@ -51,7 +51,8 @@ class SubvolumeBuild {
     size_t first[8];
     size_t counts[8] = {};
   };
-  // Adds the entries of the children of a cube to the stack.
+  // Adds the entries of the children of `cube` to the stack. The entries of `cube` are
+  // entries_[first, first + count).
   ChildEntries push_children(const LatticeCube& cube, size_t first, size_t count);
   // True if splitting a cube of at most tile size is likely to be faster than drawing it, because
   // the nodes of its parts may be in the plane memo.

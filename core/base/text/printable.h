@@ -26,7 +26,8 @@ bool is_printable(std::string_view text);
 // Returns the text on one line. Each character that is not printable, including line feeds, and
 // each byte that is not UTF-8 becomes a question mark.
 std::string printable_line(std::string_view text);
-// The same, but keeps line feeds and tabs. For text that consists of lines, such as a log file.
+// Like printable_line(), but keeps line feeds and tabs. For text that consists of lines, such as a
+// log file.
 std::string printable_lines(std::string_view text);
 
 // Returns the JSON with escapes for the characters in its strings that are not printable. The value

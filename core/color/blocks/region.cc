@@ -40,7 +40,8 @@ void RegionEncoder::add_level(uint32_t up, std::span<const ColoredCell> cells,
 
 void RegionEncoder::add(std::span<const ColoredCell> cells, uint32_t first_code) {
   if (colors_.empty()) {
-    // Also reserves space for the coarser levels.
+    // Reserves space for these cells and for the coarser levels, which usually have less than half
+    // as many cells in total.
     colors_.reserve(cells.size() + cells.size() / 2);
     parents_.reserve(std::min(cells.size(), size_t{1} << 3 * levels_ >> 3));
   }

@@ -199,7 +199,8 @@ bool VisiblePart::covers(const Polygon& polygon, bool visible, double depth) con
   return false;
 }
 
-// Returns the outline of a polygon in the image of a period.
+// Returns the outline of a polygon in one repetition of the image. `period` has the repetition's
+// numbers along u and v.
 VisiblePart::Outline VisiblePart::outline_of(const Polygon& polygon,
                                              const std::array<double, 2>& period) const {
   Outline out;

@@ -33,7 +33,7 @@ class VisiblePatches {
   static constexpr uint32_t kBlockLevels = 6;
   static constexpr size_t kBlockEdge = size_t{1} << kBlockLevels;
   using Voxel = std::array<int64_t, 3>;
-  // Axes of the rows, of the rectangles' other side, and across the layers.
+  // The axis along the rows, the other axis of the rectangles, and the axis across the layers.
   struct Axes {
     size_t along, aside, across;
   };
@@ -55,7 +55,7 @@ class VisiblePatches {
   // The bits of a block along axes_.along, one word for each position across (slowest) and aside.
   // All words are 0 between two blocks.
   std::vector<uint64_t> rows_;
-  size_t first_row_ = kBlockEdge * kBlockEdge, last_row_ = 0;  // the rows that are not 0
+  size_t first_row_ = kBlockEdge * kBlockEdge, last_row_ = 0;  // range of the rows that are not 0
 };
 
 }  // namespace voxdag

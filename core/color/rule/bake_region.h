@@ -89,9 +89,10 @@ class RegionBaker {
     add_waiting();
     return cells_.count() <= max_cells_;
   }
-  // Adds triangles in parts. After each part, charge(bytes) receives the allocated bytes of the
-  // sums for `wanted`, which grow by at most 16 MiB between two calls. If charge() returns false,
-  // add() stops and returns false.
+  // Like the other add(), but adds the triangles in parts. If `wanted` needs sums, calls
+  // charge(bytes) after each part. `bytes` is the memory that these sums have allocated so far; it
+  // grows by at most 16 MiB between two calls. If charge() returns false, add() stops and returns
+  // false.
   template <class Charge>
   bool add(std::span<const FixedSurface> triangles, const Charge& charge) {
     constexpr size_t kTrianglesPerCharge = 16;

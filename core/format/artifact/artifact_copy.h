@@ -27,7 +27,7 @@ uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std
 struct CacheEntry {
   std::unique_ptr<ReadableFile> file;
   ArtifactRef ref;
-  ArtifactRoot root;       // root, with the cube for which it was built
+  ArtifactRoot root;       // the artifact's root, with the cube of the original build
   uint64_t dag_nodes = 0;  // total of all levels
 };
 

@@ -145,8 +145,8 @@ struct ColorRegion {
   const unsigned char* blocks = nullptr;
   uint32_t block_bytes = 16;
 
-  // Returns the value of cell `i` of the region's cells, from 0, in stored order: alpha, a material
-  // or the code of a normal. Not for colors.
+  // Returns the value of cell `i` of the region: alpha, a material or the code of a normal. Cells
+  // are numbered from 0 in the order in which they are stored. Not for colors.
   uint32_t value(uint64_t i) const {
     const uint32_t bytes = block_bytes / 32;
     uint32_t value = 0;

@@ -13,7 +13,7 @@ struct SineCosine {
 // not finite counts as 0.
 SineCosine sine_and_cosine(double angle);
 
-// The rows of a 2x3 matrix.
+// A transform of texture coordinates (u, v): the rows of the 2x3 matrix that multiplies (u, v, 1).
 struct TextureTransform {
   double m[2][3] = {{1, 0, 0}, {0, 1, 0}};
 

@@ -16,8 +16,8 @@ namespace voxdag::gltf {
 class AccessorReader {
  public:
   // Throws Error{kInvalidInput} if sparse indices are out of range or do not increase strictly.
-  // Throws Error{kOutOfMemory} if there are too many for the budget of `buffers`. `document` and
-  // `buffers` must outlive the reader.
+  // Throws Error{kOutOfMemory} if the table for finding sparse indices does not fit the budget of
+  // `buffers`. `document` and `buffers` must outlive the reader.
   AccessorReader(const Document& document, BufferReader& buffers, int accessor);
 
   uint64_t count() const { return accessor_.count; }

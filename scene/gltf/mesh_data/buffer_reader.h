@@ -73,7 +73,7 @@ class BufferReader {
   MemoryBudget& budget_;
   const size_t max_open_;
   PageBuffer<std::byte> window_;
-  // Base64 characters of a window; empty until a buffer needs it.
+  // Base64 characters of a window; allocated when a buffer first needs them.
   PageBuffer<std::byte> characters_;
   struct OpenFile {
     int buffer;

@@ -39,7 +39,7 @@ class StatementReader {
   const Kind kind_;
   const uint64_t count_;
   LineReader lines_;
-  uint64_t next_;  // number of the statement at or after the next line; initially, none
+  uint64_t next_;  // number of the next statement; initially count_, past the end
 };
 
 // The positions of the vertices.

@@ -16,11 +16,11 @@ namespace voxdag::cpu {
 
 class RunningRows {
  public:
-  static constexpr int kRows = 9;  // rows along each side of a tile's square, at most
+  static constexpr int kRows = 9;  // maximum number of rows along an edge of a column's square
   static constexpr int kSquare = kRows * kRows;
 
-  // `tiles`: tiles along the subvolume's edge. `blocks`: blocks along a tile's edge, at most 8. The
-  // entry has the rows of the subvolume. Throws OutOfBudget.
+  // `tiles`: tiles along the subvolume's edge. `blocks`: blocks along a tile's edge, at most 8.
+  // `entry` holds the views of the subvolume's rows at its low faces. Throws OutOfBudget.
   RunningRows(PooledMemory& memory, const SolidEntry& entry, int tiles, int blocks);
 
   // Returns the views along `axis` at the low face of a column's next tile. `tile`: the position of

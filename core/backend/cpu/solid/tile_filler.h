@@ -15,7 +15,7 @@
 
 namespace voxdag::cpu {
 
-// Voxels of units that are inside.
+// Counts voxels whose units (core/geometry/solid_rule.h) are inside the solid.
 struct FilledVoxels {
   uint64_t filled = 0;
   uint64_t disputed = 0;  // voxels of `filled` whose unit is_disputed()
@@ -55,7 +55,9 @@ class TileFiller {
   bool is_occupied(int size_log2, int index) const;
   void fill_cube(int size_log2, int index, const int (&low)[3]);
   void fill_block(int index, const int (&low)[3]);
-  // Fills the components with corners in `block`. Removes their voxels from `rest`.
+  // Decides all components of `rest` that have a corner of the block, from the views of the block's
+  // corners: adds the voxels of components that are inside to `result`. Removes all these
+  // components from `rest`.
   void fill_components(const FillMemo::Views& views, Slices& rest, FillMemo::Filled& result) const;
   // Adds the components of `rest` to blind_.
   void add_blind(int index, const int (&low)[3], Slices& rest);

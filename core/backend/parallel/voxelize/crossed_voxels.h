@@ -38,7 +38,7 @@ VOXDAG_HD inline uint64_t crossed_voxels_by(const FixedTriangle& t, const int64_
   return voxels;
 }
 
-// Returns the voxels of the brick with the low corner `low` that the rule sets.
+// Returns the voxels of the brick with the low corner `low` that the rule kThin sets.
 VOXDAG_HD inline uint64_t crossed_voxels(const FixedTriangle& t, const int64_t (&low)[3]) {
   if (!box_touches_cube(t, low, kUnitBits + kBrickLevels)) return 0;
   if (!has_row_coordinates(t)) return crossed_voxels_by<WideRowTest>(t, low);

@@ -99,7 +99,7 @@ TEST(Jpeg, HugeSizes) {
   EXPECT_THAT(problem_of(file), HasSubstr("65500"));  // the library's own limit
   file.replace(frame + 5, 4, "\xff\x01\xff\x01");
   EXPECT_THAT(problem_of(file), HasSubstr("65281 x 65281 pixels"));
-  file.replace(frame + 5, 4, "\x40\x10\x3f\xf0");  // just below 2^28 pixels: over 1 GiB
+  file.replace(frame + 5, 4, "\x40\x10\x3f\xf0");  // just below 2^28 pixels, which need over 1 GiB
   EXPECT_THROW(decode(file), Error);
 }
 

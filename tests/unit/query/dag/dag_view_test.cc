@@ -10,8 +10,8 @@ using namespace voxdag::query;
 
 namespace {
 
-// At the level of voxels, the view visits every voxel once, at its position. It skips the children
-// that `select` excludes.
+// At the level of voxels, the view visits every voxel once, at its position. It does not visit
+// children that the selection excludes.
 TEST(DagView, VisitsTheSelectedCells) {
   const std::set<VoxelScene::Voxel> voxels = {{3, 9, 30}, {20, 10, 1}, {4, 4, 4}, {31, 31, 31}};
   const VoxelScene scene(5, voxels);

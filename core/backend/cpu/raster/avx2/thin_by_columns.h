@@ -2,7 +2,7 @@
 // of bricks along the axis D of the normal's largest component. In each voxel column, exactly one
 // voxel passes the plane test along D (thin_triangle.h). It is set if
 //
-//   - the row along D through the column's center crosses the triangle (ThinFootprint), or
+//   - the row along D through the column's center crosses the triangle (Footprint::inside), or
 //   - it passes the plane test and the edge tests along one of the other axes.
 //
 // The second condition only matters where the first one fails, which is near the triangle's edges.
@@ -26,8 +26,8 @@ class SideCrossings {
   VOXDAG_INLINE SideCrossings(const ThinTriangle<int32_t>& t, int axis)
       : heights(t.normal, t.lowest_along[axis], t.width_along[axis]) {}
 
-  // Returns all ones in the bytes of the voxel columns of `at` that have a voxel within the bounds
-  // of the plane and within `sides`, both in `below` and in `over`.
+  // Returns a mask of the voxel columns of `at` that have a voxel within the bounds of the plane
+  // and within `sides`. For such a column, both its bytes in HeightBounds (sides.h) have all ones.
   VOXDAG_INLINE __m256i hits(const typename Heights<D>::Column& at, HeightBounds sides) const {
     const HeightBounds bounds =
         _mm256_max_epu8(heights.bounds(heights.in_bricks_of(at), _mm256_setzero_si256()), sides);

@@ -259,7 +259,8 @@ TEST_F(GlobalWriterTest, LevelsOverTheLimitAreRefused) {
   EXPECT_THAT(on_end.message(), HasSubstr("level 2"));
 }
 
-// A file whose levels are out of order (from the bricks to the root) or incomplete is refused.
+// A file is refused if its levels do not come in the order from the bricks to the root, or if a
+// level is incomplete.
 TEST_F(GlobalWriterTest, LevelsOutOfTurnAreRefused) {
   GlobalFileWriter writer(system_files(), path_, grid_of(16), 64);
   EXPECT_THROW(writer.begin_level(1), Error);
