@@ -1,9 +1,10 @@
-// Presents a mesh in memory as a scene file. MeshFiles is a file system with one additional path,
-// under which it provides the mesh as a PLY file. All other paths refer to the underlying file
-// system. The build reads the PLY file in parts, like every scene file. Each read generates the
-// requested bytes from the mesh.
+// Presents meshes in memory as scene files. MeshFiles is a file system with an additional path for
+// each mesh, under which it provides the mesh as a PLY file, and with a path for each texture. All
+// other paths refer to the underlying file system. The build reads the PLY files in parts, like
+// every scene file. Each read generates the requested bytes from the mesh.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 
@@ -14,20 +15,25 @@ namespace voxdag {
 
 class MeshFiles : public ForwardingFiles {
  public:
-  // The path of the mesh, as used in messages.
+  // The path of a single mesh, as used in messages.
   static constexpr const char* kPath = "mesh in memory";
 
-  // Throws Error{kInvalidInput} for arrays of wrong lengths. The mesh's arrays must outlive this
-  // object and its files.
-  MeshFiles(FileSystem& files, const Mesh& mesh);
+  // The arrays of the meshes must outlive this object and its files.
+  explicit MeshFiles(FileSystem& files) : ForwardingFiles(files) {}
+  MeshFiles(FileSystem& files, const Mesh& mesh) : ForwardingFiles(files) { add(kPath, mesh); }
 
-  // Opens the mesh or another file. The mesh has no known identity, so no build relies on data from
-  // an earlier read of it.
+  // Adds a mesh under a path without '/'. Throws Error{kInvalidInput} for arrays of wrong lengths,
+  // and for a texture whose name is not the name of a file.
+  void add(const std::string& path, const Mesh& mesh);
+
+  // Opens a mesh, a texture or another file. Meshes and textures have no known identity, so no
+  // build relies on data from an earlier read of them.
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override;
   bool exists(const std::string& path) override;
 
  private:
-  const Mesh mesh_;
+  std::map<std::string, Mesh> meshes_;
+  std::map<std::string, std::span<const std::byte>> textures_;
 };
 
 }  // namespace voxdag
