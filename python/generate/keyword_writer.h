@@ -40,7 +40,9 @@ class KeywordWriter {
   void operator()(const Field& field, T& value) {
     if (field.is_required) return;
     const std::string name = field.name;
-    members += "    " + name + ": Optional[" + python_type<T>(field) + "]\n";
+    std::string type = python_type<T>(field);
+    if (name == "solid") type = "Union[bool, " + type + "]";  // True is the recommended rule
+    members += "    " + name + ": Optional[" + type + "]\n";
     documents += "    " + name + std::string(name.size() < 17 ? 18 - name.size() : 1, ' ') +
                  documentation(field, value, true) + "\n";
     if (field.is_path) paths += "\"" + name + "\", ";

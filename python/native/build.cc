@@ -2,8 +2,8 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -22,8 +22,15 @@ namespace {
 
 // The vertices of a mesh, one per row. mesh_of() accepts floats and doubles.
 using Vertices = nb::ndarray<nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Triangles = nb::ndarray<const uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using MeshArrays = std::pair<Vertices, Triangles>;
+template <class Number, ssize_t Columns>
+using Rows = nb::ndarray<const Number, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
+
+// A mesh of a scene: its path, which names it in messages; vertices; triangles; the colors of the
+// vertices; and a texture: the name of its material, the bytes of an image file, and the texture
+// coordinates of the vertices.
+using MeshArrays =
+    std::tuple<std::string, Vertices, Rows<uint32_t, 3>, std::optional<Rows<uint8_t, 4>>,
+               std::string, nb::bytes, std::optional<Rows<float, 2>>>;
 
 template <class Number>
 std::span<const Number> numbers_of(const auto& rows) {
@@ -31,7 +38,7 @@ std::span<const Number> numbers_of(const auto& rows) {
 }
 
 Mesh mesh_of(const MeshArrays& arrays) {
-  const auto& [vertices, triangles] = arrays;
+  const auto& [path, vertices, triangles, colors, name, texture, coordinates] = arrays;
   Mesh mesh;
   if (vertices.dtype() == nb::dtype<float>())
     mesh.positions = numbers_of<float>(vertices);
@@ -40,6 +47,11 @@ Mesh mesh_of(const MeshArrays& arrays) {
   else
     throw nb::type_error("vertices: expected float32 or float64");
   mesh.indices = numbers_of<uint32_t>(triangles);
+  if (colors) mesh.colors = numbers_of<uint8_t>(*colors);
+  if (!coordinates) return mesh;
+  mesh.texture_name = name;
+  mesh.texture = {static_cast<const std::byte*>(texture.data()), texture.size()};
+  mesh.texture_coordinates = numbers_of<float>(*coordinates);
   return mesh;
 }
 
@@ -111,37 +123,35 @@ BuildSpec spec_of(uint64_t resolution, nb::dict options) {
   return spec;
 }
 
-// Adds the scene to `spec` and returns work(spec, context). The scene is a list of files, or one
-// mesh if `arrays` is not nullopt.
+// Adds the scene to `spec` and returns work(spec, context). The files and the meshes are one scene.
 template <class Work>
 std::string run_with_scene(BuildSpec spec, std::vector<PathText> files,
-                           const std::optional<MeshArrays>& arrays, nb::object progress,
+                           const std::vector<MeshArrays>& meshes, nb::object progress,
                            const Work& work) {
   std::vector<std::string>& scenes = spec.geometry.scenes;
   for (PathText& file : files) scenes.push_back(std::move(file.bytes));
-  std::optional<MeshFiles> mesh;
-  if (arrays) {
-    scenes.emplace_back(MeshFiles::kPath);
-    mesh.emplace(system_files(), mesh_of(*arrays));
+  MeshFiles file_system(system_files());
+  for (const MeshArrays& mesh : meshes) {
+    scenes.push_back(std::get<0>(mesh));
+    file_system.add(scenes.back(), mesh_of(mesh));
   }
-  FileSystem& file_system = mesh ? *mesh : system_files();
   return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
     return work(spec, BuildContext{file_system, relay, cancel});
   });
 }
 
-std::string build(std::vector<PathText> files, std::optional<MeshArrays> mesh, uint64_t resolution,
+std::string build(std::vector<PathText> files, std::vector<MeshArrays> meshes, uint64_t resolution,
                   nb::object progress, nb::dict options) {
-  return run_with_scene(spec_of(resolution, std::move(options)), std::move(files), mesh,
+  return run_with_scene(spec_of(resolution, std::move(options)), std::move(files), meshes,
                         std::move(progress),
                         [](const BuildSpec& spec, const BuildContext& context) {
                           return report_json(run_build(spec, context));
                         });
 }
 
-std::string plan(std::vector<PathText> files, std::optional<MeshArrays> mesh, uint64_t resolution,
+std::string plan(std::vector<PathText> files, std::vector<MeshArrays> meshes, uint64_t resolution,
                  nb::object progress, nb::dict options) {
-  return run_with_scene(spec_of(resolution, std::move(options)), std::move(files), mesh,
+  return run_with_scene(spec_of(resolution, std::move(options)), std::move(files), meshes,
                         std::move(progress),
                         [](const BuildSpec& spec, const BuildContext& context) {
                           return estimate_json(plan_build(spec, context));
@@ -151,9 +161,9 @@ std::string plan(std::vector<PathText> files, std::optional<MeshArrays> mesh, ui
 }  // namespace
 
 void bind_build(nb::module_& module) {
-  module.def("build", &build, nb::arg("files"), nb::arg("mesh").none(), nb::arg("resolution"),
+  module.def("build", &build, nb::arg("files"), nb::arg("meshes"), nb::arg("resolution"),
              nb::arg("progress").none(), nb::arg("options"));
-  module.def("plan", &plan, nb::arg("files"), nb::arg("mesh").none(), nb::arg("resolution"),
+  module.def("plan", &plan, nb::arg("files"), nb::arg("meshes"), nb::arg("resolution"),
              nb::arg("progress").none(), nb::arg("options"));
 }
 

@@ -1,7 +1,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
-#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <nlohmann/json.hpp>
@@ -87,10 +87,11 @@ std::vector<PathText> export_paths(const std::string& format, const PathText& ou
   return paths;
 }
 
-std::vector<std::pair<std::string, std::string>> export_formats() {
-  std::vector<std::pair<std::string, std::string>> formats;
+// Returns the name, the summary and the required suffix ("" if none) of each format.
+std::vector<std::tuple<std::string, std::string, std::string>> export_formats() {
+  std::vector<std::tuple<std::string, std::string, std::string>> formats;
   for (const query::ExportFormat& format : query::export_formats())
-    formats.emplace_back(format.name, format.summary);
+    formats.emplace_back(format.name, format.summary, format.suffix ? format.suffix : "");
   return formats;
 }
 

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "python/native/path_text.h"
+
 namespace voxdag::python {
 
 void LatestProgress::begin_stage(std::string_view stage, uint64_t total, std::string_view unit) {
@@ -47,7 +49,7 @@ std::vector<std::string> LatestProgress::take_warnings() {
 void Messenger::pass_on(LatestProgress& progress) {
   if (PyErr_CheckSignals() != 0) throw nb::python_error();
   for (const std::string& message : progress.take_warnings())
-    if (PyErr_WarnEx(PyExc_UserWarning, message.c_str(), 1) != 0) throw nb::python_error();
+    nb::module_::import_("voxdag._error").attr("warn")(message_text(message));
   const LatestProgress::State state = progress.state();
   if (callback_.is_none() || state == last_ || state.stage.empty()) return;
   last_ = state;

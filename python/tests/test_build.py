@@ -77,7 +77,7 @@ def test_every_option_is_a_typed_and_documented_keyword(mesh):
     "scene, options, code, text",
     [
         ("nowhere.glb", {}, "not_found", "nowhere.glb"),
-        (([[0, 0, 0]], [[0, 0, 1]]), {}, "invalid_input", "triangle 0"),
+        (([[0, 0, 0]], [[0, 0, 1]]), {}, "invalid_input", "triangles[0]"),
         (([[0, 0, 0]], [[0, 0, 0.5]]), {}, "invalid_input", "integers"),
         (([[0, 0]], [[0, 0, 0]]), {}, "invalid_input", "(N, 3)"),
         (([[0, 0, 0]], [[0, 0, 0]]), {"resolution": 100}, "invalid_input", "100"),

@@ -109,7 +109,8 @@ def test_names_of_any_bytes(path, mesh, tmp_path):
     with pytest.raises(voxdag.Error, match="exists") as refused:
         voxdag.extract(names[0], names[1])
     copy = pickle.loads(pickle.dumps(refused.value))
-    assert (type(copy), str(copy), copy.code) == (voxdag.Error, str(refused.value), "invalid_input")
+    assert isinstance(copy, voxdag.Error)
+    assert (str(copy), copy.code) == (str(refused.value), "invalid_input")
     with pytest.raises(voxdag.Error, match="vdag") as missing:
         voxdag.open(names[0] + b"x")
     assert missing.value.code == "not_found"

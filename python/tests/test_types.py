@@ -36,14 +36,36 @@ def test_types(tmp_path):
         voxdag.plan("scene.glb", resolution=64, backend="gpu")
         voxdag.build("scene.glb", resolution=64, output="scene.vdag", color=True, memory="8GiB",
                      bounds=(0, 0, 0, 1), attributes=["alpha"], backend="cpu", work=b"folder")
+        report = voxdag.build(dag, resolution=64, output=dag, progress=True, solid="winding")
+        report["voxel"]
+        reveal_type(report["dropped"]["outside"])
+        reveal_type(voxdag.plan("scene.glb", resolution=64)["voxels"]["likely"])
+        reveal_type(dag[1, 2, 3])
+        reveal_type(dag.lookup([[1, 2, 3]]))
+        dag.render(sise=(8, 8))
+        dag.export("a.ply", level=4, gray=True)["notes"]
+        voxdag.from_points([[1, 2, 3]], 0.5, colors=None, memory="1GiB", thread=3)
     """)
     )
-    checked = mypy(tmp_path, "-p", "voxdag")
+    checked = mypy(tmp_path, "--strict", "--allow-any-generics", "-p", "voxdag")
     assert checked.returncode == 0, checked.stdout
     shutil.rmtree(tmp_path / "voxdag")
-    user = mypy(tmp_path, "user.py").stdout
-    assert 'user.py:4: note: Revealed type is "int"' in user.replace("builtins.", ""), user
-    assert "user.py:6: error: Argument 1" in user and "user.py:7: error: Argument" in user, user
-    assert 'user.py:8: error: Unexpected keyword argument "colors"' in user, user
-    assert "user.py:9: error: Argument" in user, user
-    assert "Found 4 errors" in user, user
+    user = mypy(tmp_path, "--strict", "--allow-any-generics", "user.py").stdout.replace(
+        "builtins.", ""
+    )
+    for expected in (
+        'user.py:4: note: Revealed type is "int"',
+        "user.py:6: error: Argument 1",
+        "user.py:7: error: Argument",
+        'user.py:8: error: Unexpected keyword argument "colors"',
+        "user.py:9: error: Argument",
+        'user.py:13: error: TypedDict "BuildReport" has no key "voxel"',
+        'user.py:14: note: Revealed type is "int"',
+        'user.py:15: note: Revealed type is "float"',
+        'user.py:16: note: Revealed type is "bool"',
+        "numpy.bool",
+        'user.py:18: error: Unexpected keyword argument "sise"',
+        'user.py:20: error: Unexpected keyword argument "thread"',
+        "Found 7 errors",
+    ):
+        assert expected in user, (expected, user)

@@ -11,15 +11,24 @@ extract(), export() and render() stop on Ctrl-C. Errors of this package are `vox
 `code`.
 """
 
-from ._build import Mesh, Progress, Scene, build, plan
-from ._dag import Dag, Hits, Region, open
+from ._build import Scene, build, plan
+from ._dag import Dag, Hits, open
 from ._derive import export, export_formats, extract
 from ._error import Error
+from ._mesh import Mesh
+from ._progress import Progress
 from ._render import render
+from ._reports import BuildReport
+from ._types import Estimate, ExportReport, ExtractReport, Region
+from ._voxels import from_dense, from_points, from_voxels
 
 __all__ = [
+    "BuildReport",
     "Dag",
     "Error",
+    "Estimate",
+    "ExportReport",
+    "ExtractReport",
     "Hits",
     "Mesh",
     "Progress",
@@ -29,6 +38,9 @@ __all__ = [
     "export",
     "export_formats",
     "extract",
+    "from_dense",
+    "from_points",
+    "from_voxels",
     "open",
     "plan",
     "render",

@@ -7,46 +7,53 @@ import operator
 import os
 import tempfile
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Callable, SupportsIndex, Union
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Callable, SupportsIndex, Union, cast
 
 from . import _native
+from ._adapt import meshes_of
 from ._error import Error, Path, path_text
+from ._help import lists_options
 from ._laz import decompressed
+from ._mesh import Mesh, native_meshes
 from ._options import PATHS, BuildOptions
+from ._progress import Progress, shown
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-# Vertices, (N, 3) numbers, and triangles, (M, 3) integers: the indexes of their three vertices.
-Mesh = tuple[Any, Any]
-Scene = Union[Path, Sequence[Path], Mesh]
-# A function that is called with the stage's name, the number of units done, the total number of
-# units (0 if unknown) and the unit's name, such as "triangles".
-Progress = Callable[[str, int, int, str], None]
-_Arrays = tuple[np.ndarray, np.ndarray]
+    from ._reports import BuildReport
+    from ._types import Estimate
+
+# A file; an object with vertices and faces; or arrays: vertices, (N, 3) numbers, and triangles,
+# (M, 3) integers, the indexes of their three vertices. Or a sequence of files and objects, which
+# are one scene together.
+Scene = Union[Path, Mesh, Any, Sequence[Any], tuple[Any, Any]]
 
 
+@lists_options(BuildOptions)
 def build(
     scene: Scene,
     *,
     resolution: SupportsIndex,
     output: Path,
-    progress: Progress | None = None,
+    progress: Progress = None,
     **options: Unpack[BuildOptions],
-) -> dict[str, Any]:
+) -> BuildReport:
     """Builds the DAG of a scene, or resumes an interrupted build, and returns its report.
 
-    scene             one file, several files that are one scene together, or a mesh in memory: a
-                      tuple of vertices (N, 3), which keep the precision of float32 or float64,
-                      and triangles (M, 3), the indexes of their vertices; do not change these
-                      arrays before build() returns. A LAZ file is decompressed to a temporary LAS
-                      file next to the output, which needs laspy and lazrs
+    scene             a file; a Mesh; an object of trimesh (Trimesh, Scene, PointCloud), Open3D
+                      (TriangleMesh, PointCloud), PyVista (PolyData and grids) or meshio (Mesh); a
+                      tuple of vertices (N, 3), which keep the precision of float32 or float64, and
+                      triangles (M, 3), the indexes of their vertices; or a list of files and
+                      objects, which are one scene together. Do not change arrays before build()
+                      returns. A LAZ file is decompressed to a temporary LAS file next to the
+                      output, which needs laspy and lazrs
     resolution        voxels per edge of the grid, a power of two from 4 to 2^20
     output            the .vdag file to write
-    progress          called up to 20 times a second; if it raises an exception, build() cancels
-                      the build and raises the exception
+    progress          called with the stage's name, the number of units done, their total number
+                      (0 if unknown) and the unit's name, up to 20 times a second; if it raises an
+                      exception, build() cancels the build and raises the exception. True shows a
+                      bar of tqdm, or lines of text without tqdm
 
     The report has the same names as the JSON of `voxdag build --json`. Raises Error. Further
     options:
@@ -54,17 +61,21 @@ def build(
     """
     output = path_text(output)
     las_prefix = f"{output}.laz-"
-    return _call(_native.build, scene, resolution, output, progress, options, las_prefix)
+    report: BuildReport = _call(
+        _native.build, scene, resolution, output, progress, options, las_prefix
+    )
+    return report
 
 
+@lists_options(BuildOptions)
 def plan(
     scene: Scene,
     *,
     resolution: SupportsIndex,
     output: Path | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     **options: Unpack[BuildOptions],
-) -> dict[str, Any]:
+) -> Estimate:
     """Estimates the cost of a build and creates no files. The arguments are the arguments of
     build(); `output` is optional. The estimate has the same names as the JSON of
     `voxdag plan --json`. Further options:
@@ -72,12 +83,10 @@ def plan(
     """
     output = "voxdag-plan" if output is None else path_text(output)
     with tempfile.TemporaryDirectory(prefix="voxdag-") as folder:
-        return _call(_native.plan, scene, resolution, output, progress, options, f"{folder}/")
-
-
-for _function in (build, plan):
-    _options_text = (BuildOptions.__doc__ or "").partition("\n\n")[2]
-    _function.__doc__ = (_function.__doc__ or "").rstrip() + "\n\n" + _options_text
+        estimate: Estimate = _call(
+            _native.plan, scene, resolution, output, progress, options, f"{folder}/"
+        )
+        return estimate
 
 
 def _call(
@@ -85,7 +94,7 @@ def _call(
     scene: Scene,
     resolution: SupportsIndex,
     output: str,
-    progress: Progress | None,
+    progress: Progress,
     options: BuildOptions,
     las_prefix: str,
 ) -> Any:
@@ -94,8 +103,6 @@ def _call(
         raise Error(
             f"resolution={resolution}: expected a power of two from 4 to 2^20", "invalid_input"
         )
-    if progress is not None and not callable(progress):
-        raise TypeError(f"progress={progress!r}: expected a function or None")
     given: dict[str, Any] = {**options, "output": output}
     if given.get("bounds") is not None:
         given["bounds"] = [float(number) for number in given["bounds"]]
@@ -104,54 +111,48 @@ def _call(
     for name in PATHS:
         if given.get(name) is not None:
             given[name] = path_text(given[name])
-    files, mesh = _parts_of(scene)
-    with decompressed(files, las_prefix) as readable:
-        return json.loads(function(readable, mesh, resolution, progress, given))
+    files, meshes = _parts_of(scene)
+    with_colors = any(given.get(name) for name in ("color", "attributes", "cutouts"))
+    arrays = native_meshes(meshes, with_colors, bool(given.get("skip_invalid")))
+    with shown(progress) as callback, decompressed(files, las_prefix) as readable:
+        return json.loads(function(readable, arrays, resolution, callback, given))
 
 
-def _parts_of(scene: Scene) -> tuple[list[str], _Arrays | None]:
-    """Returns the paths of a scene's files and None, or an empty list and the scene's mesh."""
-    if isinstance(scene, (str, bytes, os.PathLike)):
-        return [path_text(scene)], None
-    if _is_mesh(scene):
-        return [], _mesh_arrays(*scene)
-    return [path_text(file) for file in scene], None
+def _parts_of(scene: Scene) -> tuple[list[str], list[Mesh]]:
+    """Returns the files and the meshes of a scene."""
+    if _is_path(scene):
+        return [path_text(cast(Path, scene))], []
+    meshes = meshes_of(scene)
+    if meshes is None and _is_pair_of_arrays(scene):
+        vertices, triangles = cast(Any, scene)
+        meshes = [Mesh(vertices, triangles)]
+    if meshes is not None:
+        return [], meshes
+    try:
+        items = list(cast(Any, scene))
+    except TypeError:
+        raise TypeError(
+            f"the scene is a {type(scene).__name__}: expected a path, a mesh (vertices and "
+            "triangles, or an object that has them), or a list of these"
+        ) from None
+    files: list[str] = []
+    meshes = []
+    for item in items:
+        own = None if _is_path(item) else meshes_of(item)
+        if own is None:
+            files.append(path_text(item))
+        else:
+            meshes += own
+    return files, meshes
 
 
-def _is_mesh(scene: Scene) -> bool:
+def _is_path(scene: Any) -> bool:
+    return isinstance(scene, (str, bytes, os.PathLike))
+
+
+def _is_pair_of_arrays(scene: Any) -> bool:
     return (
         isinstance(scene, (tuple, list))
         and len(scene) == 2
-        and not any(isinstance(part, (str, bytes, os.PathLike)) for part in scene)
-    )
-
-
-def _mesh_arrays(vertices: Any, triangles: Any) -> _Arrays:
-    """Checks a mesh. Returns its arrays with the types that the native module requires."""
-    vertices, triangles = np.asarray(vertices), np.asarray(triangles)
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
-        raise Error(
-            f"the vertices are an array {vertices.shape} of {vertices.dtype}: "
-            "expected (N, 3) numbers",
-            "invalid_input",
-        )
-    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
-        raise Error(
-            f"the triangles are an array {triangles.shape} of {triangles.dtype}: "
-            "expected (M, 3) integers",
-            "invalid_input",
-        )
-    if len(vertices) > (1 << 32) - 2:
-        raise Error(f"the mesh has {len(vertices)} vertices: expected at most 2^32 - 2", "limit")
-    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(vertices)):
-        bad = np.flatnonzero(((triangles < 0) | (triangles >= len(vertices))).any(axis=1))[0]
-        raise Error(
-            f"triangle {bad} has the vertices {triangles[bad].tolist()}: expected numbers from 0 "
-            f"to below {len(vertices)}, the number of vertices",
-            "invalid_input",
-        )
-    is_float = vertices.dtype == np.float32
-    return (
-        np.ascontiguousarray(vertices, dtype=np.float32 if is_float else np.float64),
-        np.ascontiguousarray(triangles, dtype=np.uint32),
+        and not any(_is_path(part) or meshes_of(part) is not None for part in scene)
     )

@@ -3,12 +3,13 @@
 import json
 import os
 from collections.abc import Sequence
-from typing import Any, Optional, Union
+from typing import Optional, Union, cast
 
 from . import _native
-from ._build import Progress
-from ._dag import Dag, Region
+from ._dag import Dag
 from ._error import Error, Path, memory_text, path_text, thread_count
+from ._progress import Progress, shown
+from ._types import ExportReport, ExtractReport, Region
 
 
 def extract(
@@ -22,8 +23,8 @@ def extract(
     memory: Union[int, str, None] = None,
     threads: int = 0,
     force: bool = False,
-    progress: Optional[Progress] = None,
-) -> dict[str, Any]:
+    progress: Progress = None,
+) -> ExtractReport:
     """Writes a part of a .vdag file as a new .vdag file: a region, a coarser grid, or a region of a
     coarser grid.
 
@@ -43,8 +44,8 @@ def extract(
     with Dag(path) as dag:
         low, high = dag._region(region, level, world)
         levels = dag._levels(level)
-    return json.loads(
-        _native.extract(
+    with shown(progress) as callback:
+        report = _native.extract(
             path,
             output,
             levels,
@@ -54,28 +55,29 @@ def extract(
             memory_text(memory),
             thread_count(threads),
             force,
-            progress,
+            callback,
         )
-    )
+    return cast(ExtractReport, json.loads(report))
 
 
 def export(
     path: Path,
     output: Path,
     *,
-    to: str,
+    to: Optional[str] = None,
     region: Optional[Region] = None,
     level: Optional[int] = None,
     world: bool = False,
     memory: Union[int, str, None] = None,
     gray: bool = False,
     force: bool = False,
-    progress: Optional[Progress] = None,
-) -> dict[str, Any]:
+    progress: Progress = None,
+) -> ExportReport:
     """Writes a .vdag file, or a part of it, in the format of another program (docs/export.md).
 
     path, output          the .vdag file to read, and the file to write
-    to                    the format, one of export_formats()
+    to                    the format, one of export_formats(); by default the ending of `output`
+                          names it, such as .ply or .vox
     region, level, world  the part to write, as in Dag
     memory                limit of the memory in bytes, or text such as "8GiB"; by default half of
                           the machine's memory
@@ -87,22 +89,34 @@ def export(
     voxels; "notes", sentences on how to use the files. Raises Error.
     """
     path, output = path_text(path), path_text(output)
+    to = _format_of(output) if to is None else to
     files = _native.export_paths(to, output)
     _check_output(path, files, force)
     with Dag(path) as dag:
         low, high = dag._region(region, level, world)
         levels = dag._levels(level)
-    report = json.loads(
-        _native.export(
-            path, output, to, levels, low, high, memory_text(memory), gray, force, progress
+    with shown(progress) as callback:
+        report = _native.export(
+            path, output, to, levels, low, high, memory_text(memory), gray, force, callback
         )
-    )
-    return {"files": files, **report}
+    return cast(ExportReport, {"files": files, **json.loads(report)})
 
 
 def export_formats() -> dict[str, str]:
     """Returns the names of the formats of export(), with a description of each."""
-    return dict(_native.export_formats())
+    return {name: summary for name, summary, _ in _native.export_formats()}
+
+
+def _format_of(output: str) -> str:
+    """Returns the format that the ending of a file's name names."""
+    endings = {name: suffix or f".{name}" for name, _, suffix in _native.export_formats()}
+    for name, ending in endings.items():
+        if output.endswith(ending):
+            return name
+    raise Error(
+        f"{output}: expected a name that ends with one of {', '.join(endings.values())}, or to=",
+        "invalid_input",
+    )
 
 
 def _check_output(path: str, outputs: Sequence[str], force: bool) -> None:

@@ -7,8 +7,9 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from . import _native
-from ._build import Progress
 from ._error import Error, Path, memory_text, path_text
+from ._progress import Progress, shown
+from ._types import Bytes
 
 _MAX_EDGE = 16384  # pixels
 
@@ -25,8 +26,8 @@ def render(
     gray: bool = False,
     memory: Union[int, str, None] = None,
     threads: int = 0,
-    progress: Optional[Progress] = None,
-) -> np.ndarray:
+    progress: Progress = None,
+) -> Bytes:
     """Renders the same picture as `voxdag render`. Returns it as (height, width, 3) uint8, sRGB.
 
     view             auto, iso, front, back, left, right, top or inside
@@ -60,8 +61,6 @@ def render(
         raise Error(f"fov {fov!r}: expected 1 to 170 degrees", "invalid_input")
     if not isinstance(gray, (bool, np.bool_)):
         raise Error(f"gray {gray!r}: expected True or False", "invalid_input")
-    if progress is not None and not callable(progress):
-        raise TypeError(f"progress={progress!r}: expected a function or None")
     samples = _whole(samples, 1, 8, f"samples {samples!r}: expected 1 to 8")
     threads = _whole(threads, 0, 1 << 16, f"threads {threads!r}: expected 0 (all) to {1 << 16}")
     place = None if camera is None else _point(camera, "camera")
@@ -69,7 +68,10 @@ def render(
     file = path_text(path)
     _native.check_render_memory(width, height, memory_text(memory))
     pixels = np.empty((height, width, 3), np.uint8)
-    _native.render(file, view, place, aim, degrees, samples, bool(gray), threads, progress, pixels)
+    with shown(progress) as callback:
+        _native.render(
+            file, view, place, aim, degrees, samples, bool(gray), threads, callback, pixels
+        )
     return pixels
 
 

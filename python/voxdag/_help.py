@@ -1,0 +1,19 @@
+"""Completes the documentation that help() shows."""
+
+from __future__ import annotations
+
+from typing import Any, Callable, TypeVar
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def lists_options(options: type) -> Callable[[_Function], _Function]:
+    """Appends the generated list of options, in the documentation of `options`, to the
+    documentation of a function."""
+
+    def decorate(function: _Function) -> _Function:
+        listed = (options.__doc__ or "").partition("\n\n")[2]
+        function.__doc__ = (function.__doc__ or "").rstrip() + "\n\n" + listed
+        return function
+
+    return decorate

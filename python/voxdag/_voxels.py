@@ -1,0 +1,240 @@
+"""Builds DAGs from points, voxels and dense arrays."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import tempfile
+import warnings
+from typing import TYPE_CHECKING, Any, SupportsIndex, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._build import build
+from ._dag import Dag
+from ._error import Error, Path, path_text
+from ._help import lists_options
+from ._mesh import Mesh
+from ._options import BuildOptions, VoxelOptions
+from ._progress import Progress
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+_MIN_RESOLUTION, _MAX_RESOLUTION = 4, 1 << 20
+
+
+@lists_options(VoxelOptions)
+def from_points(
+    points: ArrayLike,
+    voxel_size: float,
+    colors: ArrayLike | None = None,
+    *,
+    origin: ArrayLike | None = None,
+    resolution: SupportsIndex | None = None,
+    output: Path | None = None,
+    progress: Progress = None,
+    **options: Unpack[VoxelOptions],
+) -> Dag:
+    """Sets the voxels that contain points, and returns the DAG.
+
+    points       (N, 3) numbers
+    voxel_size   edge of a voxel, in the units of the points
+    colors       (N, 3) or (N, 4), uint8 or floats from 0 to 1: the colors of the points; a voxel
+                 has the mean color of its points
+    origin       the low corner of the grid; by default the largest multiples of voxel_size that
+                 are not above any point. A point p is in the voxel
+                 floor((p - origin) / voxel_size)
+    resolution   voxels per edge of the grid, a power of two; by default the smallest that fits
+    output       the .vdag file to write; by default a temporary file, which is removed when the Dag
+                 is closed or no longer used
+    progress     as in build()
+
+    Raises Error. Further options:
+
+    """
+    positions = _points_of(points)
+    size = float(voxel_size)
+    if not 0 < size < math.inf:
+        raise Error(f"voxel_size={voxel_size!r}: expected a number above 0", "invalid_input")
+    if origin is not None:
+        low = _origin_of(origin)
+    elif len(positions):
+        low = np.floor(positions.min(axis=0) / size) * size
+    else:
+        low = np.zeros(3)
+    cells = np.floor((positions - low) / size)
+    if len(cells) and (cells.min() < 0 or cells.max() >= _MAX_RESOLUTION):
+        bad = np.flatnonzero(((cells < 0) | (cells >= _MAX_RESOLUTION)).any(axis=1))[0]
+        raise Error(
+            f"points[{bad}] is {positions[bad].tolist()}, in the voxel "
+            f"{[int(c) for c in cells[bad]]}: expected voxels from 0 to {_MAX_RESOLUTION - 1}; the "
+            f"origin is {low.tolist()}",
+            "invalid_input",
+        )
+    return _dag_of(cells, colors, low, size, resolution, output, progress, options)
+
+
+@lists_options(VoxelOptions)
+def from_voxels(
+    voxels: ArrayLike,
+    colors: ArrayLike | None = None,
+    *,
+    resolution: SupportsIndex | None = None,
+    voxel_size: float = 1,
+    origin: ArrayLike = (0, 0, 0),
+    output: Path | None = None,
+    progress: Progress = None,
+    **options: Unpack[VoxelOptions],
+) -> Dag:
+    """Sets exactly these voxels, and returns the DAG.
+
+    voxels       (N, 3) integers, at least 0; the same voxel may occur several times
+    colors       (N, 3) or (N, 4), uint8 or floats from 0 to 1: the colors of the voxels
+    resolution   voxels per edge of the grid, a power of two; by default the smallest that fits
+    voxel_size   edge of a voxel, in the units of the scene
+    origin       the low corner of the grid, in the units of the scene
+    output       the .vdag file to write; by default a temporary file, which is removed when the Dag
+                 is closed or no longer used
+    progress     as in build()
+
+    Raises Error. Further options:
+
+    """
+    cells = np.asarray(voxels)
+    if cells.size == 0:
+        cells = np.empty((0, 3), np.int64)
+    if cells.ndim != 2 or cells.shape[1] != 3 or cells.dtype.kind not in "iu":
+        raise Error(
+            f"the voxels are an array {cells.shape} of {cells.dtype}: expected (N, 3) integers",
+            "invalid_input",
+        )
+    size = float(voxel_size)
+    if not 0 < size < math.inf:
+        raise Error(f"voxel_size={voxel_size!r}: expected a number above 0", "invalid_input")
+    low = _origin_of(origin)
+    return _dag_of(cells, colors, low, size, resolution, output, progress, options)
+
+
+def from_dense(
+    array: ArrayLike,
+    colors: ArrayLike | None = None,
+    *,
+    resolution: SupportsIndex | None = None,
+    voxel_size: float = 1,
+    origin: ArrayLike = (0, 0, 0),
+    output: Path | None = None,
+    progress: Progress = None,
+    **options: Unpack[VoxelOptions],
+) -> Dag:
+    """Sets the voxels that are not 0 in an array [x, y, z], and returns the DAG.
+
+    array        (X, Y, Z) of bool or numbers; the voxel (x, y, z) is set if array[x, y, z] is not 0
+    colors       (X, Y, Z, 3) or (X, Y, Z, 4), uint8 or floats from 0 to 1
+
+    The other arguments are the arguments of from_voxels(). Dag.dense() is the inverse. Raises
+    Error.
+    """
+    dense = np.asarray(array)
+    if dense.ndim != 3:
+        raise Error(f"the array has the shape {dense.shape}: expected (X, Y, Z)", "invalid_input")
+    if colors is not None:
+        all_colors = np.asarray(colors)
+        if all_colors.shape not in ((*dense.shape, 3), (*dense.shape, 4)):
+            raise Error(
+                f"the colors are an array {all_colors.shape}: expected {(*dense.shape, 3)} or "
+                f"{(*dense.shape, 4)}",
+                "invalid_input",
+            )
+        colors = all_colors[dense != 0]
+    return from_voxels(
+        np.argwhere(dense),
+        colors,
+        resolution=resolution,
+        voxel_size=voxel_size,
+        origin=origin,
+        output=output,
+        progress=progress,
+        **options,
+    )
+
+
+def _points_of(points: ArrayLike) -> NDArray[np.float64]:
+    array = np.asarray(points)
+    if array.size == 0:
+        return np.empty((0, 3))
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
+        raise Error(
+            f"the points are an array {array.shape} of {array.dtype}: expected (N, 3) numbers",
+            "invalid_input",
+        )
+    finite = np.isfinite(array).all(axis=1)
+    if not finite.all():
+        bad = np.flatnonzero(~finite)[0]
+        raise Error(f"points[{bad}] is not finite: it is {array[bad].tolist()}", "invalid_input")
+    return array.astype(np.float64)
+
+
+def _origin_of(origin: ArrayLike) -> NDArray[np.float64]:
+    corner = np.asarray(origin, np.float64)
+    if corner.shape != (3,) or not np.isfinite(corner).all():
+        raise Error(f"origin={origin!r}: expected x, y, z, all finite", "invalid_input")
+    return corner
+
+
+def _resolution_of(cells: NDArray[Any], given: SupportsIndex | None) -> int:
+    """Returns the voxels per edge of a grid that contains the cells."""
+    if len(cells) and (cells.min() < 0 or cells.max() >= _MAX_RESOLUTION):
+        bad = np.flatnonzero(((cells < 0) | (cells >= _MAX_RESOLUTION)).any(axis=1))[0]
+        raise Error(
+            f"voxels[{bad}] is {cells[bad].tolist()}: expected 0 to {_MAX_RESOLUTION - 1}",
+            "invalid_input",
+        )
+    needed = int(cells.max()) + 1 if len(cells) else 1
+    smallest = max(_MIN_RESOLUTION, 1 << (needed - 1).bit_length())
+    if given is None:
+        return smallest
+    if given.__index__() < smallest:
+        raise Error(
+            f"resolution={given}: expected at least {smallest}, the smallest grid that contains "
+            "all voxels",
+            "invalid_input",
+        )
+    return given.__index__()
+
+
+def _dag_of(
+    cells: NDArray[Any],
+    colors: ArrayLike | None,
+    origin: NDArray[np.float64],
+    voxel_size: float,
+    given_resolution: SupportsIndex | None,
+    output: Path | None,
+    progress: Progress,
+    options: VoxelOptions,
+) -> Dag:
+    """Builds a grid in which these cells are set: a point in the center of each cell."""
+    for name in options:
+        if name not in VoxelOptions.__annotations__:
+            raise TypeError(f"unexpected keyword argument {name!r}")
+    resolution = _resolution_of(cells, given_resolution)
+    chosen = cast(BuildOptions, {"allow_empty": True, **options})
+    if colors is not None:
+        chosen["color"] = True
+    chosen["bounds"] = [*origin.tolist(), voxel_size * resolution]
+    # Without cells, the scene is a point outside of the grid, because it must not be empty.
+    centers = (cells + 0.5) * voxel_size + origin if len(cells) else origin[None] - voxel_size
+    scene = Mesh(centers, colors=colors if len(cells) else None)
+    folder = tempfile.mkdtemp(prefix="voxdag-") if output is None else None
+    path = f"{folder}/voxels.vdag" if output is None else path_text(output)
+    try:
+        with warnings.catch_warnings():
+            if len(cells) == 0:
+                warnings.filterwarnings("ignore", "mesh in memory: .* all outside the grid")
+            build(scene, resolution=resolution, output=path, progress=progress, **chosen)
+        return Dag(path) if folder is None else Dag._temporary(path, folder)
+    except BaseException:
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
