@@ -69,7 +69,7 @@ TEST_F(ThinBuilds, RunOptionsNeverShow) {
   expect_same(thin_spec(scene, 256, 2));
 }
 
-// A work folder of a build without the option is not resumed with it.
+// A build with --thin does not resume the work folder of a build without --thin.
 TEST_F(ThinBuilds, AreOtherJobs) {
   const Triangles scene = meshes_in(32);
   BuildSpec spec = spec_for(scene, 32);

@@ -134,11 +134,11 @@ TEST(Surfaces, TextureCoordinatesOfOtherTypesAndSets) {
   use["texCoord"] = 1;
   EXPECT_EQ(corner(1), (std::array<int64_t, 2>{kOneImage, 0}));
   EXPECT_EQ(corner(2), (std::array<int64_t, 2>{0, (kOneImage + 2) / 5}));
-  // The transform names another set.
+  // The extension KHR_texture_transform names another set of texture coordinates.
   use["extensions"] = {{"KHR_texture_transform", {{"texCoord", 2}, {"offset", {0, 0.5}}}}};
   EXPECT_EQ(corner(1), (std::array<int64_t, 2>{0, kOneImage / 2 * 3}));
   EXPECT_EQ(corner(2), (std::array<int64_t, 2>{(kOneImage + 2) / 5, kOneImage / 2}));
-  // If the primitive lacks the set, the material keeps only its factor.
+  // If the primitive lacks the set that the extension names, the material keeps only its factor.
   use["extensions"] = {{"KHR_texture_transform", {{"texCoord", 3}}}};
   OpenScene open(scene.glb());
   const SceneMaterials scene_materials = open.source->materials();

@@ -113,7 +113,8 @@ TEST(TextPoints, Colors) {
   EXPECT_EQ(color_of("1 2 3 0 0 1\n1 2 3 0 -1 0\n"), white);
   EXPECT_EQ(color_of("1 2 3 0 0 300\n"), white);
   EXPECT_EQ(color_of("1 2 3 0 0 0 0\n"), white);
-  // Named columns are colors in any case; values out of range are clamped.
+  // Columns with the names of colors, in upper or lower case, are colors; values out of range are
+  // clamped.
   EXPECT_EQ(color_of("red,GREEN,b,x,y,z\n300,-5,0,1,2,3\n"), (Color{65535, 0, 0, 65535}));
   EXPECT_EQ(color_of("1 2 3 9 0 255 0\n", {.columns = "x,y,z,_,r,g,b"}),
             (Color{0, 65535, 0, 65535}));
