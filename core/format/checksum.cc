@@ -64,7 +64,8 @@ namespace {
 
 void check(int status) {
   if (status != 1)
-    throw Error(ErrorCode::kOutOfMemory, "out of memory: libcrypto cannot compute a SHA-256");
+    throw Error(ErrorCode::kOutOfMemory,
+                "out of memory: libcrypto cannot compute a SHA-256: expected more free memory");
 }
 
 }  // namespace

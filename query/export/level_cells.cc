@@ -12,7 +12,7 @@ LevelCells::Level LevelCells::level(uint32_t depth) const {
   const voxdag_reader::Level& nodes = file_.level(depth);
   const bool wide = file_.level(depth + 1).pointer_bits == 64;
   return {NodeIndex(nodes, wide ? Pointers::kWide : Pointers::kNarrow, 1, budget_, cancel_,
-                    "level " + std::to_string(depth)),
+                    file_.path() + ": level " + std::to_string(depth)),
           PageBuffer<uint64_t>(budget_, nodes.node_count, "the places of nodes")};
 }
 

@@ -123,7 +123,7 @@ void BatchTable::open_batches(CutBatches cut, std::span<const BinId> bins,
                               const std::function<void()>& after_each) {
   if (state_.next_batch + cut.batches.size() >= kMaxBatches)
     throw Error(ErrorCode::kLimit, "the build needs batch numbers up to " +
-                                       std::to_string(state_.next_batch + cut.batches.size()) +
+                                       std::to_string(state_.next_batch + cut.batches.size() - 1) +
                                        ": expected less than " + std::to_string(kMaxBatches) +
                                        "; start over (--restart)");
   parallel_for(threads, cut.batches.size(), [&](unsigned, size_t i) {

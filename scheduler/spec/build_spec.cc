@@ -72,7 +72,8 @@ void check_options(const BuildSpec& spec) {
   if (g.solid != SolidName::kNone && g.attributes.any())
     json_fields::refuse("solid", "no color and no attributes at the same time");
   if (g.solid != SolidName::kNone && g.cutouts == CutoutRule::kSkip)
-    json_fields::refuse("solid", "no cutouts that are skipped, because they are holes");
+    json_fields::refuse(
+        "solid", "cutouts other than skip, because skipped cutouts are holes in the surface");
   if (g.solid != SolidName::kNone && g.thin)
     json_fields::refuse("thin", "no solid at the same time");
   if (g.thin && g.attributes.any())

@@ -13,8 +13,8 @@ SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool 
                                               format.records + " of voxdag serve");
   if (fresh && !may_create)
     throw Error(ErrorCode::kInvalidInput,
-                path + " is new: expected " + format.records +
-                    ", because the data folder has folders of " + format.files +
+                path + " was missing or is empty: expected " + format.records +
+                    " of voxdag serve, because the data folder has folders of " + format.files +
                     ". Restore it from a backup, or start once with --adopt, which creates new "
                     "records of the " +
                     format.files + " that are found");

@@ -10,7 +10,7 @@
 namespace voxdag::server {
 
 struct StoreFormat {
-  const char* records;     // name of the database for messages, such as "a queue"
+  const char* records;     // name of the database for messages, such as "the queue of jobs"
   const char* files;       // name of the listed items for messages, such as "jobs"
   int64_t application_id;  // PRAGMA application_id
   int64_t version;         // PRAGMA user_version

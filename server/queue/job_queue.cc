@@ -81,7 +81,7 @@ WHERE json_valid(warnings);
 )sql";
 
 // Application id "vdsv": the queue of a service.
-const StoreFormat kQueueFormat = {"a queue", "jobs", 0x76647376, 4, kSchema, kUpgrade};
+const StoreFormat kQueueFormat = {"the queue of jobs", "jobs", 0x76647376, 4, kSchema, kUpgrade};
 
 // A row of the table `job`. The columns scenes, error and warnings contain JSON, because SQL has no
 // type for them.

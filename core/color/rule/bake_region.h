@@ -40,8 +40,8 @@ namespace voxdag {
 template <class Textures>
 class RegionBaker {
  public:
-  // Upper bound of the memory that this object allocates, without the sums for `wanted` and the
-  // vectors of the caller.
+  // Upper bound of the memory that this object allocates. It excludes the sums of normals and
+  // materials, which exist if the constructor's `wanted` has them, and vectors that callers pass.
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
   // Maximum number of cells of a region that a triangle touches. Along the triangle's dominant
   // axis, the region has 64^2 columns of cells. The triangle's plane touches at most 4 cells of

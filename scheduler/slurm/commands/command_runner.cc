@@ -27,8 +27,8 @@ namespace {
 // A pipe, read from end 0 and written to end 1. Its destructor and exec() close both ends.
 class Pipe {
  public:
-  Pipe() {
-    if (pipe2(ends_.data(), O_CLOEXEC) != 0) fail("creating a pipe to a command", errno);
+  explicit Pipe(const std::string& command) {
+    if (pipe2(ends_.data(), O_CLOEXEC) != 0) fail("cannot start " + command + ": pipe", errno);
   }
   ~Pipe() {
     close_end(0);
@@ -101,7 +101,7 @@ class SystemCommands : public CommandRunner {
  public:
   CommandResult run(const std::vector<std::string>& command, const std::string& input,
                     double timeout_s, const CancelToken& cancel) override {
-    Pipe in, out, err;
+    Pipe in(command[0]), out(command[0]), err(command[0]);
     FileActions actions;
     actions.duplicate(in.end(0), 0);
     actions.duplicate(out.end(1), 1);
@@ -119,7 +119,7 @@ class SystemCommands : public CommandRunner {
     const int failure = posix_spawnp(&pid, arguments[0], actions.get(), attributes.get(),
                                      arguments.data(), environment.data());
     if (failure == ENOENT) return {127, "", command[0] + ": command not found"};
-    if (failure != 0) fail("starting " + command[0], failure);
+    if (failure != 0) fail("cannot start " + command[0], failure);
     in.close_end(0);
     out.close_end(1);
     err.close_end(1);

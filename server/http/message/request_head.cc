@@ -96,8 +96,9 @@ void parse_framing(RequestHead& head) {
     uint64_t length = 0;
     const auto parsed = std::from_chars(text.data(), text.data() + text.size(), length);
     if (lengths > 1 || parsed.ec != std::errc{} || parsed.ptr != text.data() + text.size())
-      throw bad_request("Content-Length '" + printable(text) + "', given " +
-                        std::to_string(lengths) + " times: expected one number, once");
+      throw bad_request("Content-Length '" + printable(text) +
+                        (lengths > 1 ? "', given " + std::to_string(lengths) + " times: " : "': ") +
+                        "expected one number, once");
     head.content_length = length;
   }
   if (!head.headers.contains("Transfer-Encoding")) return;

@@ -60,10 +60,10 @@ class ArtifactRows {
   const Frame& frame_of(uint32_t level, uint32_t row) {
     const ArtifactLevel* const info = reader_.level(level);
     if (!info || row >= info->rows)
-      throw Error(ErrorCode::kCorrupt, "an artifact has no row " + std::to_string(row) +
-                                           " in its level " + std::to_string(level) +
-                                           ": expected less than " +
-                                           std::to_string(info ? info->rows : 0) + " rows");
+      throw Error(ErrorCode::kCorrupt, "an artifact has " + std::to_string(info ? info->rows : 0) +
+                                           " rows in its level " + std::to_string(level) +
+                                           ": expected row " + std::to_string(row) +
+                                           ", to which a node or the root refers");
     Held& held = held_[level];
     if (held.index != row / kFrameRows) {
       held.index.reset();
