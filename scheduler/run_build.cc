@@ -209,7 +209,7 @@ void build_artifacts(BuildJob& job, SubvolumeBuilder& builder) {
     try {
       return read_and_build(job, builder);
     } catch (const DamagedTriangles& damage) {
-      if (read == kMaxReads) throw;
+      if (read >= kMaxReads) throw;
       job.context.progress.warn(damage.message() + "; the scene is read again");
       close_segments(job);
       job.checkpoint.forget();
