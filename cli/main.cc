@@ -48,7 +48,8 @@ int run(int argc, char** argv) {
 #ifdef VOXDAG_HAS_ASSIMP
            add_import_command,
 #endif
-           add_render_command,      add_extract_command,    add_export_command,
+           add_render_command,      add_extract_command,    add_combine_command,
+           add_export_command,
 #ifdef VOXDAG_HAS_VIEWER
            add_view_command,
 #endif

@@ -51,8 +51,8 @@ INCLUDES = PRODUCT_INCLUDES | {
 # Installed headers. Every folder may include them by this prefix; they include each other and the
 # standard library.
 INSTALLED_PREFIX = "voxdag/"
-# Folders that others include through one header only.
-PUBLIC_HEADERS = {"merge": ["merge/merge.h"]}
+# Folders that others include through these headers only.
+PUBLIC_HEADERS = {"merge": ["merge/merge.h", "merge/load/scratch_file.h"]}
 # Tests and benchmarks may include more than the public header.
 BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 

@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/output.h"
+#include "cli/run_times.h"
 #include "cli/selection_options.h"
 #include "cli/terminal/progress_bar.h"
-#include "core/base/clock.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
@@ -22,12 +22,7 @@ struct ExtractCommand {
   unsigned threads = default_threads();
 };
 
-struct Times {
-  double wall_s = 0;
-  double cpu_s = 0;
-};
-
-void print(const ExtractCommand& command, const query::ExtractReport& r, const Times& times) {
+void print(const ExtractCommand& command, const query::ExtractReport& r, const RunTimes& times) {
   std::printf("%s: %s, sha256 %s\n", printable_line(command.output).c_str(),
               size_text(r.bytes).c_str(), r.sha256.c_str());
   std::printf("  grid of %lld^3 voxels, low corner %.9g %.9g %.9g, edge %.9g\n",
@@ -42,7 +37,7 @@ void print(const ExtractCommand& command, const query::ExtractReport& r, const T
 }
 
 nlohmann::ordered_json extract_json(const ExtractCommand& command, const query::ExtractReport& r,
-                                    const voxdag_reader::File& written, const Times& times) {
+                                    const voxdag_reader::File& written, const RunTimes& times) {
   nlohmann::ordered_json levels = nlohmann::ordered_json::array();
   for (uint32_t l = 0; l <= written.brick_level(); ++l)
     levels.push_back({{"level", l},
@@ -78,10 +73,10 @@ void run(const ExtractCommand& command, CommandContext& context) {
   spec.replace = command.force;
   spec.threads = command.threads;
   const auto progress = make_progress_bar();
-  const double start_s = wall_seconds(), start_cpu_s = process_cpu_seconds();
+  const RunTimer timer;
   const query::ExtractReport report =
       query::extract(*file, spec, context.files, *progress, context.cancel);
-  const Times times{wall_seconds() - start_s, process_cpu_seconds() - start_cpu_s};
+  const RunTimes times = timer.elapsed();
   if (!command.json) return print(command, report, times);
   print_json(extract_json(command, report, *open_global_file(spec.output), times));
 }

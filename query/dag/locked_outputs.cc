@@ -16,7 +16,7 @@ void refuse_impossible(FileSystem& files, const Outputs& outputs) {
       throw Error(ErrorCode::kInvalidInput,
                   "the output '" + path + "': expected the name of a file to write");
     const std::array<std::string, 2> names = {path, partial_path(path)};
-    refuse_inputs(files, names, {&outputs.input, 1});
+    refuse_inputs(files, names, outputs.inputs);
     const std::string folder = parent_directory(path);
     if (!files.exists(folder))
       throw Error(ErrorCode::kNotFound,

@@ -14,9 +14,9 @@ namespace voxdag::query {
 
 // The outputs of a command. Each output is first written as PATH.partial.
 struct Outputs {
-  std::vector<std::string> paths;  // the first one is locked
-  std::string input;               // a file that is read while the outputs are written
-  bool replace = false;            // replace existing files
+  std::vector<std::string> paths;   // the first one is locked
+  std::vector<std::string> inputs;  // files that are read while the outputs are written
+  bool replace = false;             // replace existing files
 };
 
 // Holds the OutputLock of the first output. If the lock file already exists but no process holds
@@ -24,7 +24,7 @@ struct Outputs {
 class LockedOutputs {
  public:
   // Throws Error: kIo if another process holds the lock; kInvalidInput if an output has no name, is
-  // the input or is not a regular file, or if it would replace a file that is not empty and
+  // an input or is not a regular file, or if it would replace a file that is not empty and
   // `replace` is false; kNotFound if an output's folder does not exist.
   LockedOutputs(FileSystem& files, const Outputs& outputs);
   // The file system through which the command writes its outputs. Unless `replace` is true, it does

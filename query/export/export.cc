@@ -57,7 +57,7 @@ ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const CancelToken& cancel) {
   check_grid(request.selection, file.grid_levels());
   const std::vector<std::string> paths = export_paths(*request.format, request.output);
-  LockedOutputs outputs(files, {paths, file.path(), request.replace});
+  LockedOutputs outputs(files, {paths, {file.path()}, request.replace});
   const WatchedFile watched(file);
   MemoryBudget budget(request.memory_bytes);
   const bool has_colors = file.has_colors() && !request.gray;

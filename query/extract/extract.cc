@@ -19,9 +19,9 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "core/geometry/octree_descent.h"
-#include "core/io/temporary_paths.h"
 #include "merge/merge.h"
 #include "query/dag/locked_outputs.h"
+#include "query/dag/temporary_work.h"
 #include "query/extract/node_reader.h"
 #include "query/extract/part_builder.h"
 #include "query/extract/part_colors.h"
@@ -44,28 +44,6 @@ constexpr uint64_t kBytesPerNode = 128;
 constexpr uint64_t kFewNodes = uint64_t{1} << 17;
 constexpr uint64_t kPartsPerWorker = 4;
 constexpr uint64_t kMaxFirstParts = 4096;
-
-// A folder that the destructor removes with its contents.
-class TemporaryWork {
- public:
-  TemporaryWork(FileSystem& files, const std::string& prefix)
-      : files_(files), path_(make_temporary_folder(prefix)), registered_(path_) {}
-  ~TemporaryWork() {
-    try {
-      remove_tree(files_, path_);
-    } catch (const Error&) {
-      // Remaining files are useless but harmless.
-    }
-  }
-  TemporaryWork(const TemporaryWork&) = delete;
-  TemporaryWork& operator=(const TemporaryWork&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  FileSystem& files_;
-  const std::string path_;
-  const TemporaryPath registered_;
-};
 
 class Extraction {
  public:
@@ -302,7 +280,7 @@ Cube crop_cube(const Selection& selection) {
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel) {
   check_grid(spec.selection, file.grid_levels());
-  LockedOutputs outputs(files, {{spec.output}, file.path(), spec.replace});
+  LockedOutputs outputs(files, {{spec.output}, {file.path()}, spec.replace});
   const WatchedFile watched(file);  // colors are read in place
   return watched.run([&] {
     return Extraction(file, spec, outputs.files(), progress, cancel).run([&] {

@@ -9,7 +9,7 @@ using Help = CommandLine;
 
 constexpr const char* kCommands[] = {
     "build",  "plan", "status", "info",   "verify",  "diff",   "generate", "render", "extract",
-    "submit", "jobs", "watch",  "cancel", "suspend", "resume", "download", "view",
+    "submit", "jobs", "watch",  "cancel", "suspend", "resume", "download", "view",   "combine",
 #ifdef VOXDAG_HAS_ASSIMP
     "import",
 #endif

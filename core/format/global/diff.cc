@@ -233,13 +233,18 @@ std::string grid_text(const voxdag_reader::File& file) {
 
 }  // namespace
 
-DiffReport diff_global_files(const voxdag_reader::File& a, const voxdag_reader::File& b,
-                             unsigned threads, MemoryBudget& budget, const CancelToken& cancel) {
+void expect_same_grid(const voxdag_reader::File& a, const voxdag_reader::File& b,
+                      const std::string& what) {
   if (a.resolution() != b.resolution() || a.edge() != b.edge() ||
       !std::equal(a.origin(), a.origin() + 3, b.origin()))
-    throw Error(ErrorCode::kInvalidInput,
-                "only files of the same grid can be compared: " + a.path() + " has " +
-                    grid_text(a) + "; " + b.path() + " has " + grid_text(b));
+    throw Error(ErrorCode::kInvalidInput, "only files of the same grid can be " + what + ": " +
+                                              a.path() + " has " + grid_text(a) + "; " + b.path() +
+                                              " has " + grid_text(b));
+}
+
+DiffReport diff_global_files(const voxdag_reader::File& a, const voxdag_reader::File& b,
+                             unsigned threads, MemoryBudget& budget, const CancelToken& cancel) {
+  expect_same_grid(a, b, "compared");
   if (same_words(a, b, threads, cancel)) return {};
   return with_reader_errors([&] { return Differ(a, b, threads, budget, cancel).run(); });
 }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "core/base/memory_budget.h"
 #include "core/format/global/voxdag_reader.h"
@@ -17,6 +18,11 @@ struct DiffReport {
   uint64_t only_b = 0;  // voxels that only the second file has
   bool same() const { return only_a == 0 && only_b == 0; }
 };
+
+// Throws Error{kInvalidInput} if the resolutions or the bounds of two files differ. The message
+// begins with "only files of the same grid can be" and `what`, a participle.
+void expect_same_grid(const voxdag_reader::File& a, const voxdag_reader::File& b,
+                      const std::string& what);
 
 // Counts the differing voxels on up to `threads` threads. Throws Error{kInvalidInput} if the
 // resolutions or bounds differ, Error{kCorrupt} for a damaged file. Needs 43 to 86 bytes of memory

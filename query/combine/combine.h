@@ -1,0 +1,60 @@
+// Computes the union, difference, intersection or symmetric difference of two global files of the
+// same grid. The levels of the new file are canonical: they depend only on the voxels.
+//
+//   join.h           the equal nodes of the two files, and the hashes of all nodes, from the bricks
+//   up pair_levels.h    the pairs of cubes that must be combined, and the nodes to keep, from the
+//   root level_writer.h   the levels of the new file, from the bricks up
+//
+// The time depends on the sizes of the files and on the number of distinct pairs. The memory
+// depends on the budget: longer lists and the values of large levels are in a scratch folder. Only
+// the marks of the kept nodes must be in memory, one bit for each two words of two consecutive
+// levels.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/base/progress.h"
+#include "core/format/global/global_layout.h"
+#include "core/format/global/voxdag_reader.h"
+#include "core/geometry/grid.h"
+#include "core/io/file_system.h"
+#include "query/combine/operation.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::query {
+
+struct CombineSpec {
+  Operation operation = Operation::kUnion;
+  std::string output;
+  bool replace = false;  // replace an existing file
+  uint64_t memory_bytes = uint64_t{1} << 30;
+  unsigned threads = 1;  // with 2 or more, the digest is computed while the file is read back
+  // Maximum number of words in a narrow level (GlobalFileWriter). Tests use a smaller limit.
+  uint64_t narrow_words = global_layout::kNarrowLevelWords;
+  // Maximum memory of a list, or of the values of a level, if it is less than their share of
+  // memory_bytes. Tests use a small limit.
+  uint64_t list_bytes = ~uint64_t{0};
+};
+
+struct CombineReport {
+  Grid grid;
+  uint64_t voxels = 0;
+  uint64_t svo_nodes = 0;
+  uint64_t dag_nodes = 0;
+  uint64_t bytes = 0;
+  std::string sha256;
+  uint64_t pairs = 0;       // distinct pairs of nodes that were combined
+  uint64_t work_bytes = 0;  // bytes written to temporary files
+};
+
+// Writes the result to spec.output, which gets its final name when it is complete. Temporary files
+// are in a folder next to the output; combine() removes the folder at the end, also after an error.
+// If the process is killed, the next combine with the same output removes the folder. Throws Error:
+// kInvalidInput if the grids or the hash bits of the files differ, or if a file has attributes;
+// kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the errors of LockedOutputs.
+CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,
+                      const CombineSpec& spec, FileSystem& files, Progress& progress,
+                      const CancelToken& cancel);
+
+}  // namespace voxdag::query

@@ -1,0 +1,126 @@
+// Reads a global file through its mapping, and verifies every checksum block before the first use.
+// Releases pages of the mapping when the process exceeds its memory limit. Not thread-safe. Throws
+// Error{kCorrupt}, Error{kCanceled} and voxdag_reader::Error.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "core/base/popcount8.h"
+#include "core/format/global/checked_blocks.h"
+#include "core/format/global/voxdag_reader.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::query {
+
+class DagInput {
+ public:
+  // `file` must outlive this object. `memory_bytes` is the limit of the process's resident memory.
+  DagInput(const voxdag_reader::File& file, uint64_t memory_bytes, const CancelToken& cancel)
+      : file_(file), memory_bytes_(memory_bytes), cancel_(cancel), blocks_(file) {}
+
+  const voxdag_reader::File& file() const { return file_; }
+  const voxdag_reader::Level& level(uint32_t level) const { return file_.level(level); }
+  // Return the node or brick at a word offset.
+  voxdag_reader::Node node(uint32_t level, uint64_t offset) {
+    expect_intact(level, offset);
+    return file_.node(level, offset);
+  }
+  uint64_t brick(uint64_t offset) {
+    expect_intact(file_.brick_level(), offset);
+    return file_.brick(offset);
+  }
+  [[noreturn]] void corrupt(uint32_t level, uint64_t offset, const char* what) const;
+
+ private:
+  friend class LevelCursor;
+  static constexpr uint64_t kMaxNodeWords = 17;  // a child mask and eight wide offsets
+  // Bytes that the system may load for one access.
+  static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
+  static constexpr uint64_t kBytesBetweenChecks = uint64_t{8} << 20;
+
+  void expect_intact(uint32_t level, uint64_t offset) {
+    const voxdag_reader::Level& nodes = file_.level(level);
+    if (offset >= nodes.word_count) return;  // File::node() and brick() refuse the offset
+    blocks_.expect_intact(nodes.words + offset,
+                          sizeof(uint32_t) * std::min(kMaxNodeWords, nodes.word_count - offset));
+    touch(kVisitBytes);
+  }
+  void touch(uint64_t bytes) {
+    touched_bytes_ += bytes;
+    if (touched_bytes_ > kBytesBetweenChecks) check();
+  }
+  void check();
+
+  const voxdag_reader::File& file_;
+  const uint64_t memory_bytes_;
+  const CancelToken& cancel_;
+  const CheckedBlocks blocks_;
+  uint64_t touched_bytes_ = 0;  // since the last check of the memory
+};
+
+// Visits the nodes of a level, or its bricks, in the order of the file.
+class LevelCursor {
+ public:
+  LevelCursor(DagInput& input, uint32_t level)
+      : input_(input),
+        level_(level),
+        words_(input.level(level)),
+        is_brick_level_(level == input.file().brick_level()),
+        wide_(!is_brick_level_ && input.level(level + 1).pointer_bits == 64) {
+    load();
+  }
+
+  bool at_end() const { return offset_ >= words_.word_count; }
+  uint64_t offset() const { return offset_; }
+  // Requires that the level has nodes.
+  const voxdag_reader::Node& node() const { return node_; }
+  // Requires that the level has bricks.
+  uint64_t brick() const {
+    return words_.words[offset_] | static_cast<uint64_t>(words_.words[offset_ + 1]) << 32;
+  }
+  void next() {
+    offset_ += size_;
+    ++count_;
+    load();
+  }
+  // Calls visit(offset) for words that are probably pointers of nodes visited soon.
+  template <class Visit>
+  void peek(const Visit& visit) const {
+    if (wide_ || is_brick_level_) return;
+    const uint64_t end = std::min(offset_ + kWordsAhead + size_, checked_);
+    for (uint64_t at = offset_ + kWordsAhead; at < end; ++at) visit(words_.words[at]);
+  }
+
+ private:
+  static constexpr uint64_t kChunkWords = uint64_t{1} << 16;
+  static constexpr uint64_t kWordsAhead = 96;
+
+  void load() {
+    if (at_end()) return expect_all_nodes();
+    if (offset_ + DagInput::kMaxNodeWords > checked_) check_chunk();
+    if (is_brick_level_) return load_brick();
+    node_ = input_.file_.node(level_, offset_);
+    size_ = 1 + (static_cast<uint64_t>(kPopcount8[node_.child_mask]) << wide_);
+  }
+  void load_brick() {
+    size_ = 2;
+    if (offset_ + size_ > words_.word_count || brick() == 0)
+      input_.corrupt(level_, offset_, "the brick has no voxels");
+  }
+  void check_chunk();
+  void expect_all_nodes() const;
+
+  DagInput& input_;
+  const uint32_t level_;
+  const voxdag_reader::Level words_;
+  const bool is_brick_level_;
+  const bool wide_;
+  voxdag_reader::Node node_;
+  uint64_t offset_ = 0;
+  uint64_t size_ = 0;     // words of the current node
+  uint64_t count_ = 0;    // nodes before the current one
+  uint64_t checked_ = 0;  // words whose checksum blocks are verified
+};
+
+}  // namespace voxdag::query

@@ -1,0 +1,57 @@
+// Finds the equal nodes of two files. Without this step, the pairs of two large files that differ
+// in a small place would be almost all of their nodes.
+//
+// From the bricks up, the nodes of a level are hashed, and the levels of both files, which are
+// sorted by hash, are merged. A node of the second file is equal to a node of the first file if
+// their masks are equal and their children are equal nodes. So the result does not depend on hashes
+// that are equal by chance.
+//
+// Also checks what later steps rely on: every pointer points to a node, and the nodes of a level
+// are in the total order. Throws Error{kCorrupt} otherwise.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "query/combine/dag_input.h"
+#include "query/combine/operation.h"
+#include "query/combine/spill.h"
+
+namespace voxdag::query {
+
+// The share of the memory for the values of one level of one file, and for the windows and buckets
+// of its lookups.
+struct LookupMemory {
+  uint64_t value_bytes = 0;
+  uint64_t window_bytes = 0;
+};
+
+// Facts about a level of both files.
+struct JoinedLevel {
+  explicit JoinedLevel(const SpillSpace& space) : hashes_a(space), hashes_b(space), equal(space) {}
+
+  // Hashes of all nodes of the level, in the order of the file.
+  SpillList<uint64_t> hashes_a;
+  SpillList<uint64_t> hashes_b;
+  SpillList<NodePair> equal;  // both offsets increase
+  NodePair full;              // the nodes in which all voxels are set
+};
+
+class Join {
+ public:
+  Join(DagInput& a, DagInput& b, const SpillSpace& space, const LookupMemory& memory);
+  ~Join();
+
+  // Joins the levels, which must be passed from the bricks up.
+  void add_level(uint32_t level, JoinedLevel& joined);
+
+ private:
+  struct Below;
+  DagInput& a_;
+  DagInput& b_;
+  const SpillSpace& space_;
+  const LookupMemory memory_;
+  std::unique_ptr<Below> below_;  // the level joined last
+};
+
+}  // namespace voxdag::query

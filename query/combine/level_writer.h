@@ -1,0 +1,52 @@
+// Writes the levels of a combined DAG, from the bricks up: merges three sorted sequences of rows,
+// which are the kept nodes of both files and the rows made from pairs. Equal rows become one. So
+// the levels are canonical, as after a build.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/format/global/global_writer.h"
+#include "query/combine/dag_input.h"
+#include "query/combine/join.h"
+#include "query/combine/pair_levels.h"
+#include "query/combine/result_rows.h"
+#include "query/combine/spill.h"
+
+namespace voxdag::query {
+
+struct CombinedCounts {
+  OctreeCounts octree;
+  uint64_t dag_nodes = 0;
+};
+
+class LevelsWriter {
+ public:
+  LevelsWriter(DagInput& a, DagInput& b, const SpillSpace& space, const LookupMemory& memory,
+               GlobalFileWriter& out);
+  ~LevelsWriter();
+
+  // Writes a level. Levels must be passed from the bricks up. `rows` has the rows of pairs of
+  // bricks for the first level, and otherwise must be empty. Writes nothing if the level has no
+  // nodes.
+  void write_level(uint32_t level, const JoinedLevel& joined, PairLevel& pairs,
+                   SpillSorter<PairRow>& rows);
+  const CombinedCounts& counts() const { return counts_; }
+
+ private:
+  struct Below;
+  void make_rows(SpillSorter<PairRow>& rows);
+
+  DagInput& a_;
+  DagInput& b_;
+  const SpillSpace& space_;
+  const LookupMemory memory_;
+  GlobalFileWriter& out_;
+  // Results of places of the level that is written next.
+  std::unique_ptr<SpillSorter<KeyedNode>> children_;
+  std::unique_ptr<Below> below_;  // the level written last
+  CombinedCounts counts_;
+};
+
+}  // namespace voxdag::query

@@ -1,0 +1,35 @@
+// A folder for temporary files next to an output.
+#pragma once
+
+#include <string>
+
+#include "core/base/error.h"
+#include "core/io/file_system.h"
+#include "core/io/temporary_paths.h"
+
+namespace voxdag::query {
+
+// Creates a folder whose name is `prefix` and random characters. The destructor removes the folder
+// with its contents. If the process ends before, the folder is removed as a TemporaryPath.
+class TemporaryWork {
+ public:
+  TemporaryWork(FileSystem& files, const std::string& prefix)
+      : files_(files), path_(make_temporary_folder(prefix)), registered_(path_) {}
+  ~TemporaryWork() {
+    try {
+      remove_tree(files_, path_);
+    } catch (const Error&) {
+      // Remaining files are useless but harmless.
+    }
+  }
+  TemporaryWork(const TemporaryWork&) = delete;
+  TemporaryWork& operator=(const TemporaryWork&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  FileSystem& files_;
+  const std::string path_;
+  const TemporaryPath registered_;
+};
+
+}  // namespace voxdag::query
