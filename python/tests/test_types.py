@@ -45,6 +45,10 @@ def test_types(tmp_path):
         dag.render(sise=(8, 8))
         dag.export("a.ply", level=4, gray=True)["notes"]
         voxdag.from_points([[1, 2, 3]], 0.5, colors=None, memory="1GiB", thread=3)
+        voxdag.build(7, resolution=64, output="scene.vdag")
+        mesh = voxdag.Mesh([[0, 0, 0]], [[0, 0, 0]])
+        voxdag.build([mesh, "a.glb"], resolution=64, output="scene.vdag", solid=True)
+        voxdag.build(([[0, 0, 0]], [[0, 0, 0]]), resolution=64, output="scene.vdag")
     """)
     )
     checked = mypy(tmp_path, "--strict", "--allow-any-generics", "-p", "voxdag")
@@ -66,6 +70,7 @@ def test_types(tmp_path):
         "numpy.bool",
         'user.py:18: error: Unexpected keyword argument "sise"',
         'user.py:20: error: Unexpected keyword argument "thread"',
-        "Found 7 errors",
+        "user.py:21: error: Argument 1",
+        "Found 8 errors",
     ):
         assert expected in user, (expected, user)

@@ -4,13 +4,39 @@ libraries has to be installed."""
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Protocol, Union
 
 import numpy as np
 
 from ._colors import srgb_of, tinted
 from ._error import Error, warn
 from ._mesh import Mesh
+
+
+class HasVertices(Protocol):
+    """Objects of trimesh and Open3D, and others with `faces` or `triangles`."""
+
+    @property
+    def vertices(self) -> Any: ...
+
+
+class HasPoints(Protocol):
+    """Objects of PyVista and meshio, and clouds of points."""
+
+    @property
+    def points(self) -> Any: ...
+
+
+class HasGeometry(Protocol):
+    """A Scene of trimesh."""
+
+    @property
+    def geometry(self) -> Any: ...
+    @property
+    def graph(self) -> Any: ...
+
+
+SceneObject = Union[Mesh, HasVertices, HasPoints, HasGeometry]
 
 
 def meshes_of(scene: Any) -> list[Mesh] | None:

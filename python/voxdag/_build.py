@@ -9,8 +9,10 @@ import tempfile
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Callable, SupportsIndex, Union, cast
 
+from numpy.typing import ArrayLike
+
 from . import _native
-from ._adapt import meshes_of
+from ._adapt import SceneObject, meshes_of
 from ._error import Error, Path, path_text
 from ._help import lists_options
 from ._laz import decompressed
@@ -24,10 +26,11 @@ if TYPE_CHECKING:
     from ._reports import BuildReport
     from ._types import Estimate
 
+_Item = Union[Path, SceneObject]
 # A file; an object with vertices and faces; or arrays: vertices, (N, 3) numbers, and triangles,
 # (M, 3) integers, the indexes of their three vertices. Or a sequence of files and objects, which
 # are one scene together.
-Scene = Union[Path, Mesh, Any, Sequence[Any], tuple[Any, Any]]
+Scene = Union[_Item, tuple[ArrayLike, ArrayLike], Sequence[_Item]]
 
 
 @lists_options(BuildOptions)

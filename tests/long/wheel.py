@@ -68,6 +68,7 @@ def check_wheel(wheel):
     tags, suffix = expected_tags()
     assert wheel.name == f"{name}-{tags}.whl", f"{wheel.name}, expected {name}-{tags}.whl"
     modules = {path.name for path in (REPO / "python" / "voxdag").iterdir() if path.suffix == ".py"}
+    modules |= {"_options.py", "_reports.py"}  # generated
     package = {
         f"voxdag/{file}" for file in modules | {"py.typed", "_native.pyi", "_native" + suffix}
     }
