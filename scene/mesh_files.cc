@@ -83,9 +83,9 @@ class MemoryFile : public ReadableFile {
   const uint64_t size_;
 };
 
-class TextureFile : public MemoryFile {
+class BytesFile : public MemoryFile {
  public:
-  TextureFile(const std::string& path, std::span<const std::byte> bytes)
+  BytesFile(const std::string& path, std::span<const std::byte> bytes)
       : MemoryFile(path, bytes.size()), bytes_(bytes) {}
 
  private:
@@ -180,20 +180,24 @@ std::string texture_path(const std::string& mesh_path, const std::string& name) 
 
 void MeshFiles::add(const std::string& path, const Mesh& mesh) {
   check_lengths(path, mesh);
-  if (has_texture(mesh)) textures_[texture_path(path, mesh.texture_name)] = mesh.texture;
+  if (has_texture(mesh)) bytes_[texture_path(path, mesh.texture_name)] = mesh.texture;
   meshes_.insert_or_assign(path, mesh);
+}
+
+void MeshFiles::add_file(const std::string& path, std::span<const std::byte> bytes) {
+  bytes_[path] = bytes;
 }
 
 std::unique_ptr<ReadableFile> MeshFiles::open_read(const std::string& path) {
   if (const auto mesh = meshes_.find(path); mesh != meshes_.end())
     return std::make_unique<MeshFile>(path, mesh->second);
-  if (const auto texture = textures_.find(path); texture != textures_.end())
-    return std::make_unique<TextureFile>(path, texture->second);
+  if (const auto file = bytes_.find(path); file != bytes_.end())
+    return std::make_unique<BytesFile>(path, file->second);
   return ForwardingFiles::open_read(path);
 }
 
 bool MeshFiles::exists(const std::string& path) {
-  return meshes_.contains(path) || textures_.contains(path) || ForwardingFiles::exists(path);
+  return meshes_.contains(path) || bytes_.contains(path) || ForwardingFiles::exists(path);
 }
 
 }  // namespace voxdag

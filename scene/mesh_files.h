@@ -1,11 +1,13 @@
 // Presents meshes in memory as scene files. MeshFiles is a file system with an additional path for
-// each mesh, under which it provides the mesh as a PLY file, and with a path for each texture. All
-// other paths refer to the underlying file system. The build reads the PLY files in parts, like
-// every scene file. Each read generates the requested bytes from the mesh.
+// each mesh, under which it provides the mesh as a PLY file, and with a path for each texture and
+// each scene file in memory. All other paths refer to the underlying file system. The build reads
+// the PLY files in parts, like every scene file. Each read generates the requested bytes from the
+// mesh.
 #pragma once
 
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "core/io/forwarding_files.h"
@@ -26,14 +28,17 @@ class MeshFiles : public ForwardingFiles {
   // and for a texture whose name is not the name of a file.
   void add(const std::string& path, const Mesh& mesh);
 
-  // Opens a mesh, a texture or another file. Meshes and textures have no known identity, so no
-  // build relies on data from an earlier read of them.
+  // Adds a scene file whose bytes are in memory.
+  void add_file(const std::string& path, std::span<const std::byte> bytes);
+
+  // Opens a mesh, a file in memory or another file. Meshes and files in memory have no known
+  // identity, so no build relies on data from an earlier read of them.
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override;
   bool exists(const std::string& path) override;
 
  private:
   std::map<std::string, Mesh> meshes_;
-  std::map<std::string, std::span<const std::byte>> textures_;
+  std::map<std::string, std::span<const std::byte>> bytes_;  // of textures and scene files
 };
 
 }  // namespace voxdag

@@ -2,6 +2,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -25,6 +26,9 @@ using Vertices = nb::ndarray<nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device:
 template <class Number, ssize_t Columns>
 using Rows = nb::ndarray<const Number, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
 
+// A scene file in memory: its path, which names it in messages, and its bytes.
+using FileBytes = std::pair<std::string, nb::bytes>;
+
 // A mesh of a scene: its path, which names it in messages; vertices; triangles; the colors of the
 // vertices; and a texture: the name of its material, the bytes of an image file, and the texture
 // coordinates of the vertices.
@@ -35,6 +39,10 @@ using MeshArrays =
 template <class Number>
 std::span<const Number> numbers_of(const auto& rows) {
   return {static_cast<const Number*>(rows.data()), rows.size()};
+}
+
+std::span<const std::byte> bytes_of(const nb::bytes& bytes) {
+  return {static_cast<const std::byte*>(bytes.data()), bytes.size()};
 }
 
 Mesh mesh_of(const MeshArrays& arrays) {
@@ -50,7 +58,7 @@ Mesh mesh_of(const MeshArrays& arrays) {
   if (colors) mesh.colors = numbers_of<uint8_t>(*colors);
   if (!coordinates) return mesh;
   mesh.texture_name = name;
-  mesh.texture = {static_cast<const std::byte*>(texture.data()), texture.size()};
+  mesh.texture = bytes_of(texture);
   mesh.texture_coordinates = numbers_of<float>(*coordinates);
   return mesh;
 }
@@ -123,15 +131,25 @@ BuildSpec spec_of(uint64_t resolution, nb::dict options) {
   return spec;
 }
 
-// Adds the scene to `spec` and returns work(spec, context). The files and the meshes are one scene.
+// The parts of a scene: files, files in memory and meshes. Together they are one scene.
+struct SceneParts {
+  std::vector<PathText> files;
+  std::vector<FileBytes> bytes;
+  std::vector<MeshArrays> meshes;
+};
+
+// Adds the scene to `spec` and returns work(spec, context).
 template <class Work>
-std::string run_with_scene(BuildSpec spec, std::vector<PathText> files,
-                           const std::vector<MeshArrays>& meshes, nb::object progress,
+std::string run_with_scene(BuildSpec spec, SceneParts scene, nb::object progress,
                            const Work& work) {
   std::vector<std::string>& scenes = spec.geometry.scenes;
-  for (PathText& file : files) scenes.push_back(std::move(file.bytes));
   MeshFiles file_system(system_files());
-  for (const MeshArrays& mesh : meshes) {
+  for (PathText& file : scene.files) scenes.push_back(std::move(file.bytes));
+  for (const auto& [path, bytes] : scene.bytes) {
+    scenes.push_back(path);
+    file_system.add_file(path, bytes_of(bytes));
+  }
+  for (const MeshArrays& mesh : scene.meshes) {
     scenes.push_back(std::get<0>(mesh));
     file_system.add(scenes.back(), mesh_of(mesh));
   }
@@ -140,18 +158,22 @@ std::string run_with_scene(BuildSpec spec, std::vector<PathText> files,
   });
 }
 
-std::string build(std::vector<PathText> files, std::vector<MeshArrays> meshes, uint64_t resolution,
-                  nb::object progress, nb::dict options) {
-  return run_with_scene(spec_of(resolution, std::move(options)), std::move(files), meshes,
+std::string build(std::vector<PathText> files, std::vector<FileBytes> bytes,
+                  std::vector<MeshArrays> meshes, uint64_t resolution, nb::object progress,
+                  nb::dict options) {
+  return run_with_scene(spec_of(resolution, std::move(options)),
+                        {std::move(files), std::move(bytes), std::move(meshes)},
                         std::move(progress),
                         [](const BuildSpec& spec, const BuildContext& context) {
                           return report_json(run_build(spec, context));
                         });
 }
 
-std::string plan(std::vector<PathText> files, std::vector<MeshArrays> meshes, uint64_t resolution,
-                 nb::object progress, nb::dict options) {
-  return run_with_scene(spec_of(resolution, std::move(options)), std::move(files), meshes,
+std::string plan(std::vector<PathText> files, std::vector<FileBytes> bytes,
+                 std::vector<MeshArrays> meshes, uint64_t resolution, nb::object progress,
+                 nb::dict options) {
+  return run_with_scene(spec_of(resolution, std::move(options)),
+                        {std::move(files), std::move(bytes), std::move(meshes)},
                         std::move(progress),
                         [](const BuildSpec& spec, const BuildContext& context) {
                           return estimate_json(plan_build(spec, context));
@@ -161,10 +183,10 @@ std::string plan(std::vector<PathText> files, std::vector<MeshArrays> meshes, ui
 }  // namespace
 
 void bind_build(nb::module_& module) {
-  module.def("build", &build, nb::arg("files"), nb::arg("meshes"), nb::arg("resolution"),
-             nb::arg("progress").none(), nb::arg("options"));
-  module.def("plan", &plan, nb::arg("files"), nb::arg("meshes"), nb::arg("resolution"),
-             nb::arg("progress").none(), nb::arg("options"));
+  module.def("build", &build, nb::arg("files"), nb::arg("bytes"), nb::arg("meshes"),
+             nb::arg("resolution"), nb::arg("progress").none(), nb::arg("options"));
+  module.def("plan", &plan, nb::arg("files"), nb::arg("bytes"), nb::arg("meshes"),
+             nb::arg("resolution"), nb::arg("progress").none(), nb::arg("options"));
 }
 
 }  // namespace voxdag::python

@@ -1,5 +1,6 @@
 """Scenes in memory: meshes with colors and textures, objects of other libraries, and messages."""
 
+import io
 import warnings
 from types import SimpleNamespace
 
@@ -76,6 +77,22 @@ def test_meshes_files_and_arrays_are_one_scene(mesh, tmp_path):
     lines += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in mesh[1][:half].tolist())
     (tmp_path / "half.obj").write_text(lines)
     assert digest([tmp_path / "half.obj", parts[1]], tmp_path) == digest(mesh, tmp_path)
+
+
+def test_open_files(mesh, tmp_path):
+    vertices, triangles = mesh
+    lines = [f"v {x} {y} {z}\n" for x, y, z in vertices.tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in triangles.tolist()]
+    data = "".join(lines).encode()
+    expected = digest(mesh, tmp_path)
+    assert digest(io.BytesIO(data), tmp_path) == expected
+    (tmp_path / "mesh.obj").write_bytes(data)
+    with open(tmp_path / "mesh.obj", "rb") as file:
+        assert digest([file, io.BytesIO(b"4.25 0 0\n")], tmp_path) == expected
+    with pytest.raises(ValueError, match="file in memory 0"):
+        digest(io.BytesIO(b"glTF"), tmp_path)
+    with pytest.raises(TypeError, match="expected a file open in binary mode"):
+        digest(io.StringIO("0 0 0"), tmp_path)
 
 
 def test_objects_with_vertices_and_faces(mesh, tmp_path):

@@ -39,16 +39,21 @@ class HasGeometry(Protocol):
 SceneObject = Union[Mesh, HasVertices, HasPoints, HasGeometry]
 
 
-def meshes_of(scene: Any) -> list[Mesh] | None:
-    """Returns the meshes of an object: a Mesh, or an object of trimesh, Open3D, PyVista or meshio.
-    Returns None for an object without vertices."""
+def is_mesh(scene: Any) -> bool:
+    """True for a Mesh, and for the objects of other libraries that meshes_of() converts."""
+    return isinstance(scene, Mesh) or any(
+        has_attributes(scene) for has_attributes, _ in _CONVERSIONS
+    )
+
+
+def meshes_of(scene: Any) -> list[Mesh]:
+    """Returns the meshes of an object for which is_mesh() is true: a Mesh, or an object of trimesh,
+    Open3D, PyVista or meshio."""
     if isinstance(scene, Mesh):
         return [scene]
-    for has_attributes, convert in _CONVERSIONS:
-        if has_attributes(scene):
-            meshes: list[Mesh] = convert(scene)
-            return meshes
-    return None
+    convert = next(convert for has_attributes, convert in _CONVERSIONS if has_attributes(scene))
+    meshes: list[Mesh] = convert(scene)
+    return meshes
 
 
 def _has(*names: str) -> Any:
@@ -59,7 +64,7 @@ def _of_trimesh_scene(scene: Any) -> list[Mesh]:
     meshes = []
     for node in sorted(scene.graph.nodes_geometry):
         matrix, name = scene.graph[node]
-        for mesh in meshes_of(scene.geometry[name]) or []:
+        for mesh in meshes_of(scene.geometry[name]):
             vertices = np.asarray(mesh.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
             parts = {**vars(mesh), "vertices": vertices, "name": str(node)}
             meshes.append(Mesh(**parts))
@@ -141,7 +146,7 @@ def _of_open3d(mesh: Any, triangles: Any) -> list[Mesh]:
 
 
 def _of_open3d_tensors(mesh: Any) -> list[Mesh]:
-    return meshes_of(mesh.to_legacy()) or []
+    return meshes_of(mesh.to_legacy())
 
 
 def _of_pyvista(mesh: Any) -> list[Mesh]:
@@ -186,7 +191,7 @@ def _triangles_of_padded(faces: Any) -> tuple[Any, Any]:
 
 def _of_volume(mesh: Any) -> list[Mesh]:
     """Converts the surface of a grid of PyVista."""
-    return meshes_of(mesh.extract_surface()) or []
+    return meshes_of(mesh.extract_surface())
 
 
 def _of_meshio(mesh: Any) -> list[Mesh]:

@@ -7,12 +7,12 @@ import operator
 import os
 import tempfile
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Callable, SupportsIndex, Union, cast
+from typing import IO, TYPE_CHECKING, Any, Callable, SupportsIndex, Union
 
 from numpy.typing import ArrayLike
 
 from . import _native
-from ._adapt import SceneObject, meshes_of
+from ._adapt import SceneObject, is_mesh, meshes_of
 from ._error import Error, Path, path_text
 from ._help import lists_options
 from ._laz import decompressed
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from ._reports import BuildReport
     from ._types import Estimate
 
-_Item = Union[Path, SceneObject]
-# A file; an object with vertices and faces; or arrays: vertices, (N, 3) numbers, and triangles,
-# (M, 3) integers, the indexes of their three vertices. Or a sequence of files and objects, which
-# are one scene together.
+_Item = Union[Path, IO[bytes], SceneObject]
+# A file, or an open binary file; an object with vertices and faces; or arrays: vertices, (N, 3)
+# numbers, and triangles, (M, 3) integers, the indexes of their three vertices. Or a sequence of
+# files and objects, which are one scene together.
 Scene = Union[_Item, tuple[ArrayLike, ArrayLike], Sequence[_Item]]
 
 
@@ -44,13 +44,14 @@ def build(
 ) -> BuildReport:
     """Builds the DAG of a scene, or resumes an interrupted build, and returns its report.
 
-    scene             a file; a Mesh; an object of trimesh (Trimesh, Scene, PointCloud), Open3D
-                      (TriangleMesh, PointCloud), PyVista (PolyData and grids) or meshio (Mesh); a
-                      tuple of vertices (N, 3), which keep the precision of float32 or float64, and
-                      triangles (M, 3), the indexes of their vertices; or a list of files and
-                      objects, which are one scene together. Do not change arrays before build()
-                      returns. A LAZ file is decompressed to a temporary LAS file next to the
-                      output, which needs laspy and lazrs
+    scene             a file, or an open binary file such as io.BytesIO; a Mesh; an object of
+                      trimesh (Trimesh, Scene, PointCloud), Open3D (TriangleMesh, PointCloud),
+                      PyVista (PolyData and grids) or meshio (Mesh); a tuple of vertices (N, 3),
+                      which keep the precision of float32 or float64, and triangles (M, 3), the
+                      indexes of their vertices; or a list of files and objects, which are one
+                      scene together. Do not change arrays before build() returns. A LAZ file is
+                      decompressed to a temporary LAS file next to the output, which needs laspy
+                      and lazrs
     resolution        voxels per edge of the grid, a power of two from 4 to 2^20
     output            the .vdag file to write
     progress          called with the stage's name, the number of units done, their total number
@@ -114,48 +115,56 @@ def _call(
     for name in PATHS:
         if given.get(name) is not None:
             given[name] = path_text(given[name])
-    files, meshes = _parts_of(scene)
+    files, streams, meshes = _parts_of(scene)
     with_colors = any(given.get(name) for name in ("color", "attributes", "cutouts"))
+    contents = [(f"file in memory {i}", _bytes_of(stream)) for i, stream in enumerate(streams)]
     arrays = native_meshes(meshes, with_colors, bool(given.get("skip_invalid")))
     with shown(progress) as callback, decompressed(files, las_prefix) as readable:
-        return json.loads(function(readable, arrays, resolution, callback, given))
+        return json.loads(function(readable, contents, arrays, resolution, callback, given))
 
 
-def _parts_of(scene: Scene) -> tuple[list[str], list[Mesh]]:
-    """Returns the files and the meshes of a scene."""
-    if _is_path(scene):
-        return [path_text(cast(Path, scene))], []
-    meshes = meshes_of(scene)
-    if meshes is None and _is_pair_of_arrays(scene):
-        vertices, triangles = cast(Any, scene)
-        meshes = [Mesh(vertices, triangles)]
-    if meshes is not None:
-        return [], meshes
+def _parts_of(scene: Any) -> tuple[list[str], list[IO[bytes]], list[Mesh]]:
+    """Returns the files, the open files and the meshes of a scene."""
+    if _is_pair_of_arrays(scene):
+        return [], [], [Mesh(*scene)]
+    paths: list[str] = []
+    streams: list[IO[bytes]] = []
+    meshes: list[Mesh] = []
+    for item in [scene] if _is_part(scene) else _items_of(scene):
+        if is_mesh(item):
+            meshes += meshes_of(item)
+        elif hasattr(item, "read"):
+            streams.append(item)
+        else:
+            paths.append(path_text(item))
+    return paths, streams, meshes
+
+
+def _items_of(scene: Any) -> list[Any]:
     try:
-        items = list(cast(Any, scene))
+        return list(scene)
     except TypeError:
         raise TypeError(
             f"the scene is a {type(scene).__name__}: expected a path, a mesh (vertices and "
             "triangles, or an object that has them), or a list of these"
         ) from None
-    files: list[str] = []
-    meshes = []
-    for item in items:
-        own = None if _is_path(item) else meshes_of(item)
-        if own is None:
-            files.append(path_text(item))
-        else:
-            meshes += own
-    return files, meshes
 
 
-def _is_path(scene: Any) -> bool:
-    return isinstance(scene, (str, bytes, os.PathLike))
+def _bytes_of(stream: IO[bytes]) -> bytes:
+    data = stream.read()
+    if not isinstance(data, bytes):
+        raise TypeError(
+            f"{stream!r} gives {type(data).__name__}: expected a file open in binary mode"
+        )
+    return data
+
+
+def _is_part(scene: Any) -> bool:
+    """True for a path, an open file or a mesh."""
+    return isinstance(scene, (str, bytes, os.PathLike)) or hasattr(scene, "read") or is_mesh(scene)
 
 
 def _is_pair_of_arrays(scene: Any) -> bool:
     return (
-        isinstance(scene, (tuple, list))
-        and len(scene) == 2
-        and not any(_is_path(part) or meshes_of(part) is not None for part in scene)
+        isinstance(scene, (tuple, list)) and len(scene) == 2 and not any(_is_part(p) for p in scene)
     )
