@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 
 #include "core/base/popcount8.h"
 #include "core/format/global/checked_blocks.h"
@@ -84,12 +85,11 @@ class LevelCursor {
     ++count_;
     load();
   }
-  // Calls visit(offset) for words that are probably pointers of nodes visited soon.
-  template <class Visit>
-  void peek(const Visit& visit) const {
-    if (wide_ || is_brick_level_) return;
-    const uint64_t end = std::min(offset_ + kWordsAhead + size_, checked_);
-    for (uint64_t at = offset_ + kWordsAhead; at < end; ++at) visit(words_.words[at]);
+  // Returns words that are probably pointers of nodes visited soon.
+  std::span<const uint32_t> words_ahead() const {
+    const uint64_t first = offset_ + kWordsAhead;
+    if (wide_ || is_brick_level_ || first + size_ > checked_) return {};
+    return {words_.words + first, size_};
   }
 
  private:

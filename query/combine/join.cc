@@ -91,7 +91,8 @@ class HashCursor {
 
 void HashCursor::load_node() {
   const voxdag_reader::Node& node = cursor_.node();
-  if (below_) cursor_.peek([this](uint64_t offset) { below_->prefetch(offset); });
+  if (below_)
+    for (const uint32_t word : cursor_.words_ahead()) __builtin_prefetch(below_->find(word));
   own_.mask = joined_.mask = node.child_mask;
   own_.count = joined_.count = kPopcount8[node.child_mask];
   is_comparable_ = true;
@@ -124,10 +125,9 @@ Join::Join(DagInput& a, DagInput& b, const SpillSpace& space, const LookupMemory
 Join::~Join() = default;
 
 void Join::add_level(uint32_t level, JoinedLevel& joined) {
-  auto done =
-      std::unique_ptr<Below>(new Below{{space_, a_.level(level).word_count, memory_.value_bytes},
-                                       {space_, b_.level(level).word_count, memory_.value_bytes},
-                                       {}});
+  auto done = std::unique_ptr<Below>(new Below{{space_, a_.level(level), memory_.value_bytes},
+                                               {space_, b_.level(level), memory_.value_bytes},
+                                               {}});
   const NodePair full_below = below_ ? below_->full : NodePair();
   HashCursor a(a_, level, below_ ? &below_->a : nullptr, full_below.a, space_,
                memory_.window_bytes);

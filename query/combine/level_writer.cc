@@ -88,7 +88,8 @@ class KeptCursor {
       return;
     }
     const voxdag_reader::Node& node = cursor_->node();
-    if (below_) cursor_->peek([this](uint64_t offset) { below_->prefetch(offset); });
+    if (below_)
+      for (const uint32_t word : cursor_->words_ahead()) __builtin_prefetch(below_->find(word));
     row_.mask = node.child_mask;
     row_.count = kPopcount8[node.child_mask];
     for (uint32_t i = 0; i < row_.count; ++i) {
@@ -233,9 +234,8 @@ void LevelsWriter::write_level(uint32_t level, const JoinedLevel& joined, PairLe
                memory_.window_bytes);
   if (rows.at_end() && a.at_end() && b.at_end()) return;
   children_ = std::make_unique<SpillSorter<KeyedNode>>(space_);
-  auto done =
-      std::unique_ptr<Below>(new Below{{space_, a_.level(level).word_count, memory_.value_bytes},
-                                       {space_, b_.level(level).word_count, memory_.value_bytes}});
+  auto done = std::unique_ptr<Below>(new Below{{space_, a_.level(level), memory_.value_bytes},
+                                               {space_, b_.level(level), memory_.value_bytes}});
   SpillSorter<KeyedNode> results(space_);
   pairs.kept_a.uses.begin();
   pairs.kept_b.uses.begin();

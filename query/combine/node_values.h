@@ -7,13 +7,17 @@
 //   2. resolve() loads one window after the other and writes the values of the window's bucket.
 //   3. next() receives the same offsets in the same order and reads the values from the buckets.
 //
-// Every node has at least two words, so offset / 2 is a different number for every node.
+// Every node has at least two words, so offset / 2 is a different number for every node. A window
+// is an array by these numbers. In memory, the values are in an array by the order of their nodes,
+// because it is smaller; a bit for each word of the level tells where nodes begin.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
 
+#include "core/base/host_device.h"
+#include "core/format/global/voxdag_reader.h"
 #include "query/combine/spill.h"
 
 namespace voxdag::query {
@@ -31,33 +35,44 @@ constexpr uint64_t number_of_tag(uint64_t tag) { return tag >> 2; }
 template <class T>
 class NodeValues {
  public:
-  // `level_words`: the size of the level. The values are in memory if they take at most
-  // `resident_bytes`.
-  NodeValues(const SpillSpace& space, uint64_t level_words, uint64_t resident_bytes)
-      : level_words_(level_words) {
-    const uint64_t slots = level_words / 2 + 1;
-    if (slots <= resident_bytes / sizeof(T))
-      slots_ = PageBuffer<T>(space.budget, slots, "values of a level");
-    else
+  // The values are in memory if they take at most `resident_bytes`.
+  NodeValues(const SpillSpace& space, const voxdag_reader::Level& level, uint64_t resident_bytes)
+      : level_words_(level.word_count) {
+    const uint64_t blocks = level_words_ / kBlockWords + 1;
+    if (level.node_count <= resident_bytes / sizeof(T) &&
+        blocks <= (resident_bytes - level.node_count * sizeof(T)) / sizeof(Block)) {
+      blocks_ = PageBuffer<Block>(space.budget, blocks, "values of a level");
+      values_ = PageBuffer<T>(space.budget, level.node_count, "values of a level");
+    } else {
       list_.emplace(space);
+    }
   }
 
   bool is_resident() const { return !list_; }
   uint64_t level_words() const { return level_words_; }
   // Offsets must increase.
   void add(uint64_t offset, const T& value) {
-    if (list_)
-      list_->add({offset, value});
-    else
-      slots_[offset / 2] = value;
+    if (list_) return list_->add({offset, value});
+    Block& block = blocks_[offset / kBlockWords];
+    if (block.begins == 0) block.before = count_;
+    block.begins |= uint64_t{1} << offset % kBlockWords;
+    values_[count_++] = value;
   }
   void finish() {
     if (list_) list_->finish();
   }
-  // Require is_resident(). at() returns a zero value if no node begins at or next to the offset.
-  T at(uint64_t offset) const { return offset < level_words_ ? slots_[offset / 2] : T{}; }
-  void prefetch(uint64_t offset) const {
-    if (offset < level_words_) __builtin_prefetch(&slots_[offset / 2]);
+  // Require is_resident(). Without a value for the offset, find() returns null and at() a zero
+  // value.
+  const T* find(uint64_t offset) const {
+    if (offset >= level_words_) return nullptr;
+    const Block& block = blocks_[offset / kBlockWords];
+    const uint64_t bit = uint64_t{1} << offset % kBlockWords;
+    if (!(block.begins & bit)) return nullptr;
+    return &values_[block.before + static_cast<uint64_t>(popcount64(block.begins & (bit - 1)))];
+  }
+  T at(uint64_t offset) const {
+    const T* const value = find(offset);
+    return value ? *value : T{};
   }
 
  private:
@@ -67,8 +82,17 @@ class NodeValues {
     uint64_t offset;
     T value;
   };
+  static constexpr uint64_t kBlockWords = 64;
+  // A block of words of the level.
+  struct Block {
+    uint64_t begins;  // a bit for each word, set if a node with a value begins there
+    uint64_t before;  // values of the blocks before
+  };
+
   const uint64_t level_words_;
-  PageBuffer<T> slots_;
+  PageBuffer<Block> blocks_;
+  PageBuffer<T> values_;
+  uint64_t count_ = 0;
   std::optional<SpillList<Entry>> list_;
 };
 
@@ -105,7 +129,7 @@ class NodeLookups {
     answers_->finish();
     requests_.reset();
   }
-  // Returns a zero value if no node begins at or next to the offset.
+  // Returns a zero value, or a value with another tag, if no node begins at the offset.
   T next(uint64_t offset) {
     if (!answers_) return values_.at(offset);
     return offset < values_.level_words() ? answers_->next(offset / 2 / window_slots_) : T{};
