@@ -1,0 +1,158 @@
+#include "core/dag/space/enclosed_fill.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "core/base/integers.h"
+#include "core/dag/consing/slot_order.h"
+
+namespace voxdag {
+namespace {
+
+// A node, the part of its components that is outside, and the result.
+struct FilledNode {
+  uint64_t outside = 0;  // bit c: component c is outside
+  uint64_t hash = 0;
+  OctreeCounts counts;
+  uint32_t row_plus_1 = 0;  // 0: free slot
+  uint32_t id = 0;
+};
+
+// The filled nodes of one depth: an open-addressing table.
+class FilledNodes {
+ public:
+  // Returns the slot of a node: its own, or a free one.
+  FilledNode& find(PooledMemory& memory, uint32_t row, uint64_t outside) {
+    if (count_ + 1 > entries_for(used_slots_)) grow(memory);
+    return slot(row, outside);
+  }
+  void add(FilledNode& free_slot, const FilledNode& filled) {
+    free_slot = filled;
+    ++count_;
+  }
+
+ private:
+  FilledNode& slot(uint32_t row, uint64_t outside) {
+    uint64_t at = fold_multiply(outside ^ 0x9e3779b97f4a7c15ull, row + 0xd6e8feb86659fd93ull);
+    while (true) {
+      FilledNode& found = slots_[at & (used_slots_ - 1)];
+      if (found.row_plus_1 == 0 || (found.row_plus_1 == row + 1 && found.outside == outside))
+        return found;
+      ++at;
+    }
+  }
+  void grow(PooledMemory& memory) {
+    PooledArray<FilledNode> old = std::move(slots_);
+    const uint64_t old_slots = std::exchange(used_slots_, slots_for(2 * count_ + 1));
+    slots_ = PooledArray<FilledNode>(memory, used_slots_, PooledArray<FilledNode>::kZero);
+    for (uint64_t i = 0; i < old_slots; ++i)
+      if (old[i].row_plus_1 != 0) slot(old[i].row_plus_1 - 1, old[i].outside) = old[i];
+  }
+
+  PooledArray<FilledNode> slots_;
+  uint64_t used_slots_ = 0, count_ = 0;
+};
+
+class Filler {
+ public:
+  Filler(PooledMemory& memory, const SpaceLabels& labels, SubDagTables& tables)
+      : memory_(memory),
+        labels_(labels),
+        tables_(tables),
+        filled_(static_cast<size_t>(labels.levels().brick_depth())),
+        full_(static_cast<size_t>(tables.size_log2()) + 1) {}
+
+  void run(std::span<const uint8_t> is_outside) {
+    numbers_.assign(is_outside.begin(), is_outside.end());
+    fill(0, {true, 0, 0});
+  }
+
+ private:
+  int size_log2(int depth) const { return tables_.size_log2() - depth; }
+
+  NodeRef fill(int depth, const LabeledCube& cube) {
+    if (!cube.exists) return numbers_[cube.first] != 0 ? NodeRef{} : full(size_log2(depth));
+    if (depth == labels_.levels().brick_depth()) return fill_brick(cube);
+    uint64_t outside = 0;
+    if (!pack_outside(depth, cube, outside)) return fill_octants(depth, cube);
+    FilledNodes& nodes = filled_[static_cast<size_t>(depth)];
+    const FilledNode& known = nodes.find(memory_, cube.row, outside);
+    if (known.row_plus_1 != 0) {
+      tables_.counts() += known.counts;
+      return {known.hash, known.id, true};
+    }
+    const OctreeCounts before = tables_.counts();
+    const NodeRef node = fill_octants(depth, cube);
+    nodes.add(nodes.find(memory_, cube.row, outside),
+              {outside, node.hash, tables_.counts() - before, cube.row + 1, node.id});
+    return node;
+  }
+
+  // Sets `outside` to the key of the cube's components. Returns false if they are too many for a
+  // key. If all components are outside, or none is, the key does not depend on their number.
+  bool pack_outside(int depth, const LabeledCube& cube, uint64_t& outside) const {
+    const uint32_t count = labels_.count(depth, cube.row);
+    uint32_t ones = 0;
+    for (uint32_t c = 0; c < count; ++c) {
+      const uint64_t bit = numbers_[cube.first + c];
+      ones += static_cast<uint32_t>(bit);
+      outside |= bit << (c & 63);
+    }
+    if (ones == count && ones != 0) outside = ~uint64_t{0};
+    return count < 64 || ones == count || ones == 0;
+  }
+
+  NodeRef fill_octants(int depth, const LabeledCube& cube) {
+    NodeRef octants[8];
+    const size_t used = numbers_.size();
+    for (int o = 0; o < 8; ++o) {
+      octants[o] = fill(depth + 1, octant_of(labels_, depth, cube, o, 0, numbers_));
+      numbers_.resize(used);
+    }
+    return tables_.add_node(size_log2(depth), octants);
+  }
+
+  NodeRef fill_brick(const LabeledCube& cube) {
+    const uint32_t count = labels_.count(labels_.levels().brick_depth(), cube.row);
+    const uint64_t* const components = labels_.brick_components(cube.row);
+    uint64_t outside = 0;
+    for (uint32_t c = 0; c < count; ++c)
+      if (numbers_[cube.first + c] != 0) outside |= components[c];
+    return tables_.add_brick(~outside);
+  }
+
+  // Returns the node of a cube of which all voxels are set.
+  NodeRef full(int size) {
+    NodeRef& known = full_[static_cast<size_t>(size)];
+    if (!known.exists) {
+      const OctreeCounts before = tables_.counts();
+      known = make_full(size);
+      tables_.counts() = before;
+    }
+    tables_.counts() += full_counts(size);
+    return known;
+  }
+  NodeRef make_full(int size) {
+    if (size == kBrickLevels) return tables_.add_brick(~uint64_t{0});
+    NodeRef octants[8];
+    std::fill(std::begin(octants), std::end(octants), full(size - 1));
+    return tables_.add_node(size, octants);
+  }
+
+  PooledMemory& memory_;
+  const SpaceLabels& labels_;
+  SubDagTables& tables_;
+  std::vector<FilledNodes> filled_;  // by depth
+  std::vector<NodeRef> full_;        // by log2 of the edge
+  // 1 for a component that is outside, for the components of the cubes on the path
+  std::vector<uint32_t> numbers_;
+};
+
+}  // namespace
+
+void fill_enclosed(PooledMemory& memory, const SpaceLabels& labels,
+                   std::span<const uint8_t> is_outside, SubDagTables& tables) {
+  Filler(memory, labels, tables).run(is_outside);
+}
+
+}  // namespace voxdag

@@ -1,0 +1,81 @@
+// The components at a face of a sub-DAG's cube, as a quadtree in bytes. Two neighbors are joined by
+// reading both quadtrees together.
+//
+//   quadtree = 0                  no empty voxel
+//            | 1 quadtree (4x)    the quadrants, in the order of their octants
+//            | 2 label            all voxels are empty and in one component
+//            | 3 count (label, mask of 16 voxels) (count times)    the face of a brick
+//
+// Labels are the component numbers of the root, in bytes of seven bits, the lowest first.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/dag/space/space_labels.h"
+
+namespace voxdag {
+
+// Returns the quadtree of face `face` of the root. Throws OutOfBudget if it exceeds `max_bytes`.
+std::vector<std::byte> encode_face(const SpaceLabels& labels, int face, uint64_t max_bytes);
+
+// Returns the quadtree of a face of an empty cube. Its label is 0.
+std::vector<std::byte> empty_face();
+
+// Reads a quadtree. Throws Error{kCorrupt} if the bytes are not a quadtree.
+class FaceReader {
+ public:
+  enum class Kind : uint8_t { kSet, kSplit, kEmpty, kBrick };
+  struct Piece {
+    uint32_t label;
+    uint16_t voxels;
+  };
+  // A part of the face: a square, without its quadrants.
+  struct Square {
+    Kind kind = Kind::kSet;
+    std::vector<Piece> pieces;  // one for kEmpty; the components of a brick's face
+  };
+
+  explicit FaceReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+
+  // Reads the next square. If its kind is kSplit, its quadrants follow.
+  Square next();
+  // Skips the quadrants of a square that next() returned.
+  void skip(const Square& square);
+  // Reads the square at a path of quadrants. If a larger square contains it, and is not split,
+  // returns the larger square.
+  Square descend(std::span<const uint8_t> path);
+
+ private:
+  uint8_t byte();
+  uint32_t label();
+
+  std::span<const std::byte> bytes_;
+  size_t at_ = 0;
+};
+
+// Calls unite(label_a, label_b) for components of two squares that meet. Both readers are behind
+// their square; afterwards, they are behind its quadrants.
+template <class Unite>
+void join_squares(FaceReader& a, const FaceReader::Square& in_a, FaceReader& b,
+                  const FaceReader::Square& in_b, const Unite& unite) {
+  using Kind = FaceReader::Kind;
+  if (in_a.kind == Kind::kSet || in_b.kind == Kind::kSet) {
+    a.skip(in_a);
+    b.skip(in_b);
+  } else if (in_a.kind != Kind::kSplit && in_b.kind != Kind::kSplit) {
+    for (const auto& p : in_a.pieces)
+      for (const auto& q : in_b.pieces)
+        if ((p.voxels & q.voxels) != 0) unite(p.label, q.label);
+  } else {
+    for (int i = 0; i < 4; ++i) {
+      const auto next_a = in_a.kind == Kind::kSplit ? a.next() : in_a;
+      const auto next_b = in_b.kind == Kind::kSplit ? b.next() : in_b;
+      join_squares(a, next_a, b, next_b, unite);
+    }
+  }
+}
+
+}  // namespace voxdag

@@ -1,0 +1,54 @@
+// The pairs of components of two nodes that meet at a common face of the nodes' cubes.
+//
+// The pairs follow from the pairs of the octants at the face. A cache remembers the pairs of recent
+// nodes, because equal nodes are often neighbors of equal nodes. The cache only saves time: a lost
+// entry is computed again. Not thread-safe.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <optional>
+
+#include "core/dag/space/space_labels.h"
+
+namespace voxdag {
+
+class FaceRelations {
+ public:
+  static constexpr uint32_t kMaxComponents = 8;
+
+  // Bit 8 i + j: component i of the low node meets component j of the high node.
+  struct Meeting {
+    uint64_t pairs = 0;
+  };
+  static int lowest_pair(uint64_t pairs) { return std::countr_zero(pairs); }
+  static uint32_t of_low(int pair) { return static_cast<uint32_t>(pair) / kMaxComponents; }
+  static uint32_t of_high(int pair) { return static_cast<uint32_t>(pair) % kMaxComponents; }
+
+  // `labels` must have the labels of the depths that are passed to find(). Throws OutOfBudget.
+  FaceRelations(PooledMemory& memory, const SpaceLabels& labels);
+
+  // Returns the pairs of two nodes or bricks: `low` is below `high` along the axis. Returns nullopt
+  // if one of them, or of the smaller cubes at the face, has more than kMaxComponents components.
+  std::optional<Meeting> find(int depth, uint32_t low, uint32_t high, int axis);
+
+ private:
+  struct Entry {
+    uint64_t pairs = 0;
+    uint32_t low = 0, high = 0;
+    uint32_t tag = 0;  // depth and axis; 0: free
+  };
+
+  // Returns the components of a node at a face, as bits.
+  uint32_t at_face(int depth, uint32_t row, int face) const;
+  Meeting meet_bricks(uint32_t low, uint32_t high, int axis) const;
+  std::optional<Meeting> meet_octants(int depth, uint32_t low, uint32_t high, int axis);
+  // Returns the pairs of the octants `o` of `low` and `p` of `high`, as pairs of their components.
+  std::optional<Meeting> meet_pair(int depth, uint32_t low, int o, uint32_t high, int p, int axis);
+
+  const SpaceLabels& labels_;
+  uint64_t slots_;
+  PooledArray<Entry> cache_;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,97 @@
+// Labels for the empty space of a sub-DAG: the 6-connected components of the empty voxels in the
+// cube of each node, as far as they have a voxel at a face of that cube. All other components are
+// *closed*: no walk leads out of them, whatever is around the cube.
+//
+// Components belong to a node and not to its places in the octree. So the cost depends on the
+// number of unique nodes. The components of a node follow from the components of its octants, which
+// are joined where they meet: level by level, from the bricks upwards.
+//
+//   labels of a node    0, 1, ...: its components in the order in which a walk over the components
+//                       of its octants first meets them
+//   labels of a brick   its components in the order of their lowest voxels at a face
+//
+// An octant without a node is empty and has one component. Immutable after construction.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/dag/space/brick_space.h"
+#include "core/dag/space/node_levels.h"
+
+namespace voxdag {
+
+class SpaceLabels {
+ public:
+  static constexpr uint16_t kClosed = 0xffff;
+
+  // `levels` must outlive this object. Throws OutOfBudget if the memory is too small, or if a node
+  // has too many components for 16 bits. Neither happens to cubes of kSmallestEdge within
+  // kSmallestBudget.
+  SpaceLabels(PooledMemory& memory, const NodeLevels& levels);
+
+  const NodeLevels& levels() const { return levels_; }
+  // Returns the number of components of a node or brick.
+  uint32_t count(int depth, uint32_t row) const {
+    const Row& r = at(depth).rows[row];
+    return r.count < Row::kMany ? r.count : (&r)[1].first - r.first;
+  }
+  // Returns, for each component, the faces of the cube at which it has a voxel.
+  const uint8_t* touch(int depth, uint32_t row) const {
+    const Depth& d = at(depth);
+    const Row& r = d.rows[row];
+    return r.count <= Row::kFew ? r.touch : d.touch.data() + r.first;
+  }
+  // Returns the faces of the cube at which all voxels are empty.
+  uint8_t open_faces(int depth, uint32_t row) const { return at(depth).rows[row].open; }
+  // Returns, for each component of an octant, its label in the node, or kClosed.
+  const uint16_t* labels_of_octant(int depth, uint32_t row, int octant) const {
+    const Depth& d = at(depth);
+    const uint16_t* const map = d.maps.data() + d.first_map[row];
+    return map + map[octant];
+  }
+  // Returns the voxels of the components of a brick.
+  const uint64_t* brick_components(uint32_t row) const {
+    return brick_masks_.data() + at(levels_.brick_depth()).rows[row].first;
+  }
+
+ private:
+  friend class SpaceLabeler;
+
+  // The components of a node. Most nodes have few, so that one access of memory is enough.
+  struct Row {
+    static constexpr uint8_t kFew = 2, kMany = 255;
+
+    uint32_t first = 0;  // index in Depth::touch
+    uint8_t count = 0;   // kMany: the next row's `first` tells it
+    uint8_t open = 0;    // faces at which all voxels are empty
+    uint8_t touch[kFew] = {};
+  };
+  struct Depth {
+    PooledArray<Row> rows;  // one more than the nodes
+    PooledArray<uint8_t> touch;
+    // By row: index in `maps` of the starts of the octants' labels, relative to this index. The
+    // labels follow.
+    PooledArray<uint32_t> first_map;
+    PooledArray<uint16_t> maps;
+  };
+  const Depth& at(int depth) const { return depths_[static_cast<size_t>(depth)]; }
+
+  const NodeLevels& levels_;
+  std::vector<Depth> depths_;
+  PooledArray<uint64_t> brick_masks_;
+};
+
+// A node, a brick or an empty cube, as a place whose components have numbers given by the caller.
+struct LabeledCube {
+  bool exists = false;  // false: the cube is empty
+  uint32_t row = 0;
+  size_t first = 0;  // index of the number of its first component, in the caller's list
+};
+
+// Returns octant `octant` of a cube. Appends the numbers of the octant's components to `numbers`,
+// which has the numbers of the cube's components; closed components get the number `closed`.
+LabeledCube octant_of(const SpaceLabels& labels, int depth, const LabeledCube& cube, int octant,
+                      uint32_t closed, std::vector<uint32_t>& numbers);
+
+}  // namespace voxdag

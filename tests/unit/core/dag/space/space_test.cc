@@ -1,0 +1,388 @@
+// The components of empty space, and the fill of enclosed space, compared with a flood of the
+// single voxels.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <map>
+#include <random>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/dag/space/enclosed_fill.h"
+#include "core/dag/space/face_code.h"
+
+namespace voxdag {
+namespace {
+
+using SpaceCell = std::array<int, 3>;
+
+// Voxels of a box of cells.
+struct SpaceGrid {
+  explicit SpaceGrid(SpaceCell cells) : size(cells) {
+    voxels.resize(static_cast<size_t>(size[0]) * size[1] * size[2]);
+  }
+  explicit SpaceGrid(int edge) : SpaceGrid(SpaceCell{edge, edge, edge}) {}
+  size_t index(const SpaceCell& c) const {
+    return (static_cast<size_t>(c[0]) * size[1] + c[1]) * size[2] + c[2];
+  }
+  uint8_t& at(const SpaceCell& c) { return voxels[index(c)]; }
+  uint8_t at(const SpaceCell& c) const { return voxels[index(c)]; }
+  bool has(const SpaceCell& c) const {
+    for (int a = 0; a < 3; ++a)
+      if (c[a] < 0 || c[a] >= size[a]) return false;
+    return true;
+  }
+  bool is_border(const SpaceCell& c) const {
+    for (int a = 0; a < 3; ++a)
+      if (c[a] == 0 || c[a] == size[a] - 1) return true;
+    return false;
+  }
+  template <class Visit>
+  void for_each(Visit visit) const {
+    for (int x = 0; x < size[0]; ++x)
+      for (int y = 0; y < size[1]; ++y)
+        for (int z = 0; z < size[2]; ++z) visit(SpaceCell{x, y, z});
+  }
+
+  SpaceCell size;
+  std::vector<uint8_t> voxels;
+};
+
+// Sets all voxels of `out` that walks through empty voxels of `grid` reach from `start`.
+void flood(const SpaceGrid& grid, const SpaceCell& start, SpaceGrid& out) {
+  std::vector<SpaceCell> reached;
+  const auto reach = [&](const SpaceCell& c) {
+    if (!grid.has(c) || grid.at(c) || out.at(c)) return;
+    out.at(c) = 1;
+    reached.push_back(c);
+  };
+  reach(start);
+  while (!reached.empty()) {
+    const SpaceCell c = reached.back();
+    reached.pop_back();
+    for (int a = 0; a < 3; ++a)
+      for (const int step : {-1, 1}) {
+        SpaceCell next = c;
+        next[a] += step;
+        reach(next);
+      }
+  }
+}
+
+SpaceGrid outside_of(const SpaceGrid& grid) {
+  SpaceGrid out(grid.size);
+  grid.for_each([&](const SpaceCell& c) {
+    if (grid.is_border(c)) flood(grid, c, out);
+  });
+  return out;
+}
+
+// The sub-DAG of a cubic grid, with its labels.
+class SpaceDag {
+ public:
+  explicit SpaceDag(const SpaceGrid& grid) : edge_(grid.size[0]) {
+    for (int edge = edge_; edge > kBrickEdge; edge /= 2) {
+      NodeLevels::Level& level = levels_.nodes.emplace_back();
+      const size_t rows = static_cast<size_t>(edge_ / edge) * (edge_ / edge) * (edge_ / edge);
+      level.masks = PooledArray<uint8_t>(memory_, rows);
+      level.first_child = PooledArray<uint32_t>(memory_, rows);
+      level.children = PooledArray<uint32_t>(memory_, 8 * rows);
+      children_.push_back(0);
+      known_.emplace_back();
+    }
+    known_.emplace_back();
+    levels_.bricks = PooledArray<uint64_t>(memory_, grid.voxels.size() / 64);
+    add(grid, {0, 0, 0}, edge_, 0);
+    labels_ = std::make_unique<SpaceLabels>(memory_, levels_);
+  }
+
+  const SpaceLabels& labels() const { return *labels_; }
+  uint32_t components() const { return labels_->count(0, 0); }
+
+  SpaceGrid fill(const std::vector<uint8_t>& is_outside) {
+    int size_log2 = 0;
+    while (1 << size_log2 < edge_) ++size_log2;
+    SubDagTables tables(memory_, size_log2);
+    fill_enclosed(memory_, *labels_, is_outside, tables);
+    SubDag dag;
+    const auto grid_levels = static_cast<uint32_t>(size_log2);
+    summary = emit_levels(tables, {0, grid_levels, 64}, dag);
+    SpaceGrid out(edge_);
+    expand(dag, static_cast<int>(dag.levels.size()), 0, {0, 0, 0}, edge_, out);
+    return out;
+  }
+  // Returns the voxels of a component that is at the faces.
+  SpaceGrid component(uint32_t c) {
+    std::vector<uint8_t> is_outside(components());
+    is_outside[c] = 1;
+    SpaceGrid out = fill(is_outside);
+    for (uint8_t& voxel : out.voxels) voxel = !voxel;
+    return out;
+  }
+
+  SubDagSummary summary;
+
+ private:
+  static SpaceCell octant_corner(const SpaceCell& low, int half, int o) {
+    return {low[0] + half * (o >> 2), low[1] + half * (o >> 1 & 1), low[2] + half * (o & 1)};
+  }
+
+  // Returns the row of a cube plus 1; 0 if it is empty.
+  uint32_t add(const SpaceGrid& grid, const SpaceCell& low, int edge, size_t depth) {
+    std::vector<uint64_t> key;
+    if (edge == kBrickEdge) {
+      uint64_t mask = 0;
+      for (int bit = 0; bit < 64; ++bit)
+        if (grid.at({low[0] + brick_coordinate(bit, 0), low[1] + brick_coordinate(bit, 1),
+                     low[2] + brick_coordinate(bit, 2)}))
+          mask |= uint64_t{1} << bit;
+      if (mask == 0) return 0;
+      const auto [found, is_new] = known_[depth].try_emplace({mask}, levels_.brick_rows + 1);
+      if (is_new) levels_.bricks[levels_.brick_rows++] = mask;
+      return static_cast<uint32_t>(found->second);
+    }
+    for (int o = 0; o < 8; ++o)
+      key.push_back(add(grid, octant_corner(low, edge / 2, o), edge / 2, depth + 1));
+    if (std::ranges::count(key, 0u) == 8) return 0;
+    NodeLevels::Level& level = levels_.nodes[depth];
+    const auto [found, is_new] = known_[depth].try_emplace(key, level.rows + 1);
+    if (!is_new) return static_cast<uint32_t>(found->second);
+    level.first_child[level.rows] = children_[depth];
+    level.masks[level.rows] = 0;
+    for (int o = 0; o < 8; ++o) {
+      if (key[o] == 0) continue;
+      level.masks[level.rows] = static_cast<uint8_t>(level.masks[level.rows] | 1 << o);
+      level.children[children_[depth]++] = static_cast<uint32_t>(key[o] - 1);
+    }
+    return static_cast<uint32_t>(++level.rows);
+  }
+
+  void expand(const SubDag& dag, int above, uint32_t row, const SpaceCell& low, int edge,
+              SpaceGrid& out) {
+    if (above == 0) {
+      for (int bit = 0; bit < 64; ++bit)
+        out.at({low[0] + brick_coordinate(bit, 0), low[1] + brick_coordinate(bit, 1),
+                low[2] + brick_coordinate(bit, 2)}) = dag.brick_masks[row] >> bit & 1;
+      return;
+    }
+    const SubDag::Nodes& level = dag.levels[above - 1];
+    size_t at = 0;
+    for (uint32_t i = 0; i < row; ++i) at += popcount8(level.masks[i]);
+    for (int o = 0; o < 8; ++o)
+      if (level.masks[row] >> o & 1)
+        expand(dag, above - 1, level.children[at++], octant_corner(low, edge / 2, o), edge / 2,
+               out);
+  }
+
+  int edge_;
+  MemoryBudget budget_{uint64_t{256} << 20};
+  PagePool pool_;
+  PooledMemory memory_{budget_, pool_};
+  NodeLevels levels_;
+  std::vector<uint32_t> children_;
+  std::vector<std::map<std::vector<uint64_t>, uint64_t>> known_;
+  std::unique_ptr<SpaceLabels> labels_;
+};
+
+// Random voxels, or walls with random doors. Never empty.
+SpaceGrid random_grid(std::mt19937& engine, const SpaceCell& size, bool has_walls) {
+  SpaceGrid grid(size);
+  const unsigned percent = has_walls ? 97 : 20 + engine() % 60;
+  const int room = 3 + static_cast<int>(engine() % 6);
+  grid.for_each([&](const SpaceCell& c) {
+    const bool is_wall = !has_walls || c[0] % room == 1 || c[1] % room == 1 || c[2] % room == 1;
+    grid.at(c) = is_wall && engine() % 100 < percent;
+  });
+  grid.voxels[engine() % grid.voxels.size()] = 1;
+  return grid;
+}
+
+template <class Test>
+void for_random_grids(int edge, const Test& test) {
+  std::mt19937 engine(static_cast<unsigned>(edge));
+  for (int i = 0; i < 512 / edge; ++i) {
+    SCOPED_TRACE(testing::Message() << "edge " << edge << ", grid " << i);
+    test(random_grid(engine, {edge, edge, edge}, i % 2 != 0));
+  }
+}
+
+TEST(Space, NeighborsInABrick) {
+  for (int bit = 0; bit < 64; ++bit) {
+    uint64_t expected = 0;
+    for (int other = 0; other < 64; ++other) {
+      int distance = 0;
+      for (int a = 0; a < 3; ++a)
+        distance += std::abs(brick_coordinate(bit, a) - brick_coordinate(other, a));
+      if (distance == 1) expected |= uint64_t{1} << other;
+    }
+    EXPECT_EQ(brick_neighbors(uint64_t{1} << bit), expected) << bit;
+  }
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_EQ(brick_face(2 * axis + 1) >> brick_face_shift(axis), brick_face(2 * axis));
+}
+
+TEST(Space, FillSetsWhatTheBorderDoesNotReach) {
+  for (const int edge : {4, 8, 16, 32})
+    for_random_grids(edge, [](const SpaceGrid& grid) {
+      SpaceDag dag(grid);
+      const SpaceGrid filled = dag.fill(std::vector<uint8_t>(dag.components(), 1));
+      SpaceGrid expected = outside_of(grid);
+      for (uint8_t& voxel : expected.voxels) voxel = !voxel;
+      ASSERT_EQ(filled.voxels, expected.voxels);
+      EXPECT_EQ(dag.summary.voxels, static_cast<uint64_t>(std::ranges::count(filled.voxels, 1)));
+    });
+}
+
+// The components are disjoint, each is connected, and together they are the outside.
+TEST(Space, EachComponentIsConnected) {
+  for (const int edge : {4, 8, 16})
+    for_random_grids(edge, [](const SpaceGrid& grid) {
+      SpaceDag dag(grid);
+      const SpaceGrid outside = outside_of(grid);
+      SpaceGrid all(grid.size);
+      for (uint32_t c = 0; c < dag.components(); ++c) {
+        const SpaceGrid component = dag.component(c);
+        uint8_t touch = 0;
+        bool is_first = true;
+        SpaceGrid reached(grid.size);
+        grid.for_each([&](const SpaceCell& cell) {
+          if (!component.at(cell)) return;
+          if (std::exchange(is_first, false)) flood(grid, cell, reached);
+          ++all.at(cell);
+          for (int a = 0; a < 3; ++a) {
+            if (cell[a] == 0) touch = static_cast<uint8_t>(touch | 1 << 2 * a);
+            if (cell[a] == grid.size[a] - 1) touch = static_cast<uint8_t>(touch | 2 << 2 * a);
+          }
+        });
+        ASSERT_EQ(reached.voxels, component.voxels);
+        ASSERT_EQ(dag.labels().touch(0, 0)[c], touch);
+      }
+      ASSERT_EQ(all.voxels, outside.voxels);
+    });
+}
+
+// If all is outside, the sub-DAG remains as it is. If nothing is outside, all voxels are set.
+TEST(Space, FullCube) {
+  SpaceGrid grid(64);
+  grid.at({40, 3, 5}) = 1;
+  SpaceDag dag(grid);
+  ASSERT_EQ(dag.components(), 1u);
+  EXPECT_EQ(dag.fill({1}).voxels, grid.voxels);
+  EXPECT_EQ(dag.summary.dag_nodes, 5u);
+  EXPECT_EQ(std::ranges::count(dag.fill({0}).voxels, 1), 64 * 64 * 64);
+  EXPECT_EQ(dag.summary.voxels, 64u * 64 * 64);
+  EXPECT_EQ(dag.summary.svo_nodes, 1u + 8 + 64 + 512 + 4096);
+  EXPECT_EQ(dag.summary.dag_nodes, 5u);
+}
+
+// Components with more labels than the key of a filled node can hold.
+TEST(Space, ManyComponents) {
+  SpaceGrid grid(32);
+  grid.for_each([&](const SpaceCell& c) { grid.at(c) = (c[0] + c[1] + c[2]) % 2 == 0; });
+  SpaceDag dag(grid);
+  const uint32_t expected = (32 * 32 * 32 - 30 * 30 * 30) / 2;
+  ASSERT_EQ(dag.components(), expected);
+  EXPECT_EQ(dag.fill(std::vector<uint8_t>(expected, 1)).voxels, [&] {
+    SpaceGrid filled = outside_of(grid);
+    for (uint8_t& voxel : filled.voxels) voxel = !voxel;
+    return filled.voxels;
+  }());
+  std::vector<uint8_t> half(expected);
+  for (uint32_t c = 0; c < expected; c += 2) half[c] = 1;
+  EXPECT_EQ(std::ranges::count(dag.fill(half).voxels, 0), expected / 2);
+}
+
+SpaceGrid part_of(const SpaceGrid& grid, const SpaceCell& low, int edge) {
+  SpaceGrid out(edge);
+  out.for_each([&](const SpaceCell& c) {
+    out.at(c) = grid.at({low[0] + c[0], low[1] + c[1], low[2] + c[2]});
+  });
+  return out;
+}
+
+// Two cubes with a common face: their components meet iff walks through both cubes connect them.
+void expect_joined(const SpaceGrid& grid, int axis, int edge) {
+  SpaceCell high{0, 0, 0};
+  high[axis] = edge;
+  SpaceDag parts[2] = {SpaceDag(part_of(grid, {0, 0, 0}, edge)),
+                       SpaceDag(part_of(grid, high, edge))};
+  const uint32_t first[2] = {0, parts[0].components()};
+  std::vector<uint32_t> set(first[1] + parts[1].components());
+  for (uint32_t i = 0; i < set.size(); ++i) set[i] = i;
+  const auto low_face = encode_face(parts[0].labels(), 2 * axis + 1, UINT64_MAX);
+  const auto high_face = encode_face(parts[1].labels(), 2 * axis, UINT64_MAX);
+  FaceReader a(low_face), b(high_face);
+  const auto square_a = a.next(), square_b = b.next();
+  join_squares(a, square_a, b, square_b, [&](uint32_t i, uint32_t j) {
+    const uint32_t from = set[i], to = set[first[1] + j];
+    for (uint32_t& s : set)
+      if (s == from) s = to;
+  });
+  std::vector<uint32_t> sets(grid.voxels.size());  // by voxel: its set + 1; 0 for others
+  SpaceGrid walked(grid.size);
+  for (int p = 0; p < 2; ++p)
+    for (uint32_t c = 0; c < parts[p].components(); ++c) {
+      const SpaceGrid component = parts[p].component(c);
+      component.for_each([&](const SpaceCell& cell) {
+        SpaceCell at = cell;
+        at[axis] += p * edge;
+        if (component.at(cell)) sets[grid.index(at)] = set[first[p] + c] + 1;
+      });
+    }
+  grid.for_each([&](const SpaceCell& c) {
+    const uint32_t of_start = sets[grid.index(c)];
+    if (of_start == 0 || walked.at(c)) return;
+    SpaceGrid reached(grid.size);
+    flood(grid, c, reached);
+    grid.for_each([&](const SpaceCell& other) {
+      const uint32_t of_other = sets[grid.index(other)];
+      if (of_other != 0) {
+        ASSERT_EQ(of_other == of_start, reached.at(other) == 1);
+      }
+      walked.at(other) |= reached.at(other);
+    });
+  });
+}
+
+TEST(Space, FacesJoinNeighbors) {
+  std::mt19937 engine(1);
+  for (const int edge : {4, 8, 16})
+    for (int i = 0; i < 12; ++i) {
+      SCOPED_TRACE(testing::Message() << "edge " << edge << ", grid " << i);
+      SpaceCell size{edge, edge, edge};
+      size[i % 3] *= 2;
+      SpaceGrid grid = random_grid(engine, size, i % 2 != 0);
+      grid.voxels.front() = grid.voxels.back() = 1;
+      expect_joined(grid, i % 3, edge);
+    }
+}
+
+// A path leads to the square of a quadrant, or to the larger square around it.
+TEST(Space, FacesDescend) {
+  SpaceGrid grid(16);
+  grid.at({15, 2, 14}) = 1;  // quadrant 1 of the high face along x
+  SpaceDag dag(grid);
+  const auto bytes = encode_face(dag.labels(), 1, UINT64_MAX);
+  const uint8_t to_brick[] = {1, 1}, to_empty[] = {2, 1};
+  FaceReader brick(bytes), empty(bytes);
+  EXPECT_EQ(brick.descend(to_brick).kind, FaceReader::Kind::kBrick);
+  EXPECT_EQ(empty.descend(to_empty).kind, FaceReader::Kind::kEmpty);
+  EXPECT_EQ(empty_face().size(), 2u);
+}
+
+TEST(Space, MemoryIsLimited) {
+  SpaceGrid grid(32);
+  grid.for_each(
+      [&](const SpaceCell& c) { grid.at(c) = (c[0] * 7 + c[1] * 5 + c[2] * 3) % 11 < 5; });
+  SpaceDag dag(grid);
+  EXPECT_THROW(encode_face(dag.labels(), 0, 10), OutOfBudget);
+  MemoryBudget small(4096);
+  PagePool pool;
+  PooledMemory memory{small, pool};
+  EXPECT_THROW(SpaceLabels(memory, dag.labels().levels()), OutOfBudget);
+}
+
+}  // namespace
+}  // namespace voxdag
