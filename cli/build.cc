@@ -18,6 +18,8 @@ struct BuildCommand {
   bool json = false;
 };
 
+constexpr const char* kEnclosedRule = "enclosed";  // needs no sample rows
+
 void print(const BuildReport& r) {
   std::printf("%s: %s, sha256 %s\n", printable_line(r.output).c_str(), size_text(r.bytes).c_str(),
               r.sha256.c_str());
@@ -25,7 +27,10 @@ void print(const BuildReport& r) {
               static_cast<long long>(r.grid.resolution()));
   std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count_text(r.merge.voxels).c_str(),
               count_text(r.merge.svo_nodes).c_str(), count_text(r.merge.dag_nodes).c_str());
-  if (r.solid)
+  if (r.solid && r.solid->rule == kEnclosedRule)
+    std::printf("  %s voxels inside by the rule %s\n", count_text(r.solid->interior).c_str(),
+                r.solid->rule.c_str());
+  else if (r.solid)
     std::printf(
         "  %s voxels inside by the rule %s, of which %s are disputed; %s of %s sample rows are "
         "open\n",

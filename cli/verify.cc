@@ -58,6 +58,15 @@ std::optional<Cutouts> cutouts_of(const VerifyCommand& command, const voxdag_rea
   return find_cutouts(context.files, materials, command.threads, budget, context.cancel, problems);
 }
 
+query::InteriorReport compare_solid(const VerifyCommand& command, const voxdag_reader::File& file,
+                                    TriangleSource& scene, const Grid& grid, Progress& progress,
+                                    CommandContext& context) {
+  if (command.solid == "enclosed")
+    return query::compare_enclosed(file, scene, grid, command.seed, progress, context.cancel);
+  const SolidRule rule = command.solid == "winding" ? SolidRule::kWinding : SolidRule::kParity;
+  return query::compare_interior(file, scene, grid, rule, command.seed, progress, context.cancel);
+}
+
 Sample check_against(const VerifyCommand& command, const voxdag_reader::File& file,
                      Progress& progress, CommandContext& context) {
   const Grid grid = grid_of(file);
@@ -72,14 +81,9 @@ Sample check_against(const VerifyCommand& command, const voxdag_reader::File& fi
                             command.thin ? VoxelRule::kThin : VoxelRule::kShell);
   Sample sample;
   with_reader_errors([&] {
-    const SolidRule rule = command.solid.empty()        ? SolidRule::kNone
-                           : command.solid == "winding" ? SolidRule::kWinding
-                                                        : SolidRule::kParity;
-    const bool is_solid = rule != SolidRule::kNone;
-    sample.voxels = query::compare_with_sample(file, boxes, is_solid);
-    if (is_solid)
-      sample.interior =
-          query::compare_interior(file, *scene, grid, rule, command.seed, progress, context.cancel);
+    sample.voxels = query::compare_with_sample(file, boxes, !command.solid.empty());
+    if (!command.solid.empty())
+      sample.interior = compare_solid(command, file, *scene, grid, progress, context);
     if (has_attributes)
       sample.colors = query::compare_sampled_colors(
           file, grid, context.files, *scene, command.seed, file.path() + ".images.vdspill",
@@ -159,8 +163,8 @@ void declare(Command& command, VerifyCommand& state) {
                "drop invalid triangles of the scene, as the build did");
   command.option("--cutouts", state.cutouts, "skip or keep, as in the build")
       .one_of({"skip", "keep"});
-  command.option("--solid", state.solid, "winding or parity, as in the build")
-      .one_of({"winding", "parity"});
+  command.option("--solid", state.solid, "winding, parity or enclosed, as in the build")
+      .one_of({"winding", "parity", "enclosed"});
   command.flag("--thin", state.thin, "the build set thin voxels (--thin)");
   command.option("--point-radius", state.scene_options.point_radius,
                  "half edge of the cube that replaces each point, as in the build");

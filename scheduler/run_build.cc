@@ -16,6 +16,7 @@
 #include "scheduler/solid/solid_report.h"
 #include "scheduler/stages/attributes/attribute_sections.h"
 #include "scheduler/stages/build/thread_builder.h"
+#include "scheduler/stages/enclose/enclose_stage.h"
 #include "scheduler/stages/ingest/ingest_stage.h"
 #include "scheduler/stages/merge/damaged_artifacts.h"
 #include "scheduler/stages/merge/merge_stage.h"
@@ -56,6 +57,7 @@ void prepare_work_folder(BuildJob& job) {
     job.checkpoint.forget();
     job.work.remove_colors();
     job.work.remove_rows();
+    job.work.remove_filled();
     remove_tasks(job);
   } else {
     refuse_other_options(job);
@@ -106,6 +108,7 @@ void plan(BuildJob& job, const PreparedScene& scene) {
   if (check_disk_space(job.spec, scene, job.scene, job.work.path(), job.budget, job.context))
     job.clock.finish("estimate");
   job.work.remove_rows();
+  job.work.remove_filled();
   std::vector<StoredSubvolume> subvolumes(scene.plan.size());
   for (size_t i = 0; i < subvolumes.size(); ++i) {
     subvolumes[i].cube = scene.plan[i].cube;
@@ -126,7 +129,9 @@ void resume_subvolumes(BuildJob& job, SubvolumeBuilder& builder, const std::stri
   std::set<uint32_t> named;
   for (const StoredSubvolume& subvolume : job.store->leaves())
     if (subvolume.state == SubvolumeState::kBuilt) named.insert(subvolume.artifact.segment);
-  job.work.remove_garbage([&](uint32_t segment) { return named.contains(segment); });
+  job.work.remove_garbage([&](uint32_t segment) {
+    return named.contains(segment) || (job.filled && job.filled->names_segment(segment));
+  });
   if (!job.store->merge()) job.work.empty_scratch();
 }
 
@@ -140,13 +145,19 @@ void report_artifacts(BuildJob& job) {
     job.report.artifact_nodes += subvolume.summary.dag_nodes;
 }
 
-// Opens the sample rows of a solid, if an earlier run saved them.
-void open_rows(BuildJob& job, const std::string& scene_digest) {
-  const SolidRule rule = solid_rule_of(job.spec.geometry);
+// Opens the sample rows or the filled parts of a solid, if an earlier run saved them.
+void open_solid(BuildJob& job, const std::string& scene_digest) {
+  const GeometryOptions& geometry = job.spec.geometry;
+  const std::string identity = scene_digest + " " + geometry_json(geometry);
+  FileSystem& files = job.context.files;
+  if (geometry.solid == SolidName::kEnclosed) {
+    job.filled = std::make_unique<FilledParts>(files, job.work.filled_path(), identity);
+    job.filled->load();
+  }
+  const SolidRule rule = solid_rule_of(geometry);
   if (rule == SolidRule::kNone) return;
-  job.rows = std::make_unique<SolidRows>(job.context.files, job.work.rows_path(), rule,
-                                         job.report.grid.levels,
-                                         scene_digest + " " + geometry_json(job.spec.geometry));
+  job.rows = std::make_unique<SolidRows>(files, job.work.rows_path(), rule, job.report.grid.levels,
+                                         identity);
   job.rows->load();
 }
 
@@ -177,7 +188,7 @@ void read_and_build(BuildJob& job, SubvolumeBuilder& builder) {
   refuse_stored_warnings(job);
   report_scene(job, scene.state);
   plan(job, scene);
-  open_rows(job, scene.digest());
+  open_solid(job, scene.digest());
   job.scene.close();  // frees its memory for the subvolumes
   resume_subvolumes(job, builder, scene.digest());
   job.context.progress.set_grid(job.report.grid.origin, job.report.grid.edge);
@@ -229,6 +240,7 @@ bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
   if (replan_damaged(job) > 0) return true;
   if (std::exchange(has_restarted, true)) return false;
   job.store->forget_merge();
+  if (job.filled) job.filled->forget();
   job.context.progress.warn("the merge restarts: " + damage.message());
   return true;
 }
@@ -241,6 +253,7 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted) {
   if (is_published(job, attributes)) return true;
   bool reads_scene = false;  // if true, an error may come from the scene's files
   try {
+    enclose(job);
     GlobalFileWriter out(job.context.files, job.report.output, job.report.grid,
                          job.report.hash_bits);
     merge_artifacts(job, out);
@@ -274,10 +287,17 @@ void write_output(BuildJob& job, SubvolumeBuilder& builder) {
   }
 }
 
+uint64_t shell_voxels(const BuildJob& job) {
+  uint64_t voxels = 0;
+  for (const StoredSubvolume& subvolume : job.store->leaves()) voxels += subvolume.summary.voxels;
+  return voxels;
+}
+
 void write_report(BuildJob& job, double start_s) {
   BuildReport& report = job.report;
   report.stages = job.clock.stages();
   report.warnings = job.store->warnings();
+  if (job.filled) report.solid = enclosed_report(report.merge.voxels, shell_voxels(job));
   if (report.solid) report.solid->volume = solid_volume(report.grid, report.merge.voxels);
   report.wall_s = wall_seconds() - start_s;
   report.cpu_s = process_cpu_seconds();

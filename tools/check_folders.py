@@ -79,6 +79,7 @@ LAYERS = {
         "scheduler/stages/publish",
         "scheduler/stages/attributes",
         "scheduler/stages/merge",
+        "scheduler/stages/enclose",
         "scheduler/stages/build",
         "scheduler/stages/rows",
         "scheduler/stages/partition",

@@ -42,7 +42,7 @@ enum class CutoutRule { kDefault, kSkip, kKeep };
 
 // The rule that decides which empty voxels are inside the surface and are filled (docs/solid.md).
 // kNone fills nothing: only voxels that the surface touches are set.
-enum class SolidName { kNone, kWinding, kParity };
+enum class SolidName { kNone, kWinding, kParity, kEnclosed };
 
 struct BuildOptions {
   // The scene: files (glTF 2.0, PLY, OBJ, STL, LAS, text with points), a mesh in memory, or both.

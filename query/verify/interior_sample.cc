@@ -82,13 +82,10 @@ bool is_closed(SolidRule rule, const SampledVoxel& voxel) {
                                     : " is set, but it is outside the scene's surface"));
 }
 
-}  // namespace
-
-InteriorReport compare_interior(const voxdag_reader::File& file, TriangleSource& scene,
-                                const Grid& grid, SolidRule rule, uint64_t seed, Progress& progress,
-                                const CancelToken& cancel) {
-  std::vector<SampledVoxel> voxels = draw_voxels(grid, seed);
-  InteriorReport report;
+// Adds the triangles of the scene to the voxels. Returns false if a triangle is too large.
+bool add_scene(TriangleSource& scene, const Grid& grid, std::vector<SampledVoxel>& voxels,
+               Progress& progress, const CancelToken& cancel) {
+  bool is_complete = true;
   progress.begin_stage("interior", scene.declared_triangles(), "triangles");
   scene.for_each_batch([&](std::span<const WorldTriangle> batch) {
     cancel.check();
@@ -98,13 +95,53 @@ InteriorReport compare_interior(const voxdag_reader::File& file, TriangleSource&
       for (auto& vertex : snapped.v) snap_vertices(grid, vertex);
       FixedTriangle triangle;
       if (!convert(snapped, triangle)) {
-        report.is_closed = false;
+        is_complete = false;
         continue;
       }
       for (SampledVoxel& voxel : voxels) add(triangle, voxel);
     }
   });
   progress.end_stage();
+  return is_complete;
+}
+
+// True if the voxel and its neighbors are set, and all of them are in the grid.
+bool is_surrounded(const voxdag_reader::File& file, const int64_t (&at)[3], int64_t edge) {
+  for (int a = 0; a < 3; ++a)
+    for (const int64_t step : {-1, 1}) {
+      int64_t p[3] = {at[0], at[1], at[2]};
+      p[a] += step;
+      if (p[a] < 0 || p[a] >= edge || !file.voxel(p[0], p[1], p[2])) return false;
+    }
+  return true;
+}
+
+}  // namespace
+
+InteriorReport compare_enclosed(const voxdag_reader::File& file, TriangleSource& scene,
+                                const Grid& grid, uint64_t seed, Progress& progress,
+                                const CancelToken& cancel) {
+  std::vector<SampledVoxel> voxels = draw_voxels(grid, seed);
+  add_scene(scene, grid, voxels, progress, cancel);
+  InteriorReport report;
+  for (const SampledVoxel& voxel : voxels) {
+    const int64_t at[3] = {voxel.low[0] / kUnitsPerVoxel, voxel.low[1] / kUnitsPerVoxel,
+                           voxel.low[2] / kUnitsPerVoxel};
+    const bool is_set = file.voxel(at[0], at[1], at[2]);
+    if (voxel.is_touched ? !is_set : is_set && !is_surrounded(file, at, grid.resolution()))
+      refuse(file.path(), voxel, voxel.is_touched);
+    ++report.voxels;
+    report.inside += !voxel.is_touched && is_set ? 1 : 0;
+  }
+  return report;
+}
+
+InteriorReport compare_interior(const voxdag_reader::File& file, TriangleSource& scene,
+                                const Grid& grid, SolidRule rule, uint64_t seed, Progress& progress,
+                                const CancelToken& cancel) {
+  std::vector<SampledVoxel> voxels = draw_voxels(grid, seed);
+  InteriorReport report;
+  report.is_closed = add_scene(scene, grid, voxels, progress, cancel);
   for (const SampledVoxel& voxel : voxels) report.is_closed &= is_closed(rule, voxel);
   for (const SampledVoxel& voxel : voxels) {
     if (!voxel.is_touched && !report.is_closed) continue;

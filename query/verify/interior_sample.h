@@ -6,6 +6,9 @@
 // On a closed surface the winding number is the same along all rows and decides every voxel that no
 // triangle touches. If a sampled row is open, the surface is not closed; then a solid depends on
 // majorities, and only voxels that triangles touch are compared.
+//
+// The voxels of an enclosed solid are compared with their neighbors in the file instead. A set
+// voxel that no triangle touches has no empty neighbor and is not at the border of the grid.
 #pragma once
 
 #include <cstdint>
@@ -31,6 +34,11 @@ struct InteriorReport {
 // that differs.
 InteriorReport compare_interior(const voxdag_reader::File& file, TriangleSource& scene,
                                 const Grid& grid, SolidRule rule, uint64_t seed, Progress& progress,
+                                const CancelToken& cancel);
+
+// The same for an enclosed solid. The report's is_closed is true.
+InteriorReport compare_enclosed(const voxdag_reader::File& file, TriangleSource& scene,
+                                const Grid& grid, uint64_t seed, Progress& progress,
                                 const CancelToken& cancel);
 
 }  // namespace voxdag::query

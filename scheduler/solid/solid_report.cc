@@ -42,24 +42,36 @@ SolidReport solid_report(const SolidRows& rows, uint64_t interior, uint64_t disp
   return report;
 }
 
+SolidReport enclosed_report(uint64_t voxels, uint64_t shell) {
+  SolidReport report;
+  report.rule = name_of(SolidName::kEnclosed);
+  report.interior = voxels - shell;
+  return report;
+}
+
 std::optional<Warning> solid_warning(const SolidReport& report, const std::string& scene) {
   if (report.rows == 0) return std::nullopt;
   const bool is_parity = report.rule == name_of(SolidName::kParity);
   const uint64_t open = is_parity ? report.odd_rows : report.open_rows;
   const double part = static_cast<double>(open) / static_cast<double>(report.rows);
   if (report.interior == 0 && report.open_rows == 0 && report.odd_rows == 0)
-    return Warning{"solid-canceled", scene,
-                   "nothing is inside: the faces cancel each other, as double-sided faces do"};
+    return Warning{
+        "solid-canceled", scene,
+        "nothing is inside: the faces cancel each other, as double-sided faces do; --solid "
+        "enclosed fills what nothing reaches"};
   if (!is_parity && open > 0 && report.odd_rows == 0)
     return Warning{"solid-orientation", scene,
                    "the surface is closed, but its faces are oriented inconsistently (" +
                        percent_text(part) +
                        " of the sample rows): --solid parity ignores orientation"};
   if (part > kScene)
-    return Warning{"solid-open", scene,
-                   "the surface is not closed (" + percent_text(part) +
-                       " of the sample rows), so it is more a scene than an object: " +
-                       count_text(report.disputed) + " filled voxels rest on a majority"};
+    return Warning{
+        "solid-open", scene,
+        "the surface is not closed (" + percent_text(part) +
+            " of the sample rows), so it is more a scene than an object: " +
+            count_text(report.disputed) +
+            " filled voxels rest on a majority; --solid enclosed fills only what nothing "
+            "reaches"};
   if (part > kClosed)
     return Warning{"solid-open", scene,
                    "the surface is not closed (" + percent_text(part) + " of the sample rows): " +

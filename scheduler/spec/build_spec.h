@@ -30,7 +30,9 @@ constexpr std::array<const char*, 4> enum_names(MethodName) {
   return {"", "consing", "pointers", "hashes"};
 }
 constexpr std::array<const char*, 3> enum_names(CutoutRule) { return {"", "skip", "keep"}; }
-constexpr std::array<const char*, 3> enum_names(SolidName) { return {"", "winding", "parity"}; }
+constexpr std::array<const char*, 4> enum_names(SolidName) {
+  return {"", "winding", "parity", "enclosed"};
+}
 enum class ClusterEngine { kNone, kSlurm };
 constexpr std::array<const char*, 2> enum_names(ClusterEngine) { return {"", "slurm"}; }
 
@@ -56,8 +58,11 @@ struct GeometryOptions {
   VoxelRule rule() const { return thin ? VoxelRule::kThin : VoxelRule::kShell; }
 };
 
+// Returns the rule for the stages `rows` and `build`. They build only the shell of an enclosed
+// solid; the stage `enclose` fills it.
 inline SolidRule solid_rule_of(const GeometryOptions& options) {
-  return static_cast<SolidRule>(options.solid);
+  return options.solid == SolidName::kEnclosed ? SolidRule::kNone
+                                               : static_cast<SolidRule>(options.solid);
 }
 
 // Returns the geometry options as one line of JSON, for comparing jobs and for messages. Scenes are

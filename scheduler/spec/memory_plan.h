@@ -25,6 +25,12 @@
 //                     block memo                    1/16 of free                 BackendMemory
 //                     more retained pages           1/8, up to 128 MiB           nobody
 //                     cache key, before build()     7/8 of the share             ArtifactCache
+//   enclose       WorkerMemory, for every worker    7/8 of free / workers
+//                   segment writer                  1.5 MiB                      SegmentWriter
+//                   labels of a part                1/3 of the share             SpaceLabels
+//                   the part filled                 the share                    SubDagTables
+//                   quadtree of a face              1/16 of the share            nobody
+//                 components at all faces           the rest of free             ComponentSets
 //   color         surfaces; the rest is spilled     up to 1/3 of free            RecordStore
 //                   incomplete chunks of surfaces   1/8 of the budget            nobody
 //                 textures, or else spilled         up to 1/2 of the rest        TextureSet

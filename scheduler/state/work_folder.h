@@ -43,6 +43,10 @@ class WorkFolder {
   // The sample rows of a solid.
   std::string rows_path() const { return path_ + "/rows.vddurable"; }
   std::string row_sums_path() const { return path_ + "/rows.vdspill"; }
+  // The parts of an enclosed solid that are filled.
+  std::string filled_path() const { return path_ + "/filled.vddurable"; }
+  // The components at the faces of an enclosed solid's parts.
+  std::string faces_path() const { return path_ + "/faces.vdspill"; }
   // Colors of cubes that outlive a run.
   std::string colors_path() const { return path_ + "/colors.vddurable"; }
   std::string scratch_path() const { return path_ + "/merge"; }
@@ -72,6 +76,8 @@ class WorkFolder {
   void remove_durable() { remove_silently(durable_path()); }
   // Removes the sample rows of a solid. Errors are ignored.
   void remove_rows() { remove_silently(rows_path()); }
+  // Removes the record of filled parts. Errors are ignored.
+  void remove_filled() { remove_silently(filled_path()); }
   // Removes stored colors. Errors are ignored.
   void remove_colors() { remove_silently(colors_path()); }
   // Removes all files of voxdag, and the folder if it is empty afterwards. Errors are ignored,

@@ -30,6 +30,22 @@ TEST_P(SolidCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
 TEST_P(SolidCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
+// The stage that fills an enclosed solid is interrupted as well.
+class EnclosedCrashTest : public SolidCrashTest {
+ protected:
+  BuildSpec spec() const override {
+    BuildSpec spec = SolidCrashTest::spec();
+    spec.geometry.solid = voxdag::SolidName::kEnclosed;
+    return spec;
+  }
+};
+
+TEST_P(EnclosedCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
+
+TEST_P(EnclosedCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
+
+INSTANTIATE_TEST_SUITE_P(Ingested, EnclosedCrashTest, testing::Values(Ingested::kDurable), name_of);
+
 INSTANTIATE_TEST_SUITE_P(Ingested, SolidCrashTest,
                          testing::Values(Ingested::kInMemory, Ingested::kDurable), name_of);
 

@@ -14,9 +14,10 @@ using voxdag::BuildReport;
 using voxdag::BuildSpec;
 using voxdag::SolidName;
 
-constexpr SolidName kSolids[] = {SolidName::kWinding, SolidName::kParity};
+constexpr SolidName kSolids[] = {SolidName::kWinding, SolidName::kParity, SolidName::kEnclosed};
 
 oracle::SolidRule oracle_rule(SolidName name) {
+  if (name == SolidName::kEnclosed) return oracle::SolidRule::kEnclosed;
   return name == SolidName::kWinding ? oracle::SolidRule::kWinding : oracle::SolidRule::kParity;
 }
 
@@ -101,6 +102,16 @@ TEST_F(SolidBuilds, SplittingNeverShows) {
   EXPECT_EQ(split.solid->interior, whole.solid->interior);
 }
 
+// The stage that fills an enclosed solid reads the artifacts of any backend.
+TEST_F(SolidBuilds, EnclosedOnOtherBackends) {
+  BuildSpec spec = spec_for(oracle::make_solid(oracle::SolidKind::kNested, 1, 256), 256);
+  spec.geometry.solid = SolidName::kEnclosed;
+  const BuildReport expected = run(spec);
+  spec.run.backend = voxdag::BackendName::kParallelHost;
+  spec.run.subvolume_edge = 128;
+  EXPECT_EQ(run(spec).sha256, expected.sha256);
+}
+
 // Returns the twelve triangles of a cube, facing outward. `low` and `high` are in lattice units.
 Triangles cube_mesh(int64_t low, int64_t high) {
   const auto corner = [&](int c) -> oracle::Point {
@@ -154,6 +165,8 @@ TEST_F(SolidBuilds, Warnings) {
   open.pop_back();
   EXPECT_EQ(code(open, SolidName::kWinding), "solid-open");
   EXPECT_EQ(code(open, SolidName::kParity), "solid-open");
+  EXPECT_EQ(code(closed, SolidName::kEnclosed), "");
+  EXPECT_EQ(code(open, SolidName::kEnclosed), "solid-reached");
   Triangles turned = closed;
   std::swap(turned.front()[0], turned.front()[1]);
   EXPECT_EQ(code(turned, SolidName::kWinding), "solid-orientation");
@@ -203,6 +216,11 @@ constexpr Counts kCounts[] = {
     {"sponza.glb", 1024, SolidName::kWinding, 70380534, 1567526, 46055},
     {"sponza.glb", 1024, SolidName::kParity, 69077971, 1550519, 47634},
     {"dragon_100k.glb", 2048, SolidName::kWinding, 483291363, 8988136, 221447},
+    {"bunny_69k.glb", 1024, SolidName::kEnclosed, 3591814, 299473, 110044},
+    {"dragon_100k.glb", 1024, SolidName::kEnclosed, 61089742, 1181211, 76642},
+    {"armadillo.glb", 1024, SolidName::kEnclosed, 74982400, 1426126, 75743},
+    {"sponza.glb", 1024, SolidName::kEnclosed, 16809998, 691344, 48758},
+    {"dragon_100k.glb", 2048, SolidName::kEnclosed, 483292733, 8988136, 221276},
 };
 
 TEST_F(SolidBuilds, SharedScenes) {

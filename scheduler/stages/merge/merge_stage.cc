@@ -22,6 +22,7 @@ class StoredCheckpoint : public Checkpoint {
   }
   void save(uint32_t level, std::span<const std::byte> state) override {
     job_.commits.commit();
+    if (job_.filled) job_.filled->save();
     job_.store->save_merge(level, state);
   }
   void forget() override { job_.store->forget_merge(); }
@@ -66,7 +67,8 @@ void merge_artifacts(BuildJob& job, GlobalFileWriter& out) {
   BuildReport& report = job.report;
   MergeInputs inputs;
   inputs.shape = job.shape();
-  inputs.artifacts = distinct_artifacts(job.store->leaves(), job.work.store_path());
+  inputs.artifacts = job.filled ? job.filled->artifacts()
+                                : distinct_artifacts(job.store->leaves(), job.work.store_path());
   if (job.has_rows() && !job.rows->full_cubes.empty())
     inputs.artifacts.push_back(write_full_cubes(job));
   const MemoryCharge list(job.budget, inputs.artifacts.size() * sizeof(ArtifactRef),

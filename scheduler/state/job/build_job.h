@@ -9,6 +9,7 @@
 
 #include "core/base/memory_budget.h"
 #include "core/dag/sub_dag.h"
+#include "scheduler/solid/filled_parts.h"
 #include "scheduler/solid/solid_rows.h"
 #include "scheduler/spec/build_report.h"
 #include "scheduler/spec/build_spec.h"
@@ -59,8 +60,11 @@ struct BuildJob {
   const BuildContext context;
   IngestCheckpoint checkpoint;
   BuildReport report;
-  std::unique_ptr<SolidRows> rows;  // null unless the build is solid and its scene was read
-  bool start_over;                  // the stored job is ignored
+  // Null unless the solid's rule needs sample rows and the scene was read.
+  std::unique_ptr<SolidRows> rows;
+  // Null unless the solid is enclosed and the scene was read.
+  std::unique_ptr<FilledParts> filled;
+  bool start_over;  // the stored job is ignored
 };
 
 // Returns the work folder of a build with these options.

@@ -40,8 +40,10 @@ class Fields {
       columns: h("input", {placeholder: "x,y,z,r,g,b", autocomplete: "off", on}),
       ignore_extension: h("input", {placeholder: "ACME_bent, …", autocomplete: "off", on}),
       cutouts: this.choice([kAutomatic, ["skip", "Leave out"], ["keep", "Keep"]]),
-      solid:
-          this.choice([["", "Surface only"], ["winding", "By winding"], ["parity", "By parity"]]),
+      solid: this.choice([
+        ["", "Surface only"], ["winding", "By winding"], ["parity", "By parity"],
+        ["enclosed", "Enclosed space"]
+      ]),
       color_resolution: this.choice([kAutomatic, ...gridChoices(kMinLevel, kMaxLevel)]),
       hash_bits: this.number({min: "4", max: "64", step: "1", placeholder: "64"}),
       memory: h("input", {placeholder: "2GiB", autocomplete: "off", on}),

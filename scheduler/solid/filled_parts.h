@@ -1,0 +1,74 @@
+// The durable state of the stage `enclose`: the artifacts of the parts of the grid that it has
+// filled. They replace the artifacts of the shell in the merge. A filled part depends only on the
+// scene and on the geometry options, so a part of an earlier run remains right even if the grid is
+// divided in another way.
+//
+// save() writes the complete record and renames it. Thread-safe, except load(), complete() and
+// forget().
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/format/artifact/segment_writer.h"
+#include "core/geometry/cube.h"
+#include "core/io/file_system.h"
+
+namespace voxdag {
+
+struct FilledPart {
+  Cube cube;
+  ArtifactRef artifact;
+  uint64_t voxels = 0;
+};
+
+class FilledParts {
+ public:
+  // `identity` names the job; parts of other jobs are not used.
+  FilledParts(FileSystem& files, std::string path, std::string identity);
+
+  // Loads the parts that an earlier run saved, if any.
+  void load();
+  // Removes all parts, also from the disk.
+  void forget();
+
+  // Returns the part with this cube, if it is filled.
+  std::optional<FilledPart> find(const Cube& cube) const;
+  // Adds parts whose segments are synced, and saves the record.
+  void add_durable(const std::vector<FilledPart>& parts);
+
+  // Sets the parts that together have all voxels. Their segments need not be synced yet.
+  // `segments` are the segments of this run, which must be completed.
+  void complete(std::vector<FilledPart> parts,
+                std::vector<std::unique_ptr<SegmentWriter>> segments);
+  bool is_complete() const { return is_complete_; }
+  // Returns the artifacts of a complete record.
+  std::vector<ArtifactRef> artifacts() const;
+  // Makes a complete record durable. Does nothing if it is, or if the record is not complete.
+  void save();
+
+  bool names_segment(uint32_t segment) const;
+
+ private:
+  std::vector<std::byte> encode() const;
+  bool decode(std::span<const std::byte> bytes);
+  void write() const;
+
+  FileSystem& files_;
+  const std::string path_;
+  const std::string identity_;
+  mutable std::mutex mutex_;  // guards the members below
+  std::map<Cube, FilledPart> parts_;
+  bool is_complete_ = false;
+  bool is_saved_ = false;  // the complete record is durable
+  std::vector<std::unique_ptr<SegmentWriter>> segments_;
+};
+
+}  // namespace voxdag

@@ -1,0 +1,256 @@
+#include "scheduler/stages/enclose/enclose_stage.h"
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/clock.h"
+#include "core/base/error.h"
+#include "core/base/parallel_for.h"
+#include "core/dag/space/enclosed_fill.h"
+#include "core/dag/space/face_code.h"
+#include "core/format/artifact/artifact_writer.h"
+#include "core/geometry/octree_descent.h"
+#include "scheduler/solid/full_cubes.h"
+#include "scheduler/spec/memory_plan.h"
+#include "scheduler/stages/enclose/join_parts.h"
+#include "scheduler/stages/enclose/read_levels.h"
+
+namespace voxdag {
+namespace {
+
+// Thrown if a part was labeled, but its filled sub-DAG does not fit the memory of a worker.
+struct PartTooLarge {
+  Cube cube;
+};
+
+// Memory and files of a worker.
+struct EncloseWorker {
+  EncloseWorker(MemoryBudget& budget, uint64_t share_bytes) : share(share_bytes, &budget) {}
+
+  MemoryBudget share;
+  PagePool pool;
+  std::map<uint32_t, std::shared_ptr<ReadableFile>> segments;
+  std::unique_ptr<SegmentWriter> filled;
+  std::vector<FilledPart> done;  // parts in `filled` that are not durable
+  double saved_s = wall_seconds();
+};
+
+class Enclosure {
+ public:
+  Enclosure(BuildJob& job, const std::set<Cube>& too_large) : job_(job), too_large_(too_large) {}
+
+  void run() {
+    const std::vector<StoredSubvolume> leaves = shell();
+    job_.context.progress.begin_stage("enclose", 2 * leaves.size(), "subvolumes");
+    begin_workers();
+    label(leaves);
+    OutsideSpace outside = find_outside(parts_, *faces_, job_.budget, job_.context.cancel);
+    remove_faces();
+    fill(outside);
+    finish(outside);
+    job_.context.progress.end_stage();
+  }
+
+ private:
+  std::vector<StoredSubvolume> shell() const {
+    std::vector<StoredSubvolume> leaves = job_.store->leaves();
+    std::erase_if(leaves, [](const StoredSubvolume& s) { return s.summary.empty(); });
+    return leaves;
+  }
+
+  void begin_workers() {
+    // The components at the faces take the rest of the memory.
+    const auto memory =
+        WorkerMemory::divide(job_.budget.available() / 8 * 7, job_.spec.run.threads);
+    const uint32_t first_segment = job_.work.next_segment_id();
+    for (unsigned i = 0; i < memory.workers; ++i) {
+      workers_.push_back(std::make_unique<EncloseWorker>(job_.budget, memory.share_bytes));
+      workers_.back()->filled = std::make_unique<SegmentWriter>(
+          job_.context.files, job_.work.path(), first_segment + i, job_.budget);
+    }
+    job_.context.files.create(job_.work.faces_path());
+    faces_ = std::make_unique<RowFile>(job_.context.files, job_.work.faces_path(), 0);
+  }
+
+  void label(const std::vector<StoredSubvolume>& leaves) {
+    parallel_for(static_cast<unsigned>(workers_.size()), leaves.size(),
+                 [&](unsigned worker, size_t i) {
+                   label_part(*workers_[worker], leaves[i].cube, leaves[i].artifact);
+                   job_.context.progress.advance(1);
+                 });
+    std::ranges::sort(parts_, {}, &LabeledPart::cube);
+  }
+
+  // Labels a cube, or its octants if it exceeds the memory or if they are separate sub-DAGs.
+  void label_part(EncloseWorker& worker, const Cube& cube, const ArtifactRef& shell) {
+    job_.context.cancel.check();
+    const bool is_smallest = cube.edge_voxels(job_.shape().grid_levels) <= kSmallestEdge;
+    const ArtifactReader artifact = open(worker, shell);
+    const auto has_root = [&](const auto& is_related) {
+      return std::ranges::any_of(artifact.roots(), is_related);
+    };
+    const bool has_parts = has_root([&](const ArtifactRoot& root) {
+      return root.cube.level > cube.level && contains(cube, root.cube);
+    });
+    if (!has_parts &&
+        !has_root([&](const ArtifactRoot& root) { return contains(root.cube, cube); }))
+      return;
+    if (!has_parts && !too_large_.contains(cube)) try {
+        return try_label(worker, cube, shell, is_smallest ? 2 : 3);
+      } catch (const OutOfBudget&) {
+        if (is_smallest) refuse_memory(worker);
+      }
+    for (int octant = 0; octant < 8; ++octant) label_part(worker, cube.child(octant), shell);
+  }
+
+  // Filling needs more memory than labeling, so labels get only a part of the share.
+  void try_label(EncloseWorker& worker, const Cube& cube, const ArtifactRef& shell,
+                 uint64_t divisor) {
+    MemoryBudget budget(worker.share.limit() / divisor, &worker.share);
+    PooledMemory memory{budget, worker.pool};
+    const auto levels = read(worker, cube, shell, memory);
+    if (!levels) return;
+    const SpaceLabels labels(memory, *levels);
+    LabeledPart part{cube, shell, {}, {}};
+    part.touch.assign(labels.touch(0, 0), labels.touch(0, 0) + labels.count(0, 0));
+    for (int face = 0; face < kFaces; ++face)
+      part.faces[face] = faces_->append(encode_face(labels, face, worker.share.limit() / 16));
+    const std::lock_guard lock(mutex_);
+    parts_.push_back(std::move(part));
+  }
+
+  ArtifactReader open(EncloseWorker& worker, const ArtifactRef& shell) const {
+    auto& segment = worker.segments[shell.segment];
+    if (!segment) segment = job_.work.open_segment(shell.segment);
+    return {segment, shell};
+  }
+  std::optional<NodeLevels> read(EncloseWorker& worker, const Cube& cube, const ArtifactRef& shell,
+                                 PooledMemory& memory) const {
+    return read_levels(open(worker, shell), cube, memory, job_.context.cancel);
+  }
+
+  [[noreturn]] static void refuse_memory(const EncloseWorker& worker) {
+    throw Error(ErrorCode::kOutOfMemory, "the empty space of a subvolume of " +
+                                             std::to_string(kSmallestEdge) +
+                                             " voxels per edge does not fit a worker's share of " +
+                                             std::to_string(worker.share.limit()) +
+                                             " bytes: expected more memory (--memory)");
+  }
+
+  void remove_faces() {
+    faces_.reset();
+    job_.context.files.remove(job_.work.faces_path());
+  }
+
+  void fill(const OutsideSpace& outside) {
+    job_.context.progress.set_total(2 * parts_.size());
+    parallel_for(static_cast<unsigned>(workers_.size()), parts_.size(),
+                 [&](unsigned worker, size_t i) {
+                   job_.context.cancel.check();
+                   if (!job_.filled->find(parts_[i].cube))
+                     fill_part(*workers_[worker], parts_[i], outside.of_parts[i]);
+                   job_.context.progress.advance(1);
+                 });
+  }
+
+  void fill_part(EncloseWorker& worker, const LabeledPart& part,
+                 const std::vector<uint8_t>& is_outside) {
+    try {
+      PooledMemory memory{worker.share, worker.pool};
+      const auto levels = read(worker, part.cube, part.shell, memory);
+      if (!levels) return;
+      const SpaceLabels labels(memory, *levels);
+      const DagShape shape = job_.shape();
+      SubDagTables tables(memory, static_cast<int>(shape.grid_levels - part.cube.level));
+      fill_enclosed(memory, labels, is_outside, tables);
+      worker.done.push_back(write_part(worker, part.cube, tables));
+    } catch (const OutOfBudget&) {
+      if (part.cube.edge_voxels(job_.shape().grid_levels) <= kSmallestEdge) refuse_memory(worker);
+      throw PartTooLarge{part.cube};
+    }
+    if (wall_seconds() - worker.saved_s >= job_.spec.run.checkpoint_interval_s) save(worker);
+  }
+
+  FilledPart write_part(EncloseWorker& worker, const Cube& cube, SubDagTables& tables) {
+    const DagShape shape = job_.shape();
+    ArtifactWriter writer(*worker.filled, shape);
+    const SubDagSummary summary =
+        emit_levels(tables, {cube.level, shape.grid_levels, shape.hash_bits}, writer);
+    const ArtifactRoot root{cube, 0, summary.root_hash, summary.voxels, summary.svo_nodes};
+    return {cube, writer.finish({&root, 1}), summary.voxels};
+  }
+
+  // Makes the filled parts of a worker durable.
+  void save(EncloseWorker& worker) {
+    worker.filled->sync();
+    job_.filled->add_durable(std::exchange(worker.done, {}));
+    worker.saved_s = wall_seconds();
+    is_long_ = true;
+  }
+
+  // Adds the enclosed cubes between the parts, and completes the record.
+  void finish(const OutsideSpace& outside) {
+    std::vector<FilledPart> all;
+    for (const LabeledPart& part : parts_)
+      if (const auto filled = job_.filled->find(part.cube)) all.push_back(*filled);
+    for (const auto& worker : workers_)
+      all.insert(all.end(), worker->done.begin(), worker->done.end());
+    if (!outside.enclosed_cubes.empty()) {
+      const ArtifactRef artifact =
+          add_full_cubes(*workers_[0]->filled, job_.shape(), outside.enclosed_cubes);
+      for (const Cube& cube : outside.enclosed_cubes) all.push_back(full_part(cube, artifact));
+    }
+    std::vector<std::unique_ptr<SegmentWriter>> segments;
+    for (const auto& worker : workers_) {
+      worker->filled->complete();
+      segments.push_back(std::move(worker->filled));
+    }
+    warn_if_nothing_is_enclosed(all);
+    job_.filled->complete(std::move(all), std::move(segments));
+    if (is_long_) job_.filled->save();
+  }
+
+  FilledPart full_part(const Cube& cube, const ArtifactRef& artifact) const {
+    const int size = static_cast<int>(job_.shape().grid_levels - cube.level);
+    return {cube, artifact, full_counts(size).voxels};
+  }
+
+  void warn_if_nothing_is_enclosed(const std::vector<FilledPart>& all) const {
+    uint64_t voxels = 0, shell_voxels = 0;
+    for (const FilledPart& part : all) voxels += part.voxels;
+    for (const StoredSubvolume& leaf : job_.store->leaves()) shell_voxels += leaf.summary.voxels;
+    if (voxels == shell_voxels && shell_voxels != 0)
+      job_.context.progress.warn_of_input(
+          {"solid-reached", job_.spec.geometry.scenes.front(),
+           "nothing is enclosed: walks from the border of the grid reach every empty voxel"});
+  }
+
+  BuildJob& job_;
+  const std::set<Cube>& too_large_;
+  std::vector<std::unique_ptr<EncloseWorker>> workers_;
+  std::unique_ptr<RowFile> faces_;
+  std::mutex mutex_;  // guards parts_ while labels are computed
+  std::vector<LabeledPart> parts_;
+  std::atomic<bool> is_long_ = false;  // some parts are durable, so the complete record will be
+};
+
+}  // namespace
+
+void enclose(BuildJob& job) {
+  if (!job.filled || job.filled->is_complete()) return;
+  std::set<Cube> too_large;
+  while (!job.filled->is_complete()) try {
+      Enclosure(job, too_large).run();
+    } catch (const PartTooLarge& part) {
+      too_large.insert(part.cube);
+    }
+  job.clock.finish("enclose");
+}
+
+}  // namespace voxdag

@@ -1,0 +1,26 @@
+// The stage `enclose` of `--solid enclosed`: fills the empty voxels that no walk through empty
+// voxels reaches from the border of the grid. It works on the artifacts of the shell, in three
+// steps:
+//
+//   label   each part of the grid, on any thread: the components of its empty space that have a
+//           voxel at its faces (core/dag/space/space_labels.h); the labels at the faces are stored
+//   join    components of neighbors that meet; the sets that reach the border are outside
+//   fill    each part again: its filled sub-DAG becomes an artifact
+//   (core/dag/space/enclosed_fill.h)
+//
+// A part is the cube of a subvolume. A subvolume that exceeds a worker's memory is processed as
+// several parts. Empty cubes between the parts are components as well.
+//
+// Durable output: FilledParts. Resume rule: filled parts are kept; the labels are computed again
+// unless all parts are filled.
+#pragma once
+
+#include "scheduler/state/job/build_job.h"
+
+namespace voxdag {
+
+// Fills the solid, if the job is `enclosed` and not filled yet. Throws Error{kCorrupt} for a
+// damaged artifact.
+void enclose(BuildJob& job);
+
+}  // namespace voxdag

@@ -1,0 +1,25 @@
+// Joins the components of all parts of the grid where they meet, and finds the components that
+// reach the border of the grid.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "scheduler/solid/row_file.h"
+#include "scheduler/stages/enclose/part_faces.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag {
+
+struct OutsideSpace {
+  std::vector<std::vector<uint8_t>> of_parts;  // by part, by component: 1 if it is outside
+  std::vector<Cube> enclosed_cubes;            // empty cubes between the parts that are not outside
+};
+
+// `faces` has the quadtrees of the parts. Throws Error{kOutOfMemory} if the budget cannot hold five
+// bytes for each component.
+OutsideSpace find_outside(const std::vector<LabeledPart>& parts, const RowFile& faces,
+                          MemoryBudget& budget, const CancelToken& cancel);
+
+}  // namespace voxdag

@@ -1,0 +1,22 @@
+// The parts of the grid that have voxels of the shell, and the components of the empty space at
+// their faces (core/dag/space).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/dag/space/brick_space.h"
+#include "core/format/artifact/artifact.h"
+#include "core/geometry/cube.h"
+#include "scheduler/solid/row_file.h"
+
+namespace voxdag {
+
+struct LabeledPart {
+  Cube cube;
+  ArtifactRef shell;           // the artifact that has the part's shell
+  std::vector<uint8_t> touch;  // by component: the faces at which it has a voxel
+  RowExtent faces[kFaces];     // their quadtrees (core/dag/space/face_code.h)
+};
+
+}  // namespace voxdag

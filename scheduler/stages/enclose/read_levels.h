@@ -1,0 +1,19 @@
+// Reads the sub-DAG of a cube from an artifact into memory.
+#pragma once
+
+#include <optional>
+
+#include "core/dag/space/node_levels.h"
+#include "core/format/artifact/artifact_reader.h"
+#include "core/geometry/cube.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag {
+
+// Reads the nodes in `cube`, which must be inside the cube of one of the artifact's roots. Returns
+// nullopt if no voxel is in the cube. Throws OutOfBudget if the memory is too small,
+// Error{kCorrupt} for a damaged artifact.
+std::optional<NodeLevels> read_levels(const ArtifactReader& artifact, const Cube& cube,
+                                      PooledMemory& memory, const CancelToken& cancel);
+
+}  // namespace voxdag
