@@ -6,6 +6,7 @@
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "scheduler/replaced_result.h"
 #include "scheduler/run_build.h"
 #include "scheduler/spec/build_fields.h"
 
@@ -15,6 +16,7 @@ namespace {
 struct BuildCommand {
   BuildSpec spec;
   BuildClusterOptions cluster;
+  bool quiet = false;
   bool json = false;
 };
 
@@ -62,7 +64,8 @@ void print(const BuildReport& r) {
 void run(const BuildCommand& command, CommandContext& context) {
   BuildSpec spec = command.spec;
   apply_cluster(command.cluster, spec.run);
-  const auto progress = make_progress_bar();
+  refuse_result_of_other_scene(context.files, spec);
+  const auto progress = make_progress_bar(command.quiet);
   const BuildReport report = with_option_names([&] {
     try {
       return run_build(spec, {context.files, *progress, context.cancel});
@@ -79,8 +82,17 @@ void run(const BuildCommand& command, CommandContext& context) {
 void declare(Command& command, BuildCommand& state) {
   OptionDeclarer options(command, Scope::kBuild);
   fields(options, state.spec);
+  options.at("resolution").optional();  // --voxel-size can replace it
   command.config_option();
   declare_cluster(command, state.cluster);
+  command
+      .text_option(
+          "--report", "PATH|none",
+          [&state](const std::string& path) { state.spec.run.report = path; },
+          "file for the report, or none (default: OUT.report.json)")
+      .check(path_problem)
+      .group("Run (never changes the bytes of the result)");
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

@@ -3,10 +3,15 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <limits>
 #include <optional>
 #include <sstream>
 #include <type_traits>
+#include <utility>
+
+#include "cli/syntax/closest_word.h"
+#include "core/fields/field.h"
 
 namespace voxdag::cli {
 namespace {
@@ -39,9 +44,78 @@ std::string integer_problem(const std::string& text) {
          std::to_string(Limits::max());
 }
 
+// Returns the arguments with `help`, `version` and their short forms in CLI11's spelling: `help
+// build` becomes `build --help`.
+std::vector<std::string> in_full(std::vector<std::string> words) {
+  if (words.empty()) return words;
+  if (words[0] == "help") {
+    words.erase(words.begin());
+    words.insert(words.begin() + (words.empty() ? 0 : 1), "--help");
+  } else if (words[0] == "--version" || words[0] == "-V") {
+    words[0] = "version";
+  }
+  return words;
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({}))
+    if (!command->get_group().empty()) names.push_back(command->get_name());
+  return names;
+}
+
+std::vector<std::string> long_options(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  return names;
+}
+
+// Throws unless the first argument is a command or an option.
+void check_command(const CLI::App& app, const std::vector<std::string>& words) {
+  const std::string hint = "'voxdag --help' describes the commands";
+  if (words.empty())
+    throw Error(ErrorCode::kInvalidInput, "no command was given: expected one; " + hint);
+  const std::string& word = words[0];
+  const auto has_name = [&](const CLI::App* command) { return command->get_name() == word; };
+  if (word.starts_with("-") || std::ranges::any_of(app.get_subcommands({}), has_name)) return;
+  const std::vector<std::string> names = command_names(app);
+  throw Error(ErrorCode::kInvalidInput, "unknown command '" + word + "': expected one of " +
+                                            joined(names) + suggestion(word, names));
+}
+
+// Throws if the command line has arguments that the command does not know. CLI11 reports a missing
+// argument before unknown ones, although an unknown one is often the mistyped missing one.
+void check_arguments(const CLI::App& app) {
+  const auto commands = app.get_subcommands();
+  const CLI::App& command = commands.empty() ? app : *commands.front();
+  const std::vector<std::string> unknown = command.remaining();
+  if (unknown.empty()) return;
+  const auto is_option = [](const std::string& word) { return word.starts_with("-"); };
+  const auto option = std::find_if(unknown.begin(), unknown.end(), is_option);
+  const std::string place = commands.empty() ? "" : command.get_name() + ": ";
+  const std::string hint =
+      commands.empty() ? "'voxdag --help'" : "'voxdag help " + command.get_name() + "'";
+  if (option == unknown.end())
+    throw Error(ErrorCode::kInvalidInput, place + "unexpected argument '" + unknown.front() +
+                                              "': expected the arguments that " + hint +
+                                              " describes");
+  const std::string name = option->substr(0, option->find('='));
+  throw Error(ErrorCode::kInvalidInput, place + "unknown option '" + name +
+                                            "': expected an option that " + hint + " describes" +
+                                            suggestion(name, long_options(command)));
+}
+
 }  // namespace
 
+std::string path_problem(const std::string& path) {
+  return path == "-" ? "'-': expected the name of a file; files are not written to the standard "
+                       "output"
+                     : "";
+}
+
 Option Option::required() { return Option(option_->required()); }
+Option Option::optional() { return Option(option_->required(false)); }
 Option Option::group(const char* heading) { return Option(option_->group(heading)); }
 Option Option::environment(const char* variable) { return Option(option_->envname(variable)); }
 Option Option::show_default() { return Option(option_->capture_default_str()); }
@@ -94,8 +168,16 @@ Option Command::flag(const char* names, bool& value, const char* description) {
   return Option(app_->add_flag(names, value, description));
 }
 
+Option Command::output_option(const char* names, std::string& path, const char* description) {
+  return option(names, path, description).check(path_problem);
+}
+
 void Command::json_flag(bool& value, const char* description) {
   flag("--json", value, description);
+}
+
+void Command::quiet_flag(bool& value) {
+  flag("-q,--quiet", value, "print no progress, only warnings and errors");
 }
 
 void Command::threads_option(unsigned& value) {
@@ -118,22 +200,31 @@ CommandLine::CommandLine(CommandContext& context)
     : context_(context),
       app_(std::make_unique<CLI::App>(
           "voxdag: builds sparse voxel DAGs of huge triangle scenes, out of core", "voxdag")) {
-  app_->set_version_flag("--version", VOXDAG_VERSION);
+  app_->set_version_flag("-V,--version", VOXDAG_VERSION,
+                         "Print the version; --version --verbose also prints the commit and the "
+                         "features");
   app_->require_subcommand(1);
+  app_->footer("voxdag help COMMAND prints the options of a command.");
 }
 
 CommandLine::~CommandLine() = default;
 
 Command CommandLine::add(const char* name, const char* description) {
-  return Command(app_->add_subcommand(name, description));
+  CLI::App* const command = app_->add_subcommand(name, description);
+  command->footer("");  // a command inherits the footer, which is only for the list of commands
+  return Command(command);
 }
 
 int CommandLine::run(int argc, char** argv) {
+  std::vector<std::string> words = in_full({argv + 1, argv + argc});
+  check_command(*app_, words);
+  std::reverse(words.begin(), words.end());  // CLI11 takes the arguments from the end
   try {
-    app_->parse(argc, argv);
+    app_->parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     // CLI11 reports --help and --version as errors with status 0.
     if (error.get_exit_code() == 0) return app_->exit(error);
+    check_arguments(*app_);
     throw Error(ErrorCode::kInvalidInput, error.what());
   }
   return context_.exit_status;

@@ -34,11 +34,16 @@ std::array<Number, kCount> parse_list(const std::string& option, const std::stri
   return *numbers;
 }
 
+// Returns "" for the name of a file, and a text that describes the problem for "-", which other
+// programs take for the standard output.
+std::string path_problem(const std::string& path);
+
 // A handle of a command's option. Each member function returns the handle, so calls can be chained.
 class Option {
  public:
   explicit Option(CLI::Option* option) : option_(option) {}
   Option required();
+  Option optional();
   Option group(const char* heading);
   // Reads the option's value from an environment variable if the command line does not give the
   // option.
@@ -75,8 +80,12 @@ class Command {
                      std::function<void(const std::string& text)> set,
                      const std::string& description);
   Option flag(const char* names, bool& value, const char* description);
+  // Adds an option for the name of a file to write.
+  Option output_option(const char* names, std::string& path, const char* description);
   void json_flag(bool& value,
                  const char* description = "report as one JSON object on standard output");
+  // Adds --quiet.
+  void quiet_flag(bool& value);
   // Adds --threads, 1 to 1024.
   void threads_option(unsigned& value);
   // Adds the option --config, which names a TOML or INI file. The file sets options that the
@@ -124,6 +133,7 @@ State& add_command(CommandLine& line, const char* name, const char* description)
   return *state;
 }
 
+void add_version_command(CommandLine& line);
 void add_build_command(CommandLine& line);
 // Adds the hidden command that a cluster's engine starts to build a batch.
 void add_build_batch_command(CommandLine& line);

@@ -16,6 +16,7 @@ struct GenerateCommand {
   std::string kind;
   OutputFile output;
   GenerateOptions options;
+  bool quiet = false;
   bool json = false;
 };
 
@@ -34,7 +35,7 @@ void run(GenerateCommand& command, CommandContext& context) {
   GuardedOutputs files(context.files);
   command.output.guard(files);
   command.output.check(files, "", is_generated_scene);
-  const auto progress = make_progress_bar();
+  const auto progress = make_progress_bar(command.quiet);
   const double start_s = wall_seconds();
   const GenerateReport report =
       generate_scene(files, command.output.path, command.options, *progress, context.cancel);
@@ -59,7 +60,7 @@ std::string kinds_text() {
 
 void declare(Command& command, GenerateCommand& state) {
   command.option("kind", state.kind, kinds_text().c_str()).required();
-  command.option("output", state.output.path, "the .glb file to write").required();
+  command.output_option("output", state.output.path, "the .glb file to write").required();
   command.option("--seed", state.options.seed, "seed of the random numbers").show_default();
   command
       .option("--triangles", state.options.triangles,
@@ -71,6 +72,7 @@ void declare(Command& command, GenerateCommand& state) {
   command.flag("--colors", state.options.colors,
                "city: materials and colors of vertices, for build --color; not with --instances");
   state.output.declare_force(command);
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

@@ -18,7 +18,7 @@ namespace {
 struct ImportCommand {
   std::string input, memory;
   OutputFile output;
-  bool strict = false, json = false;
+  bool strict = false, quiet = false, json = false;
 };
 
 void print(const ImportCommand& command, const ImportReport& r, double wall_s) {
@@ -34,7 +34,7 @@ void run(const ImportCommand& command, CommandContext& context) {
   command.output.guard(files);
   command.output.check(files, command.input, is_imported_scene);
   const uint64_t memory_bytes = memory_limit(command.memory);
-  const auto progress = make_progress_bar();
+  const auto progress = make_progress_bar(command.quiet);
   auto warnings = nlohmann::ordered_json::array();
   const auto warn = [&](const Warning& warning) {
     if (command.strict) refuse_warning(warning);
@@ -63,11 +63,12 @@ void declare(Command& command, ImportCommand& state) {
       .option("input", state.input,
               "the scene file: .fbx, .dae, .3ds, .3mf, .off and others (docs/scenes.md)")
       .required();
-  command.option("output", state.output.path, "the .glb file to write").required();
+  command.output_option("output", state.output.path, "the .glb file to write").required();
   command.option("--memory", state.memory,
                  "limit of the memory that is allocated (default: half the RAM; at least 64MiB)");
   command.flag("--strict", state.strict, "treat warnings about the scene as errors");
   state.output.declare_force(command);
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

@@ -1,32 +1,76 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/output.h"
+#include "cli/selection_options.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
+#include "query/stats/level_stats.h"
 
 namespace voxdag::cli {
 namespace {
 
+using nlohmann::ordered_json;
+
 struct InfoCommand {
-  std::string path;
+  std::vector<std::string> paths;
+  std::string memory;
   bool digest = false;
+  bool stats = false;
+  bool csv = false;
+  bool levels = false;
   bool json = false;
+};
+
+struct FileFacts {
+  std::unique_ptr<voxdag_reader::File> file;
+  std::string sha256;                    // "" if not requested
+  std::optional<query::DagStats> stats;  // only with --stats
 };
 
 uint64_t level_bytes(const voxdag_reader::Level& level) {
   return level.word_count * sizeof(uint32_t);
 }
 
-nlohmann::ordered_json info_json(const voxdag_reader::File& file, const std::string& sha256) {
-  nlohmann::ordered_json levels = nlohmann::ordered_json::array();
-  for (uint32_t l = 0; l <= file.brick_level(); ++l)
-    levels.push_back(
-        {{"level", l}, {"nodes", file.level(l).node_count}, {"bytes", level_bytes(file.level(l))}});
+// Returns the bytes of the nodes, without colors, checksums and padding.
+uint64_t node_bytes(const voxdag_reader::File& file) {
+  uint64_t bytes = 0;
+  for (uint32_t l = 0; l <= file.brick_level() && !file.empty(); ++l)
+    bytes += level_bytes(file.level(l));
+  return bytes;
+}
+
+double bits_per_voxel(const voxdag_reader::File& file) {
+  return file.empty()
+             ? 0
+             : 8 * static_cast<double>(node_bytes(file)) / static_cast<double>(file.voxels());
+}
+
+// Returns the number of DAG nodes of encodings whose leaves are 2x2x2 voxels.
+uint64_t dag_nodes_2(const FileFacts& facts) {
+  return facts.file->dag_nodes() + facts.stats->octant_masks;
+}
+
+ordered_json level_json(const FileFacts& facts, uint32_t l) {
+  const voxdag_reader::Level& level = facts.file->level(l);
+  ordered_json json = {{"level", l}, {"nodes", level.node_count}, {"bytes", level_bytes(level)}};
+  if (!facts.stats || facts.file->empty()) return json;
+  const query::LevelStats& stats = facts.stats->levels[l];
+  json["svo_nodes"] = stats.svo_nodes;
+  json["nodes_by_children"] = stats.nodes_by_children;
+  return json;
+}
+
+ordered_json info_json(const FileFacts& facts) {
+  const voxdag_reader::File& file = *facts.file;
+  ordered_json levels = ordered_json::array();
+  for (uint32_t l = 0; l <= file.brick_level(); ++l) levels.push_back(level_json(facts, l));
   const double(&origin)[3] = file.origin();
-  nlohmann::ordered_json json{
+  ordered_json json{
+      {"file", file.path()},
       {"resolution", file.resolution()},
       {"bounds", {{"origin", {origin[0], origin[1], origin[2]}}, {"edge", file.edge()}}},
       {"hash_bits", file.hash_bits()},
@@ -34,62 +78,161 @@ nlohmann::ordered_json info_json(const voxdag_reader::File& file, const std::str
       {"svo_nodes", file.svo_nodes()},
       {"dag_nodes", file.dag_nodes()},
       {"bytes", file.file_bytes()},
-      {"levels", levels}};
+      {"node_bytes", node_bytes(file)},
+      {"bits_per_voxel", bits_per_voxel(file)}};
+  if (facts.stats) json["dag_nodes_2x2x2"] = dag_nodes_2(facts);
+  json["levels"] = levels;
   add_attribute_facts(file, json);
-  if (!sha256.empty()) json["sha256"] = sha256;
+  if (!facts.sha256.empty()) json["sha256"] = facts.sha256;
   return json;
 }
 
-void print(const voxdag_reader::File& file, const std::string& sha256) {
+// Returns a member of a JSON object as a field of a line of CSV (RFC 4180).
+std::string csv_field(const ordered_json& value) {
+  if (!value.is_string()) return value.dump();
+  std::string text;
+  for (const char c : printable_line(value.get<std::string>()))
+    text += c == '"' ? "\"\"" : std::string(1, c);
+  return text.find_first_of(",\" ") == std::string::npos ? text : "\"" + text + "\"";
+}
+
+// Adds the numbers of nodes with 1 to 8 children as columns.
+void flatten(ordered_json& row) {
+  if (!row.contains("nodes_by_children")) return;
+  const ordered_json counts = row["nodes_by_children"];
+  row.erase("nodes_by_children");
+  for (size_t i = 0; i < counts.size(); ++i) row["children_" + std::to_string(i + 1)] = counts[i];
+}
+
+// Returns the lines of the table: one for each file, or with --levels one for each level of each
+// file.
+std::vector<ordered_json> csv_rows(const InfoCommand& command, const std::vector<FileFacts>& all) {
+  std::vector<ordered_json> rows;
+  for (const FileFacts& facts : all) {
+    const ordered_json json = info_json(facts);
+    ordered_json head;
+    for (const char* name : {"file", "resolution", "voxels", "svo_nodes", "dag_nodes",
+                             "dag_nodes_2x2x2", "bytes", "node_bytes", "bits_per_voxel", "sha256"})
+      if (json.contains(name)) head[name] = json[name];
+    if (!command.levels) {
+      rows.push_back(head);
+      continue;
+    }
+    for (const ordered_json& level : json["levels"]) {
+      ordered_json row = {{"file", json["file"]}, {"resolution", json["resolution"]}};
+      row.update(level);
+      flatten(row);
+      rows.push_back(row);
+    }
+  }
+  return rows;
+}
+
+void print_csv(const std::vector<ordered_json>& rows) {
+  std::string line;
+  for (const auto& [name, value] : rows.front().items()) line += (line.empty() ? "" : ",") + name;
+  std::printf("%s\n", line.c_str());
+  for (const ordered_json& row : rows) {
+    line.clear();
+    for (const auto& [name, value] : row.items())
+      line += (line.empty() ? "" : ",") + csv_field(value);
+    std::printf("%s\n", line.c_str());
+  }
+}
+
+void print_levels(const FileFacts& facts) {
+  const voxdag_reader::File& file = *facts.file;
+  const bool has_stats = facts.stats && !file.empty();
+  std::printf("  level  cube edge            nodes         size%s\n",
+              has_stats ? "     octree nodes  nodes with 1 to 8 children" : "");
+  for (uint32_t l = 0; l <= file.brick_level(); ++l) {
+    std::printf("  %5u  %9lld  %15s  %11s", l, static_cast<long long>(file.resolution() >> l),
+                count_text(file.level(l).node_count).c_str(),
+                size_text(level_bytes(file.level(l))).c_str());
+    if (has_stats) {
+      std::printf("  %15s ", count_text(facts.stats->levels[l].svo_nodes).c_str());
+      for (const uint64_t nodes : facts.stats->levels[l].nodes_by_children)
+        std::printf(" %llu", static_cast<unsigned long long>(nodes));
+    }
+    std::printf("%s\n", l == file.brick_level() ? "  (bricks)" : "");
+  }
+}
+
+void print(const FileFacts& facts) {
+  const voxdag_reader::File& file = *facts.file;
   const double(&origin)[3] = file.origin();
   std::printf("%s: %s\n", printable_line(file.path()).c_str(),
               size_text(file.file_bytes()).c_str());
-  if (!sha256.empty()) std::printf("  sha256 %s\n", sha256.c_str());
+  if (!facts.sha256.empty()) std::printf("  sha256 %s\n", facts.sha256.c_str());
   std::printf("  grid of %lld^3 voxels, low corner %.9g %.9g %.9g, edge %.9g\n",
               static_cast<long long>(file.resolution()), origin[0], origin[1], origin[2],
               file.edge());
   std::printf("  %s voxels, %s octree nodes, %s DAG nodes, hashes of %u bits\n",
               count_text(file.voxels()).c_str(), count_text(file.svo_nodes()).c_str(),
               count_text(file.dag_nodes()).c_str(), file.hash_bits());
+  std::printf("  %s of nodes, %.4g bits per voxel\n", size_text(node_bytes(file)).c_str(),
+              bits_per_voxel(file));
+  if (facts.stats)
+    std::printf("  with leaves of 2^3 instead of 4^3 voxels: %s DAG nodes\n",
+                count_text(dag_nodes_2(facts)).c_str());
   for (const Attribute attribute : attributes_of(file).list()) {
-    const nlohmann::ordered_json facts = section_facts(section_of(file, attribute));
+    const ordered_json section = section_facts(section_of(file, attribute));
     std::printf("  %s of %lld^3 cells and coarser ones: %s, %s\n", traits_of(attribute).plural,
-                static_cast<long long>(facts["resolution"].get<int64_t>()),
-                count_text(facts["cells"].get<uint64_t>()).c_str(),
-                size_text(facts["bytes"].get<uint64_t>()).c_str());
+                static_cast<long long>(section["resolution"].get<int64_t>()),
+                count_text(section["cells"].get<uint64_t>()).c_str(),
+                size_text(section["bytes"].get<uint64_t>()).c_str());
   }
   // The last name is "" and stands for triangles without a material, so it is not counted.
   for (const AttributeTraits& row : kAttributeTable)
     if (const auto& names = section_of(file, row.attribute).names(); !names.empty())
       std::printf("  %s %s\n", count_text(names.size() - 1).c_str(), row.plural);
-  std::printf("  level  cube edge            nodes         size\n");
-  for (uint32_t l = 0; l <= file.brick_level(); ++l)
-    std::printf("  %5u  %9lld  %15s  %11s%s\n", l, static_cast<long long>(file.resolution() >> l),
-                count_text(file.level(l).node_count).c_str(),
-                size_text(level_bytes(file.level(l))).c_str(),
-                l == file.brick_level() ? "  (bricks)" : "");
+  print_levels(facts);
+}
+
+FileFacts facts_of(const InfoCommand& command, const std::string& path, CommandContext& context) {
+  FileFacts facts;
+  facts.file = open_global_file(path);
+  if (command.digest) facts.sha256 = sha256_of_file(*context.files.open_read(path), context.cancel);
+  if (!command.stats) return facts;
+  MemoryBudget budget(memory_limit(command.memory));
+  facts.stats = query::dag_stats(*facts.file, budget, context.cancel);
+  return facts;
 }
 
 void run(const InfoCommand& command, CommandContext& context) {
-  const auto file = open_global_file(command.path);
-  const std::string sha256 =
-      command.digest ? sha256_of_file(*context.files.open_read(command.path), context.cancel) : "";
-  if (command.json)
-    print_json(info_json(*file, sha256));
-  else
-    print(*file, sha256);
+  std::vector<FileFacts> all;
+  for (const std::string& path : command.paths) all.push_back(facts_of(command, path, context));
+  if (command.csv) return print_csv(csv_rows(command, all));
+  if (command.json && all.size() == 1) return print_json(info_json(all.front()));
+  if (!command.json) {
+    for (const FileFacts& facts : all) print(facts);
+    return;
+  }
+  ordered_json list = ordered_json::array();
+  for (const FileFacts& facts : all) list.push_back(info_json(facts));
+  print_json(ordered_json{{"files", list}});
 }
 
 void declare(Command& command, InfoCommand& state) {
-  command.option("file", state.path, "the .vdag file").required();
+  command.option("file", state.paths, "the .vdag file; several may be given").required();
   command.flag("--digest", state.digest, "also print the SHA-256 of the file");
+  command.flag(
+      "--stats", state.stats,
+      "also count the octree nodes of each level, the nodes by their children, and the DAG "
+      "nodes with leaves of 2^3 voxels");
+  const Option csv = command.flag("--csv", state.csv, "print a table as CSV, one line per file");
+  Option levels = command.flag("--levels", state.levels, "one line of CSV per level");
+  levels.needs(csv);
+  command.option("--memory", state.memory,
+                 "limit of the memory that --stats allocates (default: half the RAM; at least "
+                 "64MiB)");
   command.json_flag(state.json);
 }
 
 }  // namespace
 
 void add_info_command(CommandLine& line) {
-  add_command<InfoCommand>(line, "info", "print counts and sizes of a DAG, per level");
+  add_command<InfoCommand>(line, "info", "print counts and sizes of DAGs, per level");
 }
 
 }  // namespace voxdag::cli

@@ -58,6 +58,7 @@ int run(int argc, char** argv) {
            add_jobs_command,        add_watch_command,      add_job_action_commands,
            add_download_command,
 #endif
+           add_version_command,
        })
     add_command(line);
   try {

@@ -41,6 +41,8 @@ class OptionDeclarer {
       return field.is_positional ? option : Option(option).one_value_each();
     } else {
       const auto set = [field, &value](const std::string& text) {
+        if (const std::string problem = field.is_path ? path_problem(text) : ""; !problem.empty())
+          throw Error(ErrorCode::kInvalidInput, option_name(field.name) + ": " + problem);
         if (!parse_text(field, text, value))
           throw Error(ErrorCode::kInvalidInput, option_name(field.name) + ": '" + text +
                                                     "': expected " + expectation<T>(field));

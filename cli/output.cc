@@ -11,16 +11,20 @@
 namespace voxdag::cli {
 namespace {
 
+constexpr int kIndent = 2, kOneLine = -1;
+
 template <class Json>
-void print_line(const Json& json) {
-  print_json_text(json.dump(-1, ' ', false, Json::error_handler_t::replace));
+void print_with_indent(const Json& json, int indent) {
+  print_json_text(json.dump(indent, ' ', false, Json::error_handler_t::replace));
 }
 
 }  // namespace
 
 void print_json_text(const std::string& json) { std::printf("%s\n", printable_json(json).c_str()); }
-void print_json(const nlohmann::ordered_json& json) { print_line(json); }
-void print_json(const nlohmann::json& json) { print_line(json); }
+void print_json(const nlohmann::ordered_json& json) { print_with_indent(json, kIndent); }
+void print_json(const nlohmann::json& json) { print_with_indent(json, kIndent); }
+void print_json_line(const nlohmann::ordered_json& json) { print_with_indent(json, kOneLine); }
+void print_json_line(const nlohmann::json& json) { print_with_indent(json, kOneLine); }
 
 nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section) {
   // `cells` counts the cells of all levels. `bytes` counts the encoded blocks and the directory

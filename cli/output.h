@@ -11,10 +11,14 @@
 
 namespace voxdag::cli {
 
-// Prints the JSON on one line, with escapes for characters that are not printable, and U+FFFD for
+// Prints the JSON, indented, with escapes for characters that are not printable, and U+FFFD for
 // bytes that are not UTF-8.
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
+// Prints the JSON on one line. Commands that print several objects, or that continue after they
+// have printed one, print each on a line, so that readers need not find the end of an object.
+void print_json_line(const nlohmann::ordered_json& json);
+void print_json_line(const nlohmann::json& json);
 // Prints JSON text, with escapes for characters that are not printable.
 void print_json_text(const std::string& json);
 

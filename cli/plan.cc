@@ -15,6 +15,7 @@ namespace {
 struct PlanCommand {
   BuildSpec spec;
   ClusterOptions cluster;
+  bool quiet = false;
   bool json = false;
 };
 
@@ -55,7 +56,7 @@ void print(const ClusterPlan& plan) {
 }
 
 void run(const PlanCommand& command, CommandContext& context) {
-  const auto progress = make_progress_bar();
+  const auto progress = make_progress_bar(command.quiet);
   const Estimate estimate = with_option_names([&] {
     return plan_build(command.spec, {context.files, *progress, context.cancel});
   });
@@ -78,8 +79,10 @@ void run(const PlanCommand& command, CommandContext& context) {
 void declare(Command& command, PlanCommand& state) {
   OptionDeclarer options(command, Scope::kPlan);
   fields(options, state.spec);
+  options.at("resolution").optional();  // --voxel-size can replace it
   command.config_option();
   declare_cluster(command, state.cluster);
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

@@ -1,4 +1,5 @@
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -20,6 +21,9 @@ namespace voxdag::cli {
 namespace {
 
 constexpr int kMaxPictureEdge = 16384;
+// Endings of picture formats that are not written.
+constexpr const char* kOtherPictures[] = {".jpg", ".jpeg", ".webp", ".avif", ".gif", ".bmp",
+                                          ".tif", ".tiff", ".ppm",  ".pgm",  ".exr", ".hdr"};
 
 struct RenderCommand {
   std::string input;
@@ -31,6 +35,7 @@ struct RenderCommand {
   std::string size = "1280x720", memory;
   query::RenderOptions options{.threads = default_threads()};
   bool gray = false;
+  bool quiet = false;
   bool json = false;
 };
 
@@ -86,7 +91,17 @@ void report(const RenderCommand& command, const query::Placement& placement,
               eye[2], target[0], target[1], target[2], placement.fov_degrees);
 }
 
+void check_ending(std::string name) {
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const char* ending : kOtherPictures)
+    if (name.ends_with(ending))
+      throw Error(
+          ErrorCode::kInvalidInput,
+          "-o " + name + ": pictures are written as PNG: expected a name that ends in .png");
+}
+
 void check_outputs(const RenderCommand& command, GuardedOutputs& files) {
+  check_ending(command.output.path);
   if (command.output.path.empty() && command.depth.empty())
     throw Error(ErrorCode::kInvalidInput,
                 "no output was given: expected --output, --depth or both");
@@ -130,7 +145,7 @@ void run(RenderCommand& command, CommandContext& context) {
   GuardedOutputs files(context.files);
   check_outputs(command, files);
   check_memory(command);
-  const auto progress = make_progress_bar();
+  const auto progress = make_progress_bar(command.quiet);
   const auto file = open_global_file(command.input);
   const query::DagView dag(*file);
   if (!command.gray) command.options.colors = file.get();
@@ -153,9 +168,10 @@ void run(RenderCommand& command, CommandContext& context) {
 
 void declare(Command& command, RenderCommand& state) {
   command.option("input", state.input, "the .vdag file").required();
-  command.option("-o,--output", state.output.path, "the .png file to write");
-  command.option("--depth", state.depth,
-                 "the .npy file to write: distances in voxels, inf where there is no surface");
+  command.output_option("-o,--output", state.output.path, "the .png file to write");
+  command.output_option(
+      "--depth", state.depth,
+      "the .npy file to write: distances in voxels, inf where there is no surface");
   const Option view =
       command.option("--view", state.view, "named view").one_of(query::view_names()).show_default();
   Option camera = command.option("--camera", state.camera, "X,Y,Z of the camera, in scene units");
@@ -172,6 +188,7 @@ void declare(Command& command, RenderCommand& state) {
                  "limit of the memory that is allocated (default: half the RAM; at least 64MiB)");
   command.threads_option(state.options.threads);
   state.output.declare_force(command);
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

@@ -4,6 +4,7 @@
 
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/fields/field.h"
 
 namespace voxdag::cli {
 namespace {
@@ -69,8 +70,16 @@ void SelectionOptions::declare(Command& command) {
   world_flag.needs(region_option);
   Option level_option =
       command.option("--level", level, "l: the coarser grid of 2^l voxels per edge");
-  const Option resolution_option =
-      command.option("--resolution", resolution, "the same by its voxels per edge");
+  const Option resolution_option = command.text_option(
+      "--resolution", "N",
+      [this](const std::string& text) {
+        resolution = edge_of_text(text);
+        if (!resolution)
+          throw Error(
+              ErrorCode::kInvalidInput,
+              "--resolution: '" + text + "': expected a number of voxels such as 4096 or 4k");
+      },
+      "the same by its voxels per edge, such as 4096 or 4k");
   level_option.excludes(resolution_option);
 }
 

@@ -14,7 +14,7 @@ namespace voxdag::cli {
 struct SelectionOptions {
   std::string region;  // text of the option; "" for the complete grid
   bool world = false;
-  std::optional<uint64_t> level, resolution;
+  std::optional<uint64_t> level, resolution;  // at most one of the two
 
   void declare(Command& command);
   // Returns the selected cells of `file`. The grid may not be finer than the file's grid or coarser

@@ -32,6 +32,7 @@ struct VerifyCommand {
   uint64_t seed = 1;
   std::string memory;
   unsigned threads = default_threads();
+  bool quiet = false;
   bool json = false;
 };
 
@@ -141,7 +142,7 @@ nlohmann::ordered_json verify_json(const VerifyCommand& command, const voxdag_re
 
 void run(const VerifyCommand& command, CommandContext& context) {
   const auto file = open_global_file(command.path);
-  const auto progress = make_progress_bar();
+  const auto progress = make_progress_bar(command.quiet);
   MemoryBudget budget(~uint64_t{0});
   verify_global_file(*file, command.threads, budget, *progress, context.cancel);
   std::optional<Sample> sample;
@@ -175,6 +176,7 @@ void declare(Command& command, VerifyCommand& state) {
               "required extension of a glTF file to ignore, as in the build; repeatable")
       .one_value_each();
   command.threads_option(state.threads);
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

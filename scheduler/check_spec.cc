@@ -46,6 +46,10 @@ BuildSpec checked(const BuildSpec& spec) {
   choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that cannot be a grid
   check_backend(r, g.rule());
   if (solid_rule_of(g) != SolidRule::kNone) check_solid(r);
+  if (r.report == "none" && r.cluster && r.cluster->merge_job)
+    throw Error(ErrorCode::kInvalidInput,
+                "--report none: expected a report with --cluster-merge, because the merge job "
+                "returns its results in it");
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = default_threads();
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();
@@ -53,6 +57,23 @@ BuildSpec checked(const BuildSpec& spec) {
     out.geometry.color_resolution = std::min(g.resolution, kColorResolution);
   if (g.cutouts == CutoutRule::kDefault)
     out.geometry.cutouts = g.attributes[Attribute::kColor] ? CutoutRule::kSkip : CutoutRule::kKeep;
+  return out;
+}
+
+BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context) {
+  const GeometryOptions& g = spec.geometry;
+  if (g.resolution || !g.voxel_size) return spec;
+  BuildSpec out = spec;
+  out.geometry.resolution = kMaxOptionEdge;  // for the checks before the scan
+  const BuildSpec full = checked(out);
+  MemoryBudget budget(full.run.memory_bytes);
+  const auto scene =
+      open_scene(context.files, g.scenes, scene_options_of(g), budget, context.cancel);
+  IngestState state;
+  state.declared_triangles = scene->declared_triangles();
+  scan(*scene, state, {context, full.run.threads, budget}, [] {});
+  const uint32_t levels = Grid::levels_for_voxel_size(state.bounds, *g.voxel_size);
+  out.geometry.resolution = uint64_t{1} << levels;
   return out;
 }
 
@@ -75,6 +96,19 @@ void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::strin
   refuse_inputs(files, own, inputs);
 }
 
+namespace {
+
+void check_report(FileSystem& files, const std::string& report, const std::string& output) {
+  if (report == output || report == output + ".partial" || report.ends_with('/'))
+    throw Error(ErrorCode::kInvalidInput,
+                "--report " + report + ": expected a file other than the output, or none");
+  refuse_foreign_file(files, report, is_report, " (the report)");
+  refuse_foreign_file(files, report + ".partial", is_report, " (the report)");
+  files.make_directories(parent_directory(report));
+}
+
+}  // namespace
+
 void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& context) {
   FileSystem& files = context.files;
   const std::string& output = spec.run.output;
@@ -89,18 +123,17 @@ void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& 
   if (!spec.run.cache_folder.empty() && resolved(spec.run.cache_folder) == resolved(work))
     throw Error(ErrorCode::kInvalidInput,
                 work + " is both the cache (--cache) and the work folder: expected two folders");
-  const std::string partial = output + ".partial", report = report_path(output);
-  const std::string outputs[] = {output, partial, report, report + ".partial",
-                                 OutputLock::path_of(output)};
+  const std::string partial = output + ".partial", report = report_path(spec.run);
+  std::vector<std::string> outputs = {output, partial, OutputLock::path_of(output)};
+  if (!report.empty()) outputs.insert(outputs.end(), {report, report + ".partial"});
   refuse_own_files(spec, scene, work, outputs, context);
   refuse_foreign_file(files, output, is_global_file, " (-o)");
   // If the work folder has a job, voxdag created the partial file, even if its first bytes are
   // damaged.
   if (!files.exists(WorkFolder::store_path(work)))
     refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
-  refuse_foreign_file(files, report, is_report, " (-o)");
-  refuse_foreign_file(files, report + ".partial", is_report, " (-o)");
   files.make_directories(parent_directory(output));
+  if (!report.empty()) check_report(files, report, output);
   if (!spec.run.cache_folder.empty()) files.make_directories(spec.run.cache_folder);
 }
 

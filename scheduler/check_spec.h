@@ -13,6 +13,10 @@ namespace voxdag {
 // invalid option, or Error{kDevice} for a backend whose device is missing.
 BuildSpec checked(const BuildSpec& spec);
 
+// Returns the spec with a resolution. If it has a voxel size but no resolution, scans the scene for
+// its extent and chooses the smallest resolution that fits. Throws as checked() does.
+BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context);
+
 // Throws Error{kInvalidInput} if the scene reads one of `outputs` or a file of the work folder,
 // because the build would overwrite or remove that file. Files that only the scene names, such as
 // its buffers, are checked in two cases. First, the work folder has files but no job store, so no

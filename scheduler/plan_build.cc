@@ -9,7 +9,7 @@
 
 namespace voxdag {
 Estimate plan_build(const BuildSpec& spec, const BuildContext& caller) {
-  const BuildSpec full = checked(spec);
+  const BuildSpec full = checked(with_resolution(spec, caller));
   SpaceReserve files(caller.files, full.run.min_free_bytes);
   const BuildContext context{files, caller.progress, caller.cancel};
   MemoryBudget budget(full.run.memory_bytes);

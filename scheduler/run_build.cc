@@ -302,7 +302,8 @@ void write_report(BuildJob& job, double start_s) {
   report.wall_s = wall_seconds() - start_s;
   report.cpu_s = process_cpu_seconds();
   report.peak_rss_bytes = peak_resident_bytes();
-  write_file_atomically(job.context.files, report_path(report.output), report_json(report) + "\n");
+  if (const std::string path = report_path(job.spec.run); !path.empty())
+    write_file_atomically(job.context.files, path, report_json(report) + "\n");
 }
 
 void remove_work(BuildJob& job) {
@@ -408,11 +409,11 @@ std::string submit_merge_job(BuildJob& job, MergeJob& merge_job) {
 }  // namespace
 
 BuildReport run_build(const BuildSpec& requested, const BuildContext& caller) {
-  const BuildSpec spec = checked(requested);
+  const BuildSpec spec = checked(with_resolution(requested, caller));
   SpaceReserve reserve(caller.files, spec.run.min_free_bytes);
   GuardedOutputs files(reserve);
   files.guard_output(spec.run.output);
-  files.guard_output(report_path(spec.run.output));
+  if (const std::string path = report_path(spec.run); !path.empty()) files.guard_output(path);
   const BuildContext context{files, caller.progress, caller.cancel};
   MemoryBudget budget(spec.run.memory_bytes);
   BuildScene scene(spec.geometry, work_folder_of(spec.run), budget, context);

@@ -32,7 +32,7 @@ constexpr OperationOption kOperationOptions[] = {
 struct CombineCommand {
   std::string a, output, memory;
   std::string b[std::size(kOperationOptions)];  // given for one of the operations
-  bool force = false, json = false;
+  bool force = false, quiet = false, json = false;
   unsigned threads = default_threads();
 };
 
@@ -85,7 +85,7 @@ void run(const CombineCommand& command, CommandContext& context) {
   spec.memory_bytes = memory_limit(command.memory);
   spec.threads = command.threads;
   const auto a = open_global_file(command.a), b = open_global_file(command.b[operation]);
-  const auto progress = make_progress_bar();
+  const auto progress = make_progress_bar(command.quiet);
   const RunTimer timer;
   const query::CombineReport report =
       query::combine(*a, *b, spec, context.files, *progress, context.cancel);
@@ -99,11 +99,12 @@ void declare(Command& command, CombineCommand& state) {
   for (size_t i = 0; i < std::size(kOperationOptions); ++i)
     command.option(kOperationOptions[i].name, state.b[i], kOperationOptions[i].help)
         .group("Operation and second .vdag file, one of");
-  command.option("-o,--output", state.output, "the .vdag file to write").required();
+  command.output_option("-o,--output", state.output, "the .vdag file to write").required();
   command.option("--memory", state.memory,
                  "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
   command.threads_option(state.threads);
   command.flag("--force", state.force, "replace an existing file");
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

@@ -18,7 +18,7 @@ namespace {
 struct ExportCommand {
   std::string input, format, output, memory;
   SelectionOptions selection;
-  bool gray = false, force = false, json = false;
+  bool gray = false, force = false, quiet = false, json = false;
 };
 
 void print(const query::ExportReport& report, double wall_s) {
@@ -36,7 +36,7 @@ void run(const ExportCommand& command, CommandContext& context) {
   request.memory_bytes = memory_limit(command.memory);
   request.gray = command.gray;
   request.replace = command.force;
-  const auto progress = make_progress_bar();
+  const auto progress = make_progress_bar(command.quiet);
   const auto file = open_global_file(command.input);
   request.selection = command.selection.selection(*file);
   const double start_s = wall_seconds();
@@ -63,12 +63,13 @@ std::string formats_text() {
 void declare(Command& command, ExportCommand& state) {
   command.option("input", state.input, "the .vdag file").required();
   command.option("--to", state.format, formats_text().c_str()).required();
-  command.option("-o,--output", state.output, "the file to write").required();
+  command.output_option("-o,--output", state.output, "the file to write").required();
   state.selection.declare(command);
   command.option("--memory", state.memory,
                  "limit of the memory that is allocated (default: half the RAM; at least 64MiB)");
   command.flag("--gray", state.gray, "leave out the colors that the file may have");
   command.flag("--force", state.force, "replace existing files");
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

@@ -18,7 +18,7 @@ namespace {
 struct ExtractCommand {
   std::string input, output, memory;
   SelectionOptions selection;
-  bool crop = false, force = false, json = false;
+  bool crop = false, force = false, quiet = false, json = false;
   unsigned threads = default_threads();
 };
 
@@ -72,7 +72,7 @@ void run(const ExtractCommand& command, CommandContext& context) {
   spec.output = command.output;
   spec.replace = command.force;
   spec.threads = command.threads;
-  const auto progress = make_progress_bar();
+  const auto progress = make_progress_bar(command.quiet);
   const RunTimer timer;
   const query::ExtractReport report =
       query::extract(*file, spec, context.files, *progress, context.cancel);
@@ -83,7 +83,7 @@ void run(const ExtractCommand& command, CommandContext& context) {
 
 void declare(Command& command, ExtractCommand& state) {
   command.option("input", state.input, "the .vdag file").required();
-  command.option("-o,--output", state.output, "the .vdag file to write").required();
+  command.output_option("-o,--output", state.output, "the .vdag file to write").required();
   state.selection.declare(command);
   command.flag("--crop", state.crop,
                "make the smallest octree cube around the region the new grid");
@@ -91,6 +91,7 @@ void declare(Command& command, ExtractCommand& state) {
                  "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
   command.threads_option(state.threads);
   command.flag("--force", state.force, "replace an existing file");
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

@@ -40,7 +40,7 @@ void run(const ViewCommand& command, CommandContext& context) {
       command.input, command.port, context.files,
       [](const std::string& line) { std::fprintf(stderr, "voxdag: %s\n", line.c_str()); });
   if (command.json)
-    print_json(nlohmann::json{{"url", service.url()}});
+    print_json_line(nlohmann::ordered_json{{"url", service.url()}});
   else
     std::printf("%s\n", service.url().c_str());
   std::fflush(stdout);

@@ -15,6 +15,7 @@ struct DownloadCommand {
   ServiceOptions service;
   std::string id;
   OutputFile output;
+  bool quiet = false;
   bool json = false;
 };
 
@@ -22,7 +23,7 @@ void run(const DownloadCommand& command, ServiceClient& service, CommandContext&
   GuardedOutputs files(context.files);
   command.output.guard(files);
   command.output.check(files, command.output.path, "", is_global_file);
-  const auto progress = make_progress_bar();
+  const auto progress = make_progress_bar(command.quiet);
   const client::DownloadResult result = client::download_result(
       service, files, service.job(command.id), command.output.path, *progress);
   if (command.json) {
@@ -38,9 +39,10 @@ void run(const DownloadCommand& command, ServiceClient& service, CommandContext&
 
 void declare(Command& command, DownloadCommand& state) {
   command.option("id", state.id, "job id").required();
-  command.option("-o,--output", state.output.path, "the .vdag file to write").required();
+  command.output_option("-o,--output", state.output.path, "the .vdag file to write").required();
   state.service.declare(command);
   state.output.declare_force(command);
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

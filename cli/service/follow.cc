@@ -12,9 +12,10 @@ namespace {
 // Shows a job's progress. Each call of show() prints only the changes since the previous call.
 class JobView {
  public:
+  explicit JobView(bool quiet) : quiet_(quiet), line_(quiet) {}
   void show(const Json& job) {
     const std::string state = job.at("state");
-    if (state != state_ && state != "running") line_.note(state_line(job));
+    if (state != state_ && state != "running" && !quiet_) line_.note(state_line(job));
     state_ = state;
     const Json& warnings = job.at("warnings");
     for (; warnings_ < warnings.size(); ++warnings_)
@@ -49,6 +50,7 @@ class JobView {
     return done / std::max(stage.at("wall_s").get<double>(), 1e-9);
   }
 
+  const bool quiet_;
   ProgressLine line_;
   std::string state_;
   Json attempt_;
@@ -59,8 +61,8 @@ class JobView {
 
 }  // namespace
 
-Json follow_job(ServiceClient& service, const std::string& id) {
-  JobView view;
+Json follow_job(ServiceClient& service, const std::string& id, bool quiet) {
+  JobView view(quiet);
   return service.follow_job(id, [&](const Json& job) { view.show(job); });
 }
 

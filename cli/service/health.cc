@@ -1,6 +1,7 @@
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "client/http_client.h"
 #include "core/base/text/printable.h"
 
@@ -11,6 +12,7 @@ struct HealthCommand {
   std::string url = "http://127.0.0.1:8080";
   std::string ca_file;
   unsigned timeout_s = 3;
+  bool json = false;
 };
 
 void declare(Command& command, HealthCommand& state) {
@@ -21,6 +23,7 @@ void declare(Command& command, HealthCommand& state) {
   command.option("--timeout", state.timeout_s, "seconds to connect, and again for the answer")
       .positive()
       .show_default();
+  command.json_flag(state.json);
 }
 
 void run(const HealthCommand& command, CommandContext&) {
@@ -34,6 +37,8 @@ void run(const HealthCommand& command, CommandContext&) {
     throw Error(ErrorCode::kIo, "server " + command.url + ": /readyz answers with status " +
                                     std::to_string(answer.status) +
                                     ", expected 200 and \"ready\", as a voxdag service answers");
+  if (command.json)
+    return print_json(nlohmann::ordered_json{{"server", command.url}, {"ready", true}});
   std::printf("%s: ready\n", printable_line(command.url).c_str());
 }
 

@@ -19,7 +19,7 @@ struct JobActionCommand {
 void declare(Command& command, JobActionCommand& state) {
   command.option("id", state.ids, "job id; several may be given").required();
   state.service.declare(command);
-  command.json_flag(state.json, "each job as one JSON object on standard output");
+  command.json_flag(state.json, "each job as one JSON object on one line of standard output");
 }
 
 // Performs the action on each job. For a failed or canceled job, "resume" requests a retry.
@@ -29,7 +29,7 @@ void run(const JobActionCommand& command, ServiceClient& service, CommandContext
     const bool ended = state == "failed" || state == "canceled";
     const Json job = service.post_action(id, ended ? "retry" : command.action);
     if (command.json)
-      print_json(job);
+      print_json_line(job);
     else
       std::printf("%s\n", state_line(job).c_str());
   }

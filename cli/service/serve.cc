@@ -3,8 +3,9 @@
 #include <cstdio>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 
-#include "cli/command.h"
+#include "cli/output.h"
 #include "cli/service/run_until_canceled.h"
 #include "core/base/text.h"
 #include "server/api/access/tokens.h"
@@ -17,11 +18,13 @@ namespace {
 struct ServeCommand {
   server::ServerConfig options;  // from the command line
   std::string config_file;
+  bool json = false;
 };
 
 struct TokenCommand {
   std::string role;
   std::string name;
+  bool json = false;
 };
 
 // Writes one line to standard error. Thread-safe.
@@ -54,6 +57,8 @@ void serve(const ServeCommand& command, const Command& line, CommandContext& con
   umask(0077);
   server::Service service(settings(command, line, context.files), context.files, log_line);
   log_line("listening on " + service.url());
+  if (command.json) print_json_line(nlohmann::ordered_json{{"url", service.url()}});
+  std::fflush(stdout);
   run_until_canceled(
       context.cancel, [&] { service.run(); },
       [&] {
@@ -66,10 +71,16 @@ void serve(const ServeCommand& command, const Command& line, CommandContext& con
 void declare(Command& command, TokenCommand& state) {
   command.option("--role", state.role, "read, submit or admin").required();
   command.option("--name", state.name, "name of its owner, for the log").required();
+  command.json_flag(state.json, "the token and its line as one JSON object on standard output");
 }
 
 void run(const TokenCommand& command, CommandContext&) {
   const server::NewToken made = server::make_token(command.role, command.name);
+  if (command.json)
+    return print_json(nlohmann::ordered_json{{"role", command.role},
+                                             {"name", command.name},
+                                             {"token", made.token},
+                                             {"line", made.line}});
   std::fprintf(stderr, "The token (shown only once): %s\n", made.token.c_str());
   std::printf("%s\n", made.line.c_str());
 }
@@ -103,6 +114,7 @@ void add_serve_commands(CommandLine& line) {
                  "folder whose scenes jobs may name by path; may be repeated");
   command.flag("--adopt", options.adopt,
                "make new records of jobs and scenes whose records are lost");
+  command.json_flag(state->json, "print the URL as one line of JSON on standard output");
   command.on_run([state, command, &line] { serve(*state, command, line.context()); });
 
   add_command<TokenCommand>(line, "token", "create a bearer token for the service");

@@ -17,14 +17,15 @@ struct SubmitCommand {
   server::JobRequest request;
   ServiceOptions service;
   bool wait = false;
+  bool quiet = false;
   bool json = false;
 };
 
 // Uploads the scenes that are local files. Returns the server's names of all scenes. A scene that
 // is not a local file must already be on the server.
 std::vector<std::string> upload(const std::vector<std::string>& scenes, FileSystem& files,
-                                ServiceClient& service) {
-  const auto progress = make_progress_bar();
+                                ServiceClient& service, bool quiet) {
+  const auto progress = make_progress_bar(quiet);
   std::vector<std::string> names;
   for (const std::string& scene : scenes)
     names.push_back(files.exists(scene) ? client::upload_scene(service, files, scene, *progress)
@@ -34,7 +35,7 @@ std::vector<std::string> upload(const std::vector<std::string>& scenes, FileSyst
 
 void run(const SubmitCommand& command, ServiceClient& service, CommandContext& context) {
   server::JobRequest request = command.request;
-  request.scenes = upload(request.scenes, context.files, service);
+  request.scenes = upload(request.scenes, context.files, service, command.quiet);
   const Json body = options_json(request);
   // Idempotency key: if the answer is lost and the request is sent again, the server creates no
   // second job.
@@ -42,7 +43,7 @@ void run(const SubmitCommand& command, ServiceClient& service, CommandContext& c
   Json job = service.post("/api/v1/jobs", body, {{"Idempotency-Key", key}});
   if (!command.json) std::printf("%s\n", state_line(job).c_str());
   std::fflush(stdout);
-  if (command.wait) job = follow_job(service, job.at("id"));
+  if (command.wait) job = follow_job(service, job.at("id"), command.quiet);
   if (command.json) print_json(job);
   if (!command.wait) return;
   check_succeeded(job);
@@ -55,6 +56,7 @@ void declare(Command& command, SubmitCommand& state) {
   command.config_option();
   state.service.declare(command);
   command.flag("--wait", state.wait, "follow the job until it ends, as watch does");
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json, "the job as one JSON object on standard output");
 }
 

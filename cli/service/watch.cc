@@ -10,11 +10,12 @@ namespace {
 struct WatchCommand {
   ServiceOptions service;
   std::string id;
+  bool quiet = false;
   bool json = false;
 };
 
 void run(const WatchCommand& command, ServiceClient& service, CommandContext&) {
-  const Json job = follow_job(service, command.id);
+  const Json job = follow_job(service, command.id, command.quiet);
   if (command.json) print_json(job);
   check_succeeded(job);
   if (!command.json) print_result(job);
@@ -23,6 +24,7 @@ void run(const WatchCommand& command, ServiceClient& service, CommandContext&) {
 void declare(Command& command, WatchCommand& state) {
   command.option("id", state.id, "job id").required();
   state.service.declare(command);
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json, "the job as one JSON object on standard output");
 }
 

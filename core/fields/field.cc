@@ -28,6 +28,19 @@ std::optional<uint64_t> size_of_text(const std::string& text) {
   }
 }
 
+std::optional<uint64_t> edge_of_text(const std::string& text) {
+  constexpr uint64_t kMaxNumber = uint64_t{1} << 40;
+  const size_t digits = std::min(text.find_first_not_of("0123456789"), text.size());
+  const auto number = parse_numbers<uint64_t, 1>(std::string_view(text).substr(0, digits), ',');
+  if (!number || number->front() > kMaxNumber) return std::nullopt;
+  std::string unit = text.substr(digits);
+  if (unit.size() == 2 && unit[1] == 'i') unit.pop_back();
+  if (unit.empty()) return number->front();
+  if (unit == "k" || unit == "K") return number->front() << 10;
+  if (unit == "M") return number->front() << 20;
+  return std::nullopt;
+}
+
 size_t character_count(std::string_view text) {
   return static_cast<size_t>(std::ranges::count_if(
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));

@@ -198,6 +198,9 @@ std::string joined(const std::vector<std::string>& words, const char* separator 
 std::string exact_size_text(uint64_t bytes);
 // Parses a size such as "8GiB" into bytes. Returns nullopt for any other text.
 std::optional<uint64_t> size_of_text(const std::string& text);
+// Parses a number of voxels per edge such as "4096", "4k", "4Ki" or "1M", where k stands for 1024
+// and M for 1024 k. Returns nullopt for any other text.
+std::optional<uint64_t> edge_of_text(const std::string& text);
 // Returns the number of characters in a UTF-8 text.
 size_t character_count(std::string_view text);
 // Returns the spelling of a field on the command line: "--hash-bits".
@@ -327,6 +330,11 @@ bool parse_text(const Field& field, const std::string& text, T& value) {
       const auto bytes = size_of_text(text);
       if (!bytes) return false;
       value = static_cast<T>(*bytes);
+    } else if (field.is_power_of_two) {
+      const auto edge = edge_of_text(text);
+      if (!edge) return false;
+      value = static_cast<T>(*edge);
+      if (static_cast<uint64_t>(value) != *edge) return false;
     } else {
       const auto number = parse_numbers<T, 1>(text, ',');
       if (!number) return false;

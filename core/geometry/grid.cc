@@ -33,6 +33,11 @@ Grid centered(const WorldBounds& bounds, double edge, uint32_t levels) {
   return grid;
 }
 
+// Returns the edge of a grid of 2^levels voxels per edge.
+double edge_of(double voxel_size, uint32_t levels) {
+  return voxel_size * static_cast<double>(int64_t{1} << levels);
+}
+
 double largest_extent(const WorldBounds& bounds) {
   double extent = 0;
   if (!bounds.empty)
@@ -105,18 +110,33 @@ Grid Grid::given(const std::array<double, 3>& origin, double edge, uint32_t leve
 
 Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels) {
   check_levels(levels);
+  const uint32_t least = levels_for_voxel_size(bounds, voxel_size);
+  if (levels < least)
+    throw Error(ErrorCode::kInvalidInput,
+                "voxel size " + number_text(voxel_size) + ": the scene's largest extent " +
+                    number_text(largest_extent(bounds)) + " does not fit in " +
+                    std::to_string(int64_t{1} << levels) +
+                    " voxels: expected a larger voxel size or a resolution of at least " +
+                    std::to_string(int64_t{1} << least));
+  return centered(bounds, edge_of(voxel_size, levels), levels);
+}
+
+uint32_t Grid::levels_for_voxel_size(const WorldBounds& bounds, double voxel_size) {
   if (!std::isfinite(voxel_size) || !(voxel_size > 0))
     throw Error(ErrorCode::kInvalidInput,
                 "voxel size " + number_text(voxel_size) + ": expected a finite number above 0");
-  const double edge = voxel_size * static_cast<double>(int64_t{1} << levels);
   const double extent = largest_extent(bounds);
-  if (!(extent < edge) && extent > 0)
+  constexpr auto kMost = static_cast<uint32_t>(kMaxGridLevels);
+  auto levels = static_cast<uint32_t>(kMinGridLevels);
+  const auto fits = [&] { return extent == 0 || extent < edge_of(voxel_size, levels); };
+  while (levels < kMost && !fits()) ++levels;
+  if (!fits())
     throw Error(ErrorCode::kInvalidInput,
-                "the scene's largest extent " + std::to_string(extent) +
-                    " does not fit a grid of edge " + std::to_string(edge) + " (voxel size " +
-                    std::to_string(voxel_size) +
-                    " times the resolution): expected a larger voxel size or resolution");
-  return centered(bounds, edge, levels);
+                "voxel size " + number_text(voxel_size) + ": the scene's largest extent " +
+                    number_text(extent) + " does not fit in 2^" + std::to_string(kMost) +
+                    " voxels: expected a voxel size above " +
+                    number_text(extent / edge_of(1, kMost)));
+  return levels;
 }
 
 void snap_vertices(const Grid& grid, std::span<double> coordinates) {

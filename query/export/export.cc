@@ -34,6 +34,11 @@ constexpr ExportFormat kFormats[] = {
 std::span<const ExportFormat> export_formats() { return kFormats; }
 
 const ExportFormat& export_format(const std::string& name) {
+#ifdef VOXDAG_VDB_ADVICE
+  if (name == "vdb" || name == "nvdb")
+    throw Error(ErrorCode::kInvalidInput,
+                "--to " + name + ": this voxdag was built without OpenVDB: " VOXDAG_VDB_ADVICE);
+#endif
   std::string names;
   for (const ExportFormat& format : kFormats) {
     if (name == format.name) return format;

@@ -101,7 +101,7 @@ class SlurmMergeJob : public MergeJob {
 };
 
 std::optional<BuildReport> SlurmMergeJob::finished() const {
-  const std::string path = report_path(spec_.run.output);
+  const std::string path = report_path(spec_.run);
   try {
     if (!context_.files.exists(path)) return std::nullopt;
     const BuildReport report = decode_report(read_own_file(context_.files, path, kMaxReportBytes));
@@ -115,7 +115,7 @@ std::optional<BuildReport> SlurmMergeJob::finished() const {
 }
 
 void SlurmMergeJob::forget_finished() {
-  if (finished()) context_.files.remove(report_path(spec_.run.output));
+  if (finished()) context_.files.remove(report_path(spec_.run));
 }
 
 std::optional<std::vector<SlurmJob>> SlurmMergeJob::query_jobs() {

@@ -78,7 +78,9 @@ void fields(Visitor& visit, GeometryOptions& g) {
             .with(&Field::parts, "X,Y,Z,EDGE")
             .above_zero(),
         g.bounds);
-  visit(option("voxel_size", "edge of a voxel; the cube is centered on the scene")
+  visit(option("voxel_size",
+               "edge of a voxel; the cube is centered on the scene; without a resolution, the "
+               "smallest that fits")
             .above_zero()
             .excludes("bounds"),
         g.voxel_size);
@@ -139,7 +141,9 @@ void fields(Visitor& visit, RunOptions& r) {
   visit(of_build("cache_size", "limit of the cache folder").bytes(), r.cache_bytes);
   visit(of_build("keep_work", "do not remove the work folder"), r.keep_work);
   visit(of_build("restart", "start over instead of resuming the work folder"), r.restart);
-  visit(of_build("force", "build even if the estimate says it cannot fit"), r.force);
+  visit(of_build("force",
+                 "build even if the estimate says it cannot fit, and replace another scene's DAG"),
+        r.force);
 }
 
 template <class Visitor>

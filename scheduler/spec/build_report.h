@@ -10,6 +10,7 @@
 #include "core/geometry/grid.h"
 #include "core/geometry/voxel_rule.h"
 #include "merge/merge.h"
+#include "scheduler/spec/build_spec.h"
 #include "scheduler/spec/stage_clock.h"
 #include "scheduler/spec/stage_totals.h"
 
@@ -28,6 +29,7 @@ struct SolidReport {
 
 struct BuildReport {
   std::string output;
+  std::vector<std::string> scenes;  // paths relative to the folder of `output`
   std::string sha256;
   Grid grid;
   uint32_t hash_bits = 64;
@@ -58,8 +60,19 @@ struct BuildReport {
   std::string merge_request;  // only if a merge job wrote the output (MergeJob::request())
 };
 
-// Path of the build report of an output file.
-inline std::string report_path(const std::string& output) { return output + ".report.json"; }
+// Path of the report of a build that chooses no other path.
+inline std::string default_report_path(const std::string& output) {
+  return output + ".report.json";
+}
+// Path of the report of a build with these options; "" if it writes none.
+inline std::string report_path(const RunOptions& run) {
+  if (run.report == "none") return "";
+  return run.report.empty() ? default_report_path(run.output) : run.report;
+}
+
+// Returns the scene files as reports name them: relative to the output's folder. So the names do
+// not depend on the current folder, and remain valid if the folders move together.
+std::vector<std::string> reported_scenes(const BuildSpec& spec);
 
 // Returns one JSON object; docs/cli.md lists its members.
 std::string report_json(const BuildReport& report);

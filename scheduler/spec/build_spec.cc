@@ -66,7 +66,8 @@ void check_options(const BuildSpec& spec) {
   fields(checker, copy);
   const GeometryOptions& g = spec.geometry;
   if (g.resolution == 0)
-    json_fields::refuse(kResolutionField.name, expectation<uint64_t>(kResolutionField), 0);
+    json_fields::refuse(kResolutionField.name,
+                        expectation<uint64_t>(kResolutionField) + ", or a voxel size instead");
   if (!g.columns.empty() && !points::Columns::parse(g.columns))
     json_fields::refuse("columns", points::Columns::kExpected, g.columns);
   if (g.solid != SolidName::kNone && g.attributes.any())

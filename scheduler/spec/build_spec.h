@@ -101,6 +101,7 @@ struct ClusterOptions {
 // Options that never change the bytes of the global file.
 struct RunOptions {
   std::string output;           // the global file
+  std::string report;           // the report; "": output + ".report.json"; "none": no report
   std::string work_folder;      // "": output + ".work"
   uint64_t memory_bytes = 0;    // 0: half of the memory that RAM and cgroup allow
   unsigned threads = 0;         // 0: all CPUs that the process may use

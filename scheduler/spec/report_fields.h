@@ -89,6 +89,7 @@ void visit_counts(Visitor& visit, BuildReport& report) {
 template <class Visitor>
 void fields(Visitor& visit, BuildReport& report) {
   visit("output", report.output);
+  visit(Field("scene").omit_empty(), report.scenes);
   visit("sha256", report.sha256);
   visit_grid(visit, report.grid);
   visit("hash_bits", report.hash_bits);

@@ -26,17 +26,18 @@ BuildScene::BuildScene(const GeometryOptions& options, const std::string& scratc
 TriangleSource& BuildScene::open() {
   if (!scene_) {
     opened_ns_ = unix_ns();
-    scene_ = open_scene(context_.files, options_.scenes, scene_options(), budget_, context_.cancel);
+    SceneOptions options = scene_options_of(options_);
+    options.scratch_path = scratch_path_;
+    scene_ = open_scene(context_.files, options_.scenes, options, budget_, context_.cancel);
   }
   return *scene_;
 }
 
-SceneOptions BuildScene::scene_options() const {
-  return {.skip_invalid = options_.skip_invalid,
-          .scratch_path = scratch_path_,
-          .point_radius = options_.point_radius.value_or(0),
-          .columns = options_.columns,
-          .ignored_extensions = options_.ignore_extension};
+SceneOptions scene_options_of(const GeometryOptions& options) {
+  return {.skip_invalid = options.skip_invalid,
+          .point_radius = options.point_radius.value_or(0),
+          .columns = options.columns,
+          .ignored_extensions = options.ignore_extension};
 }
 
 }  // namespace voxdag

@@ -11,6 +11,9 @@
 
 namespace voxdag {
 
+// Returns the options that decide how the scene's files are read. Its scratch_path is "".
+SceneOptions scene_options_of(const GeometryOptions& options);
+
 class BuildScene {
  public:
   // Compressed geometry is decoded to a file in `scratch_folder`, which must exist before triangles
@@ -26,8 +29,6 @@ class BuildScene {
   void close() { scene_.reset(); }
 
  private:
-  SceneOptions scene_options() const;
-
   const GeometryOptions& options_;
   const std::string scratch_path_;
   MemoryBudget& budget_;

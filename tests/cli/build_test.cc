@@ -79,6 +79,100 @@ TEST_F(BuildCommand, OnlyGeometryOptionsChangeTheBytes) {
   EXPECT_GT(part["dropped"]["outside"], 0);
 }
 
+// Numbers of voxels can be written with k and M.
+TEST_F(BuildCommand, TakesResolutionsWithUnits) {
+  for (const char* resolution : {"1k", "1K", "1Ki", "1024"})
+    EXPECT_EQ(run_json({"build", "m.glb", "-r", resolution, "-o", "m.vdag"})["resolution"], 1024);
+  for (const char* text : {"1kk", "k", "1m", "1G", "1.5k", "1 k", "1ki b", "99999999999999999999"})
+    expect_error(2, "--resolution: '" + std::string(text) + "': expected a power of two from 4",
+                 {"build", "m.glb", "-r", text, "-o", "x.vdag"});
+  EXPECT_EQ(run_json({"extract", "m.vdag", "--resolution", "1k", "-o", "e.vdag"})["resolution"],
+            1024);
+  expect_error(2, "4096 or 4k", {"extract", "m.vdag", "--resolution", "k", "-o", "f.vdag"});
+}
+
+// A voxel size alone gives the smallest grid in which the scene fits. The sponge has the edge 9.
+TEST_F(BuildCommand, FindsTheResolutionOfAVoxelSize) {
+  const struct {
+    const char* voxel_size;
+    int resolution;
+  } rows[] = {{"0.05", 256}, {"0.1", 128}, {"0.0703125", 256}, {"0.0704", 128}, {"20", 4}};
+  for (const auto& row : rows) {
+    SCOPED_TRACE(row.voxel_size);
+    const Json report =
+        run_json({"build", "m.glb", "--voxel-size", row.voxel_size, "-o", "m.vdag"});
+    EXPECT_EQ(report["resolution"], row.resolution);
+    EXPECT_EQ(report["bounds"]["edge"], std::stod(row.voxel_size) * row.resolution);
+  }
+  const std::string alone = build({"--voxel-size", "0.1"})["sha256"];
+  EXPECT_EQ(run_json({"build", "m.glb", "--voxel-size", "0.1", "-o", "m.vdag"})["sha256"], alone);
+  const Json plan = run_json({"plan", "m.glb", "--voxel-size", "0.05"});
+  EXPECT_GT(plan["voxels"]["likely"], 10000);
+  EXPECT_TRUE(plan["voxels"]["likely"].is_number_integer());
+  expect_error(2, "a resolution of at least 256",
+               {"build", "m.glb", "-r", "64", "--voxel-size", "0.05", "-o", "x.vdag"});
+  expect_error(2, "does not fit in 2^20 voxels",
+               {"build", "m.glb", "--voxel-size", "1e-7", "-o", "x.vdag"});
+}
+
+// A build replaces an earlier result of its scene, but not the result of another scene.
+TEST_F(BuildCommand, KeepsResultsOfOtherScenes) {
+  put("n.glb", contents("m.glb"));
+  build();
+  EXPECT_EQ(build({"--hash-bits", "8"})["scene"], Json::array({"m.glb"}));
+  const std::vector<std::string> other = {"build", "n.glb", "-r", "64", "-o", "m.vdag"};
+  const std::string bytes = contents("m.vdag");
+  expect_error(2, "another scene, m.glb, and would be replaced by n.glb", other);
+  EXPECT_EQ(contents("m.vdag"), bytes);
+  // The same scene from another folder.
+  const std::string path = folder_.path() + "/m.glb", output = folder_.path() + "/m.vdag";
+  EXPECT_EQ(run({"build", path, "-r", "64", "-o", output}).status, 0);
+  // Without a report, the scene of a result is unknown.
+  ASSERT_EQ(run({"build", "m.glb", "-r", "64", "-o", "m.vdag", "--report", "none"}).status, 0);
+  ASSERT_EQ(remove(folder_.file("m.vdag.report.json").c_str()), 0);
+  expect_error(2, "no report shows that n.glb is its scene", other);
+  std::vector<std::string> forced = other;
+  forced.push_back("--force");
+  EXPECT_EQ(run(forced).status, 0);
+  EXPECT_EQ(run(other).status, 0);
+}
+
+TEST_F(BuildCommand, WritesTheReportWhereItIsWanted) {
+  build({"--report", "none"});
+  EXPECT_FALSE(exists("m.vdag.report.json"));
+  const Json report = build({"--report", "reports/m.json"}, "n.vdag");
+  EXPECT_FALSE(exists("n.vdag.report.json"));
+  EXPECT_EQ(Json::parse(contents("reports/m.json")), report);
+  build({"--report", "reports/m.json"}, "n.vdag");
+  put("letter.txt", "dear");
+  for (const char* path : {"letter.txt", "x.vdag", "x.vdag.partial", "-"})
+    expect_error(2, path, {"build", "m.glb", "-r", "64", "-o", "x.vdag", "--report", path});
+  EXPECT_EQ(contents("letter.txt"), "dear");
+}
+
+// Results are not written to the standard output, and there is no file with the name "-".
+TEST_F(BuildCommand, RefusesTheStandardOutput) {
+  build();
+  for (const std::vector<std::string>& args :
+       std::vector<std::vector<std::string>>{{"build", "m.glb", "-r", "64", "-o", "-"},
+                                             {"extract", "m.vdag", "-o", "-"},
+                                             {"export", "m.vdag", "--to", "npz", "-o", "-"},
+                                             {"render", "m.vdag", "-o", "-"},
+                                             {"generate", "menger", "-"}}) {
+    SCOPED_TRACE(args[0]);
+    expect_error(2, "'-': expected the name of a file", args);
+  }
+  EXPECT_FALSE(exists("-"));
+}
+
+TEST_F(BuildCommand, IsQuiet) {
+  const Answer answer = run({"build", "m.glb", "-r", "64", "-o", "m.vdag", "-q"});
+  EXPECT_EQ(answer.err, "");
+  EXPECT_NE(answer.out, "");
+  EXPECT_EQ(run({"verify", "m.vdag", "--quiet"}).err, "");
+  EXPECT_NE(run({"verify", "m.vdag"}).err, "");
+}
+
 // Options can come from a file. Options on the command line take precedence.
 TEST_F(BuildCommand, ReadsOptionsFromAFile) {
   put("options.toml", "resolution = 32\nhash-bits = 16\n");

@@ -1,4 +1,5 @@
 // Tests info, verify, diff, render, plan, status and generate on small files.
+#include <algorithm>
 #include <cmath>
 
 #include "tests/cli/command_line.h"
@@ -250,6 +251,43 @@ TEST_F(FileCommands, GenerateIsSeeded) {
     EXPECT_FALSE(make(kind, "2") == one);
   }
   expect_error(2, "expected one of", {"generate", "cathedral", "g.glb"});
+}
+
+// Pictures are PNG files, and names for other formats are refused.
+TEST_F(FileCommands, RefusesNamesOfOtherPictureFormats) {
+  for (const char* name : {"p.jpg", "p.JPEG", "p.webp", "p.exr"})
+    expect_error(2, "ends in .png", {"render", "x.vdag", "-o", name});
+}
+
+// The numbers of all levels add up to the numbers of the file, in JSON and in CSV.
+TEST_F(FileCommands, InfoCountsTheOctreeAndTheChildren) {
+  const Json json = run_json({"info", "m.vdag", "--stats"});
+  uint64_t svo_nodes = 0, dag_nodes = 0, node_bytes = 0;
+  for (const Json& level : json["levels"]) {
+    svo_nodes += level["svo_nodes"].get<uint64_t>();
+    node_bytes += level["bytes"].get<uint64_t>();
+    uint64_t nodes = 0;
+    for (const Json& count : level["nodes_by_children"]) nodes += count.get<uint64_t>();
+    EXPECT_EQ(nodes, level["nodes"]);
+    dag_nodes += nodes;
+  }
+  EXPECT_EQ(svo_nodes, json["svo_nodes"]);
+  EXPECT_EQ(dag_nodes, json["dag_nodes"]);
+  EXPECT_EQ(node_bytes, json["node_bytes"]);
+  EXPECT_GT(json["dag_nodes_2x2x2"], dag_nodes);
+  EXPECT_LE(json["dag_nodes_2x2x2"], dag_nodes + 255);
+  EXPECT_EQ(json["bits_per_voxel"],
+            8 * static_cast<double>(node_bytes) / json["voxels"].get<double>());
+  const Json files = run_json({"info", "m.vdag", "m.vdag"})["files"];
+  ASSERT_EQ(files.size(), 2u);
+  EXPECT_EQ(files[1]["dag_nodes"], json["dag_nodes"]);
+  const std::string table = run({"info", "m.vdag", "m.vdag", "--stats", "--csv"}).out;
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 3);
+  EXPECT_EQ(table.find("file,resolution,voxels,svo_nodes,dag_nodes,dag_nodes_2x2x2,bytes"), 0u);
+  EXPECT_NE(table.find("\nm.vdag,128," + json["voxels"].dump() + ","), std::string::npos) << table;
+  const std::string levels = run({"info", "m.vdag", "--csv", "--levels"}).out;
+  EXPECT_EQ(std::count(levels.begin(), levels.end(), '\n'), 1 + json["levels"].size());
+  expect_error(2, "--csv", {"info", "m.vdag", "--levels"});
 }
 
 }  // namespace

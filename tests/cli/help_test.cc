@@ -1,4 +1,6 @@
 // Tests of --help, --version and mistyped commands.
+#include <algorithm>
+
 #include "scheduler/spec/build_fields.h"
 #include "tests/cli/command_line.h"
 
@@ -78,13 +80,44 @@ TEST_F(Help, Version) {
   const Answer answer = run({"--version"});
   EXPECT_EQ(answer.status, 0);
   EXPECT_EQ(answer.out.find_first_of("0123456789"), answer.out.find_first_not_of("voxdag "));
+  for (const char* word : {"-V", "version"}) EXPECT_EQ(run({word}).out, answer.out) << word;
+}
+
+// Each optional part is listed, and a missing one with the packages that it needs.
+TEST_F(Help, VersionListsTheFeatures) {
+  const std::string text = run({"--version", "--verbose"}).out;
+  const Json json = run_json({"version"});
+  EXPECT_EQ(json["version"].get<std::string>() + "\n", run({"version"}).out);
+  for (const char* name : {"commit", "compiler", "build_type"})
+    EXPECT_FALSE(json[name].get<std::string>().empty()) << name;
+  std::vector<std::string> names;
+  for (const Json& feature : json["features"]) {
+    names.push_back(feature["name"]);
+    EXPECT_NE(text.find("\n  " + names.back()), std::string::npos) << names.back();
+    EXPECT_FALSE(feature["packages"].get<std::string>().empty()) << names.back();
+  }
+  for (const char* name : {"cuda", "vdb", "draco", "meshopt", "webp", "avif", "assimp"})
+    EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
+}
+
+TEST_F(Help, HelpOfACommandByItsName) {
+  EXPECT_EQ(run({"help"}).out, run({"--help"}).out);
+  EXPECT_EQ(run({"help", "build"}).out, run({"build", "--help"}).out);
+  expect_error(2, "did you mean build?", {"help", "biuld"});
 }
 
 // A missing or unknown command or option is invalid input, reported on standard error.
 TEST_F(Help, MistypedCommandsAreInvalidInput) {
-  expect_error(2, "subcommand", {});
-  expect_error(2, "", {"biuld"});
-  expect_error(2, "--frobnicate", {"info", "x.vdag", "--frobnicate"});
+  expect_error(2, "voxdag --help", {});
+  expect_error(2, "unknown command 'biuld': expected one of build, ", {"biuld"});
+  expect_error(2, "; did you mean build?", {"biuld"});
+  expect_error(2, "expected one of build, ", {"scene.glb"});
+  expect_error(2, "info: unknown option '--frobnicate'", {"info", "x.vdag", "--frobnicate"});
+  expect_error(2, "; did you mean --digest?", {"info", "x.vdag", "--digets"});
+  expect_error(2, "; did you mean --color?", {"build", "x.glb", "-r", "64", "--colur"});
+  expect_error(2, "; did you mean --output?", {"build", "x.glb", "-r", "64", "--outptu=x.vdag"});
+  expect_error(2, "; did you mean --force?", {"export", "x.vdag", "--for"});
+  expect_error(2, "verify: unexpected argument 'y.vdag'", {"verify", "x.vdag", "y.vdag"});
   expect_error(2, "--resolution", {"build", "x.glb", "-o", "x.vdag"});
   expect_error(2, "--output", {"build", "x.glb", "-r", "64"});
   for (const char* command : kCommands) {

@@ -1,4 +1,6 @@
 // Replaces the CUDA backend in builds without CUDA.
+#include <string>
+
 #include "core/backend/backend.h"
 #include "core/base/error.h"
 
@@ -7,8 +9,13 @@ namespace voxdag {
 int cuda_device_count() { return 0; }
 
 std::string cuda_device_problem() {
-  return "this voxdag was compiled without CUDA: expected the backend auto, cpu or parallel-host, "
-         "or a voxdag that was compiled with nvcc";
+#ifdef VOXDAG_CUDA_IS_OFF
+  constexpr const char *kReason = "with -DVOXDAG_CUDA=OFF", *kRemedy = "-DVOXDAG_CUDA=ON and nvcc";
+#else
+  constexpr const char *kReason = "without nvcc", *kRemedy = "nvcc (CUDA 12 or newer)";
+#endif
+  return std::string("this voxdag was compiled ") + kReason +
+         ": expected the backend auto, cpu or parallel-host, or a voxdag compiled with " + kRemedy;
 }
 
 std::unique_ptr<Backend> make_cuda_backend(Method, int) {

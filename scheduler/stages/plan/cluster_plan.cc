@@ -57,7 +57,7 @@ std::string cluster_plan_json(const Estimate& estimate, const ClusterPlan& plan)
                      {"cpu_hours", range_json(plan.cpu_hours)},
                      {"task_s", range_json(plan.task_s)},
                      {"merge_s", range_json(plan.merge_s)},
-                     {"shared_bytes", range_json(plan.shared_bytes)}};
+                     {"shared_bytes", count_json(plan.shared_bytes)}};
   return json.dump(2);
 }
 

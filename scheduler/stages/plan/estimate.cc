@@ -303,22 +303,22 @@ std::string estimate_json(const Estimate& e) {
       {"triangles", e.triangles},
       {"subvolumes", e.subvolumes},
       {"pilot_resolution", e.pilot_resolution},
-      {"voxels", range_json(e.voxels)},
-      {"svo_nodes", range_json(e.svo_nodes)},
-      {"dag_nodes", range_json(e.dag_nodes)},
-      {"file_bytes", range_json(e.file_bytes)},
-      {"disk_bytes", range_json(e.disk_bytes)},
-      {"memory_bytes", range_json(e.memory_bytes)},
+      {"voxels", count_json(e.voxels)},
+      {"svo_nodes", count_json(e.svo_nodes)},
+      {"dag_nodes", count_json(e.dag_nodes)},
+      {"file_bytes", count_json(e.file_bytes)},
+      {"disk_bytes", count_json(e.disk_bytes)},
+      {"memory_bytes", count_json(e.memory_bytes)},
       {"cpu_s", range_json(e.cpu_s)},
       {"wall_s", range_json(e.wall_s)},
       {"free_disk_bytes", e.free_disk},
       {"memory_budget_bytes", e.free_memory},
   };
   if (const auto& c = e.colors)
-    json["colors"] = {{"cells", range_json(c->cells)},
-                      {"file_bytes", range_json(c->file_bytes)},
-                      {"artifact_bytes", range_json(c->artifact_bytes)},
-                      {"spill_bytes", range_json(c->spill_bytes)},
+    json["colors"] = {{"cells", count_json(c->cells)},
+                      {"file_bytes", count_json(c->file_bytes)},
+                      {"artifact_bytes", count_json(c->artifact_bytes)},
+                      {"spill_bytes", count_json(c->spill_bytes)},
                       {"cpu_s", range_json(c->cpu_s)}};
   return json.dump(2);
 }

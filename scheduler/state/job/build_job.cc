@@ -43,6 +43,7 @@ BuildJob::BuildJob(const BuildSpec& spec_of_build, BuildScene& scene_of_build,
   if (!spec.run.cache_folder.empty())
     cache.emplace(context.files, spec.run.cache_folder, spec.run.cache_bytes);
   report.output = spec.run.output;
+  report.scenes = reported_scenes(spec);
   report.hash_bits = spec.geometry.hash_bits;
   report.rule = spec.geometry.rule();
   report.threads = spec.run.threads;

@@ -186,5 +186,14 @@ TEST(Schema, OfOptionsHasTheirLimits) {
   EXPECT_EQ(options["properties"]["speed"].dump(), R"({"type":"string","enum":["slow","fast"]})");
 }
 
+TEST(EdgeOfText, AcceptsUnits) {
+  const std::pair<const char*, uint64_t> rows[] = {
+      {"4096", 4096}, {"4k", 4096}, {"4K", 4096}, {"4Ki", 4096}, {"1M", 1 << 20}, {"1Mi", 1 << 20}};
+  for (const auto& [text, edge] : rows) EXPECT_EQ(edge_of_text(text), edge) << text;
+  for (const char* text :
+       {"", "k", "-4", "4m", "4kk", "4kB", "4 k", "1.5k", "99999999999999999999"})
+    EXPECT_EQ(edge_of_text(text), std::nullopt) << text;
+}
+
 }  // namespace
 }  // namespace voxdag

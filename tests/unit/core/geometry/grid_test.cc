@@ -130,6 +130,15 @@ TEST(Grid, OfAVoxelSize) {
   expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, 0.25, 4); });
   expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, 0.125, 4); });
   EXPECT_EQ(Grid::with_voxel_size(WorldBounds{}, 2, 2).edge, 8.0);
+  // The least levels that fit.
+  for (const double size : {4.0, 1.0, 0.5, 0.3, 0.25, 1e-5}) {
+    const uint32_t levels = Grid::levels_for_voxel_size(b, size);
+    EXPECT_EQ(Grid::with_voxel_size(b, size, levels).levels, levels);
+    if (levels > 2)
+      expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, size, levels - 1); });
+  }
+  EXPECT_EQ(Grid::levels_for_voxel_size(WorldBounds{}, 1e-9), 2u);
+  expect_error(ErrorCode::kInvalidInput, [&] { Grid::levels_for_voxel_size(b, 1e-9); });
   for (const double size : {0.0, -1.0, kInfinity, kNan})
     expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, size, 4); });
 }

@@ -1,0 +1,68 @@
+#include "scheduler/replaced_result.h"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/fields/field.h"
+#include "core/fields/json_fields.h"
+#include "core/format/global/open_global.h"
+#include "core/io/overwrite.h"
+#include "scheduler/spec/build_report.h"
+#include "scheduler/state/job/build_job.h"
+#include "scheduler/state/work_folder.h"
+
+namespace voxdag {
+namespace {
+
+constexpr uint64_t kMaxReplacedReportBytes = uint64_t{1} << 24;
+
+// Returns the report at `path`, or nullopt if there is no report about a file of this size.
+std::optional<BuildReport> report_at(FileSystem& files, const std::string& path,
+                                     uint64_t output_bytes) {
+  try {
+    if (path.empty() || !files.exists(path)) return std::nullopt;
+    BuildReport report = decode_report(read_own_file(files, path, kMaxReplacedReportBytes));
+    if (report.bytes == output_bytes && !report.scenes.empty()) return report;
+  } catch (const Error&) {
+    // The file is not a report, or a report of an earlier version.
+  }
+  return std::nullopt;
+}
+
+// Returns the report of the build that wrote the output, or nullopt if there is no such report. The
+// earlier build may have written its report to the default path.
+std::optional<BuildReport> report_of_output(FileSystem& files, const RunOptions& run,
+                                            uint64_t output_bytes) {
+  auto report = report_at(files, report_path(run), output_bytes);
+  return report ? report : report_at(files, default_report_path(run.output), output_bytes);
+}
+
+// Returns names as they are in the JSON of a report, which has U+FFFD for bytes that are not UTF-8.
+std::vector<std::string> as_reported(const std::vector<std::string>& names) {
+  const FieldJson json = names;
+  const auto replace = FieldJson::error_handler_t::replace;
+  return FieldJson::parse(json.dump(-1, ' ', false, replace)).get<std::vector<std::string>>();
+}
+
+}  // namespace
+
+void refuse_result_of_other_scene(FileSystem& files, const BuildSpec& spec) {
+  const RunOptions& run = spec.run;
+  if (run.force || files.exists(WorkFolder::store_path(work_folder_of(run)))) return;
+  const auto file = open_if_there(files, run.output);
+  if (!file || file->size() == 0 || !is_global_file(*file)) return;
+  const std::vector<std::string> scenes = as_reported(reported_scenes(spec));
+  const auto report = report_of_output(files, run, file->size());
+  if (report && report->scenes == scenes) return;
+  const std::string found =
+      report ? "is the result of another scene, " + joined(report->scenes)
+             : "exists, and no report shows that " + joined(scenes) + " is its scene";
+  throw Error(ErrorCode::kInvalidInput, "-o " + run.output + ": " + found +
+                                            ", and would be replaced" +
+                                            (report ? " by " + joined(scenes) : "") +
+                                            ": expected another output; --force replaces it");
+}
+
+}  // namespace voxdag
