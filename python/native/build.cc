@@ -24,7 +24,7 @@ namespace {
 // The vertices of a mesh, one per row. mesh_of() accepts floats and doubles.
 using Vertices = nb::ndarray<nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 template <class Number, ssize_t Columns>
-using Rows = nb::ndarray<const Number, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
+using Matrix = nb::ndarray<const Number, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
 
 // A scene file in memory: its path, which names it in messages, and its bytes.
 using FileBytes = std::pair<std::string, nb::bytes>;
@@ -33,8 +33,8 @@ using FileBytes = std::pair<std::string, nb::bytes>;
 // vertices; and a texture: the name of its material, the bytes of an image file, and the texture
 // coordinates of the vertices.
 using MeshArrays =
-    std::tuple<std::string, Vertices, Rows<uint32_t, 3>, std::optional<Rows<uint8_t, 4>>,
-               std::string, nb::bytes, std::optional<Rows<float, 2>>>;
+    std::tuple<std::string, Vertices, Matrix<uint32_t, 3>, std::optional<Matrix<uint8_t, 4>>,
+               std::string, nb::bytes, std::optional<Matrix<float, 2>>>;
 
 template <class Number>
 std::span<const Number> numbers_of(const auto& rows) {
