@@ -121,8 +121,8 @@ class DagFile:
         """Returns the voxel or cell that contains each point of the scene, int64 in the shape of
         `points`. It may be outside the grid.
 
-        For the low corner of a cell, as to_world() returns it, the result is this cell: errors from
-        the rounding of doubles are corrected."""
+        to_voxel(to_world(v)) is v for integer positions v: errors from the rounding of doubles are
+        corrected."""
         values = np.asarray(points, np.float64)
         if values.ndim == 0 or values.shape[-1] != 3:
             raise Error(

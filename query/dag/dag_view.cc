@@ -6,7 +6,8 @@
 
 namespace voxdag::query {
 
-DagView::DagView(const voxdag_reader::File& file) : grid_levels_(file.grid_levels()) {
+DagView::DagView(const voxdag_reader::File& file)
+    : grid_levels_(file.grid_levels()), path_(file.path()) {
   if (file.empty()) return;
   for (uint32_t l = 0; l <= file.brick_level(); ++l)
     levels_.push_back({{file.level(l).words, static_cast<size_t>(file.level(l).word_count)},
@@ -14,7 +15,7 @@ DagView::DagView(const voxdag_reader::File& file) : grid_levels_(file.grid_level
 }
 
 void DagView::corrupt(uint32_t level, uint64_t offset) const {
-  throw Error(ErrorCode::kCorrupt, "level " + std::to_string(level) + ", word " +
+  throw Error(ErrorCode::kCorrupt, path_ + ": level " + std::to_string(level) + ", word " +
                                        std::to_string(offset) +
                                        ": no node begins here, although a parent points here");
 }

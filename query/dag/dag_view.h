@@ -13,6 +13,8 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/popcount8.h"
@@ -30,9 +32,10 @@ class DagView {
     std::span<const uint32_t> words;
     bool wide = false;
   };
-  // `levels`: the levels 0 to L - 2 of the DAG, or no levels for a scene without voxels.
-  explicit DagView(std::vector<Level> levels, uint32_t grid_levels)
-      : grid_levels_(grid_levels), levels_(std::move(levels)) {}
+  // `levels`: the levels 0 to L - 2 of the DAG, or no levels for a scene without voxels. `path`
+  // names the file in errors.
+  DagView(std::vector<Level> levels, uint32_t grid_levels, std::string path)
+      : grid_levels_(grid_levels), levels_(std::move(levels)), path_(std::move(path)) {}
   explicit DagView(const voxdag_reader::File& file);
 
   bool empty() const { return levels_.empty(); }
@@ -101,6 +104,7 @@ class DagView {
 
   uint32_t grid_levels_;
   std::vector<Level> levels_;
+  std::string path_;
 };
 
 inline DagView::Children DagView::children_of_node(uint32_t depth, uint64_t offset) const {

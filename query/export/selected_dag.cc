@@ -200,7 +200,8 @@ struct SelectedDag::Built {
   std::vector<BuiltLevel> levels;
 };
 
-SelectedDag::SelectedDag(const ExportJob& job) : grid_levels_(job.selection.grid_levels) {
+SelectedDag::SelectedDag(const ExportJob& job)
+    : grid_levels_(job.selection.grid_levels), path_(job.file.path()) {
   if (job.selects_all_of(job.dag.grid_levels()) && !has_wide_levels(job.file)) {
     voxels_ = job.file.voxels();
     for (uint32_t level = 0; level <= brick_level(); ++level) {
@@ -237,7 +238,7 @@ uint64_t SelectedDag::word_count() const {
 DagView SelectedDag::view() const {
   std::vector<DagView::Level> levels;
   for (const auto words : words_) levels.push_back({words, false});
-  return DagView(std::move(levels), grid_levels_);
+  return DagView(std::move(levels), grid_levels_, path_);
 }
 
 SelectedDag::Size SelectedDag::size_at(uint32_t grid_levels) const {
@@ -252,7 +253,7 @@ SelectedDag::Size SelectedDag::size_at(uint32_t grid_levels) const {
 }
 
 void SelectedDag::corrupt(uint32_t level, uint64_t offset) const {
-  throw Error(ErrorCode::kCorrupt, "level " + std::to_string(level) + ", word " +
+  throw Error(ErrorCode::kCorrupt, path_ + ": level " + std::to_string(level) + ", word " +
                                        std::to_string(offset) +
                                        ": no node begins here, although a parent points here");
 }

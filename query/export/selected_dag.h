@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/base/popcount8.h"
@@ -71,6 +72,7 @@ class SelectedDag {
   [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
 
   uint32_t grid_levels_;
+  std::string path_;
   uint64_t voxels_ = 0;
   std::vector<std::span<const uint32_t>> words_;
   std::vector<uint64_t> nodes_;

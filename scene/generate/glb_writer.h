@@ -13,7 +13,8 @@ namespace voxdag {
 
 class GlbWriter : public BlockSink {
  public:
-  // Writes the header and `json` immediately. Advances `progress` by each triangle of the file.
+  // Creates the file and writes the header and `json`. mesh() and part() later advance `progress`
+  // by the number of triangles that they write.
   GlbWriter(FileSystem& files, const std::string& path, const std::string& json, uint64_t bin_bytes,
             Progress& progress, const CancelToken& cancel)
       : progress_(progress), cancel_(cancel), file_(files, path, json, bin_bytes) {}

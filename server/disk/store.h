@@ -19,11 +19,11 @@ struct StoreFormat {
   const char* upgrade = nullptr;
 };
 
-// Opens a database. Creates or upgrades its tables. Throws Error{kInvalidInput} for a database of
-// another kind, and for a new database unless `may_create` is true. (If the folders already have
-// files, a lost database may have listed them, so no new one may be created.) Throws
-// Error{kUnsupportedVersion} unless the version is format.version, or the previous version and
-// format.upgrade is not null.
+// Opens a database. Creates its tables if it is new, and upgrades the tables of the previous
+// version if format.upgrade is not null. Throws Error{kUnsupportedVersion} for other versions, and
+// Error{kInvalidInput} if the database belongs to another program, or is new and `may_create` is
+// false. Callers set `may_create` to false if the data folder has files of this kind, because a
+// lost database probably listed them, unless the operator gave --adopt.
 SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool may_create);
 
 }  // namespace voxdag::server

@@ -174,13 +174,16 @@ void GlobalFileWriter::resume(const GlobalFileProgress& progress) {
   for (const GlobalLevel& level : progress.levels) end += round_up_to_page(bytes_of(level));
   const auto written = s.files.open_own(s.partial_path);
   const uint64_t whole_blocks = (end - kPageBytes) / kChecksumBlockBytes;
-  if (written->size() < end || progress.levels.size() > s.brick_level() + 1 ||
-      progress.checksums.size() < whole_blocks)
-    throw Error(ErrorCode::kCorrupt,
-                s.partial_path + " has " + std::to_string(written->size()) + " bytes and " +
-                    std::to_string(progress.checksums.size()) + " checksums: expected the " +
-                    std::to_string(progress.levels.size()) + " merged levels, which end at byte " +
-                    std::to_string(end));
+  const auto expect = [&](const char* what, uint64_t found, const char* limit, uint64_t expected) {
+    throw Error(ErrorCode::kCorrupt, s.partial_path + " and its saved state: " + what + " is " +
+                                         std::to_string(found) + ", expected at " + limit + " " +
+                                         std::to_string(expected));
+  };
+  if (written->size() < end) expect("the number of bytes", written->size(), "least", end);
+  if (progress.levels.size() > s.brick_level() + 1)
+    expect("the number of merged levels", progress.levels.size(), "most", s.brick_level() + 1);
+  if (progress.checksums.size() < whole_blocks)
+    expect("the number of checksums", progress.checksums.size(), "least", whole_blocks);
   BlockChecksums checksums(std::span(progress.checksums).first(whole_blocks));
   const uint64_t last_block = kPageBytes + whole_blocks * kChecksumBlockBytes;
   read_through(*written, last_block, end, CancelToken(),

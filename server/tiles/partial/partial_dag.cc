@@ -22,7 +22,7 @@ query::DagView view_of(const std::vector<std::vector<uint32_t>>& levels, uint32_
   std::vector<query::DagView::Level> views;
   if (!levels[0].empty())
     for (const std::vector<uint32_t>& words : levels) views.push_back({words, false});
-  return query::DagView(std::move(views), grid_levels);
+  return query::DagView(std::move(views), grid_levels, "the unfinished result");
 }
 
 }  // namespace

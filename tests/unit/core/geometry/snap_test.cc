@@ -83,7 +83,8 @@ TEST(Snap, DropsWhatMissesTheGrid) {
   EXPECT_EQ(out.v[0][0], -25599);
 }
 
-// A vertex with |u| >= 2^40 is a limit error, unless the triangle misses the grid.
+// Snapping returns kTooFar if a lattice coordinate u (grid.h) has |u| >= 2^40, unless the triangle
+// misses the grid. u = 2 * floor(128 * x) + 1, so x = -2^32 gives u = 1 - 2^40, which is allowed.
 TEST(Snap, TellsWhatReachesTooFar) {
   FixedTriangle out;
   const double limit = 0x1p32;  // 2^40 units
