@@ -50,7 +50,7 @@ class VoxelScene {
     std::vector<voxdag::query::DagView::Level> levels;
     if (!words_.back().empty())
       for (const std::vector<uint32_t>& words : words_) levels.push_back({words});
-    return voxdag::query::DagView(std::move(levels), grid_levels_);
+    return voxdag::query::DagView(std::move(levels), grid_levels_, "scene");
   }
 
  private:
