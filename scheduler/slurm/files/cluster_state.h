@@ -23,8 +23,7 @@ namespace voxdag {
 struct ExpectedSubvolume {
   SubvolumeId id = 0;
   Cube cube;
-  // Number of the batch's triangles in the cube; each of them sets at least one voxel. nullopt in a
-  // state written by an earlier version.
+  // Number of the batch's triangles in the cube. nullopt in a state written by an earlier version.
   std::optional<uint64_t> triangles;
 
   bool operator==(const ExpectedSubvolume&) const = default;

@@ -18,12 +18,19 @@ std::string describe(const Cube& cube) {
          ", " + std::to_string(cube.position[1]) + ", " + std::to_string(cube.position[2]) + ")";
 }
 
-// Checks that the record has voxels in exactly the subvolumes that have triangles.
-void check_counts(const CompletionRecord& record, std::span<const ExpectedSubvolume> subvolumes) {
+// True if every triangle in a cube sets a voxel of the cube. A triangle between all rows sets no
+// voxel of the rule kThin.
+bool always_sets_voxels(VoxelRule rule) { return rule == VoxelRule::kShell; }
+
+// Checks that the record has voxels only in subvolumes that have triangles. Unless the rule allows
+// triangles without voxels, also checks the converse.
+void check_counts(const CompletionRecord& record, std::span<const ExpectedSubvolume> subvolumes,
+                  VoxelRule rule) {
   for (size_t i = 0; i < subvolumes.size(); ++i) {
     const auto& triangles = subvolumes[i].triangles;
     const uint64_t voxels = record.subvolumes[i].summary.voxels;
-    if (triangles && (*triangles > 0) != (voxels > 0))
+    if (!triangles || (*triangles > 0) == (voxels > 0)) continue;
+    if (*triangles == 0 || always_sets_voxels(rule))
       refuse_record("it has " + std::to_string(voxels) + " voxels for the " +
                     std::to_string(*triangles) + " triangles of the subvolume at " +
                     describe(subvolumes[i].cube));
@@ -74,7 +81,7 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
     refuse_record("its list of " + std::to_string(record.subvolumes.size()) +
                   " subvolumes differs from the batch's list of " +
                   std::to_string(subvolumes.size()) + ": expected the same subvolumes");
-  check_counts(record, subvolumes);
+  check_counts(record, subvolumes, state.rule);
   std::set<Cube> to_find;
   for (size_t i = 0; i < subvolumes.size(); ++i)
     if (!record.subvolumes[i].summary.empty()) to_find.insert(subvolumes[i].cube);

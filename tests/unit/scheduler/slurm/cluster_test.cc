@@ -29,6 +29,31 @@ TEST_F(Cluster, SameBytesFromAnyNumberOfTasks) {
   }
 }
 
+// With --thin, triangles without area set no voxel, so subvolumes with triangles can be empty.
+TEST_F(Cluster, SameBytesOfThinBuildsWithEmptySubvolumes) {
+  std::ofstream specks(folder_.file("specks.obj"));
+  specks << "v 0 0 0\nv 1000 1000 0\nv 0 1000 1000\nf 1 2 3\n";
+  for (int i = 0; i < 200; ++i) {
+    const auto vertex = [&](double shift) {
+      specks << "v " << 37 * i % 997 + shift << ' ' << 71 * i % 991 << ' ' << 113 * i % 983 << '\n';
+    };
+    for (const double shift : {0.0, 0.01, 0.02}) vertex(shift);
+    specks << "f -1 -2 -3\n";
+  }
+  specks.close();
+  const auto thin = [&](BuildSpec build_spec) {
+    build_spec.geometry.scenes = {folder_.file("specks.obj")};
+    build_spec.geometry.thin = true;
+    return build_spec;
+  };
+  expected_ = run_build(thin(local_spec()), context()).sha256;
+  for (const uint64_t tasks : {1, 40}) {
+    SCOPED_TRACE(tasks);
+    EXPECT_EQ(build(thin(spec(tasks))).cluster->attempts, 0u);
+    EXPECT_EQ(warnings_.text, "");
+  }
+}
+
 TEST_F(Cluster, FailedTasksAreSubmittedAgainWithSlurmsReason) {
   slurm_.fates = {"", "OUT_OF_MEMORY", "NODE_FAIL", "", "PREEMPTED"};
   const BuildReport report = build(spec(4));
