@@ -71,6 +71,30 @@ class RowTest {
   // Returns the sign of the triangle's crossings: 0 if it crosses no row along the axis.
   VOXDAG_HD int sign() const { return sign_; }
 
+  // The edges' values at a row. The triangle crosses the row iff all values are >= 0. edge_steps()
+  // returns their changes for a row `distance` units further along axis c (or b).
+  struct EdgeValues {
+    EdgeInt of[3];
+  };
+  VOXDAG_HD EdgeValues edges_at(int64_t at_b, int64_t at_c) const {
+    EdgeValues out;
+    for (int i = 0; i < 3; ++i)
+      out.of[i] = edges_[i].rise * static_cast<EdgeInt>(at_c) -
+                  edges_[i].run * static_cast<EdgeInt>(at_b) - edges_[i].least;
+    return out;
+  }
+  VOXDAG_HD EdgeValues edge_steps(bool is_along_c, int64_t distance) const {
+    EdgeValues out;
+    for (int i = 0; i < 3; ++i)
+      out.of[i] = (is_along_c ? edges_[i].rise : -edges_[i].run) * static_cast<EdgeInt>(distance);
+    return out;
+  }
+  // Returns the slopes of the plane: along the axis, the crossing moves by -slope[k] for each unit
+  // along axis k.
+  VOXDAG_HD void slopes(double (&slope)[3]) const {
+    for (int k = 0; k < 3; ++k) slope[k] = static_cast<double>(n_[k]) / static_cast<double>(n_[a_]);
+  }
+
   // True if the triangle crosses the row through p, whose coordinate along the axis is ignored.
   VOXDAG_HD bool crosses(const int64_t (&p)[3]) const { return crosses(p[b_], p[c_]); }
   // True if the triangle crosses the row with the coordinates `at_b` and `at_c` on the next two

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include "core/geometry/crossing.h"
@@ -9,48 +10,63 @@
 
 namespace voxdag {
 
-// Finds the first point of a row that is beyond a triangle. A division of 128-bit integers takes
-// longer than two exact tests of points next to an estimate in floating point.
+// Finds the first point of a row that is beyond a triangle, from an estimate in floating point. The
+// exact test, in integers, is necessary only if a point is within the estimate's error.
 class FirstBeyond {
  public:
-  FirstBeyond(const FixedTriangle& t, int axis) : axis_(axis) {
-    double e[2][3];
-    for (int i = 0; i < 2; ++i)
-      for (int a = 0; a < 3; ++a) e[i][a] = static_cast<double>(t.v[i + 1][a] - t.v[i][a]);
-    double n[3];
-    for (int a = 0; a < 3; ++a) {
-      vertex_[a] = static_cast<double>(t.v[0][a]);
-      n[a] = e[0][(a + 1) % 3] * e[1][(a + 2) % 3] - e[0][(a + 2) % 3] * e[1][(a + 1) % 3];
-    }
-    for (int a = 0; a < 3; ++a) slope_[a] = n[a] / n[axis];
+  template <class Test>
+  FirstBeyond(const Test& test, const FixedTriangle& t, int axis)
+      : triangle_(t),
+        axis_(axis),
+        b_((axis + 1) % 3),
+        c_((axis + 2) % 3),
+        at_v_(static_cast<double>(t.v[0][axis])) {
+    double slope[3];
+    test.slopes(slope);
+    slope_b_ = slope[b_];
+    slope_c_ = slope[c_];
+    v_b_ = t.v[0][b_];
+    v_c_ = t.v[0][c_];
+    // The slopes are rounded twice and the sums below a few times, each by 2^-53 of its terms.
+    const double largest =
+        std::abs(at_v_) + std::abs(slope_b_) * extent(t, b_) + std::abs(slope_c_) * extent(t, c_);
+    margin_ = 0.5 + largest * 0x1p-49;
   }
 
   // Returns the smallest k for which the point k * 2^step_log2 of the row through p is beyond the
-  // crossing. Changes p along the axis.
-  template <class EdgeInt, class PlaneInt>
-  int64_t find(const RowTest<EdgeInt, PlaneInt>& test, int64_t (&p)[3], int step_log2) const {
-    const int b = (axis_ + 1) % 3, c = (axis_ + 2) % 3;
-    if constexpr (sizeof(PlaneInt) > sizeof(int64_t)) {
-      const double at = vertex_[axis_] - slope_[b] * (static_cast<double>(p[b]) - vertex_[b]) -
-                        slope_[c] * (static_cast<double>(p[c]) - vertex_[c]);
-      if (at > -kMaxEstimate && at < kMaxEstimate) {
-        const int64_t k = (static_cast<int64_t>(at) >> step_log2) + 1;
-        p[axis_] = (k - 1) << step_log2;
-        if (!test.is_beyond(p)) {
-          p[axis_] = k << step_log2;
-          if (test.is_beyond(p)) return k;
-        }
-      }
+  // crossing. The triangle must cross the row.
+  int64_t find(const int64_t (&p)[3], int step_log2) const {
+    const double at = at_v_ - slope_b_ * static_cast<double>(p[b_] - v_b_) -
+                      slope_c_ * static_cast<double>(p[c_] - v_c_);
+    const double low = at - margin_, high = at + margin_;
+    if (low > -kMaxEstimate && high < kMaxEstimate) {
+      const int64_t k = floor_of(low) >> step_log2;
+      if (k == floor_of(high) >> step_log2) return k + 1;
     }
-    return test.first_beyond(p[b], p[c], step_log2);
+    int64_t k = 0;
+    with_row_test(triangle_, axis_,
+                  [&](const auto& test) { k = test.first_beyond(p[b_], p[c_], step_log2); });
+    return k;
   }
 
  private:
   static constexpr double kMaxEstimate = 0x1p41;
 
-  const int axis_;
-  double vertex_[3];
-  double slope_[3];  // slope_[b]: distance by which the crossing moves back per unit of axis b
+  static double extent(const FixedTriangle& t, int axis) {
+    return static_cast<double>(t.high(axis) - t.low(axis));
+  }
+
+  // Returns the largest integer <= x.
+  static int64_t floor_of(double x) {
+    const auto truncated = static_cast<int64_t>(x);
+    return truncated - (static_cast<double>(truncated) > x ? 1 : 0);
+  }
+
+  const FixedTriangle& triangle_;
+  const int axis_, b_, c_;
+  const double at_v_;
+  int64_t v_b_, v_c_;
+  double slope_b_, slope_c_, margin_;
 };
 
 // The sample rows of a closed cube: lattice lines at a distance of 2^pitch_log2 units. The
@@ -73,20 +89,32 @@ struct SampleRows {
     const Range f = rows_of(triangle, first), s = rows_of(triangle, second);
     if (f.low > f.high || s.low > s.high) return;
     const int64_t base = low[axis] >> pitch_log2;
-    with_row_test(triangle, axis, [&](const auto& test) {
+    const auto visit_rows = [&](const auto& test) {
       if (test.sign() == 0) return;
-      const FirstBeyond first_beyond(triangle, axis);
+      const FirstBeyond first_beyond(test, triangle, axis);
+      const bool first_is_c = first == (axis + 2) % 3;
+      const int64_t pitch = int64_t{1} << pitch_log2;
+      const auto step = test.edge_steps(!first_is_c, pitch);
       int64_t p[3] = {0, 0, 0};
       for (int i = f.low; i <= f.high; ++i) {
-        p[first] = low[first] + (int64_t{i} << pitch_log2);
+        p[first] = low[first] + i * pitch;
+        const int64_t at_second = low[second] + s.low * pitch;
+        auto edges =
+            first_is_c ? test.edges_at(at_second, p[first]) : test.edges_at(p[first], at_second);
         for (int j = s.low; j <= s.high; ++j) {
-          p[second] = low[second] + (int64_t{j} << pitch_log2);
-          if (!test.crosses(p)) continue;
-          const int64_t beyond = first_beyond.find(test, p, pitch_log2);
-          visit(i, j, beyond - 1 - base, test.sign());
+          if ((edges.of[0] | edges.of[1] | edges.of[2]) >= 0) {
+            p[second] = low[second] + j * pitch;
+            visit(i, j, first_beyond.find(p, pitch_log2) - 1 - base, test.sign());
+          }
+          for (int e = 0; e < 3; ++e) edges.of[e] += step.of[e];
         }
       }
-    });
+    };
+    // The normal and the edges fit 64 bits; FirstBeyond rarely needs more.
+    if (has_row_coordinates(triangle))
+      visit_rows(NarrowRowTest(triangle, axis));
+    else
+      visit_rows(WideRowTest(triangle, axis));
   }
 
  private:

@@ -1,4 +1,6 @@
 // Solids: the CPU backends fill the same voxels as the oracle, also if the grid is built in parts.
+#include <array>
+
 #include "core/geometry/row_crossings.h"
 #include "tests/conformance/harness.h"
 #include "tests/oracle/solid/rules.h"
@@ -100,6 +102,32 @@ TEST_P(Solids, EqualTheOracleInSeveralTiles) {
     SCOPED_TRACE(oracle::kind_name(kind));
     expect_solid(*backend, oracle::make_solid(kind, 7, 128), 7, SolidRule::kWinding);
   }
+}
+
+// Adds a box whose faces point outward.
+void add_small_box(oracle::Triangles& out, const std::array<int64_t, 3>& low, int64_t edge) {
+  const auto corner = [&](int c) {
+    oracle::Point p{};
+    for (int a = 0; a < 3; ++a) p[a] = low[a] + (c >> a & 1) * edge;
+    return p;
+  };
+  constexpr int kFaces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  for (const auto& f : kFaces) {
+    out.push_back({corner(f[0]), corner(f[1]), corner(f[2])});
+    out.push_back({corner(f[0]), corner(f[2]), corner(f[3])});
+  }
+}
+
+// More components without a corner than wait for their walks, some of them in the same block.
+TEST_P(Solids, EqualTheOracleWithManyComponents) {
+  const auto backend = open();
+  oracle::Triangles scene;
+  for (int64_t x = 0; x < 8; ++x)
+    for (int64_t y = 0; y < 8; ++y)
+      for (int64_t z = 0; z < 8; ++z)
+        add_small_box(scene, {1024 * x + 129, 1024 * y + 129, 1024 * z + 129}, 512);
+  for (const SolidRule rule : kRules) expect_solid(*backend, scene, 5, rule);
 }
 
 // The octants of a grid, each as its own subvolume, set the same voxels as the whole grid.

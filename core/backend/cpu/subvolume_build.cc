@@ -26,9 +26,10 @@ SubvolumeBuild::SubvolumeBuild(const SubvolumeTask& task, const Kernels& kernels
       cancel_(cancel),
       triangles_(memory),
       tables_(memory, size_log2_of(task), expected),
-      reducer_(tables_, kernels),
-      planes_(memory, tables_, reducer_, kernels, task.rule) {
-  if (task_.solid != nullptr) solid_.emplace(task_, memory, tables_);
+      full_(tables_),
+      reducer_(tables_, full_, kernels),
+      planes_(memory, tables_, full_, reducer_, kernels, task.rule) {
+  if (task_.solid != nullptr) solid_.emplace(task_, kernels, memory, tables_, full_);
 }
 
 SubDagSummary SubvolumeBuild::run(TriangleStream& stream, SubDagSink& sink) {
@@ -65,7 +66,8 @@ NodeRef SubvolumeBuild::build_streamed(TriangleStream& stream) {
   });
   if (solid_ && !solid_->fill_tile(tile_, size_log2_of(task_), visit_all))
     return finish_solid_root({{}, true});
-  return reducer_.reduce_bricks(tile_, size_log2_of(task_));
+  return reducer_.reduce_bricks(tile_, size_log2_of(task_),
+                                solid_ ? solid_->full_blocks() : nullptr);
 }
 
 void SubvolumeBuild::read(TriangleStream& stream) {
@@ -105,7 +107,13 @@ NodeRef SubvolumeBuild::build(int size_log2, const LatticeCube& cube, size_t fir
 SubvolumeBuild::SolidNode SubvolumeBuild::build_solid(int size_log2, const LatticeCube& cube,
                                                       size_t first, size_t count) {
   if (count == 0) return {{}, true};
-  if (size_log2 <= kTileLog2) return build_solid_tile(size_log2, cube, first, count);
+  if (size_log2 <= kTileLog2) {
+    SolidNode node;
+    if (count == 1 && entries_[first].inside() &&
+        build_solid_plane(size_log2, cube, entries_[first], node))
+      return node;
+    return build_solid_tile(size_log2, cube, first, count);
+  }
   const size_t below = entries_used_;
   const ChildEntries entries = push_children(cube, first, count);
   SolidNode children[8];
@@ -126,6 +134,26 @@ SubvolumeBuild::SolidNode SubvolumeBuild::build_solid(int size_log2, const Latti
   return {tables_.add_node(size_log2, nodes), false};
 }
 
+bool SubvolumeBuild::build_solid_plane(int size_log2, const LatticeCube& cube, Entry entry,
+                                       SolidNode& node) {
+  const auto found = planes_.find_plane(triangles_, entry, size_log2);
+  if (!found) return false;
+  const Plane& plane = found->plane;
+  int64_t f;
+  node.is_empty = !plane.offset_from(cube, size_log2, f);
+  if (node.is_empty) return true;
+  const int axis = plane.n[0] != 0 ? 0 : plane.n[1] != 0 ? 1 : 2;
+  const int sign = entry.wide() ? normal_sign(triangles_.wide(entry), axis)
+                                : normal_sign(triangles_.narrow(entry), axis);
+  if (sign == 0) return false;
+  const auto sides = solid_->read_plane(plane, f, (sign > 0) != (plane.n[axis] > 0), cube);
+  uint64_t filled;
+  if (!sides || !planes_.build_tile(*found, sides->inner, f, size_log2, node.node, filled))
+    return false;
+  solid_->pass_plane(*sides, filled);
+  return true;
+}
+
 SubvolumeBuild::SolidNode SubvolumeBuild::build_solid_tile(int size_log2, const LatticeCube& cube,
                                                            size_t first, size_t count) {
   cancel_.check();
@@ -140,7 +168,7 @@ SubvolumeBuild::SolidNode SubvolumeBuild::build_solid_tile(int size_log2, const 
   for (size_t i = first; i < first + count; ++i) draw(entries_[i], cube);
   visit_all([&](const FixedTriangle& triangle) { solid_->add(triangle); });
   if (!solid_->fill_tile(tile_, size_log2, visit_all)) return {{}, true};
-  return {reducer_.reduce_bricks(tile_, size_log2), false};
+  return {reducer_.reduce_bricks(tile_, size_log2, solid_->full_blocks()), false};
 }
 
 NodeRef SubvolumeBuild::finish_solid_root(const SolidNode& root) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/backend/backend.h"
+#include "core/backend/cpu/memo/full_nodes.h"
 #include "core/backend/cpu/memo/plane_memo.h"
 #include "core/backend/cpu/memo/tile_reducer.h"
 #include "core/backend/cpu/raster/kernels.h"
@@ -43,6 +44,9 @@ class SubvolumeBuild {
   };
   // build() for a solid.
   SolidNode build_solid(int size_log2, const LatticeCube& cube, size_t first, size_t count);
+  // Sets `node` to the node of a cube of tile size that the triangle `entry` covers and no other
+  // triangle touches. Returns false if the cube needs build_solid_tile().
+  bool build_solid_plane(int size_log2, const LatticeCube& cube, Entry entry, SolidNode& node);
   SolidNode build_solid_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   NodeRef finish_solid_root(const SolidNode& root);
 
@@ -77,6 +81,7 @@ class SubvolumeBuild {
   PooledArray<uint16_t> octants_;
   size_t entries_used_ = 0;
   SubDagTables tables_;
+  FullNodes full_;
   TileReducer reducer_;
   PlaneMemo planes_;
   TileBricks tile_;

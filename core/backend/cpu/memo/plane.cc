@@ -50,6 +50,11 @@ bool Plane::crosses(int64_t f, int size_log2) const {
   return f + up + last * rising() >= 0 && f + up + last * falling() <= width;
 }
 
+bool Plane::is_below(int64_t f, int size_log2) const {
+  const int64_t last = (int64_t{1} << size_log2) - 1;
+  return f + up + last * falling() > width;
+}
+
 bool Plane::offset_from(const LatticeCube& cube, int size_log2, int64_t& f) const {
   int128 at_corner = c;
   for (int a = 0; a < 3; ++a) at_corner += static_cast<int128>(n[a]) * cube.low[a];

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "core/backend/cpu/raster/triangle_set.h"
@@ -48,6 +49,9 @@ struct Plane {
   // True if a plane with this normal and with the offset f from a cube sets voxels of the cube.
   // Requires fits().
   bool crosses(int64_t f, int size_log2) const;
+  // True if a cube that the plane does not cross is on the plane's upper side, where n.p is larger.
+  // `f`: as for crosses().
+  bool is_below(int64_t f, int size_log2) const;
   // Sets `f` to the plane's offset from the cube. Returns false if the plane sets no voxel of the
   // cube; `f` is then unchanged. Requires fits().
   bool offset_from(const LatticeCube& cube, int size_log2, int64_t& f) const;
@@ -67,20 +71,45 @@ std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t, VoxelRule rule) 
   return {};
 }
 
+// Returns the sign of a component of the triangle's normal.
+template <class Int>
+int normal_sign(const Triangle<Int>& t, int axis) {
+  const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+  const auto edge = [&](int a, int i) { return static_cast<int128>(t.v[a][i + 1]) - t.v[a][i]; };
+  const int128 x = edge(b, 0) * edge(c, 1) - edge(c, 0) * edge(b, 1);
+  return x > 0 ? 1 : x < 0 ? -1 : 0;
+}
+
 // Returns the plane of a triangle, which must not be degenerate.
 Plane plane_of(const NarrowTriangle& t, VoxelRule rule);
+
+// The sides of a plane that are inside a solid. `below` is the side where n.p is smaller.
+struct InnerSides {
+  bool below = false, above = false;
+
+  bool any() const { return below || above; }
+  uint32_t bits() const { return (below ? 1u : 0u) | (above ? 2u : 0u); }
+  bool operator==(const InnerSides&) const = default;
+};
 
 // The range of n.k for the voxels that a plane with offset f sets: low <= n.k <= high, where k is
 // the position of the voxel's low corner in the cube, in voxels.
 struct PlaneRange {
   int64_t low, high;
 
+  PlaneRange(int64_t least, int64_t most) : low(least), high(most) {}
   PlaneRange(int64_t up, int64_t width, int64_t f) : low(-(f + up)), high(low + width) {}
+  // Returns the range with all voxels of the inner sides.
+  PlaneRange with(InnerSides inner) const {
+    return {inner.below ? std::numeric_limits<int64_t>::min() : low,
+            inner.above ? std::numeric_limits<int64_t>::max() : high};
+  }
 };
 
-// Returns the voxels of a brick that a plane with offset f from the brick sets.
-inline uint64_t plane_brick(const Plane& plane, int64_t f) {
-  const PlaneRange crossed(plane.up, plane.width, f);
+// Returns the voxels of a brick that a plane with offset f from the brick sets, and all voxels of
+// the inner sides.
+inline uint64_t plane_brick(const Plane& plane, int64_t f, InnerSides inner = {}) {
+  const PlaneRange crossed = PlaneRange(plane.up, plane.width, f).with(inner);
   uint64_t mask = 0;
   for (int voxel = 0; voxel < 64; ++voxel) {
     int64_t value = 0;

@@ -7,7 +7,8 @@
 
 namespace voxdag::cpu {
 
-void PlaneDirection::set_up(const Plane& plane) {
+void PlaneDirection::set_up(const Plane& plane, InnerSides inner) {
+  inner_ = inner;
   std::copy(plane.n, plane.n + 3, n_);
   up_ = plane.up;
   width_ = plane.width;
@@ -40,16 +41,24 @@ void PlaneDirection::set_up(const Plane& plane) {
 void PlaneDirection::make(int64_t f, SubDagTables& tables, const Kernels& kernels,
                           Known& known) const {
   const OctreeCounts before = tables.counts();
-  const PlaneRange crossed(up_, width_, f);
-  uint64_t masks[8];
-  kernels.find_in_range(offsets_, 512, crossed.low, crossed.high, masks);
+  const PlaneRange crossed(up_, width_, f), set = crossed.with(inner_);
+  uint64_t masks[8], shell[8];
+  kernels.find_in_range(offsets_, 512, crossed.low, crossed.high, shell);
+  kernels.find_in_range(offsets_, 512, set.low, set.high, masks);
   NodeRef bricks[8];
-  for (int c = 0; c < 8; ++c) bricks[c] = tables.add_brick(masks[c]);
+  uint32_t filled = 0;
+  for (int c = 0; c < 8; ++c) {
+    bricks[c] = tables.add_brick(masks[c]);
+    filled += static_cast<uint32_t>(popcount64(masks[c] & ~shell[c]));
+  }
   const NodeRef node = tables.add_node(kSizeLog2, bricks);
   const OctreeCounts counts = tables.counts() - before;
   tables.counts() = before;
-  known = {node.hash, node.id, static_cast<uint16_t>(counts.voxels),
-           static_cast<uint8_t>(counts.nodes)};
+  known.hash = node.hash;
+  known.id = node.id;
+  known.voxels = static_cast<uint32_t>(counts.voxels) & 0x3ff;
+  known.filled = filled & 0x3ff;
+  known.nodes = static_cast<uint32_t>(counts.nodes) & 0xf;
 }
 
 }  // namespace voxdag::cpu

@@ -2,8 +2,10 @@
 // (plane.h) passes above or below a voxel corner k, depending on whether f >= -n.k. A cube of 8^3
 // voxels has 729 corners, so the sorted values -n.k divide all offsets f into at most 730
 // intervals. All planes with offsets in one interval produce the same node. This node is made once
-// and then looked up. With the rule kThin, a voxel k changes only at the offsets -n.k and
-// -n.(k + e), where e is the unit vector along the dominant axis. So the same intervals are valid.
+// and then looked up. The same is true for nodes that also contain the inner sides of the plane
+// (InnerSides), because their voxels have the same bounds. With the rule kThin, a voxel k changes
+// only at the offsets -n.k and -n.(k + e), where e is the unit vector along the dominant axis. So
+// the same intervals are valid.
 #pragma once
 
 #include <cstdint>
@@ -20,17 +22,19 @@ class PlaneDirection {
   static constexpr int kSizeLog2 = 3;  // log2 of the edge of the nodes' cubes, in voxels
   static constexpr int kCorners = 9 * 9 * 9;
 
-  // A node of 8^3 voxels, and the numbers of voxels and octree nodes in it.
+  // A node of 8^3 voxels, and the numbers of voxels, filled voxels (of inner sides) and octree
+  // nodes in it.
   struct Known {
     uint64_t hash;
     uint32_t id;
-    uint16_t voxels;
-    uint8_t nodes;  // 0: not made yet
+    uint32_t voxels : 10;
+    uint32_t filled : 10;
+    uint32_t nodes : 4;  // 0: not made yet
   };
 
-  void set_up(const Plane& plane);
-  bool is_direction_of(const Plane& plane) const {
-    return n_[0] == plane.n[0] && n_[1] == plane.n[1] && n_[2] == plane.n[2];
+  void set_up(const Plane& plane, InnerSides inner);
+  bool is_direction_of(const Plane& plane, InnerSides inner) const {
+    return n_[0] == plane.n[0] && n_[1] == plane.n[1] && n_[2] == plane.n[2] && inner_ == inner;
   }
 
   // Returns the values of n.k for the 512 voxels k of a node, in Morton order. The same values,
@@ -65,6 +69,7 @@ class PlaneDirection {
 
   int64_t n_[3];
   int64_t up_, width_;
+  InnerSides inner_;
   int64_t min_offset_, max_offset_;
   double buckets_per_unit_;
   int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer

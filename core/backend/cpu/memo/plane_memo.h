@@ -8,13 +8,17 @@
 //   other planes     The nodes of 8^3 voxels are stored by direction (plane_direction.h), for
 //                    triangles that have covered at least kWorthwhile tiles.
 //
+// For a solid, a node can also contain the inner sides of its plane (InnerSides).
+//
 // All memory is charged to the budget and kept until the build ends.
 // BackendMemory::plane_table_bytes() limits each table. Not thread-safe.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "core/backend/cpu/memo/full_nodes.h"
 #include "core/backend/cpu/memo/plane.h"
 #include "core/backend/cpu/memo/plane_direction.h"
 #include "core/backend/cpu/memo/tile_reducer.h"
@@ -25,9 +29,20 @@ namespace voxdag::cpu {
 
 class PlaneMemo {
  public:
-  PlaneMemo(PooledMemory& memory, SubDagTables& tables, TileReducer& reducer,
+  PlaneMemo(PooledMemory& memory, SubDagTables& tables, FullNodes& full, TileReducer& reducer,
             const Kernels& kernels, VoxelRule rule)
-      : memory_(memory), tables_(tables), reducer_(reducer), kernels_(kernels), rule_(rule) {}
+      : memory_(memory),
+        tables_(tables),
+        full_(full),
+        reducer_(reducer),
+        kernels_(kernels),
+        rule_(rule) {}
+
+  // The plane of a triangle. `known` is the number of the plane in the memo, if it has one.
+  struct Found {
+    Plane plane;
+    std::optional<uint32_t> known;
+  };
 
   // log2 of the edge of the smallest cube for which build() is worthwhile.
   static constexpr int kSmallestLog2 = 4;
@@ -37,18 +52,28 @@ class PlaneMemo {
   // does not contain the plane (yet), or if Plane::fits() is false for cubes of this size.
   bool build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube, int size_log2,
              NodeRef& node);
+  // Returns the plane of a triangle that covers a cube, or nothing if build() would return false.
+  std::optional<Found> find_plane(const TriangleSet& triangles, Entry entry, int size_log2);
+  // Sets `node` to the node of a cube with an edge of at most 64 voxels, in which the plane and the
+  // voxels of its inner sides are set; `f` is the plane's offset, and the plane crosses the cube.
+  // Adds the voxels of the inner sides to `filled`. Returns false if the memo has no memory for
+  // this direction.
+  bool build_tile(const Found& found, InnerSides inner, int64_t f, int size_log2, NodeRef& node,
+                  uint64_t& filled);
   // True if build() would succeed for cubes of up to 64^3 voxels that the triangle covers.
   bool has_plane(const TriangleSet& triangles, Entry entry);
 
  private:
   struct KnownPlane {
     Plane plane;
-    PlaneDirection* direction;  // null for a small normal
+    bool is_small;
+    PlaneDirection* directions[4];  // by InnerSides::bits(); null if not made yet
   };
   struct SmallNode {
     uint64_t key;  // 0: free
     uint64_t hash;
     OctreeCounts counts;
+    uint64_t filled;
     uint32_t id;
   };
 
@@ -59,21 +84,28 @@ class PlaneMemo {
   static constexpr uint32_t kWorthwhile = 24;
   static constexpr uint32_t kNever = UINT32_MAX;
 
-  const KnownPlane* find(const TriangleSet& triangles, Entry entry, uint64_t tiles);
+  // Returns the number of a triangle's plane.
+  std::optional<uint32_t> find(const TriangleSet& triangles, Entry entry, uint64_t tiles);
   uint32_t add_plane(const Plane& plane);
-  PlaneDirection* direction_of(const Plane& plane);
+  PlaneDirection* direction_of(KnownPlane& known, InnerSides inner);
+  PlaneDirection* find_direction(const Plane& plane, InnerSides inner);
   bool fits_budget(uint64_t bytes) const;
 
-  NodeRef small_node(const Plane& plane, int64_t f, int size_log2);
-  NodeRef make_small_node(const Plane& plane, int64_t f, int size_log2);
+  NodeRef small_node(const Plane& plane, InnerSides inner, int64_t f, int size_log2);
+  NodeRef make_small_node(const Plane& plane, InnerSides inner, int64_t f, int size_log2);
+  NodeRef full_node(int size_log2);
   NodeRef node(const Plane& plane, PlaneDirection& direction, int64_t f, int size_log2);
-  NodeRef tile_node(PlaneDirection& direction, int64_t f, int size_log2);
+  NodeRef tile_node(PlaneDirection& direction, InnerSides inner, int64_t f, int size_log2);
+  // Adds the cubes of 8^3 voxels on the inner sides of a plane to `existing`.
+  void add_full(const int64_t* offsets, int count, InnerSides inner, const PlaneRange& crossed,
+                uint64_t (&existing)[8], OctreeCounts& counts);
   SmallNode& small_slot(uint64_t key);
   // Makes free slots: enlarges the table or, if the budget does not allow this, clears the table.
   void reserve_small_nodes();
 
   PooledMemory& memory_;
   SubDagTables& tables_;
+  FullNodes& full_;
   TileReducer& reducer_;
   const Kernels& kernels_;
   const VoxelRule rule_;
@@ -84,6 +116,7 @@ class PlaneMemo {
   PooledArray<SmallNode> small_nodes_;
   uint64_t small_slots_ = 0;  // a power of two
   uint64_t small_count_ = 0;
+  uint64_t filled_ = 0;  // voxels of inner sides, like the tables' counts
 };
 
 }  // namespace voxdag::cpu

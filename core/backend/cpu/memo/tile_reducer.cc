@@ -1,21 +1,22 @@
 #include "core/backend/cpu/memo/tile_reducer.h"
 
+#include <bit>
 #include <utility>
 
 #include "core/dag/node_hash.h"
 
 namespace voxdag::cpu {
 
-NodeRef TileReducer::reduce_bricks(TileBricks& tile, int size_log2) {
+NodeRef TileReducer::reduce_bricks(TileBricks& tile, int size_log2, const uint64_t* full) {
   if (size_log2 == kBrickLevels) {
     tile.touched[0] = 0;
     return tables_.add_brick(std::exchange(tile.brick(0), 0));
   }
   const int words = words_of(size_log2 - kBlockLog2);
-  const int count = kernels_.list_blocks(tile, 8 * words, existing_.bytes, blocks_, keys_);
-  if (count == 0) return {};
-  find_blocks(tile, count);
+  int count = kernels_.list_blocks(tile, 8 * words, existing_.bytes, blocks_, keys_);
+  if (count > 0) find_blocks(tile, count);
   tables_.counts().nodes += static_cast<uint64_t>(count);
+  if (full != nullptr) count = add_full_blocks(full, words, count);
   return reduce(words, count, kBlockLog2, size_log2);
 }
 
@@ -71,6 +72,31 @@ void TileReducer::find_new_blocks(TileBricks& tile, int count, bool insert) {
     if (insert) memo_.insert(keys_[at], block, node);
     block = {};
   }
+}
+
+int TileReducer::add_full_blocks(const uint64_t* full, int words, int count) {
+  int added = 0;
+  for (int w = 0; w < words; ++w) added += popcount64(full[w]);
+  if (added == 0) return count;
+  const NodeRef& node = full_.node(kBlockLog2);
+  const OctreeCounts counts = full_counts(kBlockLog2);
+  const auto times = static_cast<uint64_t>(added);
+  tables_.counts() += {times * counts.nodes, times * counts.voxels};
+  const int total = count + added;
+  // From the last node to the first, because the nodes move to higher positions.
+  for (int w = words, to = total; w-- > 0;) {
+    existing_.words[w] |= full[w];
+    for (uint64_t rest = existing_.words[w]; rest != 0;) {
+      const int bit = 63 - std::countl_zero(rest);
+      rest ^= uint64_t{1} << bit;
+      const bool is_full = full[w] >> bit & 1;
+      --to;
+      if (!is_full) --count;
+      ids_[to] = is_full ? node.id : ids_[count];
+      hashes_[to] = is_full ? node.hash : hashes_[count];
+    }
+  }
+  return total;
 }
 
 NodeRef TileReducer::reduce(int words, int count, int from_log2, int size_log2) {

@@ -11,6 +11,7 @@
 #include <cstdint>
 
 #include "core/backend/cpu/memo/block_memo.h"
+#include "core/backend/cpu/memo/full_nodes.h"
 #include "core/backend/cpu/raster/kernels.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
 #include "core/base/popcount8.h"
@@ -20,13 +21,14 @@ namespace voxdag::cpu {
 
 class TileReducer {
  public:
-  TileReducer(SubDagTables& tables, const Kernels& kernels)
-      : tables_(tables), kernels_(kernels), memo_(tables.memory()) {}
+  TileReducer(SubDagTables& tables, FullNodes& full, const Kernels& kernels)
+      : tables_(tables), full_(full), kernels_(kernels), memo_(tables.memory()) {}
 
   // Returns the node of a tile with an edge of 2^size_log2 voxels, or a NodeRef without a node if
   // the tile has no voxels. Adds the tile's octree nodes and voxels to the tables' counts, and
-  // empties the tile.
-  NodeRef reduce_bricks(TileBricks& tile, int size_log2);
+  // empties the tile. `full`: bit set of the full voxel blocks of a solid, in Morton order, which
+  // are empty in the tile. Null: there are none.
+  NodeRef reduce_bricks(TileBricks& tile, int size_log2, const uint64_t* full = nullptr);
 
   // Returns the node of a cube with an edge of 2^size_log2 voxels, from its nodes with an edge of
   // 2^from_log2 voxels. Bit m of `existing` is set if the m-th cube of this smaller size, in Morton
@@ -39,7 +41,7 @@ class TileReducer {
     for (int w = 0; w < words; ++w) {
       existing_.words[w] = existing[w];
       for (uint64_t rest = existing[w]; rest != 0; rest &= rest - 1) {
-        const auto& node = next(64 * w + lowest_bit(rest));
+        const auto node = next(64 * w + lowest_bit(rest));
         ids_[count] = node.id;
         hashes_[count++] = node.hash;
       }
@@ -68,6 +70,8 @@ class TileReducer {
   // blocks_, and clears these blocks in the tile.
   void find_blocks(TileBricks& tile, int count);
   void find_new_blocks(TileBricks& tile, int count, bool insert);
+  // Adds full voxel blocks to the `count` nodes of the current level. Returns the new number.
+  int add_full_blocks(const uint64_t* full, int words, int count);
   NodeRef reduce(int words, int count, int from_log2, int size_log2);
   // Finds or adds the nodes of `parents`. `hashes` and `ids` contain the children's values before
   // the call and the parents' values after it.
@@ -79,6 +83,7 @@ class TileReducer {
   static constexpr int kChildren = 8;
 
   SubDagTables& tables_;
+  FullNodes& full_;
   const Kernels& kernels_;
   BlockMemo memo_;
   // The current level: the bit set of its non-empty cubes, and the ids and hashes of their nodes,

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 
+#include "core/backend/cpu/raster/slices.h"
 #include "core/backend/cpu/raster/thin_triangle.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
 #include "core/backend/cpu/raster/tile_triangle.h"
@@ -53,6 +54,15 @@ struct Kernels {
   // Copies the non-empty bricks of a voxel block to the front of `bricks`, which has space for
   // eight.
   VoxelBlockContent (*unpack)(const VoxelBlock& block, uint64_t* bricks);
+  // The kernels of solids (core/backend/cpu/raster/slices.h). find_components() finds the
+  // components of a block's empty voxels. Corners with the same class decide alike.
+  void (*find_components)(const VoxelBlock& block, const int32_t (&classes)[8],
+                          BlockComponents& out);
+  // Adds the voxels of `empty` that walks of 6-neighbors through `empty` reach from `reached`, a
+  // part of `empty`.
+  void (*flood)(const Slices& empty, Slices& reached);
+  // Adds voxels to a block, which has none of them. Returns their number.
+  uint32_t (*add_slices)(const Slices& voxels, VoxelBlock& block);
 };
 
 const Kernels& portable_kernels();

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/backend/cpu/raster/flood.h"
 #include "core/backend/cpu/raster/kernels.h"
 #include "core/backend/cpu/raster/octant_test.h"
 
@@ -83,13 +84,26 @@ void find_in_range(const int64_t* values, int count, int64_t low, int64_t high, 
   }
 }
 
+void find_components(const VoxelBlock& block, const int32_t (&classes)[8], BlockComponents& out) {
+  find_components_with<7>(block, classes, out);
+}
+
+void flood(const Slices& empty, Slices& reached) { flood_with(empty, reached); }
+
+uint32_t add_slices(const Slices& voxels, VoxelBlock& block) {
+  return add_slices_with(voxels, block);
+}
+
 constexpr Kernels kPortable = {"portable",
                                draw_exactly<int32_t>,
                                draw_thin_exactly<int32_t>,
                                test_octants_narrow,
                                find_in_range,
                                list_blocks,
-                               unpack};
+                               unpack,
+                               find_components,
+                               flood,
+                               add_slices};
 
 }  // namespace
 

@@ -17,14 +17,30 @@ int blocks_of(const SubvolumeTask& task) {
 
 }  // namespace
 
-SolidFill::SolidFill(const SubvolumeTask& task, PooledMemory& memory, SubDagTables& tables)
+SolidFill::SolidFill(const SubvolumeTask& task, const Kernels& kernels, PooledMemory& memory,
+                     SubDagTables& tables, FullNodes& full)
     : rule_(task.solid->rule),
       tables_(tables),
+      full_(full),
       box_(lattice_cube(task.cube, task.grid_levels)),
       tile_edge_(kUnitsPerVoxel << tile_log2_of(task)),
       running_(memory, *task.solid, tiles_of(task), blocks_of(task)),
-      filler_(memory, rule_, task.grid_levels),
+      plane_views_(rule_, running_),
+      filler_(kernels, rule_, task.grid_levels),
       rows_{{0, 0, 0}, sample_pitch_log2(task.grid_levels), blocks_of(task)} {}
+
+std::optional<PlaneViews::Sides> SolidFill::read_plane(const Plane& plane, int64_t f,
+                                                       bool is_turned, const LatticeCube& tile) {
+  int position[3];
+  position_of(tile, position);
+  return plane_views_.read(plane, f, is_turned, position);
+}
+
+void SolidFill::pass_plane(const PlaneViews::Sides& sides, uint64_t filled) {
+  plane_views_.advance();
+  filled_.filled += filled;
+  if (sides.is_disputed) filled_.disputed += filled;
+}
 
 void SolidFill::begin_tile(const LatticeCube& tile) {
   tile_ = tile;
@@ -50,22 +66,7 @@ NodeRef SolidFill::decide(const UnitViews& unit, int size_log2) {
   if (!unit.is_inside()) return {};
   filled_.add(unit, uint64_t{1} << 3 * size_log2);
   tables_.counts() += full_counts(size_log2);
-  return full_node(size_log2);
-}
-
-NodeRef SolidFill::full_node(int size_log2) {
-  NodeRef& full = full_[size_log2];
-  if (full.exists) return full;
-  const OctreeCounts before = tables_.counts();
-  if (size_log2 == kBrickLevels) {
-    full = tables_.add_brick(~uint64_t{0});
-  } else {
-    NodeRef children[8];
-    std::fill(std::begin(children), std::end(children), full_node(size_log2 - 1));
-    full = tables_.add_node(size_log2, children);
-  }
-  tables_.counts() = before;
-  return full;
+  return full_.node(size_log2);
 }
 
 void SolidFill::position_of(const LatticeCube& cube, int (&tile)[3]) const {

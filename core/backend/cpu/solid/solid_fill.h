@@ -1,12 +1,14 @@
-// The state of a solid's interior while a subvolume is built: running rows, the views and the units
-// of the current tile, and the nodes of full cubes. Used for one build, by one thread. Throws
-// OutOfBudget.
+// The state of a solid's interior while a subvolume is built: running rows, and the views and the
+// units of the current tile. Used for one build, by one thread. Throws OutOfBudget.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "core/backend/backend.h"
+#include "core/backend/cpu/memo/full_nodes.h"
 #include "core/backend/cpu/raster/triangle_set.h"
+#include "core/backend/cpu/solid/plane_views.h"
 #include "core/backend/cpu/solid/running_rows.h"
 #include "core/backend/cpu/solid/tile_filler.h"
 #include "core/backend/cpu/solid/tile_views.h"
@@ -17,15 +19,26 @@ namespace voxdag::cpu {
 class SolidFill {
  public:
   // `task.solid` must not be null.
-  SolidFill(const SubvolumeTask& task, PooledMemory& memory, SubDagTables& tables);
+  SolidFill(const SubvolumeTask& task, const Kernels& kernels, PooledMemory& memory,
+            SubDagTables& tables, FullNodes& full);
 
-  // For each tile in octree order: begin_tile(), then add() for each triangle, then fill_tile().
+  // For a tile of 64^3 voxels whose only surface is a plane that covers it (PlaneViews): returns
+  // the plane's inner sides, or nothing if the tile needs the calls below. If the tile's node can
+  // be made with these sides, call pass_plane() with the number of filled voxels.
+  std::optional<PlaneViews::Sides> read_plane(const Plane& plane, int64_t f, bool is_turned,
+                                              const LatticeCube& tile);
+  void pass_plane(const PlaneViews::Sides& sides, uint64_t filled);
+
+  // For each other tile in octree order: begin_tile(), then add() for each triangle, then
+  // fill_tile().
   void begin_tile(const LatticeCube& tile);
   void add(const FixedTriangle& triangle) { views_.add(triangle); }
-  // Fills the units of the tile that are inside. Returns false, and fills nothing, if the tile has
-  // no voxel of the shell.
+  // Fills the units of the tile that are inside, except full_blocks(). Returns false, and fills
+  // nothing, if the tile has no voxel of the shell.
   bool fill_tile(TileBricks& bricks, int size_log2,
                  const TileFiller::ForEachTriangle& for_each_triangle);
+  // Bit set of the tile's full voxel blocks, for TileReducer.
+  const uint64_t* full_blocks() const { return filler_.full_blocks(); }
 
   // Returns the views of a cube without voxels of the shell. The cube is at least as large as a
   // tile. The tiles before the cube and in the cube must be finished, and no later tile may have
@@ -37,20 +50,20 @@ class SolidFill {
   const FilledVoxels& filled() const { return filled_; }
 
  private:
-  NodeRef full_node(int size_log2);
   void position_of(const LatticeCube& cube, int (&tile)[3]) const;
 
   const SolidRule rule_;
   SubDagTables& tables_;
+  FullNodes& full_;
   LatticeCube box_;     // the subvolume
   int64_t tile_edge_;   // in lattice units
   LatticeCube tile_{};  // the current tile
   RunningRows running_;
+  PlaneViews plane_views_;
   TileViews views_;
   TileFiller filler_;
   FilledVoxels filled_;
   SampleRows rows_;
-  NodeRef full_[kMaxGridLevels + 1];
 };
 
 }  // namespace voxdag::cpu

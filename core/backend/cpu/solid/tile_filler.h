@@ -7,9 +7,9 @@
 #include <functional>
 #include <vector>
 
+#include "core/backend/cpu/raster/kernels.h"
+#include "core/backend/cpu/raster/slices.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
-#include "core/backend/cpu/solid/block_components.h"
-#include "core/backend/cpu/solid/fill_memo.h"
 #include "core/backend/cpu/solid/tile_views.h"
 #include "core/geometry/fixed_triangle.h"
 
@@ -31,14 +31,16 @@ class TileFiller {
   // Calls its argument for each triangle of the tile.
   using ForEachTriangle = std::function<void(const std::function<void(const FixedTriangle&)>&)>;
 
-  // Throws OutOfBudget.
-  TileFiller(PooledMemory& memory, SolidRule rule, uint32_t grid_levels)
-      : rule_(rule), block_log2_(solid_block_log2(grid_levels)), memo_(memory) {}
+  TileFiller(const Kernels& kernels, SolidRule rule, uint32_t grid_levels)
+      : kernels_(kernels), rule_(rule), block_log2_(solid_block_log2(grid_levels)) {}
 
   // Fills a tile with an edge of 2^size_log2 voxels, whose low corner in lattice units is `low`.
-  // Returns false, without filling, if the tile has no voxel of the shell.
+  // Returns false, without filling, if the tile has no voxel of the shell. Leaves the blocks of
+  // full_blocks() empty.
   bool fill(TileBricks& tile, int size_log2, const int64_t (&low)[3], const TileViews& views,
             const ForEachTriangle& for_each_triangle, FilledVoxels& filled);
+  // Bit set of the blocks in empty cubes that are inside, in Morton order.
+  const uint64_t* full_blocks() const { return full_; }
 
  private:
   // A component without a corner, and the walk to it: along z, y and x, from the block's low corner
@@ -52,23 +54,24 @@ class TileFiller {
   };
 
   void list_occupied(const TileBricks& tile, int size_log2);
-  bool is_occupied(int size_log2, int index) const;
-  void fill_cube(int size_log2, int index, const int (&low)[3]);
-  void fill_block(int index, const int (&low)[3]);
-  // Decides all components of `rest` that have a corner of the block, from the views of the block's
-  // corners: adds the voxels of components that are inside to `result`. Removes all these
-  // components from `rest`.
-  void fill_components(const FillMemo::Views& views, Slices& rest, FillMemo::Filled& result) const;
+  // Finds the maximal empty cubes in the occupied cubes of a level.
+  void fill_empty_children(int level);
+  void fill_empty(int level, int index);
+  void fill_block(int index);
+  // Returns the views from a corner of a block; `block` is in blocks.
+  int32_t view_at(const int (&block)[3], int corner) const;
   // Adds the components of `rest` to blind_.
   void add_blind(int index, const int (&low)[3], Slices& rest);
   void fill_blind();
 
+  const Kernels& kernels_;
   const SolidRule rule_;
   const int block_log2_;
   // Bit sets of the cubes with voxels, in Morton order, by the log2 of their edges in blocks.
   uint64_t occupied_[4][kTileBlocks / 64];
+  uint64_t full_[kTileBlocks / 64];
   std::vector<BlindComponent> blind_;
-  FillMemo memo_;
+  BlockComponents components_;
   // Arguments of fill().
   TileBricks* tile_ = nullptr;
   const int64_t* tile_low_ = nullptr;

@@ -22,6 +22,13 @@ class TileViews {
 
   // Returns the sum of the three views from a corner; coordinates are in blocks.
   int32_t at(int x, int y, int z) const { return views_[x][y][z]; }
+  // Sets the classes of the eight corners of a block, in the order of child indices. Components
+  // with corners of one class only have the decision of this class's number: 0 for all views that
+  // are outside, 4 or -4 for views that are inside and disputed, otherwise the views.
+  void classes_at(const int (&low)[3], int32_t (&classes)[8]) const {
+    for (int c = 0; c < 8; ++c)
+      classes[c] = classes_[low[0] + (c >> 2)][low[1] + (c >> 1 & 1)][low[2] + (c & 1)];
+  }
   // Returns the views from the corners of a cube; `low` and `edge` are in blocks.
   UnitViews corners_of(const int (&low)[3], int edge) const;
 
@@ -34,6 +41,7 @@ class TileViews {
   // Sums of the signs of the crossings between corners k and k + 1 of a row: [axis][k][row].
   int32_t crossings_[3][8][RunningRows::kSquare] = {};
   int32_t views_[kCorners][kCorners][kCorners];
+  int32_t classes_[kCorners][kCorners][kCorners];
 };
 
 }  // namespace voxdag::cpu

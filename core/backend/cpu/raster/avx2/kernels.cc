@@ -3,6 +3,7 @@
 #include <immintrin.h>
 
 #include "core/backend/cpu/raster/avx2/list_blocks.h"
+#include "core/backend/cpu/raster/flood.h"
 #include "core/backend/cpu/raster/octant_test.h"
 
 namespace voxdag::cpu {
@@ -102,8 +103,18 @@ void find_in_range(const int64_t* values, int count, int64_t low, int64_t high, 
   }
 }
 
-constexpr Kernels kAvx2 = {"avx2",        draw_avx2,   draw_thin_avx2, test_octants,
-                           find_in_range, list_blocks, unpack};
+void find_components(const VoxelBlock& block, const int32_t (&classes)[8], BlockComponents& out) {
+  find_components_with<7>(block, classes, out);
+}
+
+void flood(const Slices& empty, Slices& reached) { flood_with(empty, reached); }
+
+uint32_t add_slices(const Slices& voxels, VoxelBlock& block) {
+  return add_slices_with(voxels, block);
+}
+
+constexpr Kernels kAvx2 = {"avx2",      draw_avx2, draw_thin_avx2,  test_octants, find_in_range,
+                           list_blocks, unpack,    find_components, flood,        add_slices};
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 #include <immintrin.h>
 
 #include "core/backend/cpu/raster/avx2/list_blocks.h"
+#include "core/backend/cpu/raster/flood.h"
 
 namespace voxdag::cpu {
 namespace {
@@ -31,6 +32,16 @@ VoxelBlockContent unpack(const VoxelBlock& block, uint64_t* out) {
   return {_cvtmask8_u32(mask), static_cast<uint32_t>(voxels)};
 }
 
+void find_components(const VoxelBlock& block, const int32_t (&classes)[8], BlockComponents& out) {
+  find_components_with<7>(block, classes, out);
+}
+
+void flood(const Slices& empty, Slices& reached) { flood_with(empty, reached); }
+
+uint32_t add_slices(const Slices& voxels, VoxelBlock& block) {
+  return add_slices_with(voxels, block);
+}
+
 }  // namespace
 
 const Kernels* avx512_kernels() {
@@ -46,6 +57,9 @@ const Kernels* avx512_kernels() {
     table.draw_thin = draw_thin_avx512;
     table.list_blocks = list_blocks;
     table.unpack = unpack;
+    table.find_components = find_components;
+    table.flood = flood;
+    table.add_slices = add_slices;
     return table;
   }();
   return &kernels;

@@ -14,14 +14,16 @@ namespace {
 struct Workshop {
   Workshop(const Kernels& kernels, VoxelRule its_rule)
       : tables(memory, 10),
-        reducer(tables, kernels),
-        planes(memory, tables, reducer, kernels, its_rule),
+        full(tables),
+        reducer(tables, full, kernels),
+        planes(memory, tables, full, reducer, kernels, its_rule),
         rule(its_rule) {}
 
   MemoryBudget budget{uint64_t{256} << 20};
   PagePool pool;
   PooledMemory memory{budget, pool};
   SubDagTables tables;
+  FullNodes full;
   TileReducer reducer;
   PlaneMemo planes;
   VoxelRule rule;

@@ -1,0 +1,33 @@
+// The voxels of a block, in an order in which steps to neighbors are simple: x is the number of the
+// word, and bit 8 y + z of the word belongs to y and z. A step along z or y is a shift within a
+// word, and a step along x is a step to the next word.
+#pragma once
+
+#include <cstdint>
+
+namespace voxdag::cpu {
+
+struct Slices {
+  uint64_t x[8] = {};
+
+  bool any() const {
+    uint64_t bits = 0;
+    for (const uint64_t word : x) bits |= word;
+    return bits != 0;
+  }
+  void remove(const Slices& o) {
+    for (int i = 0; i < 8; ++i) x[i] &= ~o.x[i];
+  }
+};
+
+// The 6-connected components of a block's empty voxels that have a corner of the block. Components
+// whose corners all decide alike can be joined.
+struct BlockComponents {
+  int count;
+  uint32_t corners[8];  // bit sets, by child index
+  bool is_alike[8];     // all corners of the component have the same class
+  Slices voxels[8];
+  Slices rest;  // empty voxels of components without a corner
+};
+
+}  // namespace voxdag::cpu

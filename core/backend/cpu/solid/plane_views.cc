@@ -1,0 +1,99 @@
+#include "core/backend/cpu/solid/plane_views.h"
+
+#include <algorithm>
+
+#include "core/backend/cpu/raster/voxel_block.h"
+
+namespace voxdag::cpu {
+namespace {
+
+constexpr int kBlocks = RunningRows::kRows - 1;  // along a tile's edge
+
+// Points on the plane count as moved (core/geometry/crossing.h).
+bool ties_are_above(const Plane& plane) {
+  return (plane.n[0] != 0 ? plane.n[0] : plane.n[1] != 0 ? plane.n[1] : plane.n[2]) > 0;
+}
+
+bool is_inside(int32_t views) { return UnitViews{views, 1}.is_inside(); }
+bool is_disputed(int32_t views) { return UnitViews{views, 1}.is_disputed(); }
+
+}  // namespace
+
+bool PlaneViews::Face::has(bool is_above) const {
+  for (const int i : {0, kBlocks})
+    for (const int j : {0, kBlocks})
+      if ((at(i, j) >= 0) == is_above) return true;
+  return false;
+}
+
+PlaneViews::Face PlaneViews::face(int axis, bool is_high) const {
+  return {base_ + (is_high ? kBlocks * step_[axis] : 0), step_[first_row_axis(axis)],
+          step_[second_row_axis(axis)]};
+}
+
+std::optional<PlaneViews::Sides> PlaneViews::read(const Plane& plane, int64_t f, bool is_turned,
+                                                  const int (&tile)[3]) {
+  base_ = f - (plane.fractional || ties_are_above(plane) ? 0 : 1);
+  int64_t lowest = base_, highest = base_;
+  for (int a = 0; a < 3; ++a) {
+    step_[a] = plane.n[a] * (int64_t{1} << kBlockLog2);
+    (step_[a] < 0 ? lowest : highest) += kBlocks * step_[a];
+  }
+  for (int a = 0; a < 3; ++a) {
+    rows_[a] = running_.column(a, tile);
+    if (!read(a, is_turned)) return {};
+  }
+  int32_t sums[2] = {0, 0};
+  for (const auto& views : views_)
+    for (int side = 0; side < 2; ++side) sums[side] += views[side];
+  // A side without corners has no voxels that are not in the shell.
+  const InnerSides inner{lowest < 0 && is_inside(sums[0]), highest >= 0 && is_inside(sums[1])};
+  const bool below = inner.below && is_disputed(sums[0]);
+  const bool above = inner.above && is_disputed(sums[1]);
+  if (inner.below && inner.above && below != above) return {};
+  return Sides{inner, below || above};
+}
+
+// Sets views_[axis]. Returns false if rows differ from them.
+bool PlaneViews::read(int axis, bool is_turned) {
+  const Face low = face(axis, false);
+  const int32_t* rows = rows_[axis];
+  int32_t(&views)[2] = views_[axis];
+  const bool has[2] = {low.has(false), low.has(true)};
+  for (const int i : {0, kBlocks})
+    for (const int j : {0, kBlocks}) views[low.at(i, j) >= 0] = rows[kRows * i + j];
+  if (step_[axis] != 0) {
+    const int before = step_[axis] > 0 ? 0 : 1;
+    const int sign = (step_[axis] > 0) == is_turned ? 1 : -1;
+    const int32_t behind = view_after(rule_, views[before], sign);
+    if (has[before] && has[1 - before] && views[1 - before] != behind) return false;
+    if (has[before]) views[1 - before] = behind;
+  }
+  uint32_t differ = 0;
+  if (has[0] != has[1]) {
+    const int32_t view = views[has[1]];
+    for (int row = 0; row < RunningRows::kSquare; ++row)
+      differ |= static_cast<uint32_t>(rows[row] ^ view);
+    return differ == 0;
+  }
+  for (int i = 0; i < kRows; ++i)
+    for (int j = 0; j < kRows; ++j)
+      differ |= static_cast<uint32_t>(rows[kRows * i + j] ^ views[low.at(i, j) >= 0]);
+  return differ == 0;
+}
+
+void PlaneViews::advance() {
+  for (int a = 0; a < 3; ++a) {
+    if (step_[a] == 0) continue;
+    const Face low = face(a, false), high = face(a, true);
+    const bool has[2] = {high.has(false), high.has(true)};
+    if (has[0] && has[1]) {
+      for (int i = 0; i < kRows; ++i)
+        for (int j = 0; j < kRows; ++j) rows_[a][kRows * i + j] = views_[a][high.at(i, j) >= 0];
+    } else if (low.has(!has[1])) {
+      std::fill(rows_[a], rows_[a] + RunningRows::kSquare, views_[a][has[1]]);
+    }
+  }
+}
+
+}  // namespace voxdag::cpu

@@ -1,0 +1,53 @@
+// The views around a plane that covers a tile and is the tile's only surface. If all corners of
+// blocks on one side of the plane have equal views, the plane and the inner sides determine the
+// tile, so its node can be in the plane memo. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/backend/cpu/memo/plane.h"
+#include "core/backend/cpu/solid/running_rows.h"
+
+namespace voxdag::cpu {
+
+class PlaneViews {
+ public:
+  // The inner sides, and whether the directions disagree on their voxels.
+  struct Sides {
+    InnerSides inner;
+    bool is_disputed;
+  };
+
+  PlaneViews(SolidRule rule, RunningRows& running) : rule_(rule), running_(running) {}
+
+  // Reads the views at the low faces of a tile of 64^3 voxels. `f`: the plane's offset from the
+  // tile. `is_turned`: the triangle's normal is opposite to the plane's. Returns nothing if views
+  // of one side differ, or if only one of two inner sides is disputed.
+  std::optional<Sides> read(const Plane& plane, int64_t f, bool is_turned, const int (&tile)[3]);
+  // Advances the views to the high faces of the tile of the last read().
+  void advance();
+
+ private:
+  static constexpr int kRows = RunningRows::kRows;
+
+  // A face's corners with the first corner at `base`: a corner is above the plane iff its value is
+  // >= 0.
+  struct Face {
+    int64_t base, first_step, second_step;
+
+    int64_t at(int i, int j) const { return base + i * first_step + j * second_step; }
+    bool has(bool is_above) const;
+  };
+  Face face(int axis, bool is_high) const;
+  bool read(int axis, bool is_turned);
+
+  const SolidRule rule_;
+  RunningRows& running_;
+  int64_t base_ = 0;      // value of the tile's low corner
+  int64_t step_[3] = {};  // from one corner of a block to the next
+  int32_t* rows_[3] = {};
+  int32_t views_[3][2] = {};  // [axis][is above]
+};
+
+}  // namespace voxdag::cpu
