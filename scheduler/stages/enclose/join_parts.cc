@@ -4,7 +4,7 @@
 
 #include "core/base/error.h"
 #include "core/dag/space/face_code.h"
-#include "scheduler/stages/enclose/cube_tree.h"
+#include "scheduler/stages/enclose/part_tree.h"
 
 namespace voxdag {
 namespace {
@@ -83,9 +83,9 @@ class PartJoiner {
   // Gives each leaf the numbers of its components, and returns their total.
   uint64_t number_components() {
     uint64_t count = 0;
-    for (const CubeTree::Leaf& leaf : tree_.leaves()) {
+    for (const PartTree::Leaf& leaf : tree_.leaves()) {
       first_.push_back(static_cast<uint32_t>(count));
-      count += leaf.part == CubeTree::kEmpty ? 1 : parts_[leaf.part].touch.size();
+      count += leaf.part == PartTree::kEmpty ? 1 : parts_[leaf.part].touch.size();
     }
     if (count >= UINT32_MAX)
       throw Error(ErrorCode::kLimit, "the empty space has " + std::to_string(count) +
@@ -96,9 +96,9 @@ class PartJoiner {
 
   void mark_border() {
     for (size_t i = 0; i < tree_.leaves().size(); ++i) {
-      const CubeTree::Leaf& leaf = tree_.leaves()[i];
+      const PartTree::Leaf& leaf = tree_.leaves()[i];
       const uint8_t border = border_faces(leaf.cube);
-      if (leaf.part == CubeTree::kEmpty) {
+      if (leaf.part == PartTree::kEmpty) {
         if (border != 0) sets_.set_at_border(first_[i]);
         continue;
       }
@@ -109,9 +109,9 @@ class PartJoiner {
   }
 
   void add_outside(size_t leaf_index, OutsideSpace& out) {
-    const CubeTree::Leaf& leaf = tree_.leaves()[leaf_index];
+    const PartTree::Leaf& leaf = tree_.leaves()[leaf_index];
     const uint32_t first = first_[leaf_index];
-    if (leaf.part == CubeTree::kEmpty) {
+    if (leaf.part == PartTree::kEmpty) {
       if (!sets_.is_outside(first)) out.enclosed_cubes.push_back(leaf.cube);
       return;
     }
@@ -122,11 +122,11 @@ class PartJoiner {
 
   // A cube of the tree, or a part of a leaf's face: the square at a path of quadrants.
   struct Place {
-    CubeTree::Ref ref;
+    PartTree::Ref ref;
     std::vector<uint8_t> path;
   };
 
-  void join_inside(CubeTree::Ref ref) {
+  void join_inside(PartTree::Ref ref) {
     if (ref.is_leaf) return;
     for (int o = 0; o < 8; ++o) join_inside(tree_.child(ref, o));
     for (int axis = 0; axis < 3; ++axis)
@@ -168,7 +168,7 @@ class PartJoiner {
 
   void check_label(uint32_t leaf, uint32_t label) const {
     const uint32_t part = tree_.leaves()[leaf].part;
-    if (label < (part == CubeTree::kEmpty ? 1 : parts_[part].touch.size())) return;
+    if (label < (part == PartTree::kEmpty ? 1 : parts_[part].touch.size())) return;
     throw Error(ErrorCode::kCorrupt,
                 "the labels of a subvolume's face are damaged: expected the "
                 "number of a component");
@@ -185,7 +185,7 @@ class PartJoiner {
     if (loaded.leaf == leaf && loaded.face == face) return;
     const uint32_t part = tree_.leaves()[leaf].part;
     loaded.bytes.clear();
-    if (part == CubeTree::kEmpty) {
+    if (part == PartTree::kEmpty) {
       loaded.bytes = empty_face();
     } else {
       const RowExtent& extent = parts_[part].faces[face];
@@ -201,7 +201,7 @@ class PartJoiner {
   const RowFile& faces_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
-  const CubeTree tree_;
+  const PartTree tree_;
   const MemoryCharge tree_charge_;
   std::vector<uint32_t> first_;  // by leaf: the number of its first component
   ComponentSets sets_;

@@ -51,8 +51,9 @@ VOXDAG_SLICES_INLINE void exchange_order(Words& words) {
 
 // Extends `reached` along lines of eight voxels, whose bits are kStep apart, in both directions.
 template <int kStep>
-VOXDAG_SLICES_INLINE void fill_lines(Words& reached, Words up_free, Words down_free) {
-  Words up = reached, down = reached;
+VOXDAG_SLICES_INLINE void fill_lines(Words& reached, const Words& empty_above,
+                                     const Words& empty_below) {
+  Words up = reached, down = reached, up_free = empty_above, down_free = empty_below;
   for (int step = kStep; step < 8 * kStep; step *= 2) {
     up |= up_free & (up << step);
     up_free &= up_free << step;

@@ -1,4 +1,4 @@
-#include "scheduler/stages/enclose/cube_tree.h"
+#include "scheduler/stages/enclose/part_tree.h"
 
 #include <algorithm>
 
@@ -14,14 +14,14 @@ uint64_t code_of(const Cube& cube) {
 
 }  // namespace
 
-CubeTree::CubeTree(std::span<const Cube> cubes) {
+PartTree::PartTree(std::span<const Cube> cubes) {
   std::vector<Placed> placed;
   for (uint32_t i = 0; i < cubes.size(); ++i) placed.push_back({code_of(cubes[i]), i});
   std::ranges::sort(placed, {}, &Placed::code);
   root_ = add({}, placed, cubes);
 }
 
-CubeTree::Ref CubeTree::add(const Cube& cube, std::span<const Placed> placed,
+PartTree::Ref PartTree::add(const Cube& cube, std::span<const Placed> placed,
                             std::span<const Cube> cubes) {
   if (placed.empty() || cubes[placed[0].part] == cube) {
     leaves_.push_back({cube, placed.empty() ? kEmpty : placed[0].part});

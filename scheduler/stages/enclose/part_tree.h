@@ -11,7 +11,7 @@
 
 namespace voxdag {
 
-class CubeTree {
+class PartTree {
  public:
   static constexpr uint32_t kEmpty = UINT32_MAX;
   // A given cube, or an empty one.
@@ -26,7 +26,7 @@ class CubeTree {
   };
 
   // The cubes must be disjoint.
-  explicit CubeTree(std::span<const Cube> cubes);
+  explicit PartTree(std::span<const Cube> cubes);
 
   Ref root() const { return root_; }
   Ref child(Ref node, int octant) const { return nodes_[node.index][static_cast<size_t>(octant)]; }
