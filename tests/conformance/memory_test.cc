@@ -83,7 +83,7 @@ TEST_P(Memory, SmallestCubeFitsWithAnyTriangles) {
     const bool small =
         kind == oracle::SceneKind::kSubVoxel || kind == oracle::SceneKind::kDegenerate;
     const auto unique = oracle::make_scene(kind, 9, region, small ? 1000 : 50);
-    EndlessStream stream(unique, small ? 300000 : 10000);
+    EndlessStream stream(unique, small ? 300000 : 4000);
     const int64_t before = g_heap;
     g_heap_peak = before;
     const Built built = build(*backend, task, stream, kSmallestBudget);
