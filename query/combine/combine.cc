@@ -26,7 +26,7 @@ constexpr uint64_t kListShare = 1024;
 constexpr uint64_t kSorterShare = 32;
 constexpr uint64_t kValueShare = 10;
 constexpr uint64_t kWindowShare = 32;
-constexpr uint64_t kBufferBytes = uint64_t{16} << 10;
+constexpr uint64_t kListBufferBytes = uint64_t{16} << 10;
 
 void refuse_attributes(const voxdag_reader::File& file) {
   const std::vector<Attribute> attributes = attributes_of(file).list();
@@ -69,7 +69,7 @@ class Combination {
         work_(files, spec.output + ".work-"),
         scratch_(files, work_.path()),
         space_{scratch_, budget_, share(kListShare), share(kSorterShare),
-               std::min(spec.list_bytes, kBufferBytes)},
+               std::min(spec.list_bytes, kListBufferBytes)},
         memory_{share(kValueShare), share(kWindowShare)} {}
 
   // Writes the output. Calls before_publish() before the output gets its final name. If
