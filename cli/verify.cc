@@ -36,11 +36,6 @@ struct VerifyCommand {
   bool json = false;
 };
 
-Grid grid_of(const voxdag_reader::File& file) {
-  const double(&origin)[3] = file.origin();
-  return Grid::given({origin[0], origin[1], origin[2]}, file.edge(), file.grid_levels());
-}
-
 struct Sample {
   query::SampleReport voxels;
   std::optional<query::InteriorReport> interior;   // for a solid

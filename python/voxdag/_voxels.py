@@ -55,9 +55,7 @@ def from_points(
 
     """
     positions = _points_of(points)
-    size = float(voxel_size)
-    if not 0 < size < math.inf:
-        raise Error(f"voxel_size={voxel_size!r}: expected a number above 0", "invalid_input")
+    size = _size_of(voxel_size)
     if origin is not None:
         low = _origin_of(origin)
     elif len(positions):
@@ -110,9 +108,7 @@ def from_voxels(
             f"the voxels are an array {cells.shape} of {cells.dtype}: expected (N, 3) integers",
             "invalid_input",
         )
-    size = float(voxel_size)
-    if not 0 < size < math.inf:
-        raise Error(f"voxel_size={voxel_size!r}: expected a number above 0", "invalid_input")
+    size = _size_of(voxel_size)
     low = _origin_of(origin)
     return _dag_of(cells, colors, low, size, resolution, output, progress, options)
 
@@ -174,6 +170,13 @@ def _points_of(points: ArrayLike) -> NDArray[np.float64]:
         bad = np.flatnonzero(~finite)[0]
         raise Error(f"points[{bad}] is not finite: it is {array[bad].tolist()}", "invalid_input")
     return array.astype(np.float64)
+
+
+def _size_of(voxel_size: float) -> float:
+    size = float(voxel_size)
+    if not 0 < size < math.inf:
+        raise Error(f"voxel_size={voxel_size!r}: expected a number above 0", "invalid_input")
+    return size
 
 
 def _origin_of(origin: ArrayLike) -> NDArray[np.float64]:

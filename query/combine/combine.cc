@@ -47,14 +47,6 @@ void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b) 
   refuse_attributes(b);
 }
 
-Grid grid_of_file(const voxdag_reader::File& file) {
-  Grid grid;
-  grid.levels = file.grid_levels();
-  grid.edge = file.edge();
-  for (size_t axis = 0; axis < 3; ++axis) grid.origin[axis] = file.origin()[axis];
-  return grid;
-}
-
 class Combination {
  public:
   Combination(const voxdag_reader::File& a, const voxdag_reader::File& b, const CombineSpec& spec,
@@ -75,7 +67,7 @@ class Combination {
   // Writes the output. Calls before_publish() before the output gets its final name. If
   // before_publish() throws, the output is discarded.
   CombineReport run(const std::function<void()>& before_publish) {
-    GlobalFileWriter out(files_, spec_.output, grid_of_file(a_.file()), a_.file().hash_bits(),
+    GlobalFileWriter out(files_, spec_.output, grid_of(a_.file()), a_.file().hash_bits(),
                          spec_.narrow_words);
     const CombinedCounts counts = write_levels(out);
     if (counts.octree.voxels == 0)
@@ -87,7 +79,7 @@ class Combination {
     out.publish();
     progress_.advance(1);
     progress_.end_stage();
-    return {.grid = grid_of_file(a_.file()),
+    return {.grid = grid_of(a_.file()),
             .voxels = counts.octree.voxels,
             .svo_nodes = counts.octree.nodes,
             .dag_nodes = counts.dag_nodes,

@@ -9,6 +9,7 @@
 
 #include "core/base/popcount8.h"
 #include "core/format/global/checked_blocks.h"
+#include "core/format/global/global_layout.h"
 #include "core/format/global/voxdag_reader.h"
 #include "voxdag/cancel_token.h"
 
@@ -35,7 +36,6 @@ class DagInput {
 
  private:
   friend class LevelCursor;
-  static constexpr uint64_t kMaxNodeWords = 17;  // a child mask and eight wide offsets
   // Bytes that the system may load for one access.
   static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
   static constexpr uint64_t kBytesBetweenChecks = uint64_t{8} << 20;
@@ -43,8 +43,9 @@ class DagInput {
   void expect_intact(uint32_t level, uint64_t offset) {
     const voxdag_reader::Level& nodes = file_.level(level);
     if (offset >= nodes.word_count) return;  // File::node() and brick() refuse the offset
-    blocks_.expect_intact(nodes.words + offset,
-                          sizeof(uint32_t) * std::min(kMaxNodeWords, nodes.word_count - offset));
+    blocks_.expect_intact(
+        nodes.words + offset,
+        sizeof(uint32_t) * std::min(global_layout::kMaxNodeWords, nodes.word_count - offset));
     touch(kVisitBytes);
   }
   void touch(uint64_t bytes) {
@@ -98,7 +99,7 @@ class LevelCursor {
 
   void load() {
     if (at_end()) return expect_all_nodes();
-    if (offset_ + DagInput::kMaxNodeWords > checked_) check_chunk();
+    if (offset_ + global_layout::kMaxNodeWords > checked_) check_chunk();
     if (is_brick_level_) return load_brick();
     node_ = input_.file_.node(level_, offset_);
     size_ = 1 + (static_cast<uint64_t>(kPopcount8[node_.child_mask]) << wide_);

@@ -24,6 +24,9 @@
 
 namespace voxdag::query {
 
+// Throws Error{kCorrupt}: a parent points to a word of this file at which no node begins.
+[[noreturn]] void refuse_missing_node(const std::string& path, uint32_t level, uint64_t offset);
+
 class DagView {
  public:
   // The 32-bit words of a level, in the layout of the global file (docs/format.md). If `wide` is
@@ -48,7 +51,9 @@ class DagView {
     const std::span<const uint32_t> words = levels_[depth].words;
     if (offset < words.size()) __builtin_prefetch(words.data() + offset);
   }
-  [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
+  [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const {
+    refuse_missing_node(path_, level, offset);
+  }
   int64_t resolution() const { return int64_t{1} << grid_levels_; }
 
   // The occupied children of a cell that is larger than a voxel. Bit i of `mask` is set if child i

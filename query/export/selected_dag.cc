@@ -252,10 +252,4 @@ SelectedDag::Size SelectedDag::size_at(uint32_t grid_levels) const {
   return size;
 }
 
-void SelectedDag::corrupt(uint32_t level, uint64_t offset) const {
-  throw Error(ErrorCode::kCorrupt, path_ + ": level " + std::to_string(level) + ", word " +
-                                       std::to_string(offset) +
-                                       ": no node begins here, although a parent points here");
-}
-
 }  // namespace voxdag::query

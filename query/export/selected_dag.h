@@ -69,7 +69,9 @@ class SelectedDag {
 
  private:
   struct Built;
-  [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const;
+  [[noreturn]] void corrupt(uint32_t level, uint64_t offset) const {
+    refuse_missing_node(path_, level, offset);
+  }
 
   uint32_t grid_levels_;
   std::string path_;

@@ -247,10 +247,7 @@ class VoxWriter {
     if (depth == depth_) {
       job_.cancel.check();
       if (depth_ + kBrickLevels != view_.grid_levels() && content >= level_words_)
-        throw Error(ErrorCode::kCorrupt,
-                    job_.file.path() + ": level " + std::to_string(depth_) + ", word " +
-                        std::to_string(content) +
-                        ": no node begins here, although a parent points here");
+        refuse_missing_node(job_.file.path(), depth_, content);
       return visit(corner, content);
     }
     const DagView::Children children = view_.children(depth, content);
@@ -371,7 +368,7 @@ ExportReport write_vox(const ExportJob& job) {
     report.notes.push_back("a palette of " + count_text(colors.count()) +
                            " colors; each place has a separate model (--gray shares equal models)");
   if (dag.grid_levels() > std::bit_width(kMagicaVoxelEdge) - 1)
-    report.notes.push_back(
+    report.notes.emplace_back(
         "MagicaVoxel shows at most 2048 voxels per edge; other readers take all");
   return report;
 }

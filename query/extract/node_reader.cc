@@ -5,11 +5,11 @@
 #include "core/base/error.h"
 #include "core/base/popcount8.h"
 #include "core/format/global/global_layout.h"
+#include "query/dag/dag_view.h"
 
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kMaxNodeWords = 17;  // a child mask and eight wide offsets
 // A gap of up to this number of words between two nodes is read together with them, because a
 // separate call costs about as much as reading the gap.
 constexpr uint64_t kGapWords = 2048;
@@ -48,23 +48,21 @@ void CheckedReader::check(uint64_t begin, uint64_t bytes, std::span<std::byte> b
 }
 
 void NodeReader::corrupt(uint32_t level, uint64_t offset) const {
-  throw Error(ErrorCode::kCorrupt, source_.header().path() + ": level " + std::to_string(level) +
-                                       ", word " + std::to_string(offset) +
-                                       ": no node begins here, although a parent points here");
+  refuse_missing_node(source_.header().path(), level, offset);
 }
 
 size_t NodeReader::fill(uint32_t level, std::span<const WantedNode> wanted) {
   const uint64_t level_words = source_.header().level(level).word_count;
   first_ = wanted.front().offset;
   if (first_ >= level_words) corrupt(level, first_);
-  uint64_t end = first_ + kMaxNodeWords;
+  uint64_t end = first_ + global_layout::kMaxNodeWords;
   size_t count = 1;
   for (; count < wanted.size(); ++count) {
     const uint64_t offset = wanted[count].offset;
     if (offset > end + kGapWords || offset >= level_words ||
-        offset + kMaxNodeWords > first_ + buffer_.size())
+        offset + global_layout::kMaxNodeWords > first_ + buffer_.size())
       break;
-    end = offset + kMaxNodeWords;
+    end = offset + global_layout::kMaxNodeWords;
   }
   count_ = std::min(end, level_words) - first_;
   source_.read(level, first_, {buffer_.data(), count_}, {block_.data(), block_.size()});

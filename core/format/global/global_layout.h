@@ -29,6 +29,8 @@ inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 40;
 #define VOXDAG_NARROW_LEVEL_WORDS (uint64_t{1} << 32)
 #endif
 inline constexpr uint64_t kNarrowLevelWords = VOXDAG_NARROW_LEVEL_WORDS;
+// Maximum number of words of a node: a child mask and eight wide offsets.
+inline constexpr uint64_t kMaxNodeWords = 17;
 
 // Offsets in an entry of the attribute table. All other bytes of an entry are reserved and 0.
 inline constexpr size_t kAttributeKindAt = 0;

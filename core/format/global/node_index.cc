@@ -3,11 +3,11 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/base/popcount8.h"
+#include "core/format/global/global_layout.h"
 
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kMaxNodeWords = 17;
 // A guessed beginning is accepted if this many consecutive nodes could follow from it. From a wrong
 // beginning there is practically never such a long chain. If there is, join() corrects the guess.
 constexpr int kConvincingNodes = 32;
@@ -33,7 +33,8 @@ uint64_t NodeIndex::guess_begin(uint64_t span) const {
     return at <= level_.word_count;
   };
   if (span == 0) return 0;
-  for (uint64_t at = first; at < std::min(first + kMaxNodeWords, level_.word_count); ++at)
+  for (uint64_t at = first; at < std::min(first + global_layout::kMaxNodeWords, level_.word_count);
+       ++at)
     if (is_convincing(at)) return at;
   return first;
 }

@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/color/attribute_set.h"
 #include "core/format/global/voxdag_reader.h"
+#include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 
 namespace voxdag {
@@ -61,6 +62,11 @@ static_assert(std::ranges::all_of(kAttributeTable, [](const AttributeTraits& row
 inline const voxdag_reader::ColorSection& section_of(const voxdag_reader::File& file,
                                                      Attribute attribute) {
   return file.section(static_cast<uint32_t>(attribute));
+}
+
+inline Grid grid_of(const voxdag_reader::File& file) {
+  const double(&origin)[3] = file.origin();
+  return Grid::given({origin[0], origin[1], origin[2]}, file.edge(), file.grid_levels());
 }
 
 // Returns the attributes that a file has.
