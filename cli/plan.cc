@@ -32,6 +32,7 @@ void print(const Estimate& e) {
               count_text(e.triangles).c_str(), count_text(e.subvolumes).c_str(),
               count_text(e.pilot_resolution).c_str());
   print_range("voxels", e.voxels, count);
+  if (e.solid) print_range("voxels inside", e.solid->interior, count);
   print_range("octree nodes", e.svo_nodes, count);
   print_range("DAG nodes", e.dag_nodes, count);
   print_range("global file", e.file_bytes, size);

@@ -33,6 +33,8 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& caller) {
   const PreparedScene scene = prepare_scene(full, source, budget, clock, context, no_checkpoints);
   Estimate estimate =
       estimate_build(full.geometry, scene, source, {context, full.run.threads, budget});
+  if (estimate.solid && estimate.solid->warning)
+    context.progress.warn_of_input(*estimate.solid->warning);
   estimate.free_disk = context.files.free_space(work.path());
   return estimate;
 }

@@ -36,6 +36,27 @@ class ColorEstimate(TypedDict):
     cpu_s: Range
 
 
+class SceneWarning(TypedDict):
+    """A warning about a scene."""
+
+    code: str
+    place: str
+    message: str
+    count: int
+
+
+class SolidEstimate(TypedDict):
+    """The part of an estimate for a solid's interior."""
+
+    rule: str
+    interior: Range
+    disputed: Range
+    rows: int
+    open_rows: int
+    odd_rows: int
+    warnings: list[SceneWarning]
+
+
 class Estimate(TypedDict):
     """The result of plan(). docs/cli.md (The estimate of plan) explains the members."""
 
@@ -52,6 +73,7 @@ class Estimate(TypedDict):
     wall_s: Range
     free_disk_bytes: int
     memory_budget_bytes: int
+    solid: NotRequired[SolidEstimate]
     colors: NotRequired[ColorEstimate]
 
 

@@ -50,6 +50,12 @@ SolidReport enclosed_report(uint64_t voxels, uint64_t shell) {
 }
 
 std::optional<Warning> solid_warning(const SolidReport& report, const std::string& scene) {
+  if (report.rule == name_of(SolidName::kEnclosed)) {
+    if (report.interior != 0) return std::nullopt;
+    return Warning{
+        "solid-reached", scene,
+        "nothing is enclosed: walks from the border of the grid reach every empty voxel"};
+  }
   if (report.rows == 0) return std::nullopt;
   const bool is_parity = report.rule == name_of(SolidName::kParity);
   const uint64_t open = is_parity ? report.odd_rows : report.open_rows;

@@ -225,6 +225,18 @@ TEST_F(FileCommands, PlanNames) {
   EXPECT_FALSE(exists("m.glb.work"));
 }
 
+// The estimate of a solid has its interior. The warnings about its surface come from the pilot.
+TEST_F(FileCommands, PlanOfASolid) {
+  const Json solid = run_json({"plan", "m.glb", "-r", "256", "--solid", "winding"})["solid"];
+  EXPECT_EQ(solid["rule"], "winding");
+  EXPECT_LE(solid["interior"]["low"], solid["interior"]["high"]);
+  for (const char* name : {"disputed", "rows", "open_rows", "odd_rows", "warnings"})
+    EXPECT_TRUE(solid.contains(name)) << name;
+  const Answer text = run({"plan", "m.glb", "-r", "256", "--solid", "enclosed"});
+  EXPECT_EQ(text.status, 0);
+  EXPECT_NE(text.out.find("voxels inside"), std::string::npos) << text.out;
+}
+
 // status reads a work folder. A folder that does not exist or has no job is an error.
 TEST_F(FileCommands, StatusNames) {
   run_json({"build", "m.glb", "-r", "128", "-o", "m.vdag", "--keep-work"});

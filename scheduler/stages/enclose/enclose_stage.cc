@@ -17,6 +17,7 @@
 #include "core/format/artifact/artifact_writer.h"
 #include "core/geometry/octree_descent.h"
 #include "scheduler/solid/full_cubes.h"
+#include "scheduler/solid/solid_report.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/enclose/join_parts.h"
 #include "scheduler/stages/enclose/read_levels.h"
@@ -225,10 +226,10 @@ class Enclosure {
     uint64_t voxels = 0, shell_voxels = 0;
     for (const FilledPart& part : all) voxels += part.voxels;
     for (const StoredSubvolume& leaf : job_.store->leaves()) shell_voxels += leaf.summary.voxels;
-    if (voxels == shell_voxels && shell_voxels != 0)
-      job_.context.progress.warn_of_input(
-          {"solid-reached", job_.spec.geometry.scenes.front(),
-           "nothing is enclosed: walks from the border of the grid reach every empty voxel"});
+    if (shell_voxels == 0) return;
+    const SolidReport report = enclosed_report(voxels, shell_voxels);
+    if (const auto warning = solid_warning(report, job_.spec.geometry.scenes.front()))
+      job_.context.progress.warn_of_input(*warning);
   }
 
   BuildJob& job_;

@@ -5,10 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/base/clock.h"
 #include "core/base/error.h"
-#include "scheduler/spec/memory_plan.h"
-#include "scheduler/stages/plan/pilot_triangles.h"
+#include "core/fields/json_fields.h"
+#include "scheduler/solid/row_sums.h"
+#include "scheduler/solid/solid_report.h"
+#include "scheduler/stages/plan/pilots.h"
 
 namespace voxdag {
 namespace {
@@ -38,85 +39,14 @@ constexpr double kMaxDiskBytesPerNode = 40;
 constexpr double kBuildOverPilotTime = 1.5;
 // Upper bound of the cells per brick. A surface that crosses a brick sets about 16 of its voxels.
 constexpr double kMaxCellsPerBrick = 32;
+// Bytes of the work files with sample rows, per byte of the uncompressed rows. Measured on real
+// scenes.
+constexpr EstimateRange kRowFilesOverRows = {0.02, 0.1, 0.5};
+// Memory for filling a part of an enclosed solid, per node of the part.
+constexpr double kEncloseBytesPerNode = 150;
 // Peak memory of the merge per node of the global DAG, and memory of a process without a scene.
 constexpr double kMemoryBytesPerNode = 26;
 constexpr double kBaseMemoryBytes = 24e6;
-
-// Returns the number of grid levels of the finer of the two pilots. Large builds are extrapolated
-// from 13 levels (8192^3 voxels). This pilot takes one or two seconds. If the triangles do not fit
-// in memory on this grid, they are read again for a coarser pilot.
-uint32_t pilot_levels_of(uint32_t grid_levels) {
-  return std::clamp<uint32_t>(grid_levels - std::min<uint32_t>(grid_levels, 2), 12, 13);
-}
-
-// Results of a pilot build. A pilot builds the complete scene as one subvolume on a coarser grid;
-// its output is counted and discarded.
-struct PilotCounts {
-  uint32_t levels = 0;  // levels of the pilot's grid
-  double voxels = 0;
-  double svo_nodes = 0;
-  double dag_nodes = 0;
-  double file_bytes = 0;  // size of the pilot's global file, which is not written
-  double cpu_s = 0;
-};
-
-class CountingSink : public SubDagSink {
- public:
-  void bricks(const BrickLevelView& level) override { words += 2 * level.masks.size(); }
-  void nodes(const NodeLevelView& level) override {
-    words += level.masks.size() + level.children.size();
-  }
-  uint64_t words = 0;
-};
-
-// Builds a pilot of 2^levels voxels per edge. `triangles` are snapped to a grid that is finer by
-// `shift` levels (0: to the pilot's grid). Returns nullopt if the build does not fit the budget.
-std::optional<PilotCounts> build_pilot(const PilotTriangles& triangles, uint32_t shift,
-                                       uint32_t levels, VoxelRule rule, Backend& backend,
-                                       MemoryBudget& budget, const CancelToken& cancel) {
-  const double start = thread_cpu_seconds();
-  const auto stream = triangles.open(shift);
-  CountingSink sink;
-  SubDagSummary summary;
-  if (backend.build({levels, Cube{}, 64, nullptr, rule}, *stream, budget, cancel, sink, summary) ==
-      BuildOutcome::kNeedsSplit)
-    return std::nullopt;
-  PilotCounts counts;
-  counts.levels = levels;
-  counts.voxels = static_cast<double>(summary.voxels);
-  counts.svo_nodes = static_cast<double>(summary.svo_nodes);
-  counts.dag_nodes = static_cast<double>(summary.dag_nodes);
-  counts.file_bytes = 4.0 * static_cast<double>(sink.words);
-  counts.cpu_s = thread_cpu_seconds() - start + triangles.cpu_s();
-  return counts;
-}
-
-// Runs pilots at two consecutive resolutions, the finest whose triangles and tables fit the budget.
-// Returns the coarser pilot first. Returns fewer than two pilots if too many resolutions do not
-// fit.
-std::vector<PilotCounts> build_pilots(const PreparedScene& scene, uint32_t pilot_levels,
-                                      VoxelRule rule, const StageContext& context) {
-  const auto backend = make_cpu_backend();
-  MemoryBudget share(MemoryPlan::pilot_bytes(context.budget.available()), &context.budget);
-  MemoryBudget triangle_share(share.limit() / 2, &share);
-  const uint32_t grid_levels = scene.state.grid.levels;
-  const uint32_t finest = std::min(pilot_levels, grid_levels);
-  const uint32_t coarsest = std::max<uint32_t>(kMinGridLevels, finest - std::min(finest, 4u));
-  std::vector<PilotCounts> pilots;
-  std::optional<PilotTriangles> triangles;
-  uint32_t triangle_levels = finest;
-  for (uint32_t levels = finest; levels >= coarsest && pilots.size() < 2; --levels) {
-    if (!triangles || !triangles->is_complete()) {
-      triangles.emplace(*scene.triangles, grid_levels - levels, triangle_share, context);
-      triangle_levels = levels;
-    }
-    if (!triangles->is_complete()) continue;
-    const auto pilot = build_pilot(*triangles, triangle_levels - levels, levels, rule, *backend,
-                                   share, context.build.cancel);
-    if (pilot) pilots.insert(pilots.begin(), *pilot);
-  }
-  return pilots;
-}
 
 // Extrapolates a count that grows as a R^2 + b R. `coarse` and `fine` are the counts of the two
 // pilots, which determine a and b. `doublings` is the number of doublings of R from the finer
@@ -128,6 +58,24 @@ double grow_as_surface(double coarse, double fine, int doublings) {
   if (square <= 0) return fine * ratio * ratio;
   const double grown = square * ratio * ratio + linear * ratio;
   return doublings < 0 ? std::max(grown, 1.0) : std::max(grown, fine);
+}
+
+// Extrapolates a count of a solid, which grows as a R^3 + b R^2: a R^3 for the volume of the
+// interior, b R^2 for the area of surfaces.
+double grow_as_volume(double coarse, double fine, int doublings) {
+  const double ratio = std::exp2(doublings);
+  const double cube = 2 * (fine - 4 * coarse), square = fine - cube;  // at the fine pilot
+  if (cube <= 0) return grow_as_surface(coarse, fine, doublings);
+  return std::max((cube * ratio + square) * ratio * ratio, fine);
+}
+
+// Extrapolates a number of voxels or octree nodes.
+EstimateRange grow_count(double PilotCounts::*count, const std::vector<PilotCounts>& pilots,
+                         bool is_solid, int doublings) {
+  const double fine = pilots.back().*count;
+  const double coarse = pilots[pilots.size() > 1 ? pilots.size() - 2 : 0].*count;
+  if (is_solid) return within(grow_as_volume(coarse, fine, doublings), 1 + 0.05 * doublings);
+  return within(grow_as_surface(coarse, fine, doublings), 1 + 0.02 * doublings);
 }
 
 // Extrapolates the number of DAG nodes by a number of doublings of R from the last pilot. Starts
@@ -165,6 +113,56 @@ void add_colors(const ColorEstimate& colors, Estimate& estimate) {
   estimate.cpu_s = estimate.cpu_s + colors.cpu_s;
 }
 
+// Bytes of the sample rows of all subvolumes, and of the largest one.
+struct PlannedRows {
+  double all = 0, largest = 0;
+};
+PlannedRows planned_rows(const PreparedScene& scene) {
+  PlannedRows rows;
+  for (const SubvolumePlan& subvolume : scene.plan) {
+    const auto bytes = static_cast<double>(row_bytes(subvolume.cube, scene.state.grid.levels));
+    rows.all += bytes;
+    rows.largest = std::max(rows.largest, bytes);
+  }
+  return rows;
+}
+
+// The disk space and the memory that only a solid needs.
+struct SolidNeeds {
+  EstimateRange disk_bytes, memory_bytes;
+};
+SolidNeeds solid_needs(const GeometryOptions& options, const PreparedScene& scene,
+                       const EstimateRange& artifact_nodes, unsigned threads) {
+  if (solid_rule_of(options) != SolidRule::kNone) {
+    const PlannedRows rows = planned_rows(scene);
+    return {rows.all * kRowFilesOverRows, exactly(2 * rows.largest * threads)};
+  }
+  const double subvolumes = static_cast<double>(std::max<size_t>(scene.plan.size(), 1));
+  return {kArtifactBytesPerNode * artifact_nodes,
+          kEncloseBytesPerNode * std::min(1.0, threads / subvolumes) * artifact_nodes};
+}
+
+// Extrapolates the interior of a solid. The finer pilot counts the sample rows.
+SolidEstimate estimate_solid(const GeometryOptions& options, const std::vector<PilotCounts>& pilots,
+                             int doublings) {
+  const PilotCounts& last = pilots.back();
+  SolidEstimate solid;
+  solid.rule = name_of(options.solid);
+  solid.interior = grow_count(&PilotCounts::interior, pilots, true, doublings);
+  solid.disputed = grow_count(&PilotCounts::disputed, pilots, true, doublings);
+  solid.rows = last.rows;
+  SolidReport report{.rule = solid.rule, .rows = last.rows.rows};
+  report.interior = static_cast<uint64_t>(solid.interior.likely);
+  report.disputed = static_cast<uint64_t>(solid.disputed.likely);
+  report.open_rows = last.rows.open;
+  report.odd_rows = last.rows.odd;
+  solid.warning = solid_warning(report, options.scenes.front());
+  if (solid.warning)
+    solid.warning->message +=
+        " (estimated from a build at " + std::to_string(uint64_t{1} << last.levels) + "^3)";
+  return solid;
+}
+
 // Returns an upper bound of the disk space of a build, without pilots. It is several times the
 // actual size.
 double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
@@ -176,7 +174,9 @@ double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.state.counts.triangles);
   const double octree_nodes = 2 * bricks + scene.state.grid.levels * triangles;
-  const double geometry = kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
+  double geometry = kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
+  if (options.solid == SolidName::kEnclosed) geometry += kMaxDiskBytesPerNode * octree_nodes;
+  if (solid_rule_of(options) != SolidRule::kNone) geometry += 2 * planned_rows(scene).all;
   if (!options.attributes.any()) return geometry;
   const uint32_t color_levels = levels_of_resolution(options.color_resolution);
   const double cells =
@@ -232,8 +232,7 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   estimate.subvolumes = scene.plan.size();
   for (const SubvolumePlan& subvolume : scene.plan) estimate.expected_bricks += subvolume.weight;
   estimate.free_memory = budget.limit();
-  const auto pilots =
-      build_pilots(scene, pilot_levels_of(scene.state.grid.levels), options.rule(), context);
+  const auto pilots = build_pilots(options, scene, source, context);
   if (pilots.empty()) {
     // There are too many triangles even for a small grid. Their expected voxels are an upper bound.
     estimate.voxels = {0, scene.state.counts.expected_voxels, scene.state.counts.expected_voxels};
@@ -244,11 +243,10 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   const int doublings = static_cast<int>(scene.state.grid.levels - last.levels);
   estimate.pilot_resolution = uint64_t{1} << last.levels;
 
-  const double surface_spread = 1 + 0.02 * doublings;
+  const bool is_solid = options.solid != SolidName::kNone;
   const double spread = std::pow(kSpreadPerDoubling, doublings);
-  estimate.voxels = within(grow_as_surface(before.voxels, last.voxels, doublings), surface_spread);
-  estimate.svo_nodes =
-      within(grow_as_surface(before.svo_nodes, last.svo_nodes, doublings), surface_spread);
+  estimate.voxels = grow_count(&PilotCounts::voxels, pilots, is_solid, doublings);
+  estimate.svo_nodes = grow_count(&PilotCounts::svo_nodes, pilots, is_solid, doublings);
   const double nodes = std::min(grow_as_dag(pilots, doublings), estimate.svo_nodes.likely);
   estimate.dag_nodes = within(nodes, spread);
   const double pilot_bytes = last.dag_nodes > 0 ? last.file_bytes / last.dag_nodes : 0;
@@ -266,6 +264,12 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   const double triangle_bytes =
       static_cast<double>(scene.triangles->record_bytes()) * static_cast<double>(records);
   estimate.memory_bytes = kMemoryBytesPerNode * estimate.dag_nodes + exactly(triangle_bytes);
+  if (is_solid) {
+    const SolidNeeds needs = solid_needs(options, scene, artifact_nodes, context.threads);
+    estimate.disk_bytes = estimate.disk_bytes + needs.disk_bytes;
+    estimate.memory_bytes = estimate.memory_bytes + needs.memory_bytes;
+    estimate.solid = estimate_solid(options, pilots, doublings);
+  }
   for (double* figure :
        {&estimate.memory_bytes.low, &estimate.memory_bytes.likely, &estimate.memory_bytes.high})
     *figure = std::min(*figure, static_cast<double>(budget.limit())) + kBaseMemoryBytes;
@@ -314,6 +318,16 @@ std::string estimate_json(const Estimate& e) {
       {"free_disk_bytes", e.free_disk},
       {"memory_budget_bytes", e.free_memory},
   };
+  if (const auto& s = e.solid) {
+    json["solid"] = {{"rule", s->rule},
+                     {"interior", count_json(s->interior)},
+                     {"disputed", count_json(s->disputed)},
+                     {"rows", s->rows.rows},
+                     {"open_rows", s->rows.open},
+                     {"odd_rows", s->rows.odd}};
+    json["solid"]["warnings"] = ordered_json::array();
+    if (s->warning) json["solid"]["warnings"].push_back(record_json(*s->warning));
+  }
   if (const auto& c = e.colors)
     json["colors"] = {{"cells", count_json(c->cells)},
                       {"file_bytes", count_json(c->file_bytes)},

@@ -6,6 +6,9 @@
 // nodes grows by a factor whenever R doubles. Two pilots give the first factor. A surface looks
 // flatter within smaller voxels, so the factor falls with each further doubling, at a rate measured
 // on real scenes. The range of an estimate widens with the number of doublings from the pilots.
+//
+// The pilots of a solid are solids. Its voxels and octree nodes grow as a R^3 + b R^2: a R^3 for
+// the volume of the interior, b R^2 for the area of surfaces.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +16,23 @@
 #include <string>
 #include <vector>
 
+#include "core/base/warning.h"
+#include "scheduler/solid/solid_rows.h"
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/stages/ingest/ingest_stage.h"
 #include "scheduler/stages/plan/color_estimate.h"
 #include "scheduler/stages/plan/estimate_range.h"
 
 namespace voxdag {
+
+// The interior of a solid. The numbers of sample rows are exact for the finer pilot.
+struct SolidEstimate {
+  std::string rule;
+  EstimateRange interior;  // voxels of the solid that are not in its shell
+  EstimateRange disputed;  // voxels of the interior whose directions disagree
+  RowCounts rows;
+  std::optional<Warning> warning;  // the warning that the build is expected to give
+};
 
 struct Estimate {
   uint64_t triangles = 0;
@@ -32,9 +46,10 @@ struct Estimate {
   EstimateRange cpu_s;
   EstimateRange wall_s;
   std::optional<ColorEstimate>
-      colors;                // only for a build with colors; included in the totals above
-  uint64_t free_disk = 0;    // free bytes on the work folder's disk; 0 if unknown
-  uint64_t free_memory = 0;  // the memory budget in bytes
+      colors;                          // only for a build with colors; included in the totals above
+  std::optional<SolidEstimate> solid;  // only for a solid whose pilots fit the memory
+  uint64_t free_disk = 0;              // free bytes on the work folder's disk; 0 if unknown
+  uint64_t free_memory = 0;            // the memory budget in bytes
 };
 
 // Estimates the build of a prepared scene without changing it. The pilots run on this thread,

@@ -59,6 +59,14 @@ class RecentTriangles {
   std::vector<FixedTriangle> slots_;
 };
 
+// Returns false for most triangles without area: if two corners are equal.
+bool has_area(const FixedTriangle& triangle) {
+  for (int i = 0; i < 3; ++i)
+    if (std::memcmp(triangle.v[i], triangle.v[(i + 1) % 3], sizeof triangle.v[i]) == 0)
+      return false;
+  return true;
+}
+
 // The unique triangles found by one thread.
 struct Found {
   RecentTriangles recent;
@@ -67,8 +75,8 @@ struct Found {
 
 }  // namespace
 
-PilotTriangles::PilotTriangles(const TriangleStore& scene, uint32_t shift, MemoryBudget& budget,
-                               const StageContext& context)
+PilotTriangles::PilotTriangles(const TriangleStore& scene, uint32_t shift, bool keeps_equal,
+                               MemoryBudget& budget, const StageContext& context)
     : record_bytes_(scene.record_bytes()) {
   const uint64_t triangles = scene.count(kSceneBin);
   const size_t pieces = (triangles + kPilotPiece - 1) / kPilotPiece;
@@ -107,7 +115,7 @@ PilotTriangles::PilotTriangles(const TriangleStore& scene, uint32_t shift, Memor
       const size_t n = stream.read(std::span(batch).first(std::min<uint64_t>(left, batch.size())));
       if (n == 0) break;
       for (const FixedTriangle& triangle : std::span(batch).first(n)) {
-        if (!thread.recent.add(triangle)) continue;
+        if (!(keeps_equal && has_area(triangle)) && !thread.recent.add(triangle)) continue;
         const size_t end = thread.records.size();
         thread.records.resize(end + record_bytes_);
         encode_triangle(triangle, record_bytes_, thread.records.data() + end);

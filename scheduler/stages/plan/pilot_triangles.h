@@ -1,7 +1,8 @@
 // The triangles of a scene on the coarser grid of a pilot. Triangles that become equal on this grid
 // are kept only once if they are close together in the scene's order. If the scene's triangles are
 // much smaller than the pilot's voxels, few triangles remain. They touch the same voxels of the
-// pilot's grid as all triangles.
+// pilot's grid as all triangles. The rules of solids count every crossing of a triangle, so their
+// pilots keep equal triangles, except triangles without area, which cross nothing.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +17,9 @@ namespace voxdag {
 class PilotTriangles {
  public:
   // Copies the triangles of the store's scene bin, with coordinates divided by 2^shift. All threads
-  // of the stage "estimate" read the bin. If `budget` is too small for the copy, is_complete() is
-  // false.
-  PilotTriangles(const TriangleStore& scene, uint32_t shift, MemoryBudget& budget,
+  // of the stage "estimate" read the bin. If `keeps_equal` is true, equal triangles with an area
+  // are kept. If `budget` is too small for the copy, is_complete() is false.
+  PilotTriangles(const TriangleStore& scene, uint32_t shift, bool keeps_equal, MemoryBudget& budget,
                  const StageContext& context);
 
   bool is_complete() const { return is_complete_; }

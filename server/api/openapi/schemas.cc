@@ -174,6 +174,13 @@ void add_plan(Json& all) {
   for (const char* range : {"voxels", "svo_nodes", "dag_nodes", "file_bytes", "disk_bytes",
                             "memory_bytes", "cpu_s", "wall_s"})
     members.push_back({range, named("EstimateRange")});
+  members.push_back(optional("solid", object({{"rule", text()},
+                                              {"interior", named("EstimateRange")},
+                                              {"disputed", named("EstimateRange")},
+                                              {"rows", count()},
+                                              {"open_rows", count()},
+                                              {"odd_rows", count()},
+                                              {"warnings", array(record_schema<Warning>())}})));
   all["Plan"] = object(members);
 }
 

@@ -51,7 +51,7 @@ class PilotTrianglesTest : public testing::Test {
  protected:
   PilotTrianglesTest() { fill(store_, 200); }
   PilotTriangles thin(uint32_t shift, MemoryBudget& budget, unsigned threads) {
-    return {store_, shift, budget, {{system_files(), progress_, cancel_}, threads, budget_}};
+    return {store_, shift, false, budget, {{system_files(), progress_, cancel_}, threads, budget_}};
   }
   const TemporaryFolder folder_;
   NoProgress progress_;

@@ -1,0 +1,35 @@
+// Pilots: builds of the complete scene on coarser grids, each as one subvolume. Their output is
+// counted and discarded.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "scheduler/solid/solid_rows.h"
+#include "scheduler/spec/build_spec.h"
+#include "scheduler/stages/ingest/ingest_stage.h"
+#include "scheduler/state/build_scene.h"
+
+namespace voxdag {
+
+struct PilotCounts {
+  uint32_t levels = 0;  // levels of the pilot's grid
+  double voxels = 0;
+  double svo_nodes = 0;
+  double dag_nodes = 0;
+  double file_bytes = 0;  // size of the pilot's global file, which is not written
+  double cpu_s = 0;
+  // Only for solids: set voxels that are not in the shell, the disputed ones of these, and the
+  // sample rows.
+  double interior = 0;
+  double disputed = 0;
+  RowCounts rows;
+};
+
+// Runs pilots at two consecutive resolutions, the finest whose triangles and tables fit the budget.
+// Returns the coarser pilot first. Returns fewer than two pilots if too many resolutions do not
+// fit. The pilots run on this thread.
+std::vector<PilotCounts> build_pilots(const GeometryOptions& options, const PreparedScene& scene,
+                                      BuildScene& source, const StageContext& context);
+
+}  // namespace voxdag

@@ -1,0 +1,93 @@
+#include "scheduler/stages/plan/solid_pilot.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/base/popcount8.h"
+#include "core/dag/space/enclosed_fill.h"
+#include "core/dag/space/space_labels.h"
+#include "scheduler/solid/row_sums.h"
+#include "scheduler/stages/rows/outside_rows.h"
+#include "scheduler/stages/rows/row_column.h"
+
+namespace voxdag {
+
+PilotRows::PilotRows(MemoryBudget& budget, uint32_t levels) : budget_(budget), levels_(levels) {
+  // The sums and a column need the same memory for a short time.
+  const uint64_t views = row_bytes(Cube{}, levels);
+  const uint64_t column = RowColumn::bytes(TileGrid(levels), Cube{});
+  if (budget.available() < 2 * views + column) throw OutOfBudget();
+  charge_ = MemoryCharge(budget, views, "the sample rows of a pilot");
+}
+
+void PilotRows::read(SolidRule rule, TriangleStream& triangles, BuildScene* beyond, Grid grid,
+                     const StageContext& context) {
+  RowSums sums(Cube{}, levels_, budget_);
+  std::array<FixedTriangle, 256> batch;
+  triangles.rewind();
+  while (const size_t n = triangles.read(batch)) {
+    context.build.cancel.check();
+    for (const FixedTriangle& triangle : std::span(batch).first(n)) sums.add(triangle);
+  }
+  triangles.rewind();
+  std::optional<OutsideRows> outside;
+  if (beyond != nullptr) {
+    grid.levels = levels_;
+    outside.emplace(levels_, budget_);
+    outside->read(beyond->open(), grid, context);
+  }
+  entry_.rule = rule;
+  for (int axis = 0; axis < 3; ++axis) {
+    RowColumn column(TileGrid(levels_), rule, axis, Cube{}, budget_);
+    column.add_total(Cube{}, sums.numbers(axis));
+    if (outside)
+      outside->for_each([&](int a, int first, int second, const OutsideTile& tile) {
+        if (a == axis) column.add_outside(first, second, tile);
+      });
+    column.count(counts_);
+    column.begin();
+    entry_.views[axis].resize(rows_per_axis(Cube{}, levels_));
+    column.entry(Cube{}, entry_.views[axis]);
+  }
+}
+
+void ShellLevels::bricks(const BrickLevelView& level) {
+  levels_.brick_rows = level.masks.size();
+  levels_.bricks = PooledArray<uint64_t>(memory_, level.masks.size());
+  std::ranges::copy(level.masks, levels_.bricks.begin());
+}
+
+void ShellLevels::nodes(const NodeLevelView& level) {
+  NodeLevels::Level& out = levels_.nodes.emplace_back();
+  out.rows = level.masks.size();
+  out.masks = PooledArray<uint8_t>(memory_, out.rows);
+  out.first_child = PooledArray<uint32_t>(memory_, out.rows);
+  out.children = PooledArray<uint32_t>(memory_, level.children.size());
+  std::ranges::copy(level.masks, out.masks.begin());
+  std::ranges::copy(level.children, out.children.begin());
+  uint32_t first = 0;
+  for (size_t row = 0; row < out.rows; ++row) {
+    out.first_child[row] = first;
+    first += static_cast<uint32_t>(popcount8(level.masks[row]));
+  }
+}
+
+NodeLevels ShellLevels::finish() {
+  std::ranges::reverse(levels_.nodes);
+  return std::move(levels_);
+}
+
+SubDagSummary fill_pilot(PooledMemory& memory, const NodeLevels& shell, uint32_t levels,
+                         SubDagSink& sink) {
+  const SpaceLabels labels(memory, shell);
+  // The faces of the cube are the border of the grid, so all labeled components are outside.
+  const std::vector<uint8_t> is_outside(labels.count(0, 0), 1);
+  SubDagTables tables(memory, static_cast<int>(levels));
+  fill_enclosed(memory, labels, is_outside, tables);
+  return emit_levels(tables, {0, levels, 64}, sink);
+}
+
+}  // namespace voxdag
