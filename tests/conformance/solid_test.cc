@@ -79,7 +79,8 @@ TEST_P(Solids, EqualTheOracle) {
   });
 }
 
-// Random scenes with slivers, degenerate triangles and edges through corners.
+// The voxels equal the oracle's in random scenes with slivers, degenerate triangles and edges
+// through corners.
 TEST_P(Solids, EqualTheOracleOnAnyTriangles) {
   const auto backend = open();
   for (const oracle::SceneKind kind : oracle::kAllKinds)
@@ -93,7 +94,7 @@ TEST_P(Solids, EqualTheOracleOnAnyTriangles) {
       }
 }
 
-// A grid of several tiles, as one subvolume.
+// The voxels equal the oracle's in a grid of several tiles that is built as one subvolume.
 TEST_P(Solids, EqualTheOracleInSeveralTiles) {
   const auto backend = open();
   for (const oracle::SolidKind kind :
@@ -119,7 +120,8 @@ void add_small_box(oracle::Triangles& out, const std::array<int64_t, 3>& low, in
   }
 }
 
-// More components without a corner than wait for their walks, some of them in the same block.
+// The voxels equal the oracle's if there are more components that touch no block corner than the
+// backend collects before it decides them. Some of them are in the same block.
 TEST_P(Solids, EqualTheOracleWithManyComponents) {
   const auto backend = open();
   oracle::Triangles scene;

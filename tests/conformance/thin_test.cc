@@ -30,7 +30,8 @@ void expect_thin(Backend& backend, const SubvolumeTask& task, const oracle::Tria
   expect_equals(build(backend, task, triangles), truth, task);
 }
 
-// Closed and open meshes in complete grids of 4 to 32 voxels per edge, and in their octants.
+// The voxels of closed and open meshes equal the oracle's, in complete grids of 4 to 32 voxels per
+// edge and in their octants.
 TEST_P(Thin, MeshesOfAllKinds) {
   const auto backend = open();
   const auto check = [&](oracle::SolidKind kind) {
@@ -45,7 +46,8 @@ TEST_P(Thin, MeshesOfAllKinds) {
   for (const oracle::SolidKind kind : oracle::kOpenSolids) check(kind);
 }
 
-// Triangles of every kind, in cubes at random positions of grids of up to 2^20 voxels per edge.
+// The voxels of triangles of every kind equal the oracle's, in cubes at random positions of grids
+// of up to 2^20 voxels per edge.
 TEST_P(Thin, TrianglesOfAllKinds) {
   const auto backend = open();
   oracle::Random random(31);
@@ -65,7 +67,8 @@ TEST_P(Thin, TrianglesOfAllKinds) {
     }
 }
 
-// Large triangles cover many tiles, whose nodes the CPU backend takes from its plane memo.
+// The voxels of large triangles equal the oracle's. Such triangles cover many tiles, whose nodes
+// the CPU backend takes from its plane memo.
 TEST_P(Thin, LargeFlatSurfaces) {
   const auto backend = open();
   oracle::Random random(32);

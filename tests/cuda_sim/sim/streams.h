@@ -30,7 +30,7 @@ struct CUevent_st {
 
 namespace voxdag::cuda_sim {
 
-// Held by every call of the runtime.
+// Returns the lock that every call of the runtime holds.
 std::recursive_mutex& device_lock();
 
 cudaStream_t create_stream();

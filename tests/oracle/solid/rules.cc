@@ -12,7 +12,8 @@ namespace {
 
 using Cell = std::array<int, 3>;
 
-// A connected set of empty voxels, the sum of view() over its sample points, and their number.
+// A connected set of empty voxels, the number of its sample points, and the sum of view() over
+// them.
 struct Unit {
   std::vector<Cell> cells;
   int views = 0, points = 0;

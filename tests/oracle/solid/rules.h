@@ -15,9 +15,9 @@ enum class SolidRule { kWinding, kParity, kEnclosed };
 struct Solid {
   Voxels voxels;          // the shell and the interior
   uint64_t interior = 0;  // voxels that are not in the shell
-  // Counts of sample rows: those with a crossing (rows), those whose signs of crossings do not sum
-  // to 0 (open_rows), and those with an odd number of crossings (odd_rows). `disputed` counts the
-  // interior voxels of units (rules.cc) whose directions do not all agree. All are 0 for kEnclosed.
+  // rows: sample rows with a crossing. open_rows: rows whose crossing signs do not sum to 0.
+  // odd_rows: rows with an odd number of crossings. disputed: interior voxels of units (rules.cc)
+  // whose directions do not all agree. All four are 0 for kEnclosed.
   uint64_t rows = 0, open_rows = 0, odd_rows = 0, disputed = 0;
 };
 

@@ -39,8 +39,8 @@ void sleep_for_seconds(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
 }
 
-// A library call never checks for cancellation. The command ends within 10 s with status 130, and
-// its temporary files are removed.
+// A command ends within 10 s of the signal even if it never checks for cancellation. Its status is
+// 130, and its temporary files are removed.
 TEST(Signals, EndACommandThatDoesNotStop) {
   const TemporaryFolder folder;
   const std::string file = folder.file("out.partial"), work = folder.file("work");

@@ -71,7 +71,7 @@ TEST(GltfContainer, OtherChunks) {
           glb_with_chunks(json, {{"XTRA", ""}, {"MORE", "1"}, {bin_type, bin}, {"LAST", "x"}}))
           .size(),
       1u);
-  // The lengths of chunks may lack the padding.
+  // The length of the JSON chunk may be the length without its padding.
   const std::string padded = json + std::string(4 - json.size() % 4, ' ');
   std::string glb = glb_with_chunks(padded, {{bin_type, bin}});
   put_u32(glb, 12, static_cast<uint32_t>(json.size()));

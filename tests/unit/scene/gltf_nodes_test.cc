@@ -30,7 +30,8 @@ TEST(GltfNodes, ScaleThenRotateThenTranslate) {
                   {"translation", {100, 200, 300}},
                   {"rotation", {0, 0, 0.5, 0.5}},
                   {"scale", {2, -3, 5}}});
-  // The quaternion is half of (0 0 1 1): as given, 1 - 2 * 0.25 = 0.5 and 2 * 0.25 = 0.5.
+  // The quaternion is used as given, although its length is not 1. So the entries of its matrix are
+  // 1 - 2 * 0.25 = 0.5 and 2 * 0.25 = 0.5.
   EXPECT_EQ(corners_of(scene),
             (std::vector<Point>{{100 + 0.5 * 2 + 0.5 * 6, 200 + 0.5 * 2 - 0.5 * 6, 315}}));
 }

@@ -10,7 +10,7 @@
 namespace voxdag::test {
 namespace {
 
-// A valid scene with one thing wrong, and words that the error must have.
+// A change that makes a valid scene invalid, and words that the error must contain.
 struct Refusal {
   const char* what;
   const char* pointer;  // JSON pointer of the replaced or added value

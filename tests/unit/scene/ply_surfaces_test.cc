@@ -27,7 +27,8 @@ std::string properties(const std::string& type, const std::vector<std::string>& 
   return lines;
 }
 
-// Three vertices and a face, with values after the usual ones.
+// Returns a PLY file with three vertices and a face. The arguments are additional properties of the
+// vertices and of the face, and their values.
 std::string triangle(const std::string& of_vertex, const std::string& vertex_values,
                      const std::string& of_face = "", const std::string& face_values = "",
                      const std::string& comments = "") {

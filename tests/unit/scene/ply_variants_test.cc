@@ -23,7 +23,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text;
 }
 
-// Corner numbers of vertices that are at (i, 0, 0).
+// Returns each triangle as the numbers of its vertices. Vertex i of the file is at (i, 0, 0).
 std::vector<std::array<int, 3>> numbers_of(const std::string& file) {
   std::vector<std::array<int, 3>> all;
   for (const Corners& corners : triangles_of_file(file))

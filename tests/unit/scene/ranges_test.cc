@@ -42,7 +42,8 @@ Corners corners_of(const RealTriangle& triangle) {
   return corners;
 }
 
-// Also checks that the snapped triangles and the bounds belong to the triangles that are read.
+// Returns the triangles from number `first` to `end`. Checks that read_snapped() and read_bounds()
+// give the same triangles, snapped, and their bounds.
 std::vector<Corners> triangles_between(TriangleCursor& cursor, uint64_t first, uint64_t end) {
   const Grid grid = Grid::given({-3, 2, 0.1}, 70, 10);
   std::vector<Corners> all, all_snapped, read_snapped;

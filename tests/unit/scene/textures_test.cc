@@ -13,7 +13,7 @@
 namespace voxdag::test {
 namespace {
 
-// 8-bit RGBA.
+// Returns a PNG file. `pixels` is RGBA with 8 bits.
 std::string png_of(uint32_t width, uint32_t height, const std::string& pixels) {
   PngFormat format;
   format.width = width;

@@ -242,7 +242,8 @@ TEST(Attributes, AreThoseOfTheTriangles) {
         for (const auto& [material, other] : expected.weights)
           ASSERT_TRUE(other != weight || values[i].material <= material);
 
-        // Near the threshold between the two sums, both normals are accepted.
+        // The rule uses `turned` if `area` is less than 1/64 of it. Near this limit, both normals
+        // are accepted.
         const double rest = largest_of(expected.area), turned = largest_of(expected.turned);
         const double from_rest =
             rest == 0 ? 180 : degrees_between(expected.area, direction_of(values[i].normal));

@@ -1,4 +1,4 @@
-// The voxels in which a triangle with cutouts is visible.
+// Tests in which voxels a triangle with cutouts is visible.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -276,7 +276,8 @@ TEST(Cutouts, VisibleAndHiddenImages) {
 TEST(Cutouts, BordersOfTexelsAtBordersOfVoxels) {
   const Cutouts cutouts = cutouts_of(2, 1, {Wrap::kClampToEdge, Wrap::kClampToEdge},
                                      [](uint32_t x, uint32_t) { return x == 0; });
-  // From lattice coordinate 1 to 255 * 32 along x: the middle is at 128 * 32, a border.
+  // Along x, the middle of the triangle's first edge, where its visible texel ends, is the border
+  // of a voxel. The check below confirms this.
   FixedSurface surface =
       surface_of({{0, 0, 8}, {31.9999, 0, 8}, {0, 31.9999, 8}}, {{0, 0}, {1, 0}, {0, 1}});
   ASSERT_EQ(surface.position.v[0][0] + surface.position.v[1][0], 2 * 16 * 256);

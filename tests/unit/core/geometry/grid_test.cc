@@ -130,7 +130,7 @@ TEST(Grid, OfAVoxelSize) {
   expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, 0.25, 4); });
   expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, 0.125, 4); });
   EXPECT_EQ(Grid::with_voxel_size(WorldBounds{}, 2, 2).edge, 8.0);
-  // The least levels that fit.
+  // levels_for_voxel_size() returns the smallest number of levels that is enough for the scene.
   for (const double size : {4.0, 1.0, 0.5, 0.3, 0.25, 1e-5}) {
     const uint32_t levels = Grid::levels_for_voxel_size(b, size);
     EXPECT_EQ(Grid::with_voxel_size(b, size, levels).levels, levels);

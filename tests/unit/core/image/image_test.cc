@@ -198,8 +198,8 @@ TEST(Png, HugeSizes) {
   EXPECT_THROW(decode(claiming(16384, 16384, true)), Error);
 }
 
-// Megabytes that compress to a thousandth of their size need only little memory: surplus rows after
-// the image, and compressed texts.
+// Surplus rows after the image, and compressed texts, need little memory, even if they expand to
+// megabytes, a thousand times their compressed size.
 TEST(Png, DecompressionBombs) {
   std::string rows = png_file({2, 512, 8, 6, ""}, std::string(4 << 20, '\0'));
   rows.replace(8, 25,

@@ -261,7 +261,7 @@ TEST_F(PosixFiles, CloseMayBeCalledTwice) {
   EXPECT_NO_THROW(file->close());
 }
 
-// Small files have a limit, which the error names.
+// read_small_file() refuses a file above the given size, and the error names the limit.
 TEST_F(PosixFiles, SmallFilesAreSmall) {
   put(path_, "12345");
   EXPECT_EQ(read_small_file(files_, path_, 5), "12345");

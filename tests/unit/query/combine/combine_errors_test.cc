@@ -17,9 +17,8 @@ class CombineErrors : public Combine {
     write_global(path("a"), random_voxels(7, 64));
     write_global(path("b"), random_voxels(8, 64));
   }
-  // Writes the union with short lists in memory, so that longer lists
-  // are in scratch files. Returns the code of
-  // the error; nullopt without an error.
+  // Writes the union with little memory for lists, so that longer lists are in scratch files.
+  // Returns the code of the error; nullopt without an error.
   std::optional<ErrorCode> combine_error(FileSystem& files, const CancelToken& cancel) {
     try {
       const auto a = open_global_file(path("a")), b = open_global_file(path("b"));
@@ -119,7 +118,7 @@ TEST_F(CombineErrors, FailingReads) {
 }
 
 // The process is killed at some operations. Afterwards the same command succeeds, unless the killed
-// process had finished its output. It removes the temporary files of the killed process.
+// process had finished its output. The command removes the killed process's temporary files.
 TEST_F(CombineErrors, Killed) {
   combine_error(system_files(), never_);
   const std::string clean = bytes("out");

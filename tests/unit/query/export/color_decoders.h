@@ -184,8 +184,8 @@ inline std::map<std::pair<Cell3, int>, Color3> decode_glb(const std::string& byt
   return faces;
 }
 
-// Reads the files of HashDAG. It finds a voxel's color as HashDAG's viewer does: it descends the
-// DAG and counts the voxels before this voxel.
+// Reads the files of HashDAG. Finds a voxel's color as HashDAG's viewer does: descends the DAG and
+// counts the voxels before this voxel.
 class HashDagColors {
  public:
   HashDagColors(const std::string& dag, const std::string& colors) {

@@ -214,7 +214,7 @@ TEST(GltfDraco, SkinsAreCompressed) {
 }
 
 // The triangles of a strip are the faces in the Draco data. The data lack the triangles that join
-// two strips, so the last face is repeated for each of them.
+// two strips. The reader repeats the last face once for each of these triangles.
 TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   SceneBuilder scene = compressed_scene(data, 25, 4 * 10 + 3 * 2);
@@ -269,8 +269,8 @@ TEST(GltfDraco, CountsOfTheDataAreRead) {
     }
 }
 
-// Large meshes whose faces do not share normals are not decoded to check their counts. More
-// vertices than the accessors declare are an error then, and fewer are not noticed.
+// If a mesh is large and its faces do not share normals, its counts are not checked by decoding it
+// first. Then more vertices than declared are an error, and fewer vertices are accepted.
 TEST(GltfDraco, CountsThatTheHeaderDoesNotShow) {
   const auto data = encode_draco(*bumpy_grid(60, true), draco::MESH_EDGEBREAKER_ENCODING, 10);
   const auto mesh = decode_draco(data);
@@ -431,7 +431,8 @@ TEST(GltfDraco, TablesOfIndicesArePartOfTheBudget) {
                                1, 3, 0});  // faces, vertices, compressed indices
 }
 
-// Draco allocates an object for each attribute before it decodes any attribute.
+// Draco allocates an object for each attribute before it decodes any attribute. A file whose
+// attributes exceed the budget is refused.
 TEST(GltfDraco, AttributesArePartOfTheBudget) {
   std::vector<char> data = {'D', 'R',    'A',    'C', 'O', 2, 2, 1, 0, 0, 0,  // sequential
                             1,   3,      1,      0,   1,   2,  // face, vertices, plain indices

@@ -28,7 +28,8 @@ std::vector<unsigned char> encode_sequence(const std::vector<uint32_t>& indices)
   return out;
 }
 
-// The codec rotates the corners of triangles, so the uncompressed copy stores its output.
+// Encodes and decodes the indices. The codec may rotate the corners of triangles, so the
+// uncompressed scene must store the decoded indices.
 std::vector<uint32_t> turned(const std::vector<uint32_t>& indices) {
   const auto bytes = encode_triangles(indices);
   std::vector<uint32_t> out(indices.size());
@@ -46,7 +47,7 @@ std::vector<uint32_t> grid_triangles() {
   return all;
 }
 
-// Each position is followed by `extra` more components.
+// Returns the positions of a grid's vertices, each followed by `extra` unused components.
 template <class T>
 std::vector<T> grid_positions(size_t extra) {
   std::vector<T> all;

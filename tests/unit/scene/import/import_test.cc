@@ -1,4 +1,4 @@
-// Scenes of other formats, imported and read again.
+// Imports scenes of other formats, and reads the written files.
 #include "scene/import/import.h"
 
 #include <gmock/gmock.h>
@@ -149,7 +149,8 @@ TEST_F(Import, UnitAndAxesOfFbx) {
   for (const Corners& corners : all) EXPECT_EQ(std::ranges::count(corners, inner), 1);
 }
 
-// assimp reads two meshes of this file, but only one node.
+// assimp reads two meshes of this file, but only one node. The mesh without a node causes a
+// warning.
 TEST_F(Import, MeshesWithoutNodesAreWarnings) {
   import("a.raw",
          "a\n0.5 0.5 0.5 0 0 0 0 1 0 1 0 0\nb\n0.1 0 0 0 0 3 0 1 3 1 0 3\n"

@@ -27,9 +27,9 @@ std::vector<double> in_space(const Outline& outline) {
   return xyz;
 }
 
-// Triangulates the outline. Checks that all triangles run in the outline's direction, and that the
-// sum of their areas is its area. So they cover the outline without overlap. Returns false if it is
-// doubtful.
+// Triangulates the outline. Checks that all triangles run in the outline's direction, and that
+// their areas sum to the outline's area, so that they cover it without overlap. Returns false,
+// without checks, if the triangulator reports a doubtful outline.
 bool is_covered(const Outline& outline) {
   MemoryBudget budget(uint64_t{64} << 20);
   polygon::Triangulator triangulator(budget, "a test");

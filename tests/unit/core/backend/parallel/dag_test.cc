@@ -85,8 +85,8 @@ TEST_F(ParallelDag, TheSweepRejectsCollisions) {
   EXPECT_GT(rejected, 50);
 }
 
-// Two different bricks have equal 4-bit hashes. Their parents differ only in these bricks, so they
-// also have equal hashes, one parent is dropped, and its brick is never compared as a candidate.
+// Two different bricks have equal 4-bit hashes. Their parents differ only in these bricks, so the
+// parents' hashes are also equal. The construction drops one parent and never compares its brick.
 // Only the sweep over all octree nodes detects that the bricks differ.
 TEST_F(ParallelDag, TheSweepLooksAtDroppedNodes) {
   uint64_t one = 1, other = 2;

@@ -359,7 +359,8 @@ TEST(Space, FacesJoinNeighbors) {
     }
 }
 
-// A path leads to the square of a quadrant, or to the larger square around it.
+// descend() follows a path of quadrants to a square of the face. It stops earlier if a larger
+// square on the path is empty.
 TEST(Space, FacesDescend) {
   SpaceGrid grid(16);
   grid.at({15, 2, 14}) = 1;  // quadrant 1 of the high face along x

@@ -142,7 +142,8 @@ TEST_P(IngestTest, ATriangleFromTooFarIsNamed) {
   scene_.too_far_at = 5 * kPiece + 7;
   const Error error = error_of_ingest([] {});
   EXPECT_EQ(error.code(), ErrorCode::kLimit);
-  // Triangle 81927 is too far away. The error counts without the 820 invalid triangles before it.
+  // Triangle 81927 is too far away. Its number in the error is lower by 820, because the error does
+  // not count the invalid triangles before it.
   EXPECT_NE(error.message().find("triangle 81107 of the scene"), std::string::npos)
       << error.message();
 }

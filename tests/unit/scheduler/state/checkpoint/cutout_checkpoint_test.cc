@@ -89,7 +89,8 @@ TEST_F(CutoutCheckpointTest, NoticesAChangeOfAnImage) {
   }
 }
 
-// A missing image leaves nothing out. It may appear before the build resumes.
+// Without the image, nothing is cut out. If the image appears before the build resumes, the result
+// is the same as if the image had been there from the start.
 TEST_F(CutoutCheckpointTest, NoticesANewImage) {
   const std::string image = folder_.file("leaf.png"), other = folder_.file("other.png");
   std::filesystem::rename(image, other);
@@ -109,7 +110,8 @@ TEST_F(CutoutCheckpointTest, OptionsOfCutoutsAreOtherBuilds) {
   EXPECT_EQ(digest(spec()), expected_);
 }
 
-// The patches of cut triangles are stored triangles. They count even if the scene is small.
+// The estimated disk space includes the patches of cut triangles, even if the scene itself is
+// small, because patches are stored as triangles.
 TEST_F(CutoutCheckpointTest, DiskSpaceOfPatches) {
   BuildSpec small = spec();
   small.run.durable_min_triangles = 1000;
