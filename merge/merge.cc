@@ -11,8 +11,8 @@
 namespace voxdag {
 namespace {
 
-// Maximum number of rows of the artifacts that a pass merges into one artifact. So no level of this
-// artifact has over 2^32 rows, the limit of its format.
+// Maximum total rows of the artifacts that a pass merges into one. This keeps every level of the
+// merged artifact within 2^32 rows, the format's limit.
 constexpr uint64_t kMaxArtifactRows = uint64_t{1} << 32;
 
 // Runs merge passes until all artifacts fit in one pass. The last pass then writes the global file

@@ -1,8 +1,8 @@
 // Makes a merge recoverable: saves its progress, and resumes it from the last saved state.
 //
 // A state is saved within a pass (the artifacts merged so far replace their inputs), after a pass,
-// and after a level of the final pass. After each of the last two, some bytes of the inputs are
-// never read again. These bytes are released once the state is durable.
+// and after a level of the final pass. After a pass or a level, some bytes of the inputs are never
+// read again. These bytes are released once the state is durable.
 #pragma once
 
 #include <span>

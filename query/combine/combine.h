@@ -1,9 +1,9 @@
 // Computes the union, difference, intersection or symmetric difference of two global files of the
 // same grid. The levels of the new file are canonical: they depend only on the voxels.
 //
-//   join.h           the equal nodes of the two files, and the hashes of all nodes, from the bricks
-//   up pair_levels.h    the pairs of cubes that must be combined, and the nodes to keep, from the
-//   root level_writer.h   the levels of the new file, from the bricks up
+//   join.h          finds the equal nodes of the two files and hashes all nodes, bricks first
+//   pair_levels.h   finds the pairs of cubes to combine and the nodes to keep, from the root down
+//   level_writer.h  writes the levels of the new file, from the bricks up
 //
 // The time depends on the sizes of the files and on the number of distinct pairs. The memory
 // depends on the budget: longer lists and the values of large levels are in a scratch folder. Only

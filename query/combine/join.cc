@@ -11,8 +11,8 @@ namespace voxdag::query {
 
 struct HashedNode {
   uint64_t hash = 0;
-  // make_tag() of the offset of the equal node of the first file plus one; of 0 without such a
-  // node.
+  // make_tag() of a number: the offset of the first file's equal node plus 1, or 0 if no node is
+  // equal.
   uint64_t tag = 0;
 };
 

@@ -8,7 +8,7 @@
 
 namespace voxdag::query {
 
-// A kept node of a file in the new file.
+// Where a kept node of an input file is in the new file.
 struct KeptPlace {
   uint64_t tag = 0;  // make_tag() of its word offset in the new file
   OctreeCounts counts;
@@ -162,8 +162,9 @@ class RowWriter {
   uint64_t nodes_ = 0;
 };
 
-// If the cursor is at `row`, which is at `node` in the new file, stores the place of the node, adds
-// the results of all places that use the node, and advances the cursor.
+// Does nothing unless the cursor is at `row`, which was written as `node` of the new file. Then
+// stores where the kept node now is, passes `node` to all places that use it, and advances the
+// cursor.
 void pass_kept(KeptCursor& cursor, const Row& row, const NewNode& node, KeptPlaces& placed,
                SpillSorter<NodeUse>& uses, SpillSorter<KeyedNode>& parents) {
   if (cursor.at_end() || compare_rows(cursor.row(), row) != 0) return;
@@ -174,7 +175,7 @@ void pass_kept(KeptCursor& cursor, const Row& row, const NewNode& node, KeptPlac
   cursor.next();
 }
 
-// Adds the results of all places whose results are pairs.
+// For each place whose result is a pair, adds the result of this pair.
 void add_pair_results(const SpillList<PairUse>& uses, SpillSorter<KeyedNode>& results,
                       SpillSorter<KeyedNode>& parents) {
   results.finish();

@@ -47,7 +47,8 @@ void PairLevels::add(Open& to, const NodePair& cubes, uint64_t place) const {
   }
 }
 
-// Finds the distinct pairs among the requests, and ends the pairs of equal nodes.
+// Numbers the distinct pairs among the requests. A pair of equal nodes gets no number, because its
+// result is known: one of the nodes, or nothing.
 void PairLevels::number_pairs(Open& level) const {
   SpillSorter<PairRequest>& requests = *level.requests;
   SpillReader equal(joined_[level.level]->equal);

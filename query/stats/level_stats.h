@@ -19,8 +19,8 @@ struct LevelStats {
 
 struct DagStats {
   std::vector<LevelStats> levels;  // from the root to the bricks
-  // Distinct 2x2x2 masks in the bricks. Encodings with leaves of 2^3 voxels store each as one node
-  // more.
+  // Distinct 2x2x2 masks in the bricks. Encodings with leaves of 2^3 voxels store each of these
+  // masks as an additional node.
   uint64_t octant_masks = 0;
 };
 

@@ -18,12 +18,12 @@ std::string describe(const Cube& cube) {
          ", " + std::to_string(cube.position[1]) + ", " + std::to_string(cube.position[2]) + ")";
 }
 
-// True if every triangle in a cube sets a voxel of the cube. A triangle between all rows sets no
-// voxel of the rule kThin.
+// True if every triangle in a cube sets a voxel of the cube. With the rule kThin, a triangle sets
+// no voxel if it crosses no row through voxel centers.
 bool always_sets_voxels(VoxelRule rule) { return rule == VoxelRule::kShell; }
 
 // Checks that the record has voxels only in subvolumes that have triangles. Unless the rule allows
-// triangles without voxels, also checks the converse.
+// triangles without voxels, also checks that every subvolume with triangles has voxels.
 void check_counts(const CompletionRecord& record, std::span<const ExpectedSubvolume> subvolumes,
                   VoxelRule rule) {
   for (size_t i = 0; i < subvolumes.size(); ++i) {

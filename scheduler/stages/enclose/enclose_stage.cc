@@ -238,7 +238,7 @@ class Enclosure {
   std::unique_ptr<RowFile> faces_;
   std::mutex mutex_;  // guards parts_ while labels are computed
   std::vector<LabeledPart> parts_;
-  std::atomic<bool> is_long_ = false;  // some parts are durable, so the complete record will be
+  std::atomic<bool> is_long_ = false;  // some parts were saved, so finish() saves the record
 };
 
 }  // namespace

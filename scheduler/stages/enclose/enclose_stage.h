@@ -5,8 +5,8 @@
 //   label   each part of the grid, on any thread: the components of its empty space that have a
 //           voxel at its faces (core/dag/space/space_labels.h); the labels at the faces are stored
 //   join    components of neighbors that meet; the sets that reach the border are outside
-//   fill    each part again: its filled sub-DAG becomes an artifact
-//   (core/dag/space/enclosed_fill.h)
+//   fill    each part again: its filled sub-DAG (core/dag/space/enclosed_fill.h) becomes an
+//           artifact
 //
 // A part is the cube of a subvolume. A subvolume that exceeds a worker's memory is processed as
 // several parts. Empty cubes between the parts are components as well.

@@ -10,7 +10,7 @@
 namespace voxdag {
 namespace {
 
-// The needed rows of a level, and their numbers among the needed rows.
+// Marks the rows of a level that are needed, and numbers the marked rows.
 class NeededRows {
  public:
   NeededRows(PooledMemory& memory, uint64_t rows)

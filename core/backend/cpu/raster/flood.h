@@ -25,9 +25,9 @@ VOXDAG_SLICES_INLINE bool is_zero(const Words& words) {
   return any == 0;
 }
 
-// Lanes with a certain bit of their number set exchange their bits `low` with the bits `low` <<
-// `shift` of the lanes without it. `swapped`: each lane has its partner's words. `upper`: all ones
-// in the lanes with the bit set.
+// The eight lanes form pairs of an upper and a lower lane. The upper lane's bits `low` and the
+// lower lane's bits `low` << `shift` change places. `swapped`: `words` with the lanes of each pair
+// exchanged. `upper`: all ones in the upper lanes.
 VOXDAG_SLICES_INLINE void exchange_lanes(Words& words, const Words& swapped, const Words& upper,
                                          int shift, uint64_t low) {
   const Words to_upper = (words & ~low) | ((swapped >> shift) & low);
@@ -40,7 +40,7 @@ VOXDAG_SLICES_INLINE void exchange_lanes(Words& words, const Words& swapped, con
 // each turn one order into the other, so the function is its own inverse.
 VOXDAG_SLICES_INLINE void exchange_order(Words& words) {
   constexpr uint64_t k1 = ~uint64_t{0};
-  // y2 and x1, z2 and x0, z1 and y0
+  // The exchanged bits are y2 and x1, then z2 and x0, then z1 and y0.
   exchange_lanes(words, __builtin_shufflevector(words, words, 2, 3, 0, 1, 6, 7, 4, 5),
                  Words{0, 0, k1, k1, 0, 0, k1, k1}, 32, 0x00000000ffffffffull);
   exchange_lanes(words, __builtin_shufflevector(words, words, 1, 0, 3, 2, 5, 4, 7, 6),
@@ -102,7 +102,8 @@ VOXDAG_SLICES_INLINE void flood(const Words& empty, Words& reached) {
   } while (touch(reached, empty ^ reached));
 }
 
-// Returns the corners that are in a set of voxels, in a block with an edge of kLast + 1 voxels.
+// Returns the corner voxels of a block that are in a set of voxels. The block has an edge of kLast
+// + 1 voxels.
 template <int kLast>
 VOXDAG_SLICES_INLINE uint32_t corners_in(const Words& voxels) {
   uint64_t corners = 0;
@@ -110,7 +111,7 @@ VOXDAG_SLICES_INLINE uint32_t corners_in(const Words& voxels) {
     corners |= (voxels[(c >> 2) * kLast] >> kLast * (8 * (c >> 1 & 1) + (c & 1)) & 1) << c;
   return static_cast<uint32_t>(corners);
 }
-// The inverse.
+// Sets `voxels` to the given corner voxels, numbered as corners_in() returns them.
 template <int kLast>
 VOXDAG_SLICES_INLINE void set_corners(uint64_t corners, Words& voxels) {
   uint64_t words[2] = {0, 0};

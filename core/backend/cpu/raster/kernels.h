@@ -55,7 +55,8 @@ struct Kernels {
   // eight.
   VoxelBlockContent (*unpack)(const VoxelBlock& block, uint64_t* bricks);
   // The kernels of solids (core/backend/cpu/raster/slices.h). find_components() finds the
-  // components of a block's empty voxels. Corners with the same class decide alike.
+  // components of a block's empty voxels. classes[c] is the class of corner c
+  // (TileViews::classes_at()).
   void (*find_components)(const VoxelBlock& block, const int32_t (&classes)[8],
                           BlockComponents& out);
   // Adds the voxels of `empty` that walks of 6-neighbors through `empty` reach from `reached`, a

@@ -20,12 +20,13 @@ struct Slices {
   }
 };
 
-// The 6-connected components of a block's empty voxels that have a corner of the block. Components
-// whose corners all decide alike can be joined.
+// The 6-connected components of a block's empty voxels that contain a corner of the block. Several
+// components may be in one entry if all their corners have the same class, because they get the
+// same decision.
 struct BlockComponents {
   int count;
   uint32_t corners[8];  // bit sets, by child index
-  bool is_alike[8];     // all corners of the component have the same class
+  bool is_alike[8];     // all corners of the entry have the same class
   Slices voxels[8];
   Slices rest;  // empty voxels of components without a corner
 };

@@ -58,7 +58,7 @@ void ThinTriangle<Coordinate>::set_rows(const int64_t (&v)[3][3], const int64_t 
     const int64_t sign = this->normal[d] < 0 ? -1 : 1;
     for (int i = 0; i < 3; ++i) {
       const int64_t a = -half[q][i] * sign, b = half[p][i] * sign;
-      // The sign of a value of 0 is decided by the axis that comes first.
+      // If the value is 0, its sign is the sign of the factor that belongs to the first axis.
       const int64_t first = p < q ? a : b, second = p < q ? b : a;
       const bool inside_at_zero = first != 0 ? first > 0 : second > 0;
       const Int c = static_cast<Int>(a) * (kHalfVoxel - v[p][i]) +

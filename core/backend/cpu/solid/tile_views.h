@@ -22,9 +22,9 @@ class TileViews {
 
   // Returns the sum of the three views from a corner; coordinates are in blocks.
   int32_t at(int x, int y, int z) const { return views_[x][y][z]; }
-  // Sets the classes of the eight corners of a block, in the order of child indices. Components
-  // with corners of one class only have the decision of this class's number: 0 for all views that
-  // are outside, 4 or -4 for views that are inside and disputed, otherwise the views.
+  // Sets the classes of the eight corners of a block, in the order of child indices. Views with the
+  // same decision have the same class: 0 if they are outside, 4 or -4 if they are inside and
+  // disputed. Otherwise the class is the sum of the views.
   void classes_at(const int (&low)[3], int32_t (&classes)[8]) const {
     for (int c = 0; c < 8; ++c)
       classes[c] = classes_[low[0] + (c >> 2)][low[1] + (c >> 1 & 1)][low[2] + (c & 1)];

@@ -1,6 +1,6 @@
 // The rasterizer of the rule kThin for AVX2 and AVX-512. Like draw_by_columns.h, it visits columns
 // of bricks along the axis D of the normal's largest component. In each voxel column, exactly one
-// voxel passes the plane test along D (thin_triangle.h). It is set if
+// voxel passes the plane test along D (thin_triangle.h). This voxel is set if
 //
 //   - the row along D through the column's center crosses the triangle (Footprint::inside), or
 //   - it passes the plane test and the edge tests along one of the other axes.
