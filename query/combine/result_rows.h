@@ -1,7 +1,7 @@
 // Records that pass between the levels while two DAGs are combined.
 //
-// The pairs of a level are numbered in the order (a, b). A *place* is a child of a pair: 8 * number
-// of the pair + index of the child.
+// The pairs of a level are numbered in the order of their offsets `a`, then `b` (NodePair). A
+// *place* is a child of a pair: 8 * number of the pair + index of the child.
 #pragma once
 
 #include <cstdint>

@@ -231,8 +231,8 @@ VisiblePart::Outline VisiblePart::outline_of(const Polygon& polygon,
 }
 
 // Returns the smallest block that contains the polygon and a margin around it, or the block of the
-// last level. covers() gives the same answer for this block and for all blocks that contain it,
-// because a block that contains the polygon is not separated from it, whatever the depth.
+// last level. covers() gives the same answer for any larger block that contains this one: it finds
+// no gap between the polygon and a block that contains the polygon, whatever the depth.
 VisiblePart::Block VisiblePart::block_around(const Outline& outline) const {
   const uint32_t size[2] = {mask_->width(), mask_->height()};
   uint32_t first[2], last[2];

@@ -81,7 +81,7 @@ bool VisiblePatches::descend(const Source& source, const Cube& cube, bool is_vis
   return true;
 }
 
-// Marks the visible voxels of a cube, which is in a block or is one.
+// Marks the visible voxels of a cube. The cube is a block or a part of a block.
 void VisiblePatches::mark_visible(const Source& source, const Cube& cube, bool is_visible) {
   if (!is_visible) {
     const Sight sight = source.part.sight(cube);

@@ -64,7 +64,7 @@ class CellWalk {
   const voxdag_reader::File& file_;
 };
 
-// A directory entry of a region that ColorSection::region() refuses.
+// Message about a region's directory entry that ColorSection::region() refuses.
 constexpr const char* kBrokenEntry =
     "a count of cells or the offset of its data is out of range: expected at most the cells of the "
     "region's cube, and data within the section";

@@ -28,11 +28,11 @@ struct StageBegun {
 struct StageResumed {
   uint64_t done = 0;
 };
-// "stage_advanced"
+// "stage_advanced": `done` of the stage's `total` units are completed.
 struct StageAdvanced {
   uint64_t done = 0, total = 0;
 };
-// "stage_ended"
+// "stage_ended": the last message of a stage.
 struct StageEnded {};
 // "subvolumes": the number of all subvolumes, the number of built subvolumes, and totals over the
 // built subvolumes.

@@ -118,7 +118,7 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
   s.cube = clamp((s.size / max(s.t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
   return s;
 }
-// Returns the start of a ray: above the steps that the cells of a slope form, which would block it.
+// Returns the start of a ray to the light, so far above the cells that their steps do not block it.
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
 }

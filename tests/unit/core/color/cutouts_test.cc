@@ -1,4 +1,4 @@
-// Tests in which voxels a triangle with cutouts is visible.
+// Tests where a triangle with cutouts is visible.
 #include <gtest/gtest.h>
 
 #include <algorithm>
