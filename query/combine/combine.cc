@@ -11,6 +11,7 @@
 #include "core/format/global/global_writer.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
+#include "query/combine/count_levels.h"
 #include "query/combine/join.h"
 #include "query/combine/level_writer.h"
 #include "query/combine/pair_levels.h"
@@ -69,20 +70,18 @@ class Combination {
   CombineReport run(const std::function<void()>& before_publish) {
     GlobalFileWriter out(files_, spec_.output, grid_of(a_.file()), a_.file().hash_bits(),
                          spec_.narrow_words);
-    const CombinedCounts counts = write_levels(out);
-    if (counts.octree.voxels == 0)
-      progress_.warn("the result has no voxels: the file will have no nodes");
+    const VoxelCounts counts = write_levels(out);
+    if (counts.voxels == 0) progress_.warn("the result has no voxels: the file will have no nodes");
     progress_.begin_stage("write", 1, "files");
-    const GlobalFileSummary summary = out.seal(
-        {.voxels = counts.octree.voxels, .svo_nodes = counts.octree.nodes}, spec_.threads, cancel_);
+    const GlobalFileSummary summary = out.seal(counts, spec_.threads, cancel_);
     before_publish();
     out.publish();
     progress_.advance(1);
     progress_.end_stage();
     return {.grid = grid_of(a_.file()),
-            .voxels = counts.octree.voxels,
-            .svo_nodes = counts.octree.nodes,
-            .dag_nodes = counts.dag_nodes,
+            .voxels = counts.voxels,
+            .svo_nodes = counts.svo_nodes,
+            .dag_nodes = dag_nodes_,
             .bytes = summary.bytes,
             .sha256 = summary.sha256,
             .pairs = pairs_,
@@ -109,23 +108,29 @@ class Combination {
     return joined;
   }
 
-  CombinedCounts write_levels(GlobalFileWriter& out) {
+  VoxelCounts write_levels(GlobalFileWriter& out) {
     const auto joined = join();
-    SpillSorter<PairRow> bricks(space_);
-    PairLevels pair_levels(a_, b_, spec_.operation, joined, space_);
+    BrickResults bricks(space_);
+    const Outcome reference =
+        reference_of(spec_.operation, a_.file().dag_nodes(), b_.file().dag_nodes());
+    PairLevels pair_levels(a_, b_, spec_.operation, reference, joined, space_);
     const auto pairs = pair_levels.descend(bricks);
     pairs_ = pair_levels.pair_count();
     progress_.begin_stage("merge", level_count(), "levels");
-    LevelsWriter writer(a_, b_, space_, memory_, out);
-    writer.write_level(level_count() - 1, *joined.back(), *pairs.back(), bricks);
+    CountLevels counts(a_, b_, reference, bricks.counts, space_, memory_);
+    LevelsWriter writer(a_, b_, space_, memory_, counts, out);
+    writer.write_level(level_count() - 1, *joined.back(), *pairs.back(), bricks.rows);
     progress_.advance(1);
-    for (uint32_t level = level_count() - 1; level-- > 0 && writer.counts().dag_nodes > 0;) {
+    for (uint32_t level = level_count() - 1; level-- > 0 && writer.dag_nodes() > 0;) {
       SpillSorter<PairRow> rows(space_);
       writer.write_level(level, *joined[level], *pairs[level], rows);
       progress_.advance(1);
     }
     progress_.end_stage();
-    return writer.counts();
+    dag_nodes_ = writer.dag_nodes();
+    if (dag_nodes_ == 0) return {};
+    const OctreeCounts total = counts.total();
+    return {.voxels = total.voxels, .svo_nodes = total.nodes};
   }
 
   const CombineSpec& spec_;
@@ -140,6 +145,7 @@ class Combination {
   const SpillSpace space_;
   const LookupMemory memory_;
   uint64_t pairs_ = 0;
+  uint64_t dag_nodes_ = 0;
 };
 
 }  // namespace

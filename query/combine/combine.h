@@ -1,14 +1,17 @@
 // Computes the union, difference, intersection or symmetric difference of two global files of the
 // same grid. The levels of the new file are canonical: they depend only on the voxels.
 //
-//   join.h          finds the equal nodes of the two files and hashes all nodes, bricks first
-//   pair_levels.h   finds the pairs of cubes to combine and the nodes to keep, from the root down
-//   level_writer.h  writes the levels of the new file, from the bricks up
+//   join.h          the equal nodes of the two files, and the hashes of all nodes
+//   pair_levels.h   the pairs of cubes that must be combined, and the nodes to keep
+//   level_writer.h  the levels of the new file
+//   count_levels.h  the numbers of voxels and octree nodes
+//
+// The pairs are found from the root down, all others from the bricks up.
 //
 // The time depends on the sizes of the files and on the number of distinct pairs. The memory
 // depends on the budget: longer lists and the values of large levels are in a scratch folder. Only
-// the marks of the kept nodes must be in memory, one bit for each two words of two consecutive
-// levels.
+// the marks of the kept and of the counted nodes must be in memory, one bit for each two words of
+// two consecutive levels.
 #pragma once
 
 #include <cstdint>

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include "query/combine/node_values.h"
@@ -9,28 +10,33 @@
 
 namespace voxdag::query {
 
-struct HashedNode {
+// A node of the first file.
+struct HashOfA {
   uint64_t hash = 0;
-  // make_tag() of a number: the offset of the first file's equal node plus 1, or 0 if no node is
-  // equal.
-  uint64_t tag = 0;
 };
-
-using HashedLevel = NodeValues<HashedNode>;
+// A node of the second file, with the offset of the equal node of the first file plus one; 0
+// without such a node.
+struct HashOfB {
+  uint64_t hash = 0;
+  uint64_t number_in_a = 0;
+};
 
 namespace {
 
+uint64_t number_in_a(const HashOfA&, uint64_t offset) { return offset + 1; }
+uint64_t number_in_a(const HashOfB& node, uint64_t) { return node.number_in_a; }
+
 // Hashes the nodes of a level in the order of the file.
+template <class Hash>
 class HashCursor {
  public:
   // `below` has the hashes of the next finer level; null for bricks. `full_below` is the offset of
   // the full cube of that level.
-  HashCursor(DagInput& input, uint32_t level, const HashedLevel* below, uint64_t full_below,
+  HashCursor(DagInput& input, uint32_t level, const NodeValues<Hash>* below, uint64_t full_below,
              const SpillSpace& space, uint64_t window_bytes)
       : input_(input), level_(level), full_below_(full_below), cursor_(input, level) {
     if (below) {
       lookups_.emplace(*below, space, window_bytes);
-      below_ = below->is_resident() ? below : nullptr;
       announce();
     }
     load();
@@ -38,19 +44,23 @@ class HashCursor {
 
   bool at_end() const { return cursor_.at_end(); }
   uint64_t offset() const { return cursor_.offset(); }
-  uint64_t hash() const { return own_.hash; }
+  uint64_t hash() const { return own().hash; }
   bool is_full() const { return is_full_; }
   // True if the first file has all children, so that it may have the node.
   bool is_comparable() const { return is_comparable_; }
   // Returns the node with its children's offsets in the first file. Requires is_comparable().
-  const Row& row() const { return joined_; }
+  const Row& row() const { return kIsA ? own() : joined_; }
   void next() {
-    previous_ = own_;
+    has_previous_ = true;
+    current_ ^= 1;
     cursor_.next();
     load();
   }
 
  private:
+  static constexpr bool kIsA = std::is_same_v<Hash, HashOfA>;
+
+  const Row& own() const { return rows_[current_]; }
   void announce() {
     if (!lookups_->needs_announcement()) return;
     for (LevelCursor all(input_, level_); !all.at_end(); all.next())
@@ -64,13 +74,13 @@ class HashCursor {
       load_node();
     else
       load_brick();
-    if (previous_.count > 0 && compare_rows(previous_, own_) >= 0)
+    if (has_previous_ && compare_rows(rows_[current_ ^ 1], own()) >= 0)
       input_.corrupt(level_, offset(),
                      "the node does not follow the one before it in the total order of nodes "
                      "(docs/format.md)");
   }
   void load_brick() {
-    own_ = joined_ = brick_row(cursor_.brick(), input_.file().hash_bits());
+    rows_[current_] = joined_ = brick_row(cursor_.brick(), input_.file().hash_bits());
     is_comparable_ = true;
     is_full_ = cursor_.brick() == ~uint64_t{0};
   }
@@ -80,43 +90,47 @@ class HashCursor {
   const uint32_t level_;
   const uint64_t full_below_;
   LevelCursor cursor_;
-  std::optional<NodeLookups<HashedNode>> lookups_;
-  const HashedLevel* below_ = nullptr;  // only to prefetch
-  Row own_;                             // with the children's offsets in the node's own file
-  Row joined_;
-  Row previous_;
+  std::optional<NodeLookups<NodeValues<Hash>>> lookups_;
+  // The current node and the node before it, with the children's offsets in their own file.
+  Row rows_[2];
+  int current_ = 0;
+  bool has_previous_ = false;
+  Row joined_;  // not used for the first file
   bool is_comparable_ = false;
   bool is_full_ = false;
 };
 
-void HashCursor::load_node() {
+template <class Hash>
+void HashCursor<Hash>::load_node() {
   const voxdag_reader::Node& node = cursor_.node();
-  if (below_)
-    for (const uint32_t word : cursor_.words_ahead()) __builtin_prefetch(below_->find(word));
-  own_.mask = joined_.mask = node.child_mask;
-  own_.count = joined_.count = kPopcount8[node.child_mask];
+  lookups_->prefetch(cursor_.words_ahead());
+  Row& own = rows_[current_];
+  own.mask = joined_.mask = node.child_mask;
+  own.count = joined_.count = kPopcount8[node.child_mask];
   is_comparable_ = true;
   is_full_ = node.child_mask == 255;
   uint64_t hashes[8];
-  for (uint32_t i = 0; i < own_.count; ++i) {
+  for (uint32_t i = 0; i < own.count; ++i) {
     const uint64_t child = node.child(static_cast<int>(i));
-    const HashedNode found = lookups_->next(child);
-    if (!is_tag_of(found.tag, child))
+    const FoundValue<Hash> found = lookups_->next(child);
+    if (!found.begins)
       input_.corrupt(level_, offset(), "a child is at a word where no node begins");
-    hashes[i] = found.hash;
-    own_.children[i] = child;
-    joined_.children[i] = number_of_tag(found.tag) - 1;
-    is_comparable_ = is_comparable_ && number_of_tag(found.tag) != 0;
+    const uint64_t number = number_in_a(found.value, child);
+    hashes[i] = found.value.hash;
+    own.children[i] = child;
+    if (!kIsA) joined_.children[i] = number - 1;
+    is_comparable_ = is_comparable_ && number != 0;
     is_full_ = is_full_ && child == full_below_;
   }
-  own_.hash = joined_.hash = truncate_hash(
-      hash_node(node.child_mask, static_cast<int>(own_.count), hashes), input_.file().hash_bits());
+  own.hash = joined_.hash = truncate_hash(
+      hash_node(node.child_mask, static_cast<int>(own.count), hashes), input_.file().hash_bits());
 }
 
 }  // namespace
 
 struct Join::Below {
-  HashedLevel a, b;
+  NodeValues<HashOfA> a;
+  NodeValues<HashOfB> b;
   NodePair full;
 };
 
@@ -134,7 +148,7 @@ void Join::add_level(uint32_t level, JoinedLevel& joined) {
   HashCursor b(b_, level, below_ ? &below_->b : nullptr, full_below.b, space_,
                memory_.window_bytes);
   const auto pass_a = [&] {
-    done->a.add(a.offset(), {a.hash(), make_tag(a.offset() + 1, a.offset())});
+    done->a.add(a.offset(), {a.hash()});
     joined.hashes_a.add(a.hash());
     if (a.is_full()) joined.full.a = a.offset();
     a.next();
@@ -146,7 +160,7 @@ void Join::add_level(uint32_t level, JoinedLevel& joined) {
       is_equal = !a.at_end() && compare_rows(a.row(), b.row()) == 0;
     }
     if (is_equal) joined.equal.add({a.offset(), b.offset()});
-    done->b.add(b.offset(), {b.hash(), make_tag(is_equal ? a.offset() + 1 : 0, b.offset())});
+    done->b.add(b.offset(), {b.hash(), is_equal ? a.offset() + 1 : 0});
     joined.hashes_b.add(b.hash());
     if (b.is_full()) joined.full.b = b.offset();
   }

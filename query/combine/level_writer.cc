@@ -1,20 +1,15 @@
 #include "query/combine/level_writer.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
-#include "core/base/host_device.h"
 #include "query/combine/node_values.h"
 
 namespace voxdag::query {
 
-// Where a kept node of an input file is in the new file.
-struct KeptPlace {
-  uint64_t tag = 0;  // make_tag() of its word offset in the new file
-  OctreeCounts counts;
-};
-
-using KeptPlaces = NodeValues<KeptPlace>;
+// Word offsets of kept nodes in the new file.
+using KeptPlaces = NodeValues<uint64_t>;
 
 namespace {
 
@@ -29,7 +24,6 @@ class KeptCursor {
     if (kept.bits.size() == 0) return;
     if (below) {
       lookups_.emplace(*below, space, window_bytes);
-      below_ = below->is_resident() ? below : nullptr;
       announce();
     }
     cursor_.emplace(input, level);
@@ -39,30 +33,17 @@ class KeptCursor {
   bool at_end() const { return !cursor_ || cursor_->at_end(); }
   uint64_t offset() const { return cursor_->offset(); }
   const Row& row() const { return row_; }
-  const OctreeCounts& counts() const { return counts_; }
+  // Returns the hash of the row; the maximum at the end.
+  uint64_t hash() const { return at_end() ? ~uint64_t{0} : row_.hash; }
   void next() {
     step();
     find();
   }
 
  private:
-  // Walks through the bits of offsets that increase.
-  class Bits {
-   public:
-    explicit Bits(const SpillList<uint64_t>& bits) : reader_(bits) {}
-    bool has(uint64_t offset) {
-      for (; word_ < offset / 128; ++word_) reader_.pop();
-      return reader_.front() >> offset / 2 % 64 & 1;
-    }
-
-   private:
-    SpillReader<uint64_t> reader_;
-    uint64_t word_ = 0;
-  };
-
   void announce() {
     if (!lookups_->needs_announcement()) return;
-    Bits bits(kept_.bits);
+    MarkReader bits(kept_.bits);
     for (LevelCursor all(input_, level_); !all.at_end(); all.next())
       if (bits.has(all.offset()))
         for (int i = 0; i < kPopcount8[all.node().child_mask]; ++i)
@@ -80,38 +61,27 @@ class KeptCursor {
   }
   void load() {
     row_.hash = hashes_.front();
-    counts_ = {1, 0};
     if (!lookups_) {
       row_.count = 1;
       row_.children[0] = cursor_->brick();
-      counts_.voxels = static_cast<uint64_t>(popcount64(cursor_->brick()));
       return;
     }
+    lookups_->prefetch(cursor_->words_ahead());
     const voxdag_reader::Node& node = cursor_->node();
-    if (below_)
-      for (const uint32_t word : cursor_->words_ahead()) __builtin_prefetch(below_->find(word));
     row_.mask = node.child_mask;
     row_.count = kPopcount8[node.child_mask];
-    for (uint32_t i = 0; i < row_.count; ++i) {
-      const uint64_t child = node.child(static_cast<int>(i));
-      const KeptPlace placed = lookups_->next(child);
-      if (!is_tag_of(placed.tag, child))
-        input_.corrupt(level_, offset(), "a child is at a word where no node begins");
-      row_.children[i] = number_of_tag(placed.tag);
-      counts_ += placed.counts;
-    }
+    for (uint32_t i = 0; i < row_.count; ++i)
+      row_.children[i] = lookups_->next(node.child(static_cast<int>(i))).value;
   }
 
   DagInput& input_;
   const uint32_t level_;
   const KeptNodes& kept_;
   SpillReader<uint64_t> hashes_;
-  Bits bits_;
-  std::optional<NodeLookups<KeptPlace>> lookups_;
-  const KeptPlaces* below_ = nullptr;  // only to prefetch
+  MarkReader bits_;
+  std::optional<NodeLookups<KeptPlaces>> lookups_;
   std::optional<LevelCursor> cursor_;
   Row row_;
-  OctreeCounts counts_;
 };
 
 // Appends rows to a level of the new file.
@@ -162,29 +132,53 @@ class RowWriter {
   uint64_t nodes_ = 0;
 };
 
-// Does nothing unless the cursor is at `row`, which was written as `node` of the new file. Then
-// stores where the kept node now is, passes `node` to all places that use it, and advances the
-// cursor.
-void pass_kept(KeptCursor& cursor, const Row& row, const NewNode& node, KeptPlaces& placed,
-               SpillSorter<NodeUse>& uses, SpillSorter<KeyedNode>& parents) {
-  if (cursor.at_end() || compare_rows(cursor.row(), row) != 0) return;
-  const uint64_t offset = cursor.offset();
-  placed.add(offset, {make_tag(node.position, offset), node.counts});
-  for (; !uses.at_end() && uses.front().offset == offset; uses.pop())
-    parents.add({uses.front().place, node});
-  cursor.next();
-}
+// The kept nodes of a level of a file, and what becomes of them.
+struct KeptSource {
+  KeptCursor& cursor;
+  KeptPlaces& placed;
+  SpillSorter<NodeUse>& uses;
+  SpillSorter<KeyedNode>& parents;
 
-// For each place whose result is a pair, adds the result of this pair.
-void add_pair_results(const SpillList<PairUse>& uses, SpillSorter<KeyedNode>& results,
-                      SpillSorter<KeyedNode>& parents) {
-  results.finish();
-  results.begin();
-  for (SpillReader use(uses); !use.at_end(); use.pop()) {
-    while (!results.at_end() && results.front().key < use.front().pair) results.pop();
-    if (results.at_end()) return;
-    if (results.front().key == use.front().pair)
-      parents.add({use.front().place, results.front().node});
+  // Stores the place of the current node, adds the results of all places that use the node, and
+  // advances the cursor.
+  void pass(const NewNode& node) {
+    const uint64_t offset = cursor.offset();
+    placed.add(offset, node.position);
+    for (; !uses.at_end() && uses.front().offset == offset; uses.pop())
+      parents.add({uses.front().place, node});
+    cursor.next();
+  }
+  // The same if the current node is `row`.
+  void pass_equal(const Row& row, const NewNode& node) {
+    if (!cursor.at_end() && compare_rows(cursor.row(), row) == 0) pass(node);
+  }
+  // Copies the nodes whose hashes are less than `hash`: no other source has such a node.
+  void copy_before(uint64_t hash, RowWriter& writer) {
+    while (cursor.hash() < hash) pass({writer.add(cursor.row()), cursor.row().hash});
+  }
+};
+
+// Merges the three sources of a level.
+void merge_sources(KeptSource a, KeptSource b, SpillSorter<PairRow>& rows,
+                   SpillSorter<KeyedNode>& results, RowWriter& writer) {
+  const auto hash_of_rows = [&] { return rows.at_end() ? ~uint64_t{0} : rows.front().row.hash; };
+  for (;;) {
+    a.copy_before(std::min(b.cursor.hash(), hash_of_rows()), writer);
+    b.copy_before(std::min(a.cursor.hash(), hash_of_rows()), writer);
+    const Row* least = nullptr;
+    const auto consider = [&](const Row& row) {
+      if (!least || compare_rows(row, *least) < 0) least = &row;
+    };
+    if (!a.cursor.at_end()) consider(a.cursor.row());
+    if (!b.cursor.at_end()) consider(b.cursor.row());
+    if (!rows.at_end()) consider(rows.front().row);
+    if (!least) return;
+    const Row row = *least;
+    const NewNode node{writer.add(row), row.hash};
+    a.pass_equal(row, node);
+    b.pass_equal(row, node);
+    for (; !rows.at_end() && compare_rows(rows.front().row, row) == 0; rows.pop())
+      results.add({rows.front().pair, node});
   }
 }
 
@@ -196,8 +190,8 @@ struct LevelsWriter::Below {
 };
 
 LevelsWriter::LevelsWriter(DagInput& a, DagInput& b, const SpillSpace& space,
-                           const LookupMemory& memory, GlobalFileWriter& out)
-    : a_(a), b_(b), space_(space), memory_(memory), out_(out) {}
+                           const LookupMemory& memory, CountLevels& counts, GlobalFileWriter& out)
+    : a_(a), b_(b), space_(space), memory_(memory), counts_(counts), out_(out) {}
 LevelsWriter::~LevelsWriter() = default;
 
 // Makes the rows of pairs from the results of their children.
@@ -208,20 +202,31 @@ void LevelsWriter::make_rows(SpillSorter<PairRow>& rows) {
   while (!children.at_end()) {
     PairRow made;
     made.pair = pair_of(children.front().key);
-    made.counts.nodes = 1;
     uint64_t hashes[8];
     for (; !children.at_end() && pair_of(children.front().key) == made.pair; children.pop()) {
       const auto& [place, child] = children.front();
       made.row.mask |= 1u << child_of(place);
       hashes[made.row.count] = child.hash;
       made.row.children[made.row.count++] = child.position;
-      made.counts += child.counts;
     }
     made.row.hash = truncate_hash(
         hash_node(made.row.mask, static_cast<int>(made.row.count), hashes), a_.file().hash_bits());
     rows.add(made);
   }
   children_.reset();
+}
+
+// Adds the results of all places whose results are pairs.
+void LevelsWriter::add_pair_results(const SpillList<PairUse>& uses,
+                                    SpillSorter<KeyedNode>& results) {
+  results.finish();
+  results.begin();
+  for (SpillReader use(uses); !use.at_end(); use.pop()) {
+    while (!results.at_end() && results.front().key < use.front().pair) results.pop();
+    const bool has_node = !results.at_end() && results.front().key == use.front().pair;
+    if (has_node) children_->add({use.front().place, results.front().node});
+    counts_.add_pair(use.front(), has_node);
+  }
 }
 
 void LevelsWriter::write_level(uint32_t level, const JoinedLevel& joined, PairLevel& pairs,
@@ -242,29 +247,14 @@ void LevelsWriter::write_level(uint32_t level, const JoinedLevel& joined, PairLe
   pairs.kept_b.uses.begin();
   out_.begin_level(level);
   RowWriter writer(out_, below_ && out_.is_wide(below_->words), space_.budget);
-  while (!rows.at_end() || !a.at_end() || !b.at_end()) {
-    const Row* least = nullptr;
-    const OctreeCounts* counts = nullptr;
-    const auto consider = [&](const Row& row, const OctreeCounts& row_counts) {
-      if (least && compare_rows(*least, row) <= 0) return;
-      least = &row;
-      counts = &row_counts;
-    };
-    if (!a.at_end()) consider(a.row(), a.counts());
-    if (!b.at_end()) consider(b.row(), b.counts());
-    if (!rows.at_end()) consider(rows.front().row, rows.front().counts);
-    const Row row = *least;
-    const NewNode node{writer.add(row), row.hash, *counts};
-    counts_.octree = node.counts;
-    pass_kept(a, row, node, done->a, pairs.kept_a.uses, *children_);
-    pass_kept(b, row, node, done->b, pairs.kept_b.uses, *children_);
-    for (; !rows.at_end() && compare_rows(rows.front().row, row) == 0; rows.pop())
-      results.add({rows.front().pair, node});
-  }
+  merge_sources({a, done->a, pairs.kept_a.uses, *children_},
+                {b, done->b, pairs.kept_b.uses, *children_}, rows, results, writer);
   writer.flush();
   out_.end_level({.nodes = writer.nodes(), .words = writer.words()});
-  counts_.dag_nodes += writer.nodes();
-  add_pair_results(pairs.uses, results, *children_);
+  dag_nodes_ += writer.nodes();
+  counts_.begin_level();
+  add_pair_results(pairs.uses, results);
+  counts_.add_nodes(level, pairs);
   done->a.finish();
   done->b.finish();
   done->words = writer.words();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/format/global/global_writer.h"
+#include "query/combine/count_levels.h"
 #include "query/combine/dag_input.h"
 #include "query/combine/join.h"
 #include "query/combine/pair_levels.h"
@@ -16,15 +17,11 @@
 
 namespace voxdag::query {
 
-struct CombinedCounts {
-  OctreeCounts octree;
-  uint64_t dag_nodes = 0;
-};
-
 class LevelsWriter {
  public:
+  // `counts` receives the changes of the counts of all levels that are written.
   LevelsWriter(DagInput& a, DagInput& b, const SpillSpace& space, const LookupMemory& memory,
-               GlobalFileWriter& out);
+               CountLevels& counts, GlobalFileWriter& out);
   ~LevelsWriter();
 
   // Writes a level. Levels must be passed from the bricks up. `rows` has the rows of pairs of
@@ -32,21 +29,23 @@ class LevelsWriter {
   // nodes.
   void write_level(uint32_t level, const JoinedLevel& joined, PairLevel& pairs,
                    SpillSorter<PairRow>& rows);
-  const CombinedCounts& counts() const { return counts_; }
+  uint64_t dag_nodes() const { return dag_nodes_; }
 
  private:
   struct Below;
   void make_rows(SpillSorter<PairRow>& rows);
+  void add_pair_results(const SpillList<PairUse>& uses, SpillSorter<KeyedNode>& results);
 
   DagInput& a_;
   DagInput& b_;
   const SpillSpace& space_;
   const LookupMemory memory_;
+  CountLevels& counts_;
   GlobalFileWriter& out_;
   // Results of places of the level that is written next.
   std::unique_ptr<SpillSorter<KeyedNode>> children_;
   std::unique_ptr<Below> below_;  // the level written last
-  CombinedCounts counts_;
+  uint64_t dag_nodes_ = 0;
 };
 
 }  // namespace voxdag::query

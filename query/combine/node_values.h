@@ -7,30 +7,27 @@
 //   2. resolve() loads one window after the other and writes the values of the window's bucket.
 //   3. next() receives the same offsets in the same order and reads the values from the buckets.
 //
-// Every node has at least two words, so offset / 2 is a different number for every node. A window
-// is an array by these numbers. In memory, the values are in an array by the order of their nodes,
-// because it is smaller; a bit for each word of the level tells where nodes begin.
+// Every node has at least two words, so offset / 2 is a different number for every node. The values
+// in memory and the windows are arrays by these numbers: a lookup is one read, whose address is
+// known early enough to prefetch it. A bit for each word of the level tells where nodes begin.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 
-#include "core/base/host_device.h"
 #include "core/format/global/voxdag_reader.h"
 #include "query/combine/spill.h"
 
 namespace voxdag::query {
 
-// A number and the lowest bit of the offset of its node; 0 if no node begins there. A damaged
-// file's pointer to the middle of a node has another tag, or none.
-constexpr uint64_t make_tag(uint64_t number, uint64_t offset) {
-  return number << 2 | (offset & 1) << 1 | 1;
-}
-constexpr bool is_tag_of(uint64_t tag, uint64_t offset) {
-  return (tag & 3) == ((offset & 1) << 1 | 1);
-}
-constexpr uint64_t number_of_tag(uint64_t tag) { return tag >> 2; }
+// The result of a lookup. `begins` is 0 if no node with a value begins at the offset.
+template <class T>
+struct FoundValue {
+  T value;
+  uint64_t begins;
+};
 
 template <class T>
 class NodeValues {
@@ -38,11 +35,10 @@ class NodeValues {
   // The values are in memory if they take at most `resident_bytes`.
   NodeValues(const SpillSpace& space, const voxdag_reader::Level& level, uint64_t resident_bytes)
       : level_words_(level.word_count) {
-    const uint64_t blocks = level_words_ / kBlockWords + 1;
-    if (level.node_count <= resident_bytes / sizeof(T) &&
-        blocks <= (resident_bytes - level.node_count * sizeof(T)) / sizeof(Block)) {
-      blocks_ = PageBuffer<Block>(space.budget, blocks, "values of a level");
-      values_ = PageBuffer<T>(space.budget, level.node_count, "values of a level");
+    const uint64_t slots = level_words_ / 2 + 1, blocks = level_words_ / 64 + 1;
+    if (slots * sizeof(T) + blocks * sizeof(uint64_t) <= resident_bytes) {
+      begins_ = PageBuffer<uint64_t>(space.budget, blocks, "values of a level");
+      values_ = PageBuffer<T>(space.budget, slots, "values of a level");
     } else {
       list_.emplace(space);
     }
@@ -53,57 +49,64 @@ class NodeValues {
   // Offsets must increase.
   void add(uint64_t offset, const T& value) {
     if (list_) return list_->add({offset, value});
-    Block& block = blocks_[offset / kBlockWords];
-    if (block.begins == 0) block.before = count_;
-    block.begins |= uint64_t{1} << offset % kBlockWords;
-    values_[count_++] = value;
+    begins_[offset / 64] |= uint64_t{1} << offset % 64;
+    values_[offset / 2] = value;
   }
   void finish() {
     if (list_) list_->finish();
   }
-  // Require is_resident(). Without a value for the offset, find() returns null and at() a zero
-  // value.
-  const T* find(uint64_t offset) const {
-    if (offset >= level_words_) return nullptr;
-    const Block& block = blocks_[offset / kBlockWords];
-    const uint64_t bit = uint64_t{1} << offset % kBlockWords;
-    if (!(block.begins & bit)) return nullptr;
-    return &values_[block.before + static_cast<uint64_t>(popcount64(block.begins & (bit - 1)))];
+  // Require is_resident(). prefetch() loads the cache line of the value.
+  FoundValue<T> at(uint64_t offset) const {
+    if (offset >= level_words_) return {};
+    return {values_[offset / 2], begins_[offset / 64] >> offset % 64 & 1};
   }
-  T at(uint64_t offset) const {
-    const T* const value = find(offset);
-    return value ? *value : T{};
+  void prefetch(uint64_t offset) const {
+    if (offset < level_words_) __builtin_prefetch(&values_[offset / 2]);
   }
 
+  // For NodeLookups: the values of a window, and the result of a lookup of a slot.
+  using Slot = FoundValue<T>;
+  class WindowReader {
+   public:
+    explicit WindowReader(const NodeValues& values) : reader_(*values.list_) {}
+    // Fills the slots from `first_slot`. Windows must be read in their order.
+    void read(uint64_t first_slot, PageBuffer<Slot>& window) {
+      for (; !reader_.at_end() && reader_.front().offset / 2 - first_slot < window.size();
+           reader_.pop())
+        window[reader_.front().offset / 2 - first_slot] = {reader_.front().value,
+                                                           1 + (reader_.front().offset & 1)};
+    }
+
+   private:
+    SpillReader<typename NodeValues::Entry> reader_;
+  };
+  // A slot is for two words. Only at one of them a node begins.
+  static FoundValue<T> found(uint64_t offset, const Slot& slot) {
+    return slot.begins == 1 + (offset & 1) ? slot : FoundValue<T>{};
+  }
+  static FoundValue<T> nothing() { return {}; }
+
  private:
-  template <class>
-  friend class NodeLookups;
   struct Entry {
     uint64_t offset;
     T value;
   };
-  static constexpr uint64_t kBlockWords = 64;
-  // A block of words of the level.
-  struct Block {
-    uint64_t begins;  // a bit for each word, set if a node with a value begins there
-    uint64_t before;  // values of the blocks before
-  };
-
   const uint64_t level_words_;
-  PageBuffer<Block> blocks_;
+  PageBuffer<uint64_t> begins_;
   PageBuffer<T> values_;
-  uint64_t count_ = 0;
   std::optional<SpillList<Entry>> list_;
 };
 
-template <class T>
+// Looks up many values. `Values` is a class like NodeValues.
+template <class Values>
 class NodeLookups {
  public:
+  using Slot = typename Values::Slot;
   // Windows, and the buffers of the buckets, take about `bytes` each.
-  NodeLookups(const NodeValues<T>& values, const SpillSpace& space, uint64_t bytes)
+  NodeLookups(const Values& values, const SpillSpace& space, uint64_t bytes)
       : values_(values), space_(space), bytes_(bytes) {
     if (values.is_resident()) return;
-    window_slots_ = std::clamp<uint64_t>(bytes / sizeof(T), 16, UINT32_MAX);
+    window_slots_ = std::clamp<uint64_t>(bytes / sizeof(Slot), 16, UINT32_MAX);
     windows_ = values.level_words() / 2 / window_slots_ + 1;
     requests_ = std::make_unique<SpillBuckets<uint32_t>>(space, windows_, bytes);
   }
@@ -117,32 +120,36 @@ class NodeLookups {
   }
   void resolve() {
     requests_->finish();
-    answers_ = std::make_unique<SpillBuckets<T>>(space_, windows_, bytes_);
-    SpillReader reader(*values_.list_);
+    answers_ = std::make_unique<SpillBuckets<Slot>>(space_, windows_, bytes_);
+    typename Values::WindowReader reader(values_);
     for (uint64_t w = 0; w < windows_; ++w) {
-      PageBuffer<T> window(space_.budget, window_slots_, "values of a level");
-      for (; !reader.at_end() && reader.front().offset / 2 / window_slots_ == w; reader.pop())
-        window[reader.front().offset / 2 % window_slots_] = reader.front().value;
+      PageBuffer<Slot> window(space_.budget, window_slots_, "values of a level");
+      reader.read(w * window_slots_, window);
       for (uint64_t i = requests_->size(w); i > 0; --i)
         answers_->add(w, window[requests_->next(w)]);
     }
     answers_->finish();
     requests_.reset();
   }
-  // Returns a zero value, or a value with another tag, if no node begins at the offset.
-  T next(uint64_t offset) {
+  auto next(uint64_t offset) {
     if (!answers_) return values_.at(offset);
-    return offset < values_.level_words() ? answers_->next(offset / 2 / window_slots_) : T{};
+    if (offset >= values_.level_words()) return Values::nothing();
+    return Values::found(offset, answers_->next(offset / 2 / window_slots_));
+  }
+  // Prepares the lookups of words that are probably pointers of nodes visited soon.
+  void prefetch(std::span<const uint32_t> words) const {
+    if (!values_.is_resident()) return;
+    for (const uint32_t word : words) values_.prefetch(word);
   }
 
  private:
-  const NodeValues<T>& values_;
+  const Values& values_;
   const SpillSpace& space_;
   const uint64_t bytes_;
   uint64_t window_slots_ = 0;
   uint64_t windows_ = 0;
   std::unique_ptr<SpillBuckets<uint32_t>> requests_;
-  std::unique_ptr<SpillBuckets<T>> answers_;
+  std::unique_ptr<SpillBuckets<Slot>> answers_;
 };
 
 }  // namespace voxdag::query

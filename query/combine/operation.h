@@ -62,6 +62,15 @@ constexpr Outcome outcome_of(Operation operation, const NodePair& cubes, const N
   return Outcome::kUnknown;
 }
 
+// Returns the file from which the counts of the result are derived, or kEmpty: they are the counts
+// of this file, changed where the result differs. So only few nodes must be counted if most of the
+// result is in this file.
+constexpr Outcome reference_of(Operation operation, uint64_t nodes_of_a, uint64_t nodes_of_b) {
+  if (operation == Operation::kAnd) return Outcome::kEmpty;
+  if (operation == Operation::kMinus) return Outcome::kA;
+  return nodes_of_a >= nodes_of_b ? Outcome::kA : Outcome::kB;
+}
+
 // Returns the result of two cubes with equal voxels.
 constexpr Outcome outcome_of_equal(Operation operation) {
   return combine_bricks(operation, 1, 1) ? Outcome::kA : Outcome::kEmpty;

@@ -17,9 +17,18 @@ std::array<uint64_t, 8> children_of(const voxdag_reader::Node& node) {
   return children;
 }
 
-void add_use(KeptNodes& kept, KeptMarks& marks, const NodeUse& use) {
-  kept.uses.add(use);
+template <class Use>
+void add_use(MarkedNodes<Use>& nodes, Marks& marks, const Use& use) {
+  if (use.offset == kNoNode) return;
+  nodes.uses.add(use);
   marks.mark(use.offset);
+}
+
+// Must be called after the last mark.
+template <class Use>
+void finish(MarkedNodes<Use>& nodes, const Marks& marks) {
+  nodes.uses.finish(true);
+  marks.store(nodes.bits);
 }
 
 }  // namespace
@@ -28,31 +37,42 @@ PairLevels::Open::Open(const PairLevels& all, uint32_t opened)
     : level(opened),
       pairs(std::make_unique<PairLevel>(all.space_)),
       requests(std::make_unique<SpillSorter<PairRequest>>(all.space_)),
-      marks_a(all.a_.level(opened).word_count, all.space_.budget),
-      marks_b(all.b_.level(opened).word_count, all.space_.budget) {}
+      kept_a(all.a_.level(opened).word_count, all.space_.budget),
+      kept_b(all.b_.level(opened).word_count, all.space_.budget),
+      counted_a(all.a_.level(opened).word_count, all.space_.budget),
+      counted_b(all.b_.level(opened).word_count, all.space_.budget) {}
 
 void PairLevels::add(Open& to, const NodePair& cubes, uint64_t place) const {
-  switch (outcome_of(operation_, cubes, joined_[to.level]->full)) {
-    case Outcome::kEmpty:
-      break;
-    case Outcome::kA:
-      add_use(to.pairs->kept_a, to.marks_a, {cubes.a, place});
-      break;
-    case Outcome::kB:
-      add_use(to.pairs->kept_b, to.marks_b, {cubes.b, place});
-      break;
-    case Outcome::kUnknown:
-      to.requests->add({cubes, place});
-      break;
-  }
+  const Outcome outcome = outcome_of(operation_, cubes, joined_[to.level]->full);
+  if (outcome == Outcome::kUnknown)
+    to.requests->add({cubes, place});
+  else
+    add_result(to, cubes, outcome, place);
 }
 
-// Numbers the distinct pairs among the requests. A pair of equal nodes gets no number, because its
-// result is known: one of the nodes, or nothing.
+// Adds a known result, and the change of the counts relative to the reference file.
+void PairLevels::add_result(Open& to, const NodePair& cubes, Outcome result, uint64_t place) const {
+  if (result == Outcome::kA) add_use<NodeUse>(to.pairs->kept_a, to.kept_a, {cubes.a, place});
+  if (result == Outcome::kB) add_use<NodeUse>(to.pairs->kept_b, to.kept_b, {cubes.b, place});
+  if (result == reference_) return;
+  add_counts(to, cubes, result, place, 1);
+  add_counts(to, cubes, reference_, place, -1);
+}
+
+void PairLevels::add_counts(Open& to, const NodePair& cubes, Outcome of, uint64_t place,
+                            int64_t sign) const {
+  if (of == Outcome::kA)
+    add_use<CountUse>(to.pairs->counted_a, to.counted_a, {cubes.a, place, sign});
+  if (of == Outcome::kB)
+    add_use<CountUse>(to.pairs->counted_b, to.counted_b, {cubes.b, place, sign});
+}
+
+// Finds the distinct pairs among the requests, and ends the pairs of equal nodes. Their result is
+// the node of A. If the counts are derived from B, they are equal too.
 void PairLevels::number_pairs(Open& level) const {
   SpillSorter<PairRequest>& requests = *level.requests;
   SpillReader equal(joined_[level.level]->equal);
-  const bool keep_equal = outcome_of_equal(operation_) == Outcome::kA;
+  const Outcome of_equal = outcome_of_equal(operation_);
   requests.finish();
   requests.begin();
   while (!requests.at_end()) {
@@ -65,8 +85,10 @@ void PairLevels::number_pairs(Open& level) const {
       const uint64_t place = requests.front().place;
       if (!is_equal)
         level.pairs->uses.add({number, place});
-      else if (keep_equal)
-        add_use(level.pairs->kept_a, level.marks_a, {cubes.a, place});
+      else if (of_equal == Outcome::kA && reference_ == Outcome::kB)
+        add_use<NodeUse>(level.pairs->kept_a, level.kept_a, {cubes.a, place});
+      else
+        add_result(level, cubes, of_equal, place);
     }
   }
   level.requests.reset();
@@ -84,20 +106,21 @@ void PairLevels::expand_pairs(const Open& level, Open& below) const {
   }
 }
 
-void PairLevels::add_bricks(const Open& level, SpillSorter<PairRow>& bricks) const {
+void PairLevels::add_bricks(const Open& level, BrickResults& bricks) const {
+  const auto voxels = [](uint64_t mask) { return static_cast<uint64_t>(popcount64(mask)); };
   uint64_t number = 0;
   for (SpillReader pair(level.pairs->pairs); !pair.at_end(); pair.pop(), ++number) {
-    const uint64_t mask =
-        combine_bricks(operation_, a_.brick(pair.front().a), b_.brick(pair.front().b));
-    if (mask != 0)
-      bricks.add({brick_row(mask, a_.file().hash_bits()),
-                  {1, static_cast<uint64_t>(popcount64(mask))},
-                  number});
+    const uint64_t a = a_.brick(pair.front().a), b = b_.brick(pair.front().b);
+    const uint64_t mask = combine_bricks(operation_, a, b);
+    if (mask != 0) bricks.rows.add({brick_row(mask, a_.file().hash_bits()), number});
+    const uint64_t before = reference_ == Outcome::kA ? a : reference_ == Outcome::kB ? b : 0;
+    bricks.counts.add({number, {0, voxels(mask) - voxels(before)}});
   }
+  bricks.counts.finish();
 }
 
-void PairLevels::mark_children(DagInput& input, uint32_t level, const KeptMarks& marks,
-                               KeptMarks& below) const {
+void PairLevels::mark_children(DagInput& input, uint32_t level, const Marks& marks,
+                               Marks& below) const {
   if (marks.empty()) return;
   for (LevelCursor cursor(input, level); !cursor.at_end(); cursor.next()) {
     if (!marks.has(cursor.offset())) continue;
@@ -106,7 +129,14 @@ void PairLevels::mark_children(DagInput& input, uint32_t level, const KeptMarks&
   }
 }
 
-std::vector<std::unique_ptr<PairLevel>> PairLevels::descend(SpillSorter<PairRow>& bricks) {
+void PairLevels::mark_all_children(const Open& level, Open& below) const {
+  mark_children(a_, level.level, level.kept_a, below.kept_a);
+  mark_children(b_, level.level, level.kept_b, below.kept_b);
+  mark_children(a_, level.level, level.counted_a, below.counted_a);
+  mark_children(b_, level.level, level.counted_b, below.counted_b);
+}
+
+std::vector<std::unique_ptr<PairLevel>> PairLevels::descend(BrickResults& bricks) {
   std::vector<std::unique_ptr<PairLevel>> levels;
   Open open(*this, 0);
   const auto root = [](DagInput& input) { return input.file().empty() ? kNoNode : 0; };
@@ -114,15 +144,14 @@ std::vector<std::unique_ptr<PairLevel>> PairLevels::descend(SpillSorter<PairRow>
   for (;;) {
     number_pairs(open);
     pair_count_ += open.pairs->pairs.size();
-    open.pairs->kept_a.uses.finish(true);
-    open.pairs->kept_b.uses.finish(true);
-    open.marks_a.store(open.pairs->kept_a.bits);
-    open.marks_b.store(open.pairs->kept_b.bits);
+    finish(open.pairs->kept_a, open.kept_a);
+    finish(open.pairs->kept_b, open.kept_b);
+    finish(open.pairs->counted_a, open.counted_a);
+    finish(open.pairs->counted_b, open.counted_b);
     if (open.level == a_.file().brick_level()) break;
     Open below(*this, open.level + 1);
     expand_pairs(open, below);
-    mark_children(a_, open.level, open.marks_a, below.marks_a);
-    mark_children(b_, open.level, open.marks_b, below.marks_b);
+    mark_all_children(open, below);
     levels.push_back(std::move(open.pairs));
     open = std::move(below);
   }

@@ -1,7 +1,9 @@
 // Descends through two DAGs together, level by level, and finds
 //
 //   - the distinct pairs of cubes whose result is neither empty nor a cube of one of the files;
-//   - the *kept* nodes of each file: nodes that are a result, and all nodes below them.
+//   - the *kept* nodes of each file: nodes that are a result, and all nodes below them;
+//   - the *counted* nodes of each file, whose counts differ between the new file and the file from
+//     which its counts are derived (count_levels.h), and all nodes below them.
 //
 // The pairs of a level are sorted, so that equal pairs are found, also if they do not fit in
 // memory. Pairs of equal nodes end there, because Join has found the equal nodes.
@@ -20,33 +22,67 @@
 
 namespace voxdag::query {
 
-// The nodes of one file that are kept on one level.
-struct KeptNodes {
-  explicit KeptNodes(const SpillSpace& space) : uses(space), bits(space) {}
+// Marked nodes of one level of one file, and their uses as results or as changes of counts.
+template <class Use>
+struct MarkedNodes {
+  explicit MarkedNodes(const SpillSpace& space) : uses(space), bits(space) {}
 
-  SpillSorter<NodeUse> uses;  // places whose result is a node of this file
-  // A bit for each word offset / 2, set if a kept node begins there. Empty if no node is kept.
+  SpillSorter<Use> uses;
+  // A bit for each word offset / 2, set if a marked node begins there. Empty without such nodes.
   SpillList<uint64_t> bits;
+};
+using KeptNodes = MarkedNodes<NodeUse>;
+using CountedNodes = MarkedNodes<CountUse>;
+
+// Walks through the bits of marked nodes, by increasing offsets.
+class MarkReader {
+ public:
+  explicit MarkReader(const SpillList<uint64_t>& bits) : reader_(bits) {}
+  bool has(uint64_t offset) {
+    for (; word_ < offset / 128; ++word_) reader_.pop();
+    return reader_.front() >> offset / 2 % 64 & 1;
+  }
+
+ private:
+  SpillReader<uint64_t> reader_;
+  uint64_t word_ = 0;
 };
 
 struct PairLevel {
   explicit PairLevel(const SpillSpace& space)
-      : pairs(space), uses(space), kept_a(space), kept_b(space) {}
+      : pairs(space),
+        uses(space),
+        kept_a(space),
+        kept_b(space),
+        counted_a(space),
+        counted_b(space) {}
 
   SpillList<NodePair> pairs;
   SpillList<PairUse> uses;  // by increasing numbers of pairs
   KeptNodes kept_a;
   KeptNodes kept_b;
+  CountedNodes counted_a;
+  CountedNodes counted_b;
 };
 
-// Collects the kept nodes of one level of one file.
-class KeptMarks {
+// The results of the pairs of bricks.
+struct BrickResults {
+  explicit BrickResults(const SpillSpace& space) : rows(space), counts(space) {}
+
+  SpillSorter<PairRow> rows;
+  // Changes of the voxels of the pairs relative to the bricks of the reference file, by increasing
+  // pairs.
+  SpillList<KeyedCounts> counts;
+};
+
+// Collects the marked nodes of one level of one file.
+class Marks {
  public:
-  KeptMarks(uint64_t level_words, MemoryBudget& budget) : words_(level_words), budget_(&budget) {}
+  Marks(uint64_t level_words, MemoryBudget& budget) : words_(level_words), budget_(&budget) {}
 
   void mark(uint64_t offset) {
     if (bits_.size() == 0)
-      bits_ = PageBuffer<uint64_t>(*budget_, words_ / 128 + 1, "marks of the nodes to keep");
+      bits_ = PageBuffer<uint64_t>(*budget_, words_ / 128 + 1, "marks of nodes");
     bits_[offset / 128] |= uint64_t{1} << offset / 2 % 64;
   }
   bool empty() const { return bits_.size() == 0; }
@@ -64,13 +100,19 @@ class KeptMarks {
 
 class PairLevels {
  public:
+  // `reference` is the file from which the counts of the result are derived, or kEmpty.
   // `joined` has the facts about all levels, from the root to the bricks.
-  PairLevels(DagInput& a, DagInput& b, Operation operation,
+  PairLevels(DagInput& a, DagInput& b, Operation operation, Outcome reference,
              const std::vector<std::unique_ptr<JoinedLevel>>& joined, const SpillSpace& space)
-      : a_(a), b_(b), operation_(operation), joined_(joined), space_(space) {}
+      : a_(a),
+        b_(b),
+        operation_(operation),
+        reference_(reference),
+        joined_(joined),
+        space_(space) {}
 
   // Returns all levels, from the root to the bricks, and adds the results of pairs of bricks.
-  std::vector<std::unique_ptr<PairLevel>> descend(SpillSorter<PairRow>& bricks);
+  std::vector<std::unique_ptr<PairLevel>> descend(BrickResults& bricks);
   uint64_t pair_count() const { return pair_count_; }
 
  private:
@@ -80,19 +122,23 @@ class PairLevels {
     uint32_t level;
     std::unique_ptr<PairLevel> pairs;
     std::unique_ptr<SpillSorter<PairRequest>> requests;
-    KeptMarks marks_a, marks_b;
+    Marks kept_a, kept_b;
+    Marks counted_a, counted_b;
   };
 
   void add(Open& to, const NodePair& cubes, uint64_t place) const;
+  void add_result(Open& to, const NodePair& cubes, Outcome result, uint64_t place) const;
+  void add_counts(Open& to, const NodePair& cubes, Outcome of, uint64_t place, int64_t sign) const;
   void number_pairs(Open& level) const;
   void expand_pairs(const Open& level, Open& below) const;
-  void add_bricks(const Open& level, SpillSorter<PairRow>& bricks) const;
-  void mark_children(DagInput& input, uint32_t level, const KeptMarks& marks,
-                     KeptMarks& below) const;
+  void add_bricks(const Open& level, BrickResults& bricks) const;
+  void mark_children(DagInput& input, uint32_t level, const Marks& marks, Marks& below) const;
+  void mark_all_children(const Open& level, Open& below) const;
 
   DagInput& a_;
   DagInput& b_;
   const Operation operation_;
+  const Outcome reference_;
   const std::vector<std::unique_ptr<JoinedLevel>>& joined_;
   const SpillSpace& space_;
   uint64_t pair_count_ = 0;

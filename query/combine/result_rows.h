@@ -39,11 +39,25 @@ struct NodeUse {
   friend auto operator<=>(const NodeUse&, const NodeUse&) = default;
 };
 
+// A place whose counts change by `sign` times the counts of a node of one of the files.
+struct CountUse {
+  uint64_t offset = 0;
+  uint64_t place = 0;
+  int64_t sign = 1;
+  friend auto operator<=>(const CountUse&, const CountUse&) = default;
+};
+
+// A change of the counts of a place or of a pair, whose number is `key`, modulo 2^64.
+struct KeyedCounts {
+  uint64_t key = 0;
+  OctreeCounts counts;
+  friend bool operator<(const KeyedCounts& a, const KeyedCounts& b) { return a.key < b.key; }
+};
+
 // A node of the new file.
 struct NewNode {
   uint64_t position = 0;  // word offset in its level
   uint64_t hash = 0;
-  OctreeCounts counts;
 };
 
 // The result of a place or of a pair, whose number is `key`.
@@ -56,7 +70,6 @@ struct KeyedNode {
 // A row that is made from a pair.
 struct PairRow {
   Row row;
-  OctreeCounts counts;
   uint64_t pair = 0;
   friend bool operator<(const PairRow& a, const PairRow& b) {
     const int order = compare_rows(a.row, b.row);

@@ -1,0 +1,63 @@
+// Computes how many voxels and octree nodes the new file has.
+//
+// The counts of the new file are those of the *reference* file (reference_of()), changed at the
+// places where the result is not the reference's node. Changes go up with the levels: the change of
+// a pair is the sum of the changes of its places. Only the nodes that are added or left out at a
+// place, and the nodes below them, must be counted. All sums are modulo 2^64.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "query/combine/dag_input.h"
+#include "query/combine/node_values.h"
+#include "query/combine/operation.h"
+#include "query/combine/pair_levels.h"
+#include "query/combine/spill.h"
+
+namespace voxdag::query {
+
+class CountLevels {
+ public:
+  // `bricks` has the changes of the pairs of bricks.
+  CountLevels(DagInput& a, DagInput& b, Outcome reference, const SpillList<KeyedCounts>& bricks,
+              const SpillSpace& space, const LookupMemory& memory)
+      : a_(a),
+        b_(b),
+        reference_(reference),
+        space_(space),
+        memory_(memory),
+        pair_changes_(&bricks) {}
+
+  // Call these for each level, from the bricks up: begin_level(), add_pair() for the places whose
+  // results are pairs, by increasing pairs, and add_nodes().
+  void begin_level();
+  // `has_node` is false if the result of the pair is empty.
+  void add_pair(const PairUse& use, bool has_node);
+  void add_nodes(uint32_t level, PairLevel& pairs);
+
+  // Returns the counts of the new file. Must be called after the root level.
+  OctreeCounts total();
+
+ private:
+  using Counts = NodeValues<OctreeCounts>;
+  void add_nodes(DagInput& input, uint32_t level, CountedNodes& nodes,
+                 std::unique_ptr<Counts>& below);
+  void sum_pairs();
+
+  DagInput& a_;
+  DagInput& b_;
+  const Outcome reference_;
+  const SpillSpace& space_;
+  const LookupMemory memory_;
+  // Changes of the pairs of the current level.
+  const SpillList<KeyedCounts>* pair_changes_;
+  std::unique_ptr<SpillList<KeyedCounts>> sums_;
+  std::optional<SpillReader<KeyedCounts>> next_pair_;
+  // Changes of the places of the current level.
+  std::unique_ptr<SpillSorter<KeyedCounts>> places_;
+  // The counted nodes of the level added last.
+  std::unique_ptr<Counts> below_a_, below_b_;
+};
+
+}  // namespace voxdag::query
