@@ -22,9 +22,10 @@ class GrowingCharge {
   // one step more do not fit the budget.
   void grow_to(uint64_t bytes) {
     if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
-    throw Error(ErrorCode::kOutOfMemory, "out of memory: " + what_ + " needs over " +
-                                             std::to_string(bytes) +
-                                             " bytes, more than the memory budget has left");
+    throw Error(
+        ErrorCode::kOutOfMemory,
+        "out of memory: " + what_ + " needs over " + std::to_string(bytes) +
+            " bytes, more than the memory budget has left: expected a larger budget (--memory)");
   }
   // Charges `bytes` more. The total is the sum of all calls of add().
   void add(uint64_t bytes) { grow_to(added_ += bytes); }

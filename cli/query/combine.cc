@@ -45,7 +45,9 @@ size_t operation_of(const CombineCommand& command) {
     ++given;
   }
   if (given != 1)
-    throw Error(ErrorCode::kInvalidInput, "expected one of --union, --minus, --and and --xor");
+    throw Error(ErrorCode::kInvalidInput,
+                "no operation or several operations are given: expected one of --union, --minus, "
+                "--and and --xor");
   return found;
 }
 

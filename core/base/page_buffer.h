@@ -59,9 +59,10 @@ class PageBuffer {
   void grow(size_t size, std::string_view what) {
     const uint64_t old_bytes = charge_.bytes();
     if (!charge_.try_resize(byte_count(size)))
-      throw Error(ErrorCode::kOutOfMemory, "out of memory: " + std::string(what) + " needs " +
-                                               std::to_string(byte_count(size)) +
-                                               " bytes, more than the memory budget has left");
+      throw Error(
+          ErrorCode::kOutOfMemory,
+          "out of memory: " + std::string(what) + " needs " + std::to_string(byte_count(size)) +
+              " bytes, more than the memory budget has left: expected a larger budget (--memory)");
     try {
       data_ = static_cast<T*>(grow_pages(data_, old_bytes, byte_count(size), what));
     } catch (...) {

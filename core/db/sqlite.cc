@@ -173,7 +173,7 @@ int64_t SqlDatabase::integer(const std::string& sql) {
   if (!statement.step())
     throw Error(ErrorCode::kCorrupt, std::string("database ") +
                                          sqlite3_db_filename(handle_.get(), "main") +
-                                         ": expected a row as the result of: " + sql);
+                                         ": a query returned no row, expected one: " + sql);
   return statement.integer(0);
 }
 

@@ -26,7 +26,8 @@ class ForwardingFiles : public FileSystem {
     const FileIdentity own = files_.open_own(path)->identity();
     auto file = open_read(path);
     if (file->identity().inode != own.inode)
-      throw Error(ErrorCode::kInvalidInput, path + " changed while it was opened");
+      throw Error(ErrorCode::kInvalidInput,
+                  path + " changed while it was opened: expected a file that stays the same");
     return file;
   }
   std::unique_ptr<WritableFile> create(const std::string& path) override {

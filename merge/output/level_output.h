@@ -29,7 +29,7 @@ struct LevelExtent {
       throw Error(ErrorCode::kLimit, "level " + std::to_string(level) +
                                          " of the merged DAG has over 2^" + std::to_string(bits) +
                                          (in_words ? " words" : " nodes") +
-                                         ", the limit of a level");
+                                         ", the limit of a level: expected a lower resolution");
   }
 };
 

@@ -217,7 +217,9 @@ def _checked_uv(given: ArrayLike, vertices: int, triangles: int, where: str) -> 
             "invalid_input",
         )
     if not np.isfinite(uv).all():
-        raise Error(f"{where}uv has numbers that are not finite", "invalid_input")
+        raise Error(
+            f"{where}uv has numbers that are not finite: expected finite numbers", "invalid_input"
+        )
     return uv.astype(np.float32)
 
 

@@ -107,7 +107,7 @@ class LevelCursor {
   void load_brick() {
     size_ = 2;
     if (offset_ + size_ > words_.word_count || brick() == 0)
-      input_.corrupt(level_, offset_, "the brick has no voxels");
+      input_.corrupt(level_, offset_, "the brick has no voxels: expected at least one");
   }
   void check_chunk();
   void expect_all_nodes() const;

@@ -75,9 +75,10 @@ class HashCursor {
     else
       load_brick();
     if (has_previous_ && compare_rows(rows_[current_ ^ 1], own()) >= 0)
-      input_.corrupt(level_, offset(),
-                     "the node does not follow the one before it in the total order of nodes "
-                     "(docs/format.md)");
+      input_.corrupt(
+          level_, offset(),
+          "the node does not follow the one before it: expected the total order of nodes "
+          "(docs/format.md)");
   }
   void load_brick() {
     rows_[current_] = joined_ = brick_row(cursor_.brick(), input_.file().hash_bits());
@@ -114,7 +115,8 @@ void HashCursor<Hash>::load_node() {
     const uint64_t child = node.child(static_cast<int>(i));
     const FoundValue<Hash> found = lookups_->next(child);
     if (!found.begins)
-      input_.corrupt(level_, offset(), "a child is at a word where no node begins");
+      input_.corrupt(level_, offset(),
+                     "a child pointer leads to a word at which no node begins: expected a node");
     const uint64_t number = number_in_a(found.value, child);
     hashes[i] = found.value.hash;
     own.children[i] = child;

@@ -66,7 +66,8 @@ DagStats dag_stats(const voxdag_reader::File& file, MemoryBudget& budget,
           if (child == NodeIndex::kNone)
             throw Error(ErrorCode::kCorrupt, file.path() + ": level " + std::to_string(l) +
                                                  ", word " + std::to_string(offset) +
-                                                 ": a child pointer is no node's offset");
+                                                 ": a child pointer leads to a word at which no "
+                                                 "node begins: expected a node");
           child_times[child] += times[i];
         }
       });

@@ -56,8 +56,9 @@ class LevelsReader {
     const auto root =
         std::ranges::find_if(roots, [&](const ArtifactRoot& r) { return contains(r.cube, cube); });
     if (root == roots.end())
-      throw Error(ErrorCode::kCorrupt,
-                  "an artifact has no root in the cube of its subvolume: expected one");
+      throw Error(
+          ErrorCode::kCorrupt,
+          "an artifact has no root in the cube of its subvolume: start over with --restart");
     uint32_t row = root->index;
     for (uint32_t level = root->cube.level; level < cube.level; ++level) {
       const auto child = child_row(level, row, ancestor(cube, level + 1).child_index());
@@ -84,8 +85,8 @@ class LevelsReader {
   const ArtifactLevel& level(uint32_t number) const {
     const ArtifactLevel* const level = artifact_.level(number);
     if (level == nullptr)
-      throw Error(ErrorCode::kCorrupt,
-                  "an artifact lacks level " + std::to_string(number) + ": expected all levels");
+      throw Error(ErrorCode::kCorrupt, "an artifact lacks level " + std::to_string(number) +
+                                           ": start over with --restart");
     return *level;
   }
 
@@ -93,7 +94,8 @@ class LevelsReader {
     const auto& frames = level(number).frames;
     const auto after = std::ranges::upper_bound(frames, uint64_t{row}, {}, &FrameInfo::first_row);
     if (after == frames.begin())
-      throw Error(ErrorCode::kCorrupt, "an artifact has no row for a root: expected one");
+      throw Error(ErrorCode::kCorrupt,
+                  "an artifact has no row for one of its roots: start over with --restart");
     const size_t frame = static_cast<size_t>(after - frames.begin()) - 1;
     artifact_.read_frame(number, frame, frame_);
     size_t at = 0;

@@ -61,7 +61,8 @@ function parseCamera(space, eye, target, fov, defaultFov) {
 
 function parsePoint(space, text, name) {
   const parts = (text ?? "").split(",");
-  if (parts.length !== 3) throw new Error(`Expected ${name} X,Y,Z.`);
+  if (parts.length !== 3)
+    throw new Error(`${name} is missing or is not three numbers. Expected ${name} X,Y,Z.`);
   return space.toVoxels(parts.map((part) => parseNumber(part, name)));
 }
 
