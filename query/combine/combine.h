@@ -6,7 +6,7 @@
 //   level_writer.h  the levels of the new file
 //   count_levels.h  the numbers of voxels and octree nodes
 //
-// The pairs are found from the root down, all others from the bricks up.
+// pair_levels.h goes from the root down to the bricks, the others from the bricks up to the root.
 //
 // The time depends on the sizes of the files and on the number of distinct pairs. The memory
 // depends on the budget: longer lists and the values of large levels are in a scratch folder. Only

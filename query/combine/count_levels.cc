@@ -6,7 +6,7 @@
 
 namespace voxdag::query {
 
-// Adds the changes of the places of each pair.
+// Computes the change of each pair: the sum of the changes of its places.
 void CountLevels::sum_pairs() {
   auto sums = std::make_unique<SpillList<KeyedCounts>>(space_);
   places_->finish();

@@ -1,9 +1,9 @@
 // Computes how many voxels and octree nodes the new file has.
 //
-// The counts of the new file are those of the *reference* file (reference_of()), changed at the
-// places where the result is not the reference's node. Changes go up with the levels: the change of
-// a pair is the sum of the changes of its places. Only the nodes that are added or left out at a
-// place, and the nodes below them, must be counted. All sums are modulo 2^64.
+// The counts of the new file are the counts of the *reference* file (reference_of()), changed at
+// the places where the result is not the reference's node. Changes go up with the levels: the
+// change of a pair is the sum of the changes of its places. Only the nodes that are added or left
+// out at a place, and the nodes below them, must be counted. All sums are modulo 2^64.
 #pragma once
 
 #include <memory>
@@ -29,8 +29,8 @@ class CountLevels {
         memory_(memory),
         pair_changes_(&bricks) {}
 
-  // Call these for each level, from the bricks up: begin_level(), add_pair() for the places whose
-  // results are pairs, by increasing pairs, and add_nodes().
+  // Call these for each level, from the bricks up, in this order. Call add_pair() for each place
+  // whose result is the result of a pair, by increasing numbers of the pairs.
   void begin_level();
   // `has_node` is false if the result of the pair is empty.
   void add_pair(const PairUse& use, bool has_node);

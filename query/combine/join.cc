@@ -14,8 +14,8 @@ namespace voxdag::query {
 struct HashOfA {
   uint64_t hash = 0;
 };
-// A node of the second file, with the offset of the equal node of the first file plus one; 0
-// without such a node.
+// A node of the second file. `number_in_a` is the offset of the equal node of the first file plus
+// 1, or 0 if there is no such node.
 struct HashOfB {
   uint64_t hash = 0;
   uint64_t number_in_a = 0;

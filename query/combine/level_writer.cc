@@ -33,7 +33,7 @@ class KeptCursor {
   bool at_end() const { return !cursor_ || cursor_->at_end(); }
   uint64_t offset() const { return cursor_->offset(); }
   const Row& row() const { return row_; }
-  // Returns the hash of the row; the maximum at the end.
+  // Returns the hash of the current row; at the end, the maximum of uint64_t.
   uint64_t hash() const { return at_end() ? ~uint64_t{0} : row_.hash; }
   void next() {
     step();
@@ -132,7 +132,8 @@ class RowWriter {
   uint64_t nodes_ = 0;
 };
 
-// The kept nodes of a level of a file, and what becomes of them.
+// The kept nodes of a level of a file, with their places in the new file, the places of pairs that
+// use them (`uses`), and the results of these places (`parents`).
 struct KeptSource {
   KeptCursor& cursor;
   KeptPlaces& placed;
@@ -148,7 +149,7 @@ struct KeptSource {
       parents.add({uses.front().place, node});
     cursor.next();
   }
-  // The same if the current node is `row`.
+  // Calls pass() if the current node is equal to `row`.
   void pass_equal(const Row& row, const NewNode& node) {
     if (!cursor.at_end() && compare_rows(cursor.row(), row) == 0) pass(node);
   }

@@ -64,7 +64,8 @@ class NodeValues {
     if (offset < level_words_) __builtin_prefetch(&values_[offset / 2]);
   }
 
-  // For NodeLookups: the values of a window, and the result of a lookup of a slot.
+  // For NodeLookups, which reads the values of a window as slots. A slot is for two words, and a
+  // node begins at only one of them: `begins` is 1 for the first, 2 for the second.
   using Slot = FoundValue<T>;
   class WindowReader {
    public:
@@ -80,7 +81,7 @@ class NodeValues {
    private:
     SpillReader<typename NodeValues::Entry> reader_;
   };
-  // A slot is for two words. Only at one of them a node begins.
+  // Returns the result of a lookup from the slot of `offset`.
   static FoundValue<T> found(uint64_t offset, const Slot& slot) {
     return slot.begins == 1 + (offset & 1) ? slot : FoundValue<T>{};
   }

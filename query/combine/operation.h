@@ -62,9 +62,10 @@ constexpr Outcome outcome_of(Operation operation, const NodePair& cubes, const N
   return Outcome::kUnknown;
 }
 
-// Returns the file from which the counts of the result are derived, or kEmpty: they are the counts
-// of this file, changed where the result differs. So only few nodes must be counted if most of the
-// result is in this file.
+// Returns the reference file: the counts of the result are computed from the counts of this file,
+// by adding the changes at the places where the result differs. So if most of the result is in this
+// file, only few nodes must be counted. kEmpty: there is no reference file; all nodes of the result
+// are counted.
 constexpr Outcome reference_of(Operation operation, uint64_t nodes_of_a, uint64_t nodes_of_b) {
   if (operation == Operation::kAnd) return Outcome::kEmpty;
   if (operation == Operation::kMinus) return Outcome::kA;

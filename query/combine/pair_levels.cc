@@ -67,8 +67,9 @@ void PairLevels::add_counts(Open& to, const NodePair& cubes, Outcome of, uint64_
     add_use<CountUse>(to.pairs->counted_b, to.counted_b, {cubes.b, place, sign});
 }
 
-// Finds the distinct pairs among the requests, and ends the pairs of equal nodes. Their result is
-// the node of A. If the counts are derived from B, they are equal too.
+// Finds the distinct pairs among the requests, and numbers them. A pair of equal nodes gets no
+// number: its result is the node of A, or empty. If the result is the node of A, it does not change
+// the counts, even if the reference file is B, because the node of B has the same counts.
 void PairLevels::number_pairs(Open& level) const {
   SpillSorter<PairRequest>& requests = *level.requests;
   SpillReader equal(joined_[level.level]->equal);

@@ -22,7 +22,8 @@
 
 namespace voxdag::query {
 
-// Marked nodes of one level of one file, and their uses as results or as changes of counts.
+// Marked nodes of one level of one file, and the places that use them: for their result or for a
+// change of their counts.
 template <class Use>
 struct MarkedNodes {
   explicit MarkedNodes(const SpillSpace& space) : uses(space), bits(space) {}

@@ -142,7 +142,7 @@ SolidNeeds solid_needs(const GeometryOptions& options, const PreparedScene& scen
           kEncloseBytesPerNode * std::min(1.0, threads / subvolumes) * artifact_nodes};
 }
 
-// Extrapolates the interior of a solid. The finer pilot counts the sample rows.
+// Extrapolates the interior of a solid. Copies the numbers of sample rows from the finer pilot.
 SolidEstimate estimate_solid(const GeometryOptions& options, const std::vector<PilotCounts>& pilots,
                              int doublings) {
   const PilotCounts& last = pilots.back();

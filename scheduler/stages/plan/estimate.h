@@ -25,7 +25,7 @@
 
 namespace voxdag {
 
-// The interior of a solid. The numbers of sample rows are exact for the finer pilot.
+// The interior of a solid, and the numbers of the finer pilot's sample rows.
 struct SolidEstimate {
   std::string rule;
   EstimateRange interior;  // voxels of the solid that are not in its shell

@@ -59,7 +59,7 @@ class RecentTriangles {
   std::vector<FixedTriangle> slots_;
 };
 
-// Returns false for most triangles without area: if two corners are equal.
+// Returns false if two corners are equal. Most triangles without area have equal corners.
 bool has_area(const FixedTriangle& triangle) {
   for (int i = 0; i < 3; ++i)
     if (std::memcmp(triangle.v[i], triangle.v[(i + 1) % 3], sizeof triangle.v[i]) == 0)

@@ -16,7 +16,7 @@
 namespace voxdag {
 
 PilotRows::PilotRows(MemoryBudget& budget, uint32_t levels) : budget_(budget), levels_(levels) {
-  // The sums and a column need the same memory for a short time.
+  // read() also needs memory for the sums, which are as large as the views, and for a column.
   const uint64_t views = row_bytes(Cube{}, levels);
   const uint64_t column = RowColumn::bytes(TileGrid(levels), Cube{});
   if (budget.available() < 2 * views + column) throw OutOfBudget();
