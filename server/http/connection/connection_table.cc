@@ -41,9 +41,10 @@ std::string client_of(const std::string& address) {
 
 bool ConnectionTable::admit(int socket, const std::string& address, Place& place) {
   const std::string client = client_of(address);
+  const bool is_exempt = is_loopback(address);
   std::unique_lock lock(mutex_);
   const auto same = by_client_.find(client);
-  if (same != by_client_.end() && same->second >= limits_.max_per_client && !is_loopback(address))
+  if (same != by_client_.end() && same->second >= limits_.max_per_client && !is_exempt)
     return false;
   // The table may have more entries than connections, because an evicted connection remains in the
   // table until its thread has ended.
@@ -51,8 +52,8 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
   if (!removed_.wait_for(lock, kMaxEvictionWait, [&] { return entries_.size() < max_entries; }) ||
       (entries_.size() >= limits_.max_connections && !evict_one()))
     return false;
-  place = entries_.insert(entries_.end(),
-                          Entry{socket, client, Waiting::kForRequest, wall_seconds(), false});
+  place = entries_.insert(entries_.end(), Entry{socket, client, is_exempt, Waiting::kForRequest,
+                                                wall_seconds(), false});
   ++by_client_[client];
   return true;
 }
@@ -122,12 +123,12 @@ bool ConnectionTable::make_room_for_answer(const Entry& entry, size_t bytes) {
     return false;
   };
   const auto same_client = [&](const Entry& other) { return other.client == entry.client; };
-  if (!is_loopback(entry.client) && !fits(kMaxAnswerBytesPerClient, same_client)) return false;
+  if (!entry.is_exempt && !fits(kMaxAnswerBytesPerClient, same_client)) return false;
   return fits(kMaxAnswerBytes, [](const Entry&) { return true; });
 }
 
 bool ConnectionTable::reserve_answer(Place place, size_t bytes) {
-  if (bytes > kMaxAnswerBytesPerClient) return false;
+  if (bytes > (place->is_exempt ? kMaxAnswerBytes : kMaxAnswerBytesPerClient)) return false;
   const auto deadline = std::chrono::steady_clock::now() + kMaxEvictionWait;
   std::unique_lock lock(mutex_);
   while (!make_room_for_answer(*place, bytes)) {

@@ -25,6 +25,7 @@ class ConnectionTable {
   struct Entry {
     int socket;
     std::string client;
+    bool is_exempt;  // from the limits per client, as the loopback is
     Waiting waiting;
     double waiting_since_s;
     bool evicted;
@@ -36,7 +37,8 @@ class ConnectionTable {
 
   // Maximum memory of the answers of all connections.
   static constexpr size_t kMaxAnswerBytes = 64 << 20;
-  // Maximum memory of the answers of one client's connections. The loopback (a proxy) is exempt.
+  // Maximum memory of the answers of one client's connections. The loopback (a proxy) is exempt
+  // and may use kMaxAnswerBytes.
   static constexpr size_t kMaxAnswerBytesPerClient = kMaxAnswerBytes / 2;
 
   explicit ConnectionTable(const HttpLimits& limits) : limits_(limits) {}

@@ -192,6 +192,25 @@ TEST(AnswerMemory, OneClientCannotTakeItAll) {
   EXPECT_TRUE(table.reserve_answer(other, kMost));
 }
 
+// A proxy on the loopback forwards the requests of all clients, so it may use all the memory.
+TEST(AnswerMemory, TheLoopbackMayTakeItAll) {
+  constexpr size_t kMost = ConnectionTable::kMaxAnswerBytes;
+  const HttpLimits limits;
+  for (const char* address : {"127.0.0.1", "::1", "::ffff:127.0.0.1"}) {
+    SCOPED_TRACE(address);
+    ConnectionTable table(limits);
+    ConnectionTable::Place first, second;
+    ASSERT_TRUE(table.admit(-1, address, first));
+    ASSERT_TRUE(table.admit(-1, address, second));
+    table.set_working(first);
+    EXPECT_FALSE(table.reserve_answer(first, kMost + 1));
+    ASSERT_TRUE(table.reserve_answer(first, kMost)) << "one answer";
+    table.release_answer(first);
+    ASSERT_TRUE(table.reserve_answer(first, kMost / 2));
+    EXPECT_TRUE(table.reserve_answer(second, kMost / 2)) << "two answers";
+  }
+}
+
 // The number of evicted connections whose threads still run is limited.
 TEST(SlowConnections, EvictedConnectionsAreBounded) {
   HttpLimits limits;
