@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/error.h"
 #include "core/io/file_system.h"
 
 namespace voxdag {
@@ -18,17 +17,10 @@ class ForwardingFiles : public FileSystem {
   explicit ForwardingFiles(FileSystem& files) : files_(files) {}
 
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
-    return files_.open_read(path);
+    return reader_of(files_.open_read(path));
   }
-  // Calls open_read() for the file that the other file system opened, so a derived class that
-  // changes open_read() also changes this call.
   std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
-    const FileIdentity own = files_.open_own(path)->identity();
-    auto file = open_read(path);
-    if (file->identity().inode != own.inode)
-      throw Error(ErrorCode::kInvalidInput,
-                  path + " changed while it was opened: expected a file that stays the same");
-    return file;
+    return reader_of(files_.open_own(path));
   }
   std::unique_ptr<WritableFile> create(const std::string& path) override {
     return files_.create(path);
@@ -57,6 +49,11 @@ class ForwardingFiles : public FileSystem {
 
  protected:
   FileSystem& files() { return files_; }
+  // Returns the reader for a file that open_read() or open_own() opened. A derived class that
+  // changes reads overrides this function.
+  virtual std::unique_ptr<ReadableFile> reader_of(std::unique_ptr<ReadableFile> file) {
+    return file;
+  }
 
  private:
   FileSystem& files_;

@@ -29,16 +29,15 @@ class TestDisk : public ForwardingFiles {
         for (const DirectoryEntry& entry : list(path + folder)) used += entry.bytes;
     return bytes - std::min(bytes, used);
   }
-  std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
-    auto file = ForwardingFiles::open_read(path);
-    if (!on_part_read || path.find("/parts/") == std::string::npos) return file;
-    return std::make_unique<File>(std::move(file), on_part_read);
-  }
-
   uint64_t bytes = uint64_t{1} << 40;
   std::function<void()> on_part_read;
 
  private:
+  std::unique_ptr<ReadableFile> reader_of(std::unique_ptr<ReadableFile> file) override {
+    if (!on_part_read || file->path().find("/parts/") == std::string::npos) return file;
+    return std::make_unique<File>(std::move(file), on_part_read);
+  }
+
   class File : public ForwardingReader {
    public:
     File(std::unique_ptr<ReadableFile> file, const std::function<void()>& hook)

@@ -154,12 +154,13 @@ TEST_F(TileLimits, TilesAreNoLargerThanDocumented) {
 class ChangingFiles : public ForwardingFiles {
  public:
   using ForwardingFiles::ForwardingFiles;
-  std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
-    return std::make_unique<Reader>(ForwardingFiles::open_read(path), changes);
-  }
   std::atomic<bool> changes{false};
 
  private:
+  std::unique_ptr<ReadableFile> reader_of(std::unique_ptr<ReadableFile> file) override {
+    return std::make_unique<Reader>(std::move(file), changes);
+  }
+
   class Reader : public ForwardingReader {
    public:
     Reader(std::unique_ptr<ReadableFile> file, const std::atomic<bool>& changes)

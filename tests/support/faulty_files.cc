@@ -95,8 +95,9 @@ void FaultyFiles::read() {
     throw Error(ErrorCode::kIo, "the test's disk cannot be read");
 }
 
-std::unique_ptr<voxdag::ReadableFile> FaultyFiles::open_read(const std::string& path) {
-  return std::make_unique<FaultyReader>(*this, ForwardingFiles::open_read(path));
+std::unique_ptr<voxdag::ReadableFile> FaultyFiles::reader_of(
+    std::unique_ptr<voxdag::ReadableFile> file) {
+  return std::make_unique<FaultyReader>(*this, std::move(file));
 }
 
 std::unique_ptr<voxdag::WritableFile> FaultyFiles::create(const std::string& path) {

@@ -40,7 +40,6 @@ class FaultyFiles : public voxdag::ForwardingFiles {
   uint64_t operations() const { return operations_; }
   uint64_t reads() const { return reads_; }
 
-  std::unique_ptr<voxdag::ReadableFile> open_read(const std::string& path) override;
   std::unique_ptr<voxdag::WritableFile> create(const std::string& path) override;
   std::unique_ptr<voxdag::WritableFile> open_write(const std::string& path) override;
   bool create_new(const std::string& path) override;
@@ -52,6 +51,8 @@ class FaultyFiles : public voxdag::ForwardingFiles {
  private:
   friend class FaultyWriter;
   friend class FaultyReader;
+  std::unique_ptr<voxdag::ReadableFile> reader_of(
+      std::unique_ptr<voxdag::ReadableFile> file) override;
   // Gives the operation its number. Then runs the operation, or causes the planned fault. `half`
   // does the part of the operation that a failing disk still does.
   template <class Operation, class Half>

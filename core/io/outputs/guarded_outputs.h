@@ -26,9 +26,6 @@ class GuardedOutputs : public ForwardingFiles {
   // Guards `path` and its temporary name, `path` + ".partial".
   void guard_output(const std::string& path);
 
-  std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
-    return files().open_own(path);
-  }
   // These functions throw Error{kInvalidInput} if they would change a file of another program.
   std::unique_ptr<WritableFile> create(const std::string& path) override;
   void rename(const std::string& from, const std::string& to) override;

@@ -17,9 +17,6 @@ class SpaceReserve : public ForwardingFiles {
   SpaceReserve(FileSystem& files, uint64_t reserve_bytes)
       : ForwardingFiles(files), reserve_bytes_(reserve_bytes) {}
 
-  std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
-    return files().open_own(path);
-  }
   std::unique_ptr<WritableFile> create(const std::string& path) override;
   std::unique_ptr<WritableFile> open_write(const std::string& path) override;
   // Returns the free bytes without the reserve.

@@ -42,6 +42,14 @@ ConfinedFiles::ConfinedFiles(FileSystem& files, const std::vector<std::string>& 
 }
 
 std::unique_ptr<ReadableFile> ConfinedFiles::open_read(const std::string& path) {
+  return open_checked(&FileSystem::open_read, path);
+}
+
+std::unique_ptr<ReadableFile> ConfinedFiles::open_own(const std::string& path) {
+  return open_checked(&FileSystem::open_own, path);
+}
+
+std::unique_ptr<ReadableFile> ConfinedFiles::open_checked(Open open, const std::string& path) {
   // Missing files and forbidden files give the same error, so that a scene cannot find out which
   // files exist.
   std::string resolved = resolved_path(path);
@@ -51,7 +59,7 @@ std::unique_ptr<ReadableFile> ConfinedFiles::open_read(const std::string& path) 
       std::any_of(readable_.begin(), readable_.end(),
                   [&](const std::string& p) { return is_within(resolved, p); });
   if (is_readable) {
-    auto file = ForwardingFiles::open_read(path);
+    auto file = (files().*open)(path);
     if (is_same_file(resolved, file->identity())) return file;
   }
   throw Error(ErrorCode::kInvalidInput,

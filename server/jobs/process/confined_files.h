@@ -1,8 +1,9 @@
 // A file system that opens only the given files for reading. Without it, an uploaded scene could
 // read any file of the machine by naming it as a buffer: directly, with "..", or through a symbolic
-// link. All calls other than open_read() are forwarded.
+// link. Calls that do not open a file for reading are forwarded.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -16,11 +17,15 @@ class ConfinedFiles : public ForwardingFiles {
   // path that does not exist yet must not contain symbolic links, "." or "..".
   ConfinedFiles(FileSystem& files, const std::vector<std::string>& readable);
 
-  // Opens a file for reading. Error messages contain `path` as given. Throws Error{kInvalidInput}
-  // if reading the file is not allowed.
+  // These functions open a file for reading. Error messages contain `path` as given. They throw
+  // Error{kInvalidInput} if reading the file is not allowed.
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override;
+  std::unique_ptr<ReadableFile> open_own(const std::string& path) override;
 
  private:
+  using Open = std::unique_ptr<ReadableFile> (FileSystem::*)(const std::string& path);
+  std::unique_ptr<ReadableFile> open_checked(Open open, const std::string& path);
+
   std::vector<std::string> readable_;  // resolved
 };
 

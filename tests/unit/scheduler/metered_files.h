@@ -35,9 +35,6 @@ class MeteredFiles : public ForwardingFiles {
     syncs.clear();
   }
 
-  std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
-    return std::make_unique<Reader>(*this, ForwardingFiles::open_read(path));
-  }
   std::unique_ptr<WritableFile> create(const std::string& path) override {
     return std::make_unique<Writer>(*this, ForwardingFiles::create(path));
   }
@@ -52,6 +49,9 @@ class MeteredFiles : public ForwardingFiles {
   }
 
  private:
+  std::unique_ptr<ReadableFile> reader_of(std::unique_ptr<ReadableFile> file) override {
+    return std::make_unique<Reader>(*this, std::move(file));
+  }
   uint64_t add(std::map<std::string, uint64_t>& counts, const std::string& path, uint64_t more) {
     std::lock_guard lock(mutex_);
     return counts[path] += more;

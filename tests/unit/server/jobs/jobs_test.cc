@@ -344,8 +344,11 @@ TEST(ConfinedFilesTest, OpensNothingOutside) {
   for (const char* name : {"out", "inside", "in/link", "in/../out", "in/up/out"}) {
     SCOPED_TRACE(name);
     EXPECT_THROW(files.open_read(folder.file(name)), Error);
+    EXPECT_THROW(files.open_own(folder.file(name)), Error);
   }
+  EXPECT_EQ(files.open_own(folder.file("in/a"))->size(), 1u);
   std::filesystem::create_symlink(folder.file("in/a"), folder.file("public.glb"));
+  EXPECT_THROW(files.open_own(folder.file("public.glb")), Error) << "a symbolic link";
   EXPECT_EQ(files.open_read(folder.file("public.glb"))->path(), folder.file("public.glb"))
       << "errors name the link, not its target";
   ConfinedFiles one(system_files(), {folder.file("in/a")});

@@ -91,11 +91,10 @@ TEST_F(ViewedFilesTest, AreOpenedAgainIfTheyCouldNotBeRead) {
 
    public:
     using ForwardingFiles::ForwardingFiles;
-    std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
-      return std::make_unique<Reader>(ForwardingFiles::open_read(path));
-    }
-    std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
-      return open_read(path);
+
+   private:
+    std::unique_ptr<ReadableFile> reader_of(std::unique_ptr<ReadableFile> file) override {
+      return std::make_unique<Reader>(std::move(file));
     }
   } same(system_files());
   OpenTileSources files(same, 4);
