@@ -2,9 +2,10 @@
 """Kills builds at random moments, and immediately runs the same command again.
 
     tests/long/kill_builds.py [--voxdag build/cpu/voxdag] [--kills 300] [--scene FILE]
-                              [-r 2048] [--color]
+                              [--generate "terrain --triangles 400000"] [-r 2048]
+                              [--color] [--build-options "--threads 2"] [--seed 1]
 
-Without --scene a terrain is generated. With --color the file has colors. The build is killed
+Without --scene a scene is generated. With --color the file has colors. The build is killed
 (SIGKILL) one to six times, each time at a random moment of the remaining time, and started again
 without a pause; then it runs to its end. What must hold:
 
@@ -26,13 +27,14 @@ from pathlib import Path
 
 class Builds:
     def __init__(self, options, folder):
+        self.seed = options.seed
         self.random = random.Random(options.seed)
         self.output = folder / "out.vdag"
         scene = options.scene
         if not scene:
             scene = folder / "scene.glb"
             subprocess.run(
-                [options.voxdag, "generate", "terrain", scene, "--triangles", "400000"],
+                [options.voxdag, "generate", *options.generate.split(), scene],
                 check=True,
                 stdout=subprocess.DEVNULL,
             )
@@ -125,8 +127,8 @@ class Builds:
                     flush=True,
                 )
         print(
-            f"{self.kills} kills, {self.finished_early} builds ended before their kill, "
-            f"{self.waits} commands waited for a lock, {len(self.failures)} failures"
+            f"seed {self.seed}: {self.kills} kills, {self.finished_early} builds ended before "
+            f"their kill, {self.waits} commands waited for a lock, {len(self.failures)} failures"
         )
         for failure in self.failures:
             print(failure)
@@ -138,6 +140,7 @@ def main():
     parser.add_argument("--voxdag", default="build/cpu/voxdag", type=Path)
     parser.add_argument("--kills", default=300, type=int)
     parser.add_argument("--scene", type=Path)
+    parser.add_argument("--generate", default="terrain --triangles 400000", help="kind of scene")
     parser.add_argument("-r", "--resolution", default=2048, type=int)
     parser.add_argument("--build-options", default="--threads 2", help="for voxdag build")
     parser.add_argument("--color", action="store_true", help="with colors")

@@ -2,6 +2,7 @@
 """Many clients use one service for a long time, and the service is killed repeatedly.
 
     tests/long/soak.py [--voxdag build/cpu/voxdag] [--minutes 60] [--clients 20] [--kill-every 5]
+                       [--seed 1]
 
 Each client repeats, chosen by its seed: upload a scene, submit a job, follow its events, download
 and compare the result, cancel, suspend and resume, retry, delete. Every KILL-EVERY minutes the
@@ -85,11 +86,11 @@ class Service:
 class Client(threading.Thread):
     """One user. Requests that a kill breaks are repeated, as the API's documentation says."""
 
-    def __init__(self, service, number, expected, scenes, until, counts):
+    def __init__(self, service, number, expected, scenes, until, counts, seed):
         super().__init__(daemon=True)
         self.service, self.number, self.expected, self.scenes = service, number, expected, scenes
         self.until, self.counts = until, counts
-        self.random = random.Random(number)
+        self.random = random.Random(1000 * seed + number)
         self.failure = None
 
     def run(self):
@@ -242,6 +243,7 @@ def main():
     parser.add_argument("--minutes", default=60, type=float)
     parser.add_argument("--clients", default=20, type=int)
     parser.add_argument("--kill-every", default=5, type=float)
+    parser.add_argument("--seed", default=1, type=int)
     arguments = parser.parse_args()
     voxdag = arguments.voxdag.resolve()
     with tempfile.TemporaryDirectory(prefix="voxdag-soak-") as name:
@@ -254,7 +256,15 @@ def soak(voxdag, folder, arguments):
     begin = time.monotonic()
     counts = {"lock": threading.Lock()}
     clients = [
-        Client(service, number, expected, scenes, begin + 60 * arguments.minutes, counts)
+        Client(
+            service,
+            number,
+            expected,
+            scenes,
+            begin + 60 * arguments.minutes,
+            counts,
+            arguments.seed,
+        )
         for number in range(arguments.clients)
     ]
     for client in clients:
@@ -291,7 +301,10 @@ def soak(voxdag, folder, arguments):
     if service.process.wait(timeout=60) != 0:
         failures.append(f"SIGTERM: exit status {service.process.returncode}")
     shown = {k: v for k, v in sorted(counts.items()) if k != "lock"}
-    print(f"{kills} kills, {shown}")
+    print(
+        f"seed {arguments.seed}: {arguments.minutes:g} minutes, {kills} kills, {shown}, "
+        f"{len(failures)} failures"
+    )
     for failure in failures:
         print("FAILED ", failure)
     return 1 if failures else 0
