@@ -90,7 +90,7 @@ std::optional<std::string> ArtifactCache::key(const SubvolumeTask& task, Triangl
 bool ArtifactCache::find(const std::string& key, uint32_t grid_levels, StoredSubvolume& subvolume,
                          SegmentWriter& segment) {
   try {
-    const CacheEntry entry = read_cache_entry(files_, path_of(key));
+    const CacheEntry entry = read_cache_entry(files_, path_of(key), key);
     subvolume.artifact =
         copy_artifact(*entry.file, entry.ref, subvolume.cube, grid_levels, segment);
     subvolume.summary = {entry.root.voxels, entry.root.svo_nodes, entry.dag_nodes, entry.root.hash};
@@ -117,7 +117,7 @@ void ArtifactCache::add(const std::string& key, const ReadableFile& segment,
     const std::string partial = partial_of(key);
     uint64_t bytes = 0;
     try {
-      bytes = write_cache_entry(files_, path_of(key), partial, segment, artifact);
+      bytes = write_cache_entry(files_, path_of(key), partial, key, segment, artifact);
     } catch (const Error&) {
       files_.remove(partial);
       throw;

@@ -36,6 +36,15 @@ ArtifactIndex read_single_index(const ReadableFile& file, const ArtifactRef& ref
   return index;
 }
 
+// The checksum of a footer also covers the key, so that an entry under the name of another key is
+// not used.
+uint64_t footer_checksum(std::span<const std::byte> fields, const std::string& key) {
+  std::vector<std::byte> bytes(fields.begin(), fields.end());
+  const auto digits = std::as_bytes(std::span(key));
+  bytes.insert(bytes.end(), digits.begin(), digits.end());
+  return checksum64(bytes);
+}
+
 }  // namespace
 
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
@@ -65,7 +74,8 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
 }
 
 uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
-                           const ReadableFile& from, const ArtifactRef& ref) {
+                           const std::string& key, const ReadableFile& from,
+                           const ArtifactRef& ref) {
   const auto file = files.create(partial);
   const std::vector<std::byte> header = encode_segment_header(0);
   file->write_at(0, header);
@@ -83,14 +93,14 @@ uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std
   sink.put(ref.bytes);
   sink.put(uint64_t{ref.index_offset - ref.offset + begin});
   sink.put(ref.checksum);
-  sink.put(checksum64(footer));
+  sink.put(footer_checksum(footer, key));
   file->write_at(end, footer);
   file->close();
   files.rename(partial, path);
   return end + footer.size();
 }
 
-CacheEntry read_cache_entry(FileSystem& files, const std::string& path) {
+CacheEntry read_cache_entry(FileSystem& files, const std::string& path, const std::string& key) {
   CacheEntry entry;
   entry.file = files.open_own(path);
   if (entry.file->size() < kSegmentHeaderBytes + kFooterBytes)
@@ -112,8 +122,8 @@ CacheEntry read_cache_entry(FileSystem& files, const std::string& path) {
   entry.ref.bytes = source.get<uint64_t>();
   entry.ref.index_offset = source.get<uint64_t>();
   entry.ref.checksum = source.get<uint64_t>();
-  if (source.get<uint64_t>() != checksum64(std::span(footer).first(kFooterBytes - 8)))
-    corrupt_copy(path, "its footer fails its checksum");
+  if (source.get<uint64_t>() != footer_checksum(std::span(footer).first(kFooterBytes - 8), key))
+    corrupt_copy(path, "its footer fails its checksum, or belongs to another key than " + key);
   const ArtifactIndex index = read_single_index(*entry.file, entry.ref);
   entry.root = index.roots[0];
   for (const ArtifactLevel& level : index.levels) entry.dag_nodes += level.rows;

@@ -17,12 +17,13 @@ namespace voxdag {
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
                           uint32_t grid_levels, SegmentWriter& to);
 
-// Writes the artifact at `ref` of `from` as a cache entry at `path`, atomically: writes the file
-// `partial`, a name that only the caller uses, and renames it to `path`. Does not sync the file. If
-// a power failure damages an entry, its checksums fail, and a lookup of the entry is a cache miss.
-// Returns the size of the file in bytes.
+// Writes the artifact at `ref` of `from` as the cache entry of `key` at `path`, atomically: writes
+// the file `partial`, a name that only the caller uses, and renames it to `path`. Does not sync the
+// file. If a power failure damages an entry, its checksums fail, and a lookup of the entry is a
+// cache miss. Returns the size of the file in bytes.
 uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
-                           const ReadableFile& from, const ArtifactRef& ref);
+                           const std::string& key, const ReadableFile& from,
+                           const ArtifactRef& ref);
 
 struct CacheEntry {
   std::unique_ptr<ReadableFile> file;
@@ -31,8 +32,9 @@ struct CacheEntry {
   uint64_t dag_nodes = 0;  // total of all levels
 };
 
-// Opens a cache entry and reads its artifact's index. Throws Error{kNotFound} if the file does not
-// exist; Error{kCorrupt} or Error{kUnsupportedVersion} if it is invalid.
-CacheEntry read_cache_entry(FileSystem& files, const std::string& path);
+// Opens the cache entry of `key` and reads its artifact's index. Throws Error{kNotFound} if the
+// file does not exist; Error{kCorrupt} or Error{kUnsupportedVersion} if it is invalid, or if it is
+// the entry of another key.
+CacheEntry read_cache_entry(FileSystem& files, const std::string& path, const std::string& key);
 
 }  // namespace voxdag

@@ -1,9 +1,14 @@
 // Builds that share subvolumes through a cache. Cached results are copied, and the bytes of the
 // file are the same.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <random>
+#include <thread>
 
 #include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
@@ -121,6 +126,74 @@ TEST_F(CacheTest, DamageLimitAndLeftovers) {
   uint64_t bytes = 0;
   for (const auto& path : entries()) bytes += std::filesystem::file_size(path);
   EXPECT_LE(bytes, limited.run.cache_bytes);
+}
+
+// Replaces random entries of a cache by things that no build has written, until it is destroyed.
+class CacheAttack {
+ public:
+  CacheAttack(std::filesystem::path folder, unsigned seed)
+      : folder_(std::move(folder)), random_(seed), thread_([this](const std::stop_token& end) {
+          while (!end.stop_requested()) attack();
+        }) {}
+  uint64_t attacks() const { return attacks_; }
+
+ private:
+  std::filesystem::path any_entry() {
+    std::vector<std::filesystem::path> paths;
+    std::error_code failure;
+    for (std::filesystem::directory_iterator at(folder_, failure), end; at != end && !failure;
+         at.increment(failure))
+      paths.push_back(at->path());
+    return paths.empty() ? folder_ / "none.vdart" : paths[random_() % paths.size()];
+  }
+  void flip(const std::filesystem::path& path) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(random_() % 4096));
+    file.put(static_cast<char>(random_()));
+  }
+  void attack() {
+    const std::filesystem::path path = any_entry(), other = any_entry();
+    std::error_code ignored;
+    const unsigned kind = random_() % 8;
+    const bool is_file = std::filesystem::is_regular_file(path, ignored);
+    if (kind == 0 && is_file) std::filesystem::resize_file(path, random_() % 4096, ignored);
+    if (kind == 1 && is_file) flip(path);
+    if (kind == 2 && is_file) std::filesystem::resize_file(path, uint64_t{256} << 20, ignored);
+    if (kind >= 3) std::filesystem::remove_all(path, ignored);
+    if (kind == 3) std::filesystem::create_symlink(other, path, ignored);
+    if (kind == 4) std::filesystem::create_symlink("/dev/zero", path, ignored);
+    if (kind == 5) mkfifo(path.c_str(), 0666);
+    if (kind == 6) std::filesystem::create_directory(path, ignored);
+    if (kind == 7 && std::filesystem::is_regular_file(other, ignored))
+      std::filesystem::copy_file(other, path, ignored);  // the entry of another key
+    ++attacks_;
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+
+  const std::filesystem::path folder_;
+  std::mt19937 random_;
+  std::atomic<uint64_t> attacks_{0};
+  std::jthread thread_;  // must be the last member
+};
+
+// Links, pipes, folders, torn, huge and misplaced files in the cache, also those that appear while
+// a build reads or adds entries, neither change the file nor stop the build.
+TEST_F(CacheTest, SurvivesHostileEntries) {
+  write_chair(0);
+  const BuildSpec attacked = spec_with_chair(folder_.file("cache"));
+  const std::string expected = build(spec_with_chair("")).sha256;
+  EXPECT_EQ(build(attacked).sha256, expected);
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  CacheAttack attack(attacked.run.cache_folder, seed);
+  uint64_t cached = 0;
+  for (int round = 0; round < 4; ++round) {
+    const BuildReport report = build(attacked);
+    EXPECT_EQ(report.sha256, expected);
+    cached += report.subvolumes_cached;
+  }
+  EXPECT_GT(attack.attacks(), 20u);
+  EXPECT_GT(cached, 0u) << "the cache is in use";
 }
 
 }  // namespace

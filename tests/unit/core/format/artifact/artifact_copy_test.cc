@@ -21,12 +21,13 @@ class ArtifactCopyTest : public testing::Test {
     write_artifact(segment, random_rows(1, 50, 10, 1, 64), 10, 64);
     const ArtifactRef ref =
         write_artifact(segment, oracle::as_sub_dag(dag_, 10), 10, 64, {&root, 1});
-    write_cache_entry(system_files(), entry_path_, entry_path_ + ".partial",
+    write_cache_entry(system_files(), entry_path_, entry_path_ + ".partial", kKey,
                       *system_files().open_read(segment_path(folder_.path(), 0)), ref);
   }
+  static constexpr const char* kKey = "key";
   // Reads the entry and copies its artifact for `cube` of a grid of 2^14 voxels per edge.
   ArtifactReader copy(const Cube& cube) {
-    const CacheEntry entry = read_cache_entry(system_files(), entry_path_);
+    const CacheEntry entry = read_cache_entry(system_files(), entry_path_, kKey);
     SegmentWriter segment(system_files(), folder_.path(), 1, budget_);
     const ArtifactRef ref = copy_artifact(*entry.file, entry.ref, cube, 14, segment);
     segment.flush();
@@ -48,13 +49,19 @@ TEST_F(ArtifactCopyTest, MovesASubDagToAnotherCube) {
   ASSERT_EQ(reader.roots().size(), 1u);
   EXPECT_EQ(reader.roots()[0].cube, cube);
   EXPECT_EQ(reader.roots()[0].voxels, dag_.voxels);
-  const CacheEntry entry = read_cache_entry(system_files(), entry_path_);
+  const CacheEntry entry = read_cache_entry(system_files(), entry_path_, kKey);
   EXPECT_EQ(entry.root.svo_nodes, dag_.svo_nodes);
   EXPECT_EQ(entry.dag_nodes, dag_.dag_nodes);
 }
 
 TEST_F(ArtifactCopyTest, CubesOfAnotherSizeAreRefused) {
   EXPECT_EQ(error_of([&] { copy({8, {1, 2, 3}}); }).code(), ErrorCode::kCorrupt);
+}
+
+// An entry that was moved to the name of another key is not used.
+TEST_F(ArtifactCopyTest, EntriesOfOtherKeysAreRefused) {
+  EXPECT_EQ(error_of([&] { read_cache_entry(system_files(), entry_path_, "other"); }).code(),
+            ErrorCode::kCorrupt);
 }
 
 // Cache entries are not synced, so after a power cut they may contain anything. Reading a damaged
