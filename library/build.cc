@@ -27,6 +27,7 @@ BuildSpec spec_of(const BuildOptions& options) {
   geometry.ignore_extension = options.ignore_extension;
   geometry.hash_bits = options.hash_bits;
   geometry.solid = options.solid;
+  geometry.seed = options.seed;
   geometry.attributes[Attribute::kColor] = options.color;
   geometry.attributes[Attribute::kAlpha] = options.alpha;
   geometry.attributes[Attribute::kNormal] = options.normal;

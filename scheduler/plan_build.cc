@@ -5,6 +5,7 @@
 #include "core/io/outputs/space_reserve.h"
 #include "core/io/temporary_paths.h"
 #include "scheduler/check_spec.h"
+#include "scheduler/solid/seed.h"
 #include "scheduler/state/work_folder.h"
 
 namespace voxdag {
@@ -31,6 +32,7 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& caller) {
   } cleanup{work, full.run.work_folder.empty()};
   IngestCheckpoint no_checkpoints(full, nullptr, work, context);
   const PreparedScene scene = prepare_scene(full, source, budget, clock, context, no_checkpoints);
+  seed_of(full.geometry, scene.state.grid);  // throws for a point outside the grid
   Estimate estimate =
       estimate_build(full.geometry, scene, source, {context, full.run.threads, budget});
   if (estimate.solid && estimate.solid->warning)

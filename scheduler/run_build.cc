@@ -13,6 +13,7 @@
 #include "core/io/outputs/space_reserve.h"
 #include "scheduler/check_spec.h"
 #include "scheduler/cluster/cluster.h"
+#include "scheduler/solid/seed.h"
 #include "scheduler/solid/solid_report.h"
 #include "scheduler/stages/attributes/attribute_sections.h"
 #include "scheduler/stages/build/thread_builder.h"
@@ -94,6 +95,7 @@ void report_scene(BuildJob& job, const IngestState& state) {
   report.dropped_outside = state.counts.dropped_outside;
   report.dropped_invalid = state.counts.dropped_invalid;
   if (report.triangles == 0) check_empty(job, state.declared_triangles);
+  seed_of(job.spec.geometry, report.grid);  // throws for a point outside the grid
 }
 
 // The plan stage: records the subvolumes in the job store. Resume rule: a stored job keeps its
@@ -298,6 +300,7 @@ void write_report(BuildJob& job, double start_s) {
   report.stages = job.clock.stages();
   report.warnings = job.store->warnings();
   if (job.filled) report.solid = enclosed_report(report.merge.voxels, shell_voxels(job));
+  if (report.solid) report.solid->seed = job.spec.geometry.seed;
   if (report.solid) report.solid->volume = solid_volume(report.grid, report.merge.voxels);
   report.wall_s = wall_seconds() - start_s;
   report.cpu_s = process_cpu_seconds();

@@ -72,6 +72,9 @@ struct BuildOptions {
   CutoutRule cutouts = CutoutRule::kDefault;
   uint32_t hash_bits = 64;  // bits of the node hash, 4 to 64
   SolidName solid = SolidName::kNone;
+  // For kEnclosed: a point in the units of the scene. If it is set, only the enclosed space around
+  // this point is filled.
+  std::optional<std::array<double, 3>> seed;
   // The attributes to store for each cell of the color grid. `color_resolution` is the number of
   // cells per edge of this grid, a power of two. 0 means the smaller of `resolution` and 4096.
   bool color = false, alpha = false, normal = false, material = false;

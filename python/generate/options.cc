@@ -11,9 +11,9 @@
 namespace {
 
 // Options that have no meaning for voxels: the voxels determine the grid, and each of them is set.
-constexpr std::array kOnlyForScenes = {"bounds",  "voxel_size",   "point_radius",    "columns",
-                                       "color",   "skip_invalid", "solid",           "thin",
-                                       "cutouts", "allow_empty",  "ignore_extension"};
+constexpr std::array kOnlyForScenes = {
+    "bounds", "voxel_size", "point_radius", "columns",          "color", "skip_invalid", "solid",
+    "thin",   "cutouts",    "allow_empty",  "ignore_extension", "seed"};
 
 bool is_only_for_scenes(const voxdag::Field& field) {
   return std::ranges::count(kOnlyForScenes, std::string_view(field.name)) > 0;

@@ -49,6 +49,12 @@ SolidReport enclosed_report(uint64_t voxels, uint64_t shell) {
   return report;
 }
 
+Warning seed_warning(const Seed& seed, const std::string& scene) {
+  return {"solid-reached", scene,
+          "a walk leads from the seed " + seed.text +
+              " to the border of the grid, so its space is not filled"};
+}
+
 std::optional<Warning> solid_warning(const SolidReport& report, const std::string& scene) {
   if (report.rule == name_of(SolidName::kEnclosed)) {
     if (report.interior != 0) return std::nullopt;

@@ -6,6 +6,7 @@
 
 #include "core/base/warning.h"
 #include "core/geometry/grid.h"
+#include "scheduler/solid/seed.h"
 #include "scheduler/solid/solid_rows.h"
 #include "scheduler/spec/build_report.h"
 
@@ -20,6 +21,9 @@ SolidReport enclosed_report(uint64_t voxels, uint64_t shell);
 
 // Returns the volume of these voxels, in cubic units of the scene.
 double solid_volume(const Grid& grid, uint64_t voxels);
+
+// Returns the warning for a seed whose space reaches the border of the grid.
+Warning seed_warning(const Seed& seed, const std::string& scene);
 
 // Returns a warning if the surface is open, if its faces are oriented inconsistently, or if they
 // cancel each other.

@@ -53,6 +53,9 @@ void fields(Visitor& visit, GeometryOptions& g) {
             .unset_means("fill nothing")
             .or_unset(),
         g.solid);
+  visit(option("seed", "with solid enclosed: fill only the enclosed space around this point")
+            .with(&Field::parts, "X,Y,Z"),
+        g.seed);
   visit(option("skip_invalid", "drop and count invalid triangles").key(true), g.skip_invalid);
   visit(option("thin", "set fewer voxels: the thinnest surface without holes between faces"),
         g.thin);

@@ -19,9 +19,10 @@ namespace voxdag {
 // The interior of a solid build.
 struct SolidReport {
   std::string rule;
-  uint64_t interior = 0;   // set voxels that the surface does not touch
-  double volume = 0;       // volume of all set voxels, in units of the scene
-  uint64_t rows = 0;       // sample rows that cross the surface
+  std::optional<std::array<double, 3>> seed;  // the option of the same name
+  uint64_t interior = 0;                      // set voxels that the surface does not touch
+  double volume = 0;                          // volume of all set voxels, in units of the scene
+  uint64_t rows = 0;                          // sample rows that cross the surface
   uint64_t open_rows = 0;  // sample rows that enter the solid more or less often than they leave it
   uint64_t odd_rows = 0;   // sample rows with an odd number of crossings
   uint64_t disputed = 0;   // voxels of the interior on which the directions disagree

@@ -75,6 +75,8 @@ void check_options(const BuildSpec& spec) {
   if (g.solid != SolidName::kNone && g.cutouts == CutoutRule::kSkip)
     json_fields::refuse(
         "solid", "cutouts other than skip, because skipped cutouts are holes in the surface");
+  if (g.seed && g.solid != SolidName::kEnclosed)
+    json_fields::refuse("seed", "the solid rule enclosed as well");
   if (g.solid != SolidName::kNone && g.thin)
     json_fields::refuse("thin", "no solid at the same time");
   if (g.thin && g.attributes.any())

@@ -50,7 +50,9 @@ struct GeometryOptions {
   std::vector<std::string> ignore_extension;  // required extensions of glTF files
   uint32_t hash_bits = 64;
   SolidName solid = SolidName::kNone;  // the rule that fills the interior
-  AttributeSet attributes;             // attributes of the color grid's cells
+  // A point in scene units. If it is set, only its enclosed space is filled.
+  std::optional<std::array<double, 3>> seed;
+  AttributeSet attributes;  // attributes of the color grid's cells
   // Cells per edge of the color grid, a power of two from 4 to the resolution; 0: the build chooses
   // it.
   uint64_t color_resolution = 0;

@@ -32,6 +32,7 @@ void fields(Visitor& visit, ColorReport& colors) {
 template <class Visitor>
 void fields(Visitor& visit, SolidReport& solid) {
   visit("rule", solid.rule);
+  visit("seed", solid.seed);
   visit("interior", solid.interior);
   visit("volume", solid.volume);
   visit("rows", solid.rows);

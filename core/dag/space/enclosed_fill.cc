@@ -55,9 +55,11 @@ class FilledNodes {
 
 class Filler {
  public:
-  Filler(PooledMemory& memory, const SpaceLabels& labels, SubDagTables& tables)
+  // If `keeps_closed` is true, closed components remain empty.
+  Filler(PooledMemory& memory, const SpaceLabels& labels, bool keeps_closed, SubDagTables& tables)
       : memory_(memory),
         labels_(labels),
+        keeps_closed_(keeps_closed),
         tables_(tables),
         filled_(static_cast<size_t>(labels.levels().brick_depth())),
         full_(static_cast<size_t>(tables.size_log2()) + 1) {}
@@ -67,7 +69,41 @@ class Filler {
     fill(0, {true, 0, 0});
   }
 
+  // Also fills the component of a voxel, if it is closed. `labels` are this object's labels.
+  void run(std::span<const uint8_t> is_outside, SpaceLabels& labels, const CubeVoxel& seed) {
+    const SeedPlace place = find_seed(labels, seed);
+    if (place.kind != SeedPlace::Kind::kClosed) return run(is_outside);
+    numbers_.assign(is_outside.begin(), is_outside.end());
+    fill_around(0, {true, 0, 0}, labels, seed, place);
+  }
+
  private:
+  // Fills a cube around a closed component. Its node differs from equal nodes in other places.
+  NodeRef fill_around(int depth, const LabeledCube& cube, SpaceLabels& labels,
+                      const CubeVoxel& seed, const SeedPlace& place) {
+    if (depth == labels_.levels().brick_depth()) {
+      const uint64_t empty = ~labels_.levels().bricks[cube.row];
+      const uint64_t bit = uint64_t{1} << bit_in_brick(seed);
+      return tables_.add_brick(filled_mask(cube) | brick_flood(bit, empty));
+    }
+    const int around = octant_around(seed, labels_.levels().brick_depth(), depth);
+    std::vector<uint8_t> is_filled;
+    if (depth == place.depth)
+      is_filled = connected_components(memory_, labels, depth, cube.row, around, place.component);
+    NodeRef octants[8];
+    const size_t used = numbers_.size();
+    size_t component = 0;
+    for (int o = 0; o < 8; ++o) {
+      const LabeledCube octant = octant_of(labels_, depth, cube, o, kOutside, numbers_);
+      for (size_t i = octant.first; i < numbers_.size() && !is_filled.empty(); ++i)
+        if (is_filled[component++] != 0) numbers_[i] = 0;
+      octants[o] = o == around && depth < place.depth
+                       ? fill_around(depth + 1, octant, labels, seed, place)
+                       : fill(depth + 1, octant);
+      numbers_.resize(used);
+    }
+    return tables_.add_node(size_log2(depth), octants);
+  }
   int size_log2(int depth) const { return tables_.size_log2() - depth; }
 
   NodeRef fill(int depth, const LabeledCube& cube) {
@@ -106,19 +142,22 @@ class Filler {
     NodeRef octants[8];
     const size_t used = numbers_.size();
     for (int o = 0; o < 8; ++o) {
-      octants[o] = fill(depth + 1, octant_of(labels_, depth, cube, o, 0, numbers_));
+      octants[o] = fill(depth + 1,
+                        octant_of(labels_, depth, cube, o, keeps_closed_ ? kOutside : 0, numbers_));
       numbers_.resize(used);
     }
     return tables_.add_node(size_log2(depth), octants);
   }
 
-  NodeRef fill_brick(const LabeledCube& cube) {
+  NodeRef fill_brick(const LabeledCube& cube) { return tables_.add_brick(filled_mask(cube)); }
+
+  uint64_t filled_mask(const LabeledCube& cube) const {
     const uint32_t count = labels_.count(labels_.levels().brick_depth(), cube.row);
     const uint64_t* const components = labels_.brick_components(cube.row);
-    uint64_t outside = 0;
+    uint64_t outside = 0, inside = labels_.levels().bricks[cube.row];
     for (uint32_t c = 0; c < count; ++c)
-      if (numbers_[cube.first + c] != 0) outside |= components[c];
-    return tables_.add_brick(~outside);
+      (numbers_[cube.first + c] != 0 ? outside : inside) |= components[c];
+    return keeps_closed_ ? inside : ~outside;
   }
 
   // Returns the node of a cube of which all voxels are set.
@@ -139,8 +178,11 @@ class Filler {
     return tables_.add_node(size, octants);
   }
 
+  static constexpr uint32_t kOutside = 1;
+
   PooledMemory& memory_;
   const SpaceLabels& labels_;
+  const bool keeps_closed_;
   SubDagTables& tables_;
   std::vector<FilledNodes> filled_;  // by depth
   std::vector<NodeRef> full_;        // by log2 of the edge
@@ -152,7 +194,16 @@ class Filler {
 
 void fill_enclosed(PooledMemory& memory, const SpaceLabels& labels,
                    std::span<const uint8_t> is_outside, SubDagTables& tables) {
-  Filler(memory, labels, tables).run(is_outside);
+  Filler(memory, labels, false, tables).run(is_outside);
+}
+
+void fill_from_seed(PooledMemory& memory, SpaceLabels& labels, std::span<const uint8_t> is_outside,
+                    const std::optional<CubeVoxel>& seed, SubDagTables& tables) {
+  Filler filler(memory, labels, true, tables);
+  if (seed)
+    filler.run(is_outside, labels, *seed);
+  else
+    filler.run(is_outside);
 }
 
 }  // namespace voxdag

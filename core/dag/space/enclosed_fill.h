@@ -4,9 +4,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "core/dag/consing/sub_dag_tables.h"
+#include "core/dag/space/seed_place.h"
 #include "core/dag/space/space_labels.h"
 
 namespace voxdag {
@@ -16,5 +18,10 @@ namespace voxdag {
 // OutOfBudget.
 void fill_enclosed(PooledMemory& memory, const SpaceLabels& labels,
                    std::span<const uint8_t> is_outside, SubDagTables& tables);
+
+// Like fill_enclosed(), but leaves components without a voxel at the faces of the root's cube
+// empty, except the component of `seed`, if it is one of them.
+void fill_from_seed(PooledMemory& memory, SpaceLabels& labels, std::span<const uint8_t> is_outside,
+                    const std::optional<CubeVoxel>& seed, SubDagTables& tables);
 
 }  // namespace voxdag

@@ -40,6 +40,7 @@ LabeledCube octant_of(const SpaceLabels& labels, int depth, const LabeledCube& c
 // Computes the labels, level by level from the bricks upwards.
 class SpaceLabeler {
  public:
+  // `out` must have the labels of the depths below the nodes that are labeled.
   SpaceLabeler(PooledMemory& memory, SpaceLabels& out)
       : memory_(memory), levels_(out.levels_), out_(out), relations_(memory, out) {}
 
@@ -48,6 +49,15 @@ class SpaceLabeler {
     out_.depths_.resize(static_cast<size_t>(bricks) + 1);
     label_bricks(out_.depths_.back());
     for (int depth = bricks; depth-- > 0;) label_nodes(depth);
+  }
+
+  std::vector<uint8_t> connected(int depth, uint32_t row, int octant, uint32_t component) {
+    LabeledCube octants[kOctants];
+    const size_t components = join_octants(depth, row, octants);
+    std::vector<uint8_t> out(components);
+    const uint32_t root = find(static_cast<uint32_t>(octants[octant].first) + component);
+    for (size_t i = 0; i < components; ++i) out[i] = find(static_cast<uint32_t>(i)) == root;
+    return out;
   }
 
  private:
@@ -87,8 +97,16 @@ class SpaceLabeler {
   }
 
   void label_node(int depth, uint32_t row, SpaceLabels::Depth& out) {
-    elements_.clear();
     LabeledCube octants[kOctants];
+    const size_t components = join_octants(depth, row, octants);
+    number(depth + 1, octants, components);
+    write_map(row, octants, components, out);
+    end_row(out, row, touch_used_, open_faces(depth + 1, octants));
+  }
+
+  // Joins the components of a node's octants. Returns the number of these components.
+  size_t join_octants(int depth, uint32_t row, LabeledCube (&octants)[kOctants]) {
+    elements_.clear();
     for (int o = 0; o < kOctants; ++o) {
       LabeledCube& octant = octants[o];
       octant = {levels_.has_child(depth, row, o), 0, elements_.size()};
@@ -103,9 +121,7 @@ class SpaceLabeler {
     for (int axis = 0; axis < 3; ++axis)
       for (int o = 0; o < kOctants; ++o)
         if ((o & 4 >> axis) == 0) join(depth + 1, octants[o], octants[o | 4 >> axis], axis);
-    number(depth + 1, octants, components);
-    write_map(row, octants, components, out);
-    end_row(out, row, touch_used_, open_faces(depth + 1, octants));
+    return components;
   }
 
   // Sets touch_ of the root of each set to the faces of the node at which the set has a voxel.
@@ -245,6 +261,11 @@ class SpaceLabeler {
   std::vector<uint8_t> touch_;
   std::vector<uint32_t> labels_;
 };
+
+std::vector<uint8_t> connected_components(PooledMemory& memory, SpaceLabels& labels, int depth,
+                                          uint32_t row, int octant, uint32_t component) {
+  return SpaceLabeler(memory, labels).connected(depth, row, octant, component);
+}
 
 SpaceLabels::SpaceLabels(PooledMemory& memory, const NodeLevels& levels) : levels_(levels) {
   SpaceLabeler(memory, *this).run();

@@ -82,6 +82,12 @@ class SpaceLabels {
   PooledArray<uint64_t> brick_masks_;
 };
 
+// Returns the components of a node's octants that are connected within the node with component
+// `component` of octant `octant`: 1 for each of them, in the order of the octants, otherwise 0.
+// Throws OutOfBudget.
+std::vector<uint8_t> connected_components(PooledMemory& memory, SpaceLabels& labels, int depth,
+                                          uint32_t row, int octant, uint32_t component);
+
 // A node, a brick or an empty cube, as a place whose components have numbers given by the caller.
 struct LabeledCube {
   bool exists = false;  // false: the cube is empty

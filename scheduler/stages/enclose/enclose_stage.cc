@@ -4,6 +4,7 @@
 #include <atomic>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "core/format/artifact/artifact_writer.h"
 #include "core/geometry/octree_descent.h"
 #include "scheduler/solid/full_cubes.h"
+#include "scheduler/solid/seed.h"
 #include "scheduler/solid/solid_report.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/enclose/join_parts.h"
@@ -44,14 +46,16 @@ struct EncloseWorker {
 
 class Enclosure {
  public:
-  Enclosure(BuildJob& job, const std::set<Cube>& too_large) : job_(job), too_large_(too_large) {}
+  Enclosure(BuildJob& job, const std::set<Cube>& too_large)
+      : job_(job), too_large_(too_large), seed_(seed_of(job.spec.geometry, job.report.grid)) {}
 
   void run() {
     const std::vector<StoredSubvolume> leaves = shell();
     job_.context.progress.begin_stage("enclose", 2 * leaves.size(), "subvolumes");
     begin_workers();
     label(leaves);
-    OutsideSpace outside = find_outside(parts_, *faces_, job_.budget, job_.context.cancel);
+    const OutsideSpace outside = find_outside(parts_, *faces_, seed_, job_.shape().grid_levels,
+                                              job_.budget, job_.context.cancel);
     remove_faces();
     fill(outside);
     finish(outside);
@@ -118,12 +122,23 @@ class Enclosure {
     const auto levels = read(worker, cube, shell, memory);
     if (!levels) return;
     const SpaceLabels labels(memory, *levels);
-    LabeledPart part{cube, shell, {}, {}};
+    LabeledPart part{cube, shell, {}, seed_component(labels, cube), {}};
     part.touch.assign(labels.touch(0, 0), labels.touch(0, 0) + labels.count(0, 0));
     for (int face = 0; face < kFaces; ++face)
       part.faces[face] = faces_->append(encode_face(labels, face, worker.share.limit() / 16));
     const std::lock_guard lock(mutex_);
     parts_.push_back(std::move(part));
+  }
+
+  // Returns the component with the seed, if it is open in this part. Throws Error{kInvalidInput} if
+  // the seed's voxel is set.
+  std::optional<uint32_t> seed_component(const SpaceLabels& labels, const Cube& cube) const {
+    const auto voxel = seed_in(seed_, cube, job_.shape().grid_levels);
+    if (!voxel) return std::nullopt;
+    const SeedPlace place = find_seed(labels, *voxel);
+    if (place.kind == SeedPlace::Kind::kSet) refuse_seed_in_shell(*seed_);
+    if (place.kind == SeedPlace::Kind::kClosed) return std::nullopt;
+    return place.component;
   }
 
   ArtifactReader open(EncloseWorker& worker, const ArtifactRef& shell) const {
@@ -166,10 +181,14 @@ class Enclosure {
       PooledMemory memory{worker.share, worker.pool};
       const auto levels = read(worker, part.cube, part.shell, memory);
       if (!levels) return;
-      const SpaceLabels labels(memory, *levels);
+      SpaceLabels labels(memory, *levels);
       const DagShape shape = job_.shape();
       SubDagTables tables(memory, static_cast<int>(shape.grid_levels - part.cube.level));
-      fill_enclosed(memory, labels, is_outside, tables);
+      if (seed_)
+        fill_from_seed(memory, labels, is_outside, seed_in(seed_, part.cube, shape.grid_levels),
+                       tables);
+      else
+        fill_enclosed(memory, labels, is_outside, tables);
       worker.done.push_back(write_part(worker, part.cube, tables));
     } catch (const OutOfBudget&) {
       if (part.cube.edge_voxels(job_.shape().grid_levels) <= kSmallestEdge) refuse_memory(worker);
@@ -212,7 +231,7 @@ class Enclosure {
       worker->filled->complete();
       segments.push_back(std::move(worker->filled));
     }
-    warn_if_nothing_is_enclosed(all);
+    warn_of_walks(outside, all);
     job_.filled->complete(std::move(all), std::move(segments));
     if (is_long_) job_.filled->save();
   }
@@ -222,18 +241,23 @@ class Enclosure {
     return {cube, artifact, full_counts(size).voxels};
   }
 
-  void warn_if_nothing_is_enclosed(const std::vector<FilledPart>& all) const {
+  // Warns if nothing is enclosed, or if a walk leads from the seed to the border.
+  void warn_of_walks(const OutsideSpace& outside, const std::vector<FilledPart>& all) const {
+    const std::string& scene = job_.spec.geometry.scenes.front();
+    if (outside.is_seed_outside) job_.context.progress.warn_of_input(seed_warning(*seed_, scene));
+    if (seed_) return;
     uint64_t voxels = 0, shell_voxels = 0;
     for (const FilledPart& part : all) voxels += part.voxels;
     for (const StoredSubvolume& leaf : job_.store->leaves()) shell_voxels += leaf.summary.voxels;
     if (shell_voxels == 0) return;
     const SolidReport report = enclosed_report(voxels, shell_voxels);
-    if (const auto warning = solid_warning(report, job_.spec.geometry.scenes.front()))
+    if (const auto warning = solid_warning(report, scene))
       job_.context.progress.warn_of_input(*warning);
   }
 
   BuildJob& job_;
   const std::set<Cube>& too_large_;
+  const std::optional<Seed> seed_;
   std::vector<std::unique_ptr<EncloseWorker>> workers_;
   std::unique_ptr<RowFile> faces_;
   std::mutex mutex_;  // guards parts_ while labels are computed

@@ -26,24 +26,27 @@ std::vector<Cube> cubes_of(const std::vector<LabeledPart>& parts) {
   return cubes;
 }
 
-// Sets of components (union-find). A set reaches the border if one of its components does.
+// Sets of components (union-find). A set reaches the border, or has the seed, if one of its
+// components does.
 class ComponentSets {
  public:
   ComponentSets(MemoryBudget& budget, uint64_t count)
       : charge_(budget, count * (sizeof(uint32_t) + 1), "the components of the empty space"),
         parents_(count),
-        is_at_border_(count, 0) {
+        marks_(count, 0) {
     for (uint64_t i = 0; i < count; ++i) parents_[i] = static_cast<uint32_t>(i);
   }
-  void set_at_border(uint32_t component) { is_at_border_[find(component)] = 1; }
-  bool is_outside(uint32_t component) { return is_at_border_[find(component)] != 0; }
+  enum Mark : uint8_t { kBorder = 1, kSeed = 2 };
+
+  void mark(uint32_t component, Mark mark) { marks_[find(component)] |= mark; }
+  bool has(uint32_t component, Mark mark) { return (marks_[find(component)] & mark) != 0; }
   void unite(uint32_t a, uint32_t b) {
     a = find(a);
     b = find(b);
     if (a == b) return;
     if (b < a) std::swap(a, b);
     parents_[b] = a;
-    is_at_border_[a] |= is_at_border_[b];
+    marks_[a] |= marks_[b];
   }
 
  private:
@@ -54,15 +57,18 @@ class ComponentSets {
 
   const MemoryCharge charge_;
   std::vector<uint32_t> parents_;
-  std::vector<uint8_t> is_at_border_;
+  std::vector<uint8_t> marks_;
 };
 
 class PartJoiner {
  public:
-  PartJoiner(const std::vector<LabeledPart>& parts, const RowFile& faces, MemoryBudget& budget,
+  PartJoiner(const std::vector<LabeledPart>& parts, const RowFile& faces,
+             const std::optional<Seed>& seed, uint32_t grid_levels, MemoryBudget& budget,
              const CancelToken& cancel)
       : parts_(parts),
         faces_(faces),
+        seed_(seed),
+        grid_levels_(grid_levels),
         budget_(budget),
         cancel_(cancel),
         tree_(cubes_of(parts)),
@@ -72,8 +78,10 @@ class PartJoiner {
 
   OutsideSpace run() {
     mark_border();
+    const std::optional<uint32_t> of_seed = mark_seed();
     join_inside(tree_.root());
     OutsideSpace out;
+    out.is_seed_outside = of_seed && sets_.has(*of_seed, ComponentSets::kBorder);
     out.of_parts.resize(parts_.size());
     for (size_t i = 0; i < tree_.leaves().size(); ++i) add_outside(i, out);
     return out;
@@ -99,25 +107,49 @@ class PartJoiner {
       const PartTree::Leaf& leaf = tree_.leaves()[i];
       const uint8_t border = border_faces(leaf.cube);
       if (leaf.part == PartTree::kEmpty) {
-        if (border != 0) sets_.set_at_border(first_[i]);
+        if (border != 0) sets_.mark(first_[i], ComponentSets::kBorder);
         continue;
       }
       const std::vector<uint8_t>& touch = parts_[leaf.part].touch;
       for (size_t c = 0; c < touch.size(); ++c)
-        if ((touch[c] & border) != 0) sets_.set_at_border(first_[i] + static_cast<uint32_t>(c));
+        if ((touch[c] & border) != 0)
+          sets_.mark(first_[i] + static_cast<uint32_t>(c), ComponentSets::kBorder);
     }
+  }
+
+  // Marks the component with the seed and returns it. Returns nullopt if there is no seed, or if
+  // its component is closed within a part.
+  std::optional<uint32_t> mark_seed() {
+    for (size_t i = 0; i < tree_.leaves().size(); ++i) {
+      const PartTree::Leaf& leaf = tree_.leaves()[i];
+      if (!seed_in(seed_, leaf.cube, grid_levels_)) continue;
+      uint32_t component = first_[i];
+      if (leaf.part != PartTree::kEmpty) {
+        const std::optional<uint32_t> in_part = parts_[leaf.part].seed_component;
+        if (!in_part) return std::nullopt;
+        component += *in_part;
+      }
+      sets_.mark(component, ComponentSets::kSeed);
+      return component;
+    }
+    return std::nullopt;
+  }
+
+  bool is_outside(uint32_t component) {
+    return sets_.has(component, ComponentSets::kBorder) ||
+           (seed_ && !sets_.has(component, ComponentSets::kSeed));
   }
 
   void add_outside(size_t leaf_index, OutsideSpace& out) {
     const PartTree::Leaf& leaf = tree_.leaves()[leaf_index];
     const uint32_t first = first_[leaf_index];
     if (leaf.part == PartTree::kEmpty) {
-      if (!sets_.is_outside(first)) out.enclosed_cubes.push_back(leaf.cube);
+      if (!is_outside(first)) out.enclosed_cubes.push_back(leaf.cube);
       return;
     }
     const size_t count = parts_[leaf.part].touch.size();
     for (size_t c = 0; c < count; ++c)
-      out.of_parts[leaf.part].push_back(sets_.is_outside(first + static_cast<uint32_t>(c)) ? 1 : 0);
+      out.of_parts[leaf.part].push_back(is_outside(first + static_cast<uint32_t>(c)) ? 1 : 0);
   }
 
   // A cube of the tree, or a part of a leaf's face: the square at a path of quadrants.
@@ -199,6 +231,8 @@ class PartJoiner {
 
   const std::vector<LabeledPart>& parts_;
   const RowFile& faces_;
+  const std::optional<Seed>& seed_;
+  const uint32_t grid_levels_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
   const PartTree tree_;
@@ -211,8 +245,9 @@ class PartJoiner {
 }  // namespace
 
 OutsideSpace find_outside(const std::vector<LabeledPart>& parts, const RowFile& faces,
+                          const std::optional<Seed>& seed, uint32_t grid_levels,
                           MemoryBudget& budget, const CancelToken& cancel) {
-  return PartJoiner(parts, faces, budget, cancel).run();
+  return PartJoiner(parts, faces, seed, grid_levels, budget, cancel).run();
 }
 
 }  // namespace voxdag

@@ -7,6 +7,7 @@
 
 #include "core/base/memory_budget.h"
 #include "scheduler/solid/row_file.h"
+#include "scheduler/solid/seed.h"
 #include "scheduler/stages/enclose/part_faces.h"
 #include "voxdag/cancel_token.h"
 
@@ -15,11 +16,15 @@ namespace voxdag {
 struct OutsideSpace {
   std::vector<std::vector<uint8_t>> of_parts;  // by part, by component: 1 if it is outside
   std::vector<Cube> enclosed_cubes;            // empty cubes between the parts that are not outside
+  bool is_seed_outside = false;                // a walk leads from the seed to the border
 };
 
+// If the build has a seed, components that do not reach the seed are outside as well.
+//
 // `faces` has the quadtrees of the parts. Throws Error{kOutOfMemory} if the budget cannot hold five
 // bytes for each component.
 OutsideSpace find_outside(const std::vector<LabeledPart>& parts, const RowFile& faces,
+                          const std::optional<Seed>& seed, uint32_t grid_levels,
                           MemoryBudget& budget, const CancelToken& cancel);
 
 }  // namespace voxdag

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/dag/space/brick_space.h"
@@ -16,7 +17,9 @@ struct LabeledPart {
   Cube cube;
   ArtifactRef shell;           // the artifact that has the part's shell
   std::vector<uint8_t> touch;  // by component: the faces at which it has a voxel
-  RowExtent faces[kFaces];     // their quadtrees (core/dag/space/face_code.h)
+  // The component with the build's seed, if the seed's space is open in this part.
+  std::optional<uint32_t> seed_component;
+  RowExtent faces[kFaces];  // their quadtrees (core/dag/space/face_code.h)
 };
 
 }  // namespace voxdag

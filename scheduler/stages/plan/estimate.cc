@@ -151,12 +151,14 @@ SolidEstimate estimate_solid(const GeometryOptions& options, const std::vector<P
   solid.interior = grow_count(&PilotCounts::interior, pilots, true, doublings);
   solid.disputed = grow_count(&PilotCounts::disputed, pilots, true, doublings);
   solid.rows = last.rows;
-  SolidReport report{.rule = solid.rule, .rows = last.rows.rows};
+  SolidReport report;
+  report.rule = solid.rule;
+  report.rows = last.rows.rows;
   report.interior = static_cast<uint64_t>(solid.interior.likely);
   report.disputed = static_cast<uint64_t>(solid.disputed.likely);
   report.open_rows = last.rows.open;
   report.odd_rows = last.rows.odd;
-  solid.warning = solid_warning(report, options.scenes.front());
+  if (!options.seed) solid.warning = solid_warning(report, options.scenes.front());
   if (solid.warning)
     solid.warning->message +=
         " (estimated from a build at " + std::to_string(uint64_t{1} << last.levels) + "^3)";

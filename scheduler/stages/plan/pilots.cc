@@ -104,7 +104,9 @@ class PilotBuilder {
     if (summary.empty()) return true;
     const uint64_t shell_voxels = summary.voxels;
     CountingSink sink;
-    summary = fill_pilot(memory, shell.finish(), counts.levels, sink);
+    Grid grid = scene_.state.grid;
+    grid.levels = counts.levels;
+    summary = fill_pilot(memory, shell.finish(), seed_of(options_, grid), counts.levels, sink);
     counts.interior = static_cast<double>(summary.voxels - shell_voxels);
     add(summary, sink, counts);
     return true;

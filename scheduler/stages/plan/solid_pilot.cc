@@ -80,13 +80,16 @@ NodeLevels ShellLevels::finish() {
   return std::move(levels_);
 }
 
-SubDagSummary fill_pilot(PooledMemory& memory, const NodeLevels& shell, uint32_t levels,
-                         SubDagSink& sink) {
-  const SpaceLabels labels(memory, shell);
+SubDagSummary fill_pilot(PooledMemory& memory, const NodeLevels& shell,
+                         const std::optional<Seed>& seed, uint32_t levels, SubDagSink& sink) {
+  SpaceLabels labels(memory, shell);
   // The faces of the cube are the border of the grid, so all labeled components are outside.
   const std::vector<uint8_t> is_outside(labels.count(0, 0), 1);
   SubDagTables tables(memory, static_cast<int>(levels));
-  fill_enclosed(memory, labels, is_outside, tables);
+  if (seed)
+    fill_from_seed(memory, labels, is_outside, seed->voxel, tables);
+  else
+    fill_enclosed(memory, labels, is_outside, tables);
   return emit_levels(tables, {0, levels, 64}, sink);
 }
 

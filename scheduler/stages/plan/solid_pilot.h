@@ -7,6 +7,7 @@
 #include "core/backend/backend.h"
 #include "core/dag/consing/pooled_memory.h"
 #include "core/dag/space/node_levels.h"
+#include "scheduler/solid/seed.h"
 #include "scheduler/solid/solid_rows.h"
 #include "scheduler/state/build_scene.h"
 
@@ -51,8 +52,9 @@ class ShellLevels : public SubDagSink {
   NodeLevels levels_;
 };
 
-// Fills the enclosed space of a grid. Throws OutOfBudget.
-SubDagSummary fill_pilot(PooledMemory& memory, const NodeLevels& shell, uint32_t levels,
-                         SubDagSink& sink);
+// Fills the enclosed space of a grid, or only the space around the build's seed. Throws
+// OutOfBudget.
+SubDagSummary fill_pilot(PooledMemory& memory, const NodeLevels& shell,
+                         const std::optional<Seed>& seed, uint32_t levels, SubDagSink& sink);
 
 }  // namespace voxdag

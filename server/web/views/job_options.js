@@ -44,6 +44,7 @@ class Fields {
         ["", "Surface only"], ["winding", "By winding"], ["parity", "By parity"],
         ["enclosed", "Enclosed space"]
       ]),
+      seed: h("input", {placeholder: "X,Y,Z", autocomplete: "off", on}),
       color_resolution: this.choice([kAutomatic, ...gridChoices(kMinLevel, kMaxLevel)]),
       hash_bits: this.number({min: "4", max: "64", step: "1", placeholder: "64"}),
       memory: h("input", {placeholder: "2GiB", autocomplete: "off", on}),
@@ -105,6 +106,7 @@ export class JobOptions {
             "Required extensions of glTF files to read without."),
         field("Cutouts", options.cutouts, "Parts of surfaces that alpha makes invisible."),
         field("Interior", options.solid, "Also sets the voxels inside the surface."),
+        field("Seed", options.seed, "A point: fills only the enclosed space around it."),
         checkRow(flags.skip_invalid, "Skip invalid triangles"), checkRow(flags.thin, "Thin voxels"),
         checkRow(flags.color, "Colors of the scene"),
         attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,
@@ -194,7 +196,17 @@ function valueOf(name, input) {
   if (["memory", "backend", "method", "columns", "cutouts", "solid"].includes(name))
     return input.value.trim();
   if (name === "ignore_extension") return input.value.split(",").map((text) => text.trim());
+  if (name === "seed") return pointOf(input);
   return numberOf(input, `The ${name.replace("_", " ")}`);
+}
+
+// Returns a point "X,Y,Z" as three numbers.
+function pointOf(input) {
+  const texts = input.value.split(",").map((text) => text.trim());
+  const point = texts.map(Number);
+  if (point.length !== 3 || texts.includes("") || !point.every(Number.isFinite))
+    throw new Problem(0, "invalid_input", "The seed: expected three numbers X,Y,Z");
+  return point;
 }
 
 function numberOf(input, what) {

@@ -102,10 +102,28 @@ class SpaceDag {
   uint32_t components() const { return labels_->count(0, 0); }
 
   SpaceGrid fill(const std::vector<uint8_t>& is_outside) {
+    return filled(
+        [&](SubDagTables& tables) { fill_enclosed(memory_, *labels_, is_outside, tables); });
+  }
+  // Fills the component of a voxel, also if it reaches the faces.
+  SpaceGrid fill_seed(const SpaceCell& cell) {
+    CubeVoxel voxel{};
+    for (size_t a = 0; a < 3; ++a) voxel[a] = static_cast<uint32_t>(cell[a]);
+    std::vector<uint8_t> is_outside(components(), 1);
+    place = find_seed(*labels_, voxel);
+    if (place.kind == SeedPlace::Kind::kOpen) is_outside.at(place.component) = 0;
+    return filled([&](SubDagTables& tables) {
+      fill_from_seed(memory_, *labels_, is_outside, voxel, tables);
+    });
+  }
+  SeedPlace place;
+
+  // Returns the voxels of the tables that `fill_tables` fills.
+  SpaceGrid filled(const std::function<void(SubDagTables&)>& fill_tables) {
     int size_log2 = 0;
     while (1 << size_log2 < edge_) ++size_log2;
     SubDagTables tables(memory_, size_log2);
-    fill_enclosed(memory_, *labels_, is_outside, tables);
+    fill_tables(tables);
     SubDag dag;
     const auto grid_levels = static_cast<uint32_t>(size_log2);
     summary = emit_levels(tables, {0, grid_levels, 64}, dag);
@@ -233,6 +251,33 @@ TEST(Space, FillSetsWhatTheBorderDoesNotReach) {
       ASSERT_EQ(filled.voxels, expected.voxels);
       EXPECT_EQ(dag.summary.voxels, static_cast<uint64_t>(std::ranges::count(filled.voxels, 1)));
     });
+}
+
+// A seed fills its component and no other one, whether it reaches the faces or not.
+TEST(Space, SeedFillsItsComponent) {
+  std::mt19937 engine(5);
+  std::array<int, 3> kinds{};
+  for (const int edge : {4, 8, 16, 32})
+    for_random_grids(edge, [&](const SpaceGrid& grid) {
+      SpaceDag dag(grid);
+      const SpaceGrid outside = outside_of(grid);
+      for (int i = 0; i < 12; ++i) {
+        const auto any = [&] { return static_cast<int>(engine() % static_cast<unsigned>(edge)); };
+        const SpaceCell seed{any(), any(), any()};
+        SpaceGrid expected(grid.size);
+        flood(grid, seed, expected);
+        for (size_t v = 0; v < grid.voxels.size(); ++v) expected.voxels[v] |= grid.voxels[v];
+        ASSERT_EQ(dag.fill_seed(seed).voxels, expected.voxels);
+        EXPECT_EQ(dag.summary.voxels,
+                  static_cast<uint64_t>(std::ranges::count(expected.voxels, 1)));
+        const auto kind = grid.at(seed)      ? SeedPlace::Kind::kSet
+                          : outside.at(seed) ? SeedPlace::Kind::kOpen
+                                             : SeedPlace::Kind::kClosed;
+        ASSERT_EQ(dag.place.kind, kind);
+        ++kinds[static_cast<size_t>(kind)];
+      }
+    });
+  for (const int count : kinds) EXPECT_GT(count, 20);
 }
 
 // The components are disjoint, each is connected, and together they are the outside.

@@ -1,0 +1,52 @@
+#include "scheduler/solid/seed.h"
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+
+namespace voxdag {
+namespace {
+
+std::string point_text(const std::array<double, 3>& point) {
+  return number_text(point[0]) + "," + number_text(point[1]) + "," + number_text(point[2]);
+}
+
+}  // namespace
+
+std::optional<Seed> seed_of(const GeometryOptions& options, const Grid& grid) {
+  if (!options.seed) return std::nullopt;
+  Seed seed{{}, point_text(*options.seed)};
+  std::array<double, 3> snapped = *options.seed;
+  snap_vertices(grid, snapped);
+  const auto end = static_cast<double>(grid.resolution() * kUnitsPerVoxel);
+  for (size_t a = 0; a < 3; ++a) {
+    if (!(snapped[a] >= 0 && snapped[a] < end))
+      throw Error(ErrorCode::kInvalidInput,
+                  "--seed " + seed.text + ": the point is outside the grid, whose low corner is " +
+                      point_text(grid.origin) + " and whose edge is " + number_text(grid.edge) +
+                      ": expected a point in the grid");
+    seed.voxel[a] = static_cast<uint32_t>(static_cast<int64_t>(snapped[a]) / kUnitsPerVoxel);
+  }
+  return seed;
+}
+
+std::optional<CubeVoxel> seed_in(const std::optional<Seed>& seed, const Cube& cube,
+                                 uint32_t grid_levels) {
+  if (!seed) return std::nullopt;
+  const auto edge = static_cast<uint64_t>(cube.edge_voxels(grid_levels));
+  CubeVoxel out{};
+  for (size_t a = 0; a < 3; ++a) {
+    const uint64_t low = cube.position[a] * edge;
+    if (seed->voxel[a] < low || seed->voxel[a] >= low + edge) return std::nullopt;
+    out[a] = static_cast<uint32_t>(seed->voxel[a] - low);
+  }
+  return out;
+}
+
+void refuse_seed_in_shell(const Seed& seed) {
+  throw Error(ErrorCode::kInvalidInput,
+              "--seed " + seed.text +
+                  ": the surface touches the voxel of this point: expected a "
+                  "point in empty space, at least a voxel away from surfaces");
+}
+
+}  // namespace voxdag

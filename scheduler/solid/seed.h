@@ -1,0 +1,32 @@
+// The seed of an enclosed solid: a point whose space is filled.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/dag/space/seed_place.h"
+#include "core/geometry/cube.h"
+#include "core/geometry/grid.h"
+#include "scheduler/spec/build_spec.h"
+
+namespace voxdag {
+
+struct Seed {
+  CubeVoxel voxel{};  // in the grid
+  std::string text;   // the point as "X,Y,Z"
+};
+
+// Returns the seed of a build, or nullopt if it has none. Throws Error{kInvalidInput} if the point
+// is outside the grid.
+std::optional<Seed> seed_of(const GeometryOptions& options, const Grid& grid);
+
+// Returns the seed's position in a cube of the grid, or nullopt if the cube does not contain it.
+std::optional<CubeVoxel> seed_in(const std::optional<Seed>& seed, const Cube& cube,
+                                 uint32_t grid_levels);
+
+// Throws Error{kInvalidInput}: the seed's voxel is in the shell.
+[[noreturn]] void refuse_seed_in_shell(const Seed& seed);
+
+}  // namespace voxdag
