@@ -148,6 +148,7 @@ void add_import_command(CommandLine& line);
 void add_render_command(CommandLine& line);
 void add_extract_command(CommandLine& line);
 void add_combine_command(CommandLine& line);
+void add_edit_command(CommandLine& line);
 void add_export_command(CommandLine& line);
 void add_view_command(CommandLine& line);
 // Adds `serve`, `token`, and the hidden command that `serve` runs in a child process for each job.

@@ -1,16 +1,15 @@
 #include "query/combine/combine.h"
 
-#include <cstdio>
+#include <array>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/output.h"
+#include "cli/query/combine_report.h"
 #include "cli/run_times.h"
 #include "cli/selection_options.h"
 #include "cli/terminal/progress_bar.h"
-#include "core/base/process_limits.h"
-#include "core/base/text.h"
-#include "core/base/text/printable.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag::cli {
@@ -32,7 +31,8 @@ constexpr OperationOption kOperationOptions[] = {
 struct CombineCommand {
   std::string a, output, memory;
   std::string b[std::size(kOperationOptions)];  // given for one of the operations
-  bool force = false, quiet = false, json = false;
+  std::optional<std::array<int64_t, 3>> offset;
+  bool clip = false, force = false, quiet = false, json = false;
   unsigned threads = default_threads();
 };
 
@@ -51,38 +51,13 @@ size_t operation_of(const CombineCommand& command) {
   return found;
 }
 
-void print(const CombineCommand& command, const query::CombineReport& r, const RunTimes& times) {
-  std::printf("%s: %s, sha256 %s\n", printable_line(command.output).c_str(),
-              size_text(r.bytes).c_str(), r.sha256.c_str());
-  std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count_text(r.voxels).c_str(),
-              count_text(r.svo_nodes).c_str(), count_text(r.dag_nodes).c_str());
-  std::printf("  %s pairs of nodes, %s wall, %s CPU, peak memory %s\n", count_text(r.pairs).c_str(),
-              duration_text(times.wall_s).c_str(), duration_text(times.cpu_s).c_str(),
-              size_text(peak_resident_bytes()).c_str());
-}
-
-nlohmann::ordered_json combine_json(const CombineCommand& command, const query::CombineReport& r,
-                                    const RunTimes& times) {
-  return {{"output", command.output},
-          {"sha256", r.sha256},
-          {"resolution", r.grid.resolution()},
-          {"bounds", {{"origin", r.grid.origin}, {"edge", r.grid.edge}}},
-          {"voxels", r.voxels},
-          {"svo_nodes", r.svo_nodes},
-          {"dag_nodes", r.dag_nodes},
-          {"bytes", r.bytes},
-          {"pairs", r.pairs},
-          {"work_bytes", r.work_bytes},
-          {"wall_s", times.wall_s},
-          {"cpu_s", times.cpu_s},
-          {"peak_rss_bytes", peak_resident_bytes()}};
-}
-
 void run(const CombineCommand& command, CommandContext& context) {
   const size_t operation = operation_of(command);
   query::CombineSpec spec;
   spec.operation = kOperationOptions[operation].operation;
   spec.output = command.output;
+  spec.offset = command.offset;
+  spec.clip = command.clip;
   spec.replace = command.force;
   spec.memory_bytes = memory_limit(command.memory);
   spec.threads = command.threads;
@@ -92,8 +67,8 @@ void run(const CombineCommand& command, CommandContext& context) {
   const query::CombineReport report =
       query::combine(*a, *b, spec, context.files, *progress, context.cancel);
   const RunTimes times = timer.elapsed();
-  if (!command.json) return print(command, report, times);
-  print_json(combine_json(command, report, times));
+  if (!command.json) return print_combined(command.output, report, times);
+  print_json(combined_json(command.output, report, times));
 }
 
 void declare(Command& command, CombineCommand& state) {
@@ -101,6 +76,14 @@ void declare(Command& command, CombineCommand& state) {
   for (size_t i = 0; i < std::size(kOperationOptions); ++i)
     command.option(kOperationOptions[i].name, state.b[i], kOperationOptions[i].help)
         .group("Operation and second .vdag file, one of");
+  command.text_option(
+      "--offset", "X,Y,Z",
+      [&state](const std::string& text) {
+        state.offset = parse_list<int64_t, 3>("--offset", text, ',', "three whole numbers X,Y,Z");
+      },
+      "move the second file: its voxel 0,0,0 comes to this voxel of the first file's grid");
+  command.flag("--clip", state.clip,
+               "drop voxels that --offset moves out of the grid; otherwise they are an error");
   command.output_option("-o,--output", state.output, "the .vdag file to write").required();
   command.option("--memory", state.memory,
                  "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
@@ -113,8 +96,7 @@ void declare(Command& command, CombineCommand& state) {
 }  // namespace
 
 void add_combine_command(CommandLine& line) {
-  add_command<CombineCommand>(line, "combine",
-                              "union, difference or intersection of two DAGs of the same grid");
+  add_command<CombineCommand>(line, "combine", "union, difference or intersection of two DAGs");
 }
 
 }  // namespace voxdag::cli

@@ -5,6 +5,8 @@
 //   pair_levels.h   the pairs of cubes that must be combined, and the nodes to keep
 //   level_writer.h  the levels of the new file
 //   count_levels.h  the numbers of voxels and octree nodes
+//   moved.h         the second file at an offset, which is written to a temporary file first
+//   shape.h         spheres and boxes as the second operand
 //
 // pair_levels.h goes from the root down to the bricks, the others from the bricks up to the root.
 //
@@ -14,7 +16,9 @@
 // two consecutive levels.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/base/progress.h"
@@ -23,6 +27,7 @@
 #include "core/geometry/grid.h"
 #include "core/io/file_system.h"
 #include "query/combine/operation.h"
+#include "query/combine/shape.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
@@ -30,6 +35,10 @@ namespace voxdag::query {
 struct CombineSpec {
   Operation operation = Operation::kUnion;
   std::string output;
+  // Voxel (0, 0, 0) of the second file comes to this voxel of the first file. Then the grids may
+  // differ, except in the edge of a voxel.
+  std::optional<std::array<int64_t, 3>> offset;
+  bool clip = false;     // drop moved voxels outside of the grid; otherwise they are an error
   bool replace = false;  // replace an existing file
   uint64_t memory_bytes = uint64_t{1} << 30;
   unsigned threads = 1;  // with 2 or more, the digest is computed while the file is read back
@@ -48,16 +57,22 @@ struct CombineReport {
   uint64_t bytes = 0;
   std::string sha256;
   uint64_t pairs = 0;       // distinct pairs of nodes that were combined
+  uint64_t clipped = 0;     // moved voxels outside of the grid
   uint64_t work_bytes = 0;  // bytes written to temporary files
 };
 
 // Writes the result to spec.output, which gets its final name when it is complete. Temporary files
 // are in a folder next to the output; combine() removes the folder at the end, also after an error.
 // If the process is killed, the next combine with the same output removes the folder. Throws Error:
-// kInvalidInput if the grids or the hash bits of the files differ, or if a file has attributes;
+// kInvalidInput if the grids or the hash bits of the files differ, if a file has attributes, or if
+// moved voxels are outside of the grid;
 // kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the errors of LockedOutputs.
 CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,
                       const CombineSpec& spec, FileSystem& files, Progress& progress,
                       const CancelToken& cancel);
+
+// Removes the voxels of a shape. Uses neither the operation nor the offset in `spec`.
+CombineReport cut(const voxdag_reader::File& a, const Shape& shape, const CombineSpec& spec,
+                  FileSystem& files, Progress& progress, const CancelToken& cancel);
 
 }  // namespace voxdag::query

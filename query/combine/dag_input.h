@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -11,6 +12,7 @@
 #include "core/format/global/checked_blocks.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/voxdag_reader.h"
+#include "query/combine/operation.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
@@ -60,6 +62,15 @@ class DagInput {
   const CheckedBlocks blocks_;
   uint64_t touched_bytes_ = 0;  // since the last check of the memory
 };
+
+// Returns the offsets of a node's children by their index; kNoNode if a child does not exist.
+inline std::array<uint64_t, 8> children_by_index(const voxdag_reader::Node& node) {
+  std::array<uint64_t, 8> children;
+  int next = 0;
+  for (size_t c = 0; c < 8; ++c)
+    children[c] = node.child_mask >> c & 1 ? node.child(next++) : kNoNode;
+  return children;
+}
 
 // Visits the nodes of a level, or its bricks, in the order of the file.
 class LevelCursor {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "query/combine/node_values.h"
-#include "query/combine/row.h"
+#include "query/combine/result_rows.h"
 
 namespace voxdag::query {
 

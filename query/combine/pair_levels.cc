@@ -1,21 +1,11 @@
 #include "query/combine/pair_levels.h"
 
-#include <array>
 #include <utility>
 
 #include "core/base/host_device.h"
 
 namespace voxdag::query {
 namespace {
-
-// Returns the offsets of a node's children by their index; kNoNode if a child does not exist.
-std::array<uint64_t, 8> children_of(const voxdag_reader::Node& node) {
-  std::array<uint64_t, 8> children;
-  int next = 0;
-  for (size_t c = 0; c < 8; ++c)
-    children[c] = node.child_mask >> c & 1 ? node.child(next++) : kNoNode;
-  return children;
-}
 
 template <class Use>
 void add_use(MarkedNodes<Use>& nodes, Marks& marks, const Use& use) {
@@ -97,11 +87,16 @@ void PairLevels::number_pairs(Open& level) const {
   level.pairs->uses.finish();
 }
 
+std::array<uint64_t, 8> PairLevels::children_of_b(uint32_t level, uint64_t cube) const {
+  if (shape_) return shape_->children(a_.file().grid_levels(), level, cube);
+  return children_by_index(b_.node(level, cube));
+}
+
 void PairLevels::expand_pairs(const Open& level, Open& below) const {
   uint64_t number = 0;
   for (SpillReader pair(level.pairs->pairs); !pair.at_end(); pair.pop(), ++number) {
-    const auto a = children_of(a_.node(level.level, pair.front().a));
-    const auto b = children_of(b_.node(level.level, pair.front().b));
+    const auto a = children_by_index(a_.node(level.level, pair.front().a));
+    const auto b = children_of_b(level.level, pair.front().b);
     for (int c = 0; c < 8; ++c)
       add(below, {a[static_cast<size_t>(c)], b[static_cast<size_t>(c)]}, place_of(number, c));
   }
@@ -111,7 +106,8 @@ void PairLevels::add_bricks(const Open& level, BrickResults& bricks) const {
   const auto voxels = [](uint64_t mask) { return static_cast<uint64_t>(popcount64(mask)); };
   uint64_t number = 0;
   for (SpillReader pair(level.pairs->pairs); !pair.at_end(); pair.pop(), ++number) {
-    const uint64_t a = a_.brick(pair.front().a), b = b_.brick(pair.front().b);
+    const uint64_t a = a_.brick(pair.front().a);
+    const uint64_t b = shape_ ? shape_->brick(pair.front().b) : b_.brick(pair.front().b);
     const uint64_t mask = combine_bricks(operation_, a, b);
     if (mask != 0) bricks.rows.add({brick_row(mask, a_.file().hash_bits()), number});
     const uint64_t before = reference_ == Outcome::kA ? a : reference_ == Outcome::kB ? b : 0;
@@ -141,7 +137,7 @@ std::vector<std::unique_ptr<PairLevel>> PairLevels::descend(BrickResults& bricks
   std::vector<std::unique_ptr<PairLevel>> levels;
   Open open(*this, 0);
   const auto root = [](DagInput& input) { return input.file().empty() ? kNoNode : 0; };
-  add(open, {root(a_), root(b_)}, 0);
+  add(open, {root(a_), shape_ ? shape_->root(a_.file().grid_levels()) : root(b_)}, 0);
   for (;;) {
     number_pairs(open);
     pair_count_ += open.pairs->pairs.size();

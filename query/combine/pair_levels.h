@@ -9,6 +9,7 @@
 // memory. Pairs of equal nodes end there, because Join has found the equal nodes.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "query/combine/join.h"
 #include "query/combine/operation.h"
 #include "query/combine/result_rows.h"
+#include "query/combine/shape.h"
 #include "query/combine/spill.h"
 
 namespace voxdag::query {
@@ -103,10 +105,13 @@ class PairLevels {
  public:
   // `reference` is the file from which the counts of the result are derived, or kEmpty.
   // `joined` has the facts about all levels, from the root to the bricks.
-  PairLevels(DagInput& a, DagInput& b, Operation operation, Outcome reference,
+  // With a shape, the operation is kMinus, the shape's cubes are the cubes of the second file, and
+  // `b` has no nodes.
+  PairLevels(DagInput& a, DagInput& b, const Shape* shape, Operation operation, Outcome reference,
              const std::vector<std::unique_ptr<JoinedLevel>>& joined, const SpillSpace& space)
       : a_(a),
         b_(b),
+        shape_(shape),
         operation_(operation),
         reference_(reference),
         joined_(joined),
@@ -131,6 +136,7 @@ class PairLevels {
   void add_result(Open& to, const NodePair& cubes, Outcome result, uint64_t place) const;
   void add_counts(Open& to, const NodePair& cubes, Outcome of, uint64_t place, int64_t sign) const;
   void number_pairs(Open& level) const;
+  std::array<uint64_t, 8> children_of_b(uint32_t level, uint64_t cube) const;
   void expand_pairs(const Open& level, Open& below) const;
   void add_bricks(const Open& level, BrickResults& bricks) const;
   void mark_children(DagInput& input, uint32_t level, const Marks& marks, Marks& below) const;
@@ -138,6 +144,7 @@ class PairLevels {
 
   DagInput& a_;
   DagInput& b_;
+  const Shape* const shape_;
   const Operation operation_;
   const Outcome reference_;
   const std::vector<std::unique_ptr<JoinedLevel>>& joined_;

@@ -10,8 +10,9 @@ namespace {
 using Help = CommandLine;
 
 constexpr const char* kCommands[] = {
-    "build",  "plan", "status", "info",   "verify",  "diff",   "generate", "render", "extract",
-    "submit", "jobs", "watch",  "cancel", "suspend", "resume", "download", "view",   "combine",
+    "build",  "plan",     "status", "info",    "verify", "diff",   "generate",
+    "render", "extract",  "submit", "jobs",    "watch",  "cancel", "suspend",
+    "resume", "download", "view",   "combine", "edit",
 #ifdef VOXDAG_HAS_ASSIMP
     "import",
 #endif

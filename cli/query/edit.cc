@@ -1,0 +1,167 @@
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/output.h"
+#include "cli/query/combine_report.h"
+#include "cli/run_times.h"
+#include "cli/selection_options.h"
+#include "cli/terminal/progress_bar.h"
+#include "core/format/global/open_global.h"
+#include "query/combine/combine.h"
+#include "query/dag/locked_outputs.h"
+#include "query/dag/temporary_work.h"
+#include "scheduler/run_build.h"
+
+namespace voxdag::cli {
+namespace {
+
+struct EditCommand {
+  std::string input, output, memory;
+  std::vector<std::string> cuts, scenes, parts;
+  bool clip = false, force = false, quiet = false, json = false;
+  unsigned threads = default_threads();
+};
+
+// A file that is pasted, and the voxel to which its voxel 0,0,0 comes.
+struct Part {
+  explicit Part(const std::string& text) {
+    const size_t at = std::min(text.rfind('@'), text.size());
+    path = text.substr(0, at);
+    offset = parse_list<int64_t, 3>("--paste", text.substr(std::min(at + 1, text.size())), ',',
+                                    "a .vdag file and three whole numbers, PART.vdag@X,Y,Z");
+  }
+  std::string path;
+  std::array<int64_t, 3> offset = {};
+};
+
+// Applies the edits one after the other. Every edit reads the file that the edit before it wrote to
+// the temporary folder.
+class Edit {
+ public:
+  Edit(const EditCommand& command, CommandContext& context, FileSystem& files)
+      : command_(command),
+        context_(context),
+        files_(files),
+        progress_(make_progress_bar(command.quiet)),
+        folder_(files, command.output + ".work-"),
+        current_(command.input) {
+    spec_.replace = true;
+    spec_.clip = command.clip;
+    spec_.memory_bytes = memory_limit(command.memory);
+    spec_.threads = command.threads;
+  }
+
+  query::CombineReport run() {
+    std::vector<query::Shape> shapes(command_.cuts.begin(), command_.cuts.end());
+    std::vector<Part> parts(command_.parts.begin(), command_.parts.end());
+    for (const query::Shape& shape : shapes)
+      apply([&](const voxdag_reader::File& file) {
+        return query::cut(file, shape, spec_, files_, *progress_, context_.cancel);
+      });
+    if (!command_.scenes.empty()) {
+      build_scenes();
+      unite(scenes_path(), std::nullopt);
+    }
+    for (const Part& part : parts) unite(part.path, part.offset);
+    files_.rename(current_, command_.output);
+    files_.sync_directory(parent_directory(command_.output));
+    return total_;
+  }
+
+ private:
+  std::string scenes_path() const { return folder_.path() + "/scenes.vdag"; }
+  template <class Step>
+  void apply(const Step& step) {
+    spec_.output = folder_.path() + "/" + std::to_string(steps_++) + ".vdag";
+    const auto file = open_global_file(current_);
+    query::CombineReport report = step(*file);
+    report.pairs += total_.pairs;
+    report.clipped += total_.clipped;
+    report.work_bytes += total_.work_bytes;
+    total_ = report;
+    if (current_ != command_.input) files_.remove(current_);
+    current_ = spec_.output;
+  }
+  void unite(const std::string& path, const std::optional<std::array<int64_t, 3>>& offset) {
+    spec_.operation = query::Operation::kUnion;
+    spec_.offset = offset;
+    const auto other = open_global_file(path);
+    apply([&](const voxdag_reader::File& file) {
+      return query::combine(file, *other, spec_, files_, *progress_, context_.cancel);
+    });
+  }
+  // Builds the scenes on the grid of the file.
+  void build_scenes() {
+    const auto file = open_global_file(current_);
+    BuildSpec build;
+    build.geometry.scenes = command_.scenes;
+    build.geometry.resolution = static_cast<uint64_t>(file->resolution());
+    build.geometry.bounds = {file->origin()[0], file->origin()[1], file->origin()[2], file->edge()};
+    build.geometry.hash_bits = file->hash_bits();
+    build.run.output = scenes_path();
+    build.run.report = "none";
+    build.run.memory_bytes = spec_.memory_bytes;
+    build.run.threads = command_.threads;
+    run_build(build, {files_, *progress_, context_.cancel});
+  }
+
+  const EditCommand& command_;
+  CommandContext& context_;
+  FileSystem& files_;
+  const std::unique_ptr<Progress> progress_;
+  const query::TemporaryWork folder_;
+  query::CombineSpec spec_;
+  std::string current_;  // the file that the next edit reads
+  int steps_ = 0;
+  query::CombineReport total_;
+};
+
+void run(const EditCommand& command, CommandContext& context) {
+  if (command.cuts.empty() && command.scenes.empty() && command.parts.empty())
+    throw Error(ErrorCode::kInvalidInput, "expected --cut, --add or --paste");
+  query::LockedOutputs outputs(context.files, {{command.output}, {command.input}, command.force});
+  const RunTimer timer;
+  const query::CombineReport report = Edit(command, context, outputs.files()).run();
+  const RunTimes times = timer.elapsed();
+  if (!command.json) return print_combined(command.output, report, times);
+  print_json(combined_json(command.output, report, times));
+}
+
+void declare(Command& command, EditCommand& state) {
+  command.option("input", state.input, "a .vdag file").required();
+  command
+      .option("--cut", state.cuts,
+              "remove the voxels with centers in sphere:X,Y,Z,R or box:X0,Y0,Z0,X1,Y1,Z1, in "
+              "voxels of the grid; may be repeated")
+      .one_value_each();
+  command
+      .option("--add", state.scenes, "add a scene, built on the grid of the file; may be repeated")
+      .one_value_each();
+  command
+      .option("--paste", state.parts,
+              "add the file in PART.vdag@X,Y,Z, whose voxel 0,0,0 comes to voxel X,Y,Z; may be "
+              "repeated")
+      .one_value_each();
+  command.flag("--clip", state.clip,
+               "drop voxels that --paste puts outside of the grid; otherwise they are an error");
+  command.output_option("-o,--output", state.output, "the .vdag file to write").required();
+  command.option("--memory", state.memory,
+                 "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
+  command.threads_option(state.threads);
+  command.flag("--force", state.force, "replace an existing file");
+  command.quiet_flag(state.quiet);
+  command.json_flag(state.json);
+}
+
+}  // namespace
+
+void add_edit_command(CommandLine& line) {
+  add_command<EditCommand>(line, "edit", "cut shapes from a DAG, add scenes and paste DAGs");
+}
+
+}  // namespace voxdag::cli

@@ -1,0 +1,160 @@
+#include "query/combine/moved.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/host_device.h"
+
+namespace voxdag::query {
+namespace {
+
+// Returns bit `axis` of an index of 2 x 2 x 2 cubes.
+constexpr int64_t axis_bit(size_t index, size_t axis) {
+  return static_cast<int64_t>(index >> (2 - axis) & 1);
+}
+
+// Returns the bit of a voxel in the mask of a brick; the coordinates are from 0 to 3.
+constexpr int voxel_bit(int64_t x, int64_t y, int64_t z) {
+  const auto octant = [](int64_t high, int64_t middle, int64_t low) {
+    return static_cast<int>(4 * high + 2 * middle + low);
+  };
+  return 8 * octant(x >> 1, y >> 1, z >> 1) + octant(x & 1, y & 1, z & 1);
+}
+
+}  // namespace
+
+// Returns the cube of the edge of the new grid at a position counted in such cubes.
+uint64_t MovedLevels::cube_at(const std::array<int64_t, 3>& index) const {
+  const int64_t depth = std::max<int64_t>(input_level(0), 0);
+  for (const int64_t i : index)
+    if (i < 0 || i >= int64_t{1} << depth) return kNoNode;
+  uint64_t cube = input_.file().empty() ? kNoNode : 0;
+  for (int64_t level = 0; level < depth && cube != kNoNode; ++level) {
+    size_t child = 0;
+    for (const int64_t i : index)
+      child = 2 * child + static_cast<size_t>(i >> (depth - 1 - level) & 1);
+    cube = children_by_index(input_.node(static_cast<uint32_t>(level), cube))[child];
+  }
+  return cube;
+}
+
+MovedLevels::Cubes MovedLevels::root() const {
+  Cubes cubes;
+  for (size_t i = 0; i < 8; ++i) {
+    std::array<int64_t, 3> index;
+    bool is_used = true;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      index[axis] = (-offset_[axis] >> levels_) + axis_bit(i, axis);
+      is_used = is_used && (axis_bit(i, axis) == 0 || remainder(0, axis) != 0);
+    }
+    cubes[i] = is_used ? cube_at(index) : kNoNode;
+  }
+  return cubes;
+}
+
+// Returns the children of a cube of the input with the edge of the new file's level.
+std::array<uint64_t, 8> MovedLevels::children(uint32_t level, uint64_t cube) const {
+  std::array<uint64_t, 8> children;
+  children.fill(kNoNode);
+  if (cube == kNoNode) return children;
+  const int64_t at = input_level(level);
+  if (at >= 0) return children_by_index(input_.node(static_cast<uint32_t>(at), cube));
+  children[0] = 0;  // the input's grid is in the low corner of this cube
+  return children;
+}
+
+void MovedLevels::add(Open& to, const Cubes& cubes, uint64_t place) const {
+  for (const uint64_t cube : cubes)
+    if (cube != kNoNode) return to.requests->add({cubes, place});
+}
+
+// Finds the distinct groups among the requests.
+void MovedLevels::number_groups(Open& level) const {
+  SpillSorter<Request>& requests = *level.requests;
+  requests.finish();
+  requests.begin();
+  while (!requests.at_end()) {
+    const Cubes cubes = requests.front().cubes;
+    const uint64_t number = level.groups->size();
+    level.groups->add(cubes);
+    for (; !requests.at_end() && requests.front().cubes == cubes; requests.pop())
+      level.result->uses.add({number, requests.front().place});
+  }
+  level.requests.reset();
+  level.groups->finish();
+  level.result->uses.finish();
+}
+
+void MovedLevels::expand_groups(const Open& level, Open& below) const {
+  // Along an axis, the first finer cube is the second child of the first cube if the remainder is
+  // at least the finer edge.
+  std::array<int64_t, 3> first;
+  for (size_t axis = 0; axis < 3; ++axis)
+    first[axis] = remainder(level.level, axis) >= edge(below.level) ? 1 : 0;
+  uint64_t number = 0;
+  for (SpillReader group(*level.groups); !group.at_end(); group.pop(), ++number) {
+    std::array<uint64_t, 8> finer[8];
+    for (size_t i = 0; i < 8; ++i) finer[i] = children(level.level, group.front()[i]);
+    for (size_t child = 0; child < 8; ++child) {
+      Cubes cubes;
+      for (size_t i = 0; i < 8; ++i) {
+        size_t cube = 0, octant = 0;
+        bool is_used = true;
+        for (size_t axis = 0; axis < 3; ++axis) {
+          const int64_t at = axis_bit(child, axis) + first[axis] + axis_bit(i, axis);
+          is_used = is_used && (axis_bit(i, axis) == 0 || remainder(below.level, axis) != 0);
+          cube = 2 * cube + static_cast<size_t>(at >> 1 & 1);
+          octant = 2 * octant + static_cast<size_t>(at & 1);
+        }
+        cubes[i] = is_used ? finer[cube][octant] : kNoNode;
+      }
+      add(below, cubes, place_of(number, static_cast<int>(child)));
+    }
+  }
+}
+
+// Returns the mask of the brick of a group.
+uint64_t MovedLevels::brick(const Cubes& cubes) const {
+  uint64_t masks[8], mask = 0;
+  for (size_t i = 0; i < 8; ++i) masks[i] = cubes[i] == kNoNode ? 0 : input_.brick(cubes[i]);
+  const int64_t rx = -offset_[0] & 3, ry = -offset_[1] & 3, rz = -offset_[2] & 3;
+  for (int64_t x = 0; x < 4; ++x)
+    for (int64_t y = 0; y < 4; ++y)
+      for (int64_t z = 0; z < 4; ++z) {
+        const int64_t fx = x + rx, fy = y + ry, fz = z + rz;
+        const auto from = static_cast<size_t>(4 * (fx >> 2) + 2 * (fy >> 2) + (fz >> 2));
+        const uint64_t bit = masks[from] >> voxel_bit(fx & 3, fy & 3, fz & 3) & 1;
+        mask |= bit << voxel_bit(x, y, z);
+      }
+  return mask;
+}
+
+void MovedLevels::add_bricks(const Open& level, BrickResults& bricks) const {
+  uint64_t number = 0;
+  for (SpillReader group(*level.groups); !group.at_end(); group.pop(), ++number) {
+    const uint64_t mask = brick(group.front());
+    if (mask == 0) continue;
+    bricks.rows.add({brick_row(mask, hash_bits_), number});
+    bricks.counts.add({number, {0, static_cast<uint64_t>(popcount64(mask))}});
+  }
+  bricks.counts.finish();
+}
+
+std::vector<std::unique_ptr<PairLevel>> MovedLevels::descend(BrickResults& bricks) {
+  std::vector<std::unique_ptr<PairLevel>> levels;
+  Open open(0, space_);
+  add(open, root(), 0);
+  for (;;) {
+    number_groups(open);
+    if (open.level + 2 == levels_) break;
+    Open below(open.level + 1, space_);
+    expand_groups(open, below);
+    levels.push_back(std::move(open.result));
+    open = std::move(below);
+  }
+  add_bricks(open, bricks);
+  levels.push_back(std::move(open.result));
+  return levels;
+}
+
+}  // namespace voxdag::query

@@ -1,0 +1,124 @@
+#include "query/combine/shape.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/error.h"
+#include "core/base/text.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr uint64_t kMixed = 0;          // any value except kNoNode and Shape::kFull
+constexpr int kIndexBits = 20;          // kMaxGridLevels
+constexpr double kMaxLength = 1 << 24;  // so that sums of squares have less than 64 bits
+
+[[noreturn]] void refuse(const std::string& text) {
+  throw Error(ErrorCode::kInvalidInput,
+              "shape '" + text +
+                  "': expected sphere:X,Y,Z,R with multiples of 0.5, or box:X0,Y0,Z0,X1,Y1,Z1 with "
+                  "whole numbers, in voxels of at most 16777216");
+}
+
+// Returns the number in half voxels.
+int64_t halves_of(double number, const std::string& text) {
+  if (!(std::abs(number) <= kMaxLength) || std::floor(2 * number) != 2 * number) refuse(text);
+  return static_cast<int64_t>(2 * number);
+}
+
+// Returns the voxel of a brick at a bit of its mask.
+constexpr std::array<int64_t, 3> voxel_of_bit(int bit) {
+  const auto axis = [&](int shift) { return (bit >> (shift + 3) & 1) * 2 + (bit >> shift & 1); };
+  return {axis(2), axis(1), axis(0)};
+}
+
+constexpr int64_t square(int64_t x) { return x * x; }
+
+}  // namespace
+
+Shape::Shape(const std::string& text) {
+  const size_t colon = text.find(':');
+  if (colon == std::string::npos) refuse(text);
+  const std::string kind = text.substr(0, colon), numbers = text.substr(colon + 1);
+  if (kind == "box") {
+    const auto box = parse_numbers<int64_t, 6>(numbers, ',');
+    if (!box) refuse(text);
+    is_box_ = true;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      low_[axis] = (*box)[axis];
+      high_[axis] = (*box)[axis + 3] - 1;
+      if (low_[axis] > high_[axis]) refuse(text);
+    }
+    return;
+  }
+  const auto sphere = parse_numbers<double, 4>(numbers, ',');
+  if (kind != "sphere" || !sphere || !((*sphere)[3] >= 0)) refuse(text);
+  for (size_t axis = 0; axis < 3; ++axis) center_[axis] = halves_of((*sphere)[axis], text);
+  radius_ = halves_of((*sphere)[3], text);
+}
+
+uint64_t Shape::box_cover(const Position& low, const Position& high) const {
+  bool is_full = true;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (high[axis] < low_[axis] || low[axis] > high_[axis]) return kNoNode;
+    is_full = is_full && low[axis] >= low_[axis] && high[axis] <= high_[axis];
+  }
+  return is_full ? kFull : kMixed;
+}
+
+// The centers of the voxels are the odd numbers, in half voxels.
+uint64_t Shape::sphere_cover(const Position& low, const Position& high) const {
+  int64_t nearest = 0, farthest = 0;  // squared distances of centers
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const int64_t first = 2 * low[axis] + 1 - center_[axis],
+                  last = 2 * high[axis] + 1 - center_[axis];
+    const int64_t near = first > 0 ? first : last < 0 ? last : first & 1;
+    nearest += square(near);
+    farthest += std::max(square(first), square(last));
+  }
+  if (nearest > square(radius_)) return kNoNode;
+  return farthest <= square(radius_) ? kFull : kMixed;
+}
+
+// Returns the cube of an edge at a position counted in such cubes.
+uint64_t Shape::cube(const Position& index, int64_t edge) const {
+  Position low, high;
+  uint64_t code = 0;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    low[axis] = edge * index[axis];
+    high[axis] = low[axis] + edge - 1;
+    code = code << kIndexBits | static_cast<uint64_t>(index[axis]);
+  }
+  const uint64_t cover = is_box_ ? box_cover(low, high) : sphere_cover(low, high);
+  return cover == kMixed ? code : cover;
+}
+
+std::array<uint64_t, 8> Shape::children(uint32_t levels, uint32_t level, uint64_t cube) const {
+  const int64_t edge = int64_t{1} << (levels - level - 1);
+  std::array<uint64_t, 8> children;
+  for (int child = 0; child < 8; ++child) {
+    Position index;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto coarse =
+          static_cast<int64_t>(cube >> kIndexBits * (2 - axis) & ((uint64_t{1} << kIndexBits) - 1));
+      index[static_cast<size_t>(axis)] = 2 * coarse + (child >> (2 - axis) & 1);
+    }
+    children[static_cast<size_t>(child)] = this->cube(index, edge);
+  }
+  return children;
+}
+
+uint64_t Shape::brick(uint64_t cube) const {
+  uint64_t mask = 0;
+  for (int bit = 0; bit < 64; ++bit) {
+    Position voxel = voxel_of_bit(bit);
+    for (size_t axis = 0; axis < 3; ++axis)
+      voxel[axis] += 4 * static_cast<int64_t>(cube >> kIndexBits * (2 - axis) &
+                                              ((uint64_t{1} << kIndexBits) - 1));
+    const uint64_t cover = is_box_ ? box_cover(voxel, voxel) : sphere_cover(voxel, voxel);
+    if (cover == kFull) mask |= uint64_t{1} << bit;
+  }
+  return mask;
+}
+
+}  // namespace voxdag::query

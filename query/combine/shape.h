@@ -1,0 +1,45 @@
+// A sphere or a box as the second operand of a difference. A shape has no nodes: for each cube it
+// tells whether the cube is empty, full or mixed. The rule is exact: a voxel belongs to a shape if
+// its center does. All lengths are in voxels of the grid.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "query/combine/operation.h"
+
+namespace voxdag::query {
+
+class Shape {
+ public:
+  // Parses "sphere:X,Y,Z,R" (multiples of 1/2) or "box:X0,Y0,Z0,X1,Y1,Z1" (whole numbers). Throws
+  // Error{kInvalidInput}.
+  explicit Shape(const std::string& text);
+
+  // Stands for a full cube of any level, as the offset of a node stands for the node's cube.
+  static constexpr uint64_t kFull = kNoNode - 1;
+
+  // These are like functions of a DAG's nodes, in a grid of 2^levels voxels per edge. `cube` is a
+  // result of root() or children(). Requires a mixed cube.
+  uint64_t root(uint32_t levels) const { return cube({0, 0, 0}, int64_t{1} << levels); }
+  std::array<uint64_t, 8> children(uint32_t levels, uint32_t level, uint64_t cube) const;
+  uint64_t brick(uint64_t cube) const;
+
+ private:
+  using Position = std::array<int64_t, 3>;
+
+  uint64_t cube(const Position& index, int64_t edge) const;
+  // Return kNoNode, kFull or another value for the voxels from `low` to `high`.
+  uint64_t sphere_cover(const Position& low, const Position& high) const;
+  uint64_t box_cover(const Position& low, const Position& high) const;
+
+  bool is_box_ = false;
+  // A box has the voxels from low_ to high_. Numbers of a sphere are in half voxels, so that the
+  // centers of voxels are whole numbers.
+  Position low_ = {}, high_ = {};
+  Position center_ = {};
+  int64_t radius_ = 0;
+};
+
+}  // namespace voxdag::query

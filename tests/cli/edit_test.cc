@@ -1,0 +1,108 @@
+// Tests the command edit, and combine at an offset, against builds and other commands.
+#include "tests/cli/command_line.h"
+
+namespace command_line {
+namespace {
+
+class Edit : public CommandLine {
+ protected:
+  void SetUp() override {
+    for (const std::string name : {"a", "b"})
+      ASSERT_EQ(run({"generate", "soup", name + ".glb", "--triangles", "500", "--seed",
+                     name == "a" ? "1" : "2"})
+                    .status,
+                0);
+    build({"a.glb"}, "a.vdag");
+  }
+  // Builds on a grid with voxels of edge 16. `shift` moves the scene, in voxels.
+  Json build(std::vector<std::string> scenes, const std::string& output,
+             const std::array<int, 3>& shift = {}, const std::vector<std::string>& options = {}) {
+    scenes.insert(scenes.begin(), "build");
+    std::string bounds;
+    for (const int voxels : shift) bounds += std::to_string(-1024 - 16 * voxels) + ",";
+    for (const std::string& argument :
+         {std::string("-r"), std::string("128"), std::string("--bounds"), bounds + "2048",
+          std::string("-o")})
+      scenes.push_back(argument);
+    scenes.push_back(output);
+    scenes.insert(scenes.end(), options.begin(), options.end());
+    return run_json(scenes);
+  }
+  void expect_equal(const std::string& a, const std::string& b) const {
+    EXPECT_TRUE(contents(a) == contents(b)) << a << " " << b;
+  }
+};
+
+// A file that is combined at an offset equals a build of the moved scene.
+TEST_F(Edit, OffsetEqualsAMovedScene) {
+  build({"a.glb"}, "moved.vdag", {3, 0, -5});
+  const Json same = run_json(
+      {"combine", "moved.vdag", "--xor", "a.vdag", "--offset", "3,0,-5", "-o", "none.vdag"});
+  EXPECT_EQ(same["voxels"], 0);
+  EXPECT_EQ(same["clipped_voxels"], 0);
+  run_json({"combine", "a.vdag", "--minus", "a.vdag", "-o", "empty.vdag"});
+  const Json back = run_json(
+      {"combine", "empty.vdag", "--union", "moved.vdag", "--offset", "-3,0,5", "-o", "back.vdag"});
+  EXPECT_EQ(back["sha256"], run_json({"info", "a.vdag", "--digest"})["sha256"]);
+}
+
+TEST_F(Edit, OffsetOutOfTheGrid) {
+  expect_error(2, "voxels would be outside of the grid",
+               {"combine", "a.vdag", "--union", "a.vdag", "--offset", "100,0,0", "-o", "x.vdag"});
+  expect_error(2, "three whole numbers",
+               {"combine", "a.vdag", "--union", "a.vdag", "--offset", "1,2", "-o", "x.vdag"});
+  const Json clipped = run_json(
+      {"combine", "a.vdag", "--union", "a.vdag", "--offset", "100,0,0", "--clip", "-o", "x.vdag"});
+  EXPECT_GT(clipped["clipped_voxels"], 0);
+}
+
+// Adding a scene equals one build of both scenes.
+TEST_F(Edit, AddEqualsOneBuild) {
+  const Json both = build({"a.glb", "b.glb"}, "both.vdag");
+  const Json added = run_json({"edit", "a.vdag", "--add", "b.glb", "-o", "c.vdag"});
+  EXPECT_EQ(added["sha256"], both["sha256"]);
+  expect_equal("c.vdag", "both.vdag");
+}
+
+// Pasting what a cut removed gives the same file, also through a cropped file.
+TEST_F(Edit, CutAndPaste) {
+  const std::string region = "32,0,64,64,32,96";
+  run_json({"edit", "a.vdag", "--cut", "box:" + region, "-o", "hole.vdag"});
+  run_json({"extract", "a.vdag", "--region", region, "--crop", "-o", "part.vdag"});
+  EXPECT_LT(run_json({"info", "part.vdag"})["resolution"], 128);
+  run_json({"edit", "hole.vdag", "--paste", "part.vdag@32,0,64", "-o", "c.vdag"});
+  expect_equal("c.vdag", "a.vdag");
+  // The edits are applied in the order cut, add, paste, in one command too.
+  run_json(
+      {"edit", "a.vdag", "--paste", "part.vdag@32,0,64", "--cut", "box:" + region, "-o", "d.vdag"});
+  expect_equal("d.vdag", "a.vdag");
+}
+
+TEST_F(Edit, Spheres) {
+  const Json cut = run_json({"edit", "a.vdag", "--cut", "sphere:64,64,64,30", "--cut",
+                             "sphere:64,64,64.5,31", "-o", "c.vdag"});
+  EXPECT_GT(cut["pairs"], 0);
+  EXPECT_LT(cut["voxels"], run_json({"info", "a.vdag"})["voxels"]);
+  EXPECT_EQ(cut["sha256"], run_json({"info", "c.vdag", "--digest"})["sha256"]);
+}
+
+TEST_F(Edit, RefusesBadArguments) {
+  expect_error(2, "expected --cut, --add or --paste", {"edit", "a.vdag", "-o", "x.vdag"});
+  expect_error(2, "shape 'cone:1'", {"edit", "a.vdag", "--cut", "cone:1", "-o", "x.vdag"});
+  expect_error(2, "PART.vdag@X,Y,Z", {"edit", "a.vdag", "--paste", "a.vdag", "-o", "x.vdag"});
+  expect_error(3, "none.glb", {"edit", "a.vdag", "--add", "none.glb", "-o", "x.vdag"});
+  expect_error(2, "a.vdag",
+               {"edit", "a.vdag", "--cut", "sphere:0,0,0,5", "-o", "a.vdag", "--force"});
+  put("mine.txt", "not a DAG");
+  expect_error(2, "mine.txt", {"edit", "a.vdag", "--cut", "sphere:0,0,0,5", "-o", "mine.txt"});
+  EXPECT_EQ(contents("mine.txt"), "not a DAG");
+  build({"a.glb"}, "colored.vdag", {}, {"--color"});
+  expect_error(2, "colored.vdag has colors",
+               {"edit", "colored.vdag", "--cut", "sphere:0,0,0,5", "-o", "x.vdag"});
+  expect_error(2, "colored.vdag has colors",
+               {"edit", "a.vdag", "--paste", "colored.vdag@0,0,0", "-o", "x.vdag"});
+  EXPECT_FALSE(exists("x.vdag") || exists("x.vdag.partial") || exists("x.vdag.lock"));
+}
+
+}  // namespace
+}  // namespace command_line
