@@ -1,10 +1,13 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "core/format/global/open_global.h"
 #include "core/io/file_system.h"
@@ -12,6 +15,7 @@
 #include "python/native/long_work.h"
 #include "python/native/memory.h"
 #include "python/native/path_text.h"
+#include "query/combine/combine.h"
 #include "query/export/export.h"
 #include "query/extract/extract.h"
 
@@ -79,6 +83,35 @@ std::string export_file(const PathText& path, const PathText& output, const std:
   });
 }
 
+query::Operation operation_named(const std::string& name) {
+  constexpr std::pair<const char*, query::Operation> kOperations[] = {
+      {"union", query::Operation::kUnion},
+      {"minus", query::Operation::kMinus},
+      {"and", query::Operation::kAnd},
+      {"xor", query::Operation::kXor}};
+  for (const auto& [known, operation] : kOperations)
+    if (name == known) return operation;
+  throw Error(ErrorCode::kInvalidInput,
+              "operation '" + name + "': expected union, minus, and, or xor");
+}
+
+void combine(const PathText& a, const PathText& b, const std::string& operation,
+             const PathText& output, const std::optional<Corner>& offset, bool clip,
+             const std::string& memory, unsigned threads, bool replace, nb::object progress) {
+  query::CombineSpec spec;
+  spec.operation = operation_named(operation);
+  spec.output = output.bytes;
+  spec.offset = offset;
+  spec.clip = clip;
+  spec.replace = replace;
+  spec.memory_bytes = memory_of(memory);
+  spec.threads = threads ? threads : default_threads();
+  run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
+    const auto file_a = open_global_file(a.bytes), file_b = open_global_file(b.bytes);
+    return query::combine(*file_a, *file_b, spec, system_files(), relay, cancel);
+  });
+}
+
 // Returns the files that an export would write.
 std::vector<PathText> export_paths(const std::string& format, const PathText& output) {
   std::vector<PathText> paths;
@@ -104,6 +137,9 @@ void bind_derive(nb::module_& module) {
   module.def("export", &export_file, nb::arg("path"), nb::arg("output"), nb::arg("format"),
              nb::arg("grid_levels"), nb::arg("low"), nb::arg("high"), nb::arg("memory"),
              nb::arg("gray"), nb::arg("replace"), nb::arg("progress").none());
+  module.def("combine", &combine, nb::arg("a"), nb::arg("b"), nb::arg("operation"),
+             nb::arg("output"), nb::arg("offset").none(), nb::arg("clip"), nb::arg("memory"),
+             nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
   module.def("export_paths", &export_paths, nb::arg("format"), nb::arg("output"));
   module.def("export_formats", &export_formats);
 }

@@ -49,6 +49,8 @@ def test_types(tmp_path):
         mesh = voxdag.Mesh([[0, 0, 0]], [[0, 0, 0]])
         voxdag.build([mesh, "a.glb"], resolution=64, output="scene.vdag", solid=True)
         voxdag.build(([[0, 0, 0]], [[0, 0, 0]]), resolution=64, output="scene.vdag")
+        reveal_type((dag | dag) - dag)
+        voxdag.combine(dag, "b.vdag", "or")
     """)
     )
     checked = mypy(tmp_path, "--strict", "--allow-any-generics", "-p", "voxdag")
@@ -71,6 +73,8 @@ def test_types(tmp_path):
         'user.py:18: error: Unexpected keyword argument "sise"',
         'user.py:20: error: Unexpected keyword argument "thread"',
         "user.py:21: error: Argument 1",
-        "Found 8 errors",
+        'user.py:25: note: Revealed type is "voxdag._dag.Dag"',
+        "user.py:26: error: Argument 3",
+        "Found 9 errors",
     ):
         assert expected in user, (expected, user)

@@ -7,13 +7,13 @@
         dag.dense(region, level=8)              # a box of the grid with 2^8 cells per edge
 
 Long calls release the interpreter's lock, so other Python threads can run. build(), plan(),
-extract(), export() and render() stop on Ctrl-C. Errors of this package are `voxdag.Error`, with a
-`code`.
+combine(), extract(), export() and render() stop on Ctrl-C. Errors of this package are
+`voxdag.Error`, with a `code`.
 """
 
 from ._build import Scene, build, plan
 from ._dag import Dag, Hits, open
-from ._derive import export, export_formats, extract
+from ._derive import combine, export, export_formats, extract
 from ._error import Error
 from ._mesh import Mesh
 from ._progress import Progress
@@ -35,6 +35,7 @@ __all__ = [
     "Region",
     "Scene",
     "build",
+    "combine",
     "export",
     "export_formats",
     "extract",

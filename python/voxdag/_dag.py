@@ -18,6 +18,7 @@ from ._types import Bools, Bytes, Doubles, Integers, Region
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from ._derive import Operation
     from ._types import ExportOptions, ExportReport, ExtractOptions, ExtractReport, RenderOptions
 
 # For each attribute's name: the number of components of a value, and the numpy type of a component.
@@ -60,13 +61,33 @@ class Dag(DagFile):
     threads   number of threads; 0 means all cores
 
     A Dag is also a set of voxels and an array of bool: `(x, y, z) in dag`, `len(dag)`,
-    `for x, y, z in dag`, `dag[x, y, z]`, `dag[10:20, :, 5]`, `np.asarray(dag)`. It is accepted
-    wherever a path is. pickle keeps the path and the digest; unpickling opens the file again and
+    `for x, y, z in dag`, `dag[x, y, z]`, `dag[10:20, :, 5]`, `np.asarray(dag)`. `a | b`, `a - b`,
+    `a & b` and `a ^ b` are new Dags in temporary files, as of combine(). A Dag is accepted wherever
+    a path is. pickle keeps the path and the digest; unpickling opens the file again and
     raises Error if it changed. Two Dags are equal if their files have equal contents.
     """
 
     def __len__(self) -> int:
         return self.voxels
+
+    def __or__(self, other: Dag) -> Dag:
+        """Returns the voxels of this Dag or of the other one, in a temporary file. See
+        voxdag.combine()."""
+        return self._combined(other, "union") if isinstance(other, Dag) else NotImplemented
+
+    def __sub__(self, other: Dag) -> Dag:
+        return self._combined(other, "minus") if isinstance(other, Dag) else NotImplemented
+
+    def __and__(self, other: Dag) -> Dag:
+        return self._combined(other, "and") if isinstance(other, Dag) else NotImplemented
+
+    def __xor__(self, other: Dag) -> Dag:
+        return self._combined(other, "xor") if isinstance(other, Dag) else NotImplemented
+
+    def _combined(self, other: Dag, operation: Operation) -> Dag:
+        from ._derive import combine
+
+        return combine(self, other, operation)
 
     def __contains__(self, voxel: ArrayLike) -> bool:
         found = self.lookup(voxel)
