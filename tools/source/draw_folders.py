@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Draws docs/images/folders.svg: which folder includes which, read from the include lines.
 
-    tools/draw_folders.py            writes the picture
-    tools/draw_folders.py --check    exits 1 if the picture in the tree is not the current one
+    tools/source/draw_folders.py            writes the picture
+    tools/source/draw_folders.py --check    exits 1 if the picture is not up to date
 
 An arrow that follows from two others (a includes b, b includes c, so a may see c) is left out, so
 that the picture shows the layers. tests, bench and docs include everything and are left out, and so
@@ -138,7 +138,7 @@ def main():
         with open(PICTURE, encoding="utf-8") as file:
             if file.read() == picture:
                 return 0
-        print(f"{PICTURE}: is not of the current sources; run tools/draw_folders.py")
+        print(f"{PICTURE}: is not of the current sources; run tools/source/draw_folders.py")
         return 1
     with open(PICTURE, "w", encoding="utf-8") as file:
         file.write(picture)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Counts sentence patterns that make comments and pages hard to read (CONTRIBUTING.md, "Language").
 
-    tools/check_prose.py [--list] [PATH...]     default: all tracked files
+    tools/source/check_prose.py [--list] [PATH...]     default: all tracked files
 
 Prose is comments of C++, CUDA, JavaScript and CSS, comments and docstrings of Python, comments of CMake and
 shell, and paragraphs of Markdown outside of code. A pattern marks a place to look at; each has good uses. So
@@ -47,7 +47,7 @@ PATTERNS = {
 }
 COMPILED = {cure: re.compile(pattern) for cure, pattern in PATTERNS.items()}
 # This file contains the patterns themselves, and the license is a fixed text.
-LEFT_OUT = {"tools/check_prose.py", "LICENSE"}
+LEFT_OUT = {"tools/source/check_prose.py", "LICENSE"}
 
 SLASHES = (".h", ".cc", ".cpp", ".cu", ".cuh", ".c", ".js", ".css")
 HASHES = (".py", ".sh", ".cmake", ".yml", "CMakeLists.txt")
