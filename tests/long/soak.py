@@ -221,7 +221,16 @@ def prepare(voxdag, folder):
         scenes[name] = path.read_bytes()
         for resolution in RESOLUTIONS:
             built = subprocess.run(
-                [voxdag, "build", path, "-r", str(resolution), "-o", folder / "out.vdag", "--json"],
+                [
+                    voxdag,
+                    "build",
+                    path,
+                    "-r",
+                    str(resolution),
+                    "-o",
+                    folder / f"{name}.vdag",
+                    "--json",
+                ],
                 check=True,
                 capture_output=True,
                 text=True,
