@@ -64,10 +64,11 @@ void for_each_batch(unsigned threads, size_t items, const Body& body) {
 }
 
 // Fills `rays`, with directions scaled to length 1. Throws Error{kInvalidInput} for numbers that
-// are not finite and for directions of 0. Processes two rays per operation, because otherwise the
-// divisions would take longer than the walk of the rays through large cells.
+// are not finite and for directions of 0; `number` is the number of the first ray in the message.
+// Processes two rays per operation, because otherwise the divisions would take longer than the walk
+// of the rays through large cells.
 void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
-               Ray* rays) {
+               size_t number, Ray* rays) {
   const DoublePair zero = DoublePair::of(0), one = DoublePair::of(1);
   for (size_t first = 0; first < origins.size(); first += 2) {
     const size_t second = std::min(first + 1, origins.size() - 1);
@@ -82,9 +83,9 @@ void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates
     }
     if (!(equal(nothing, zero) == 3 && less(zero, largest) == 3)) {
       const size_t bad = is_ray(origins[first], directions[first]) ? second : first;
-      refuse("a ray has the origin " + point_text(origins[bad]) + " and the direction " +
-             point_text(directions[bad]) +
-             ": expected finite numbers and a direction other than 0");
+      refuse("rays[" + std::to_string(number + bad) + "] has the origin " +
+             point_text(origins[bad]) + " and the direction " + point_text(directions[bad]) +
+             ": expected finite numbers and a direction other than 0 0 0");
     }
     // Divides by the largest component first, so that no square of a component overflows or becomes
     // 0.
@@ -321,7 +322,7 @@ void DagFile::rays(std::span<const Coordinates> origins, std::span<const Coordin
       Hit found[kRays];
       for (size_t first = batch; first < batch + count; first += kRays) {
         const size_t n = std::min(kRays, batch + count - first);
-        make_rays(origins.subspan(first, n), directions.subspan(first, n), rays);
+        make_rays(origins.subspan(first, n), directions.subspan(first, n), first, rays);
         const uint64_t have_hit = packet.cast({rays, n}, found);
         for (size_t i = 0; i < n; ++i)
           hits[first + i] = have_hit >> i & 1 ? as_ray_hit(found[i], rays[i]) : RayHit{};

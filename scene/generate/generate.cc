@@ -49,11 +49,13 @@ void check(const GenerateOptions& options) {
   const std::string name = scene_kind(options.kind).name;
   const bool has_parts = options.kind == SceneKind::kCity || options.kind == SceneKind::kSpheres;
   if (options.instances && !has_parts)
-    throw Error(ErrorCode::kInvalidInput, name +
+    throw Error(ErrorCode::kInvalidInput, "a scene of the kind " + name +
                                               " has no repeated parts to write as instances: "
-                                              "expected city or spheres");
+                                              "expected the kind city or spheres");
   if (options.colors && scene_kind(options.kind).materials.empty())
-    throw Error(ErrorCode::kInvalidInput, name + " has no colors: expected city");
+    throw Error(ErrorCode::kInvalidInput, "a scene of the kind " + name +
+                                              " cannot have colors: expected the kind city, or no "
+                                              "colors");
   if (options.colors && options.instances)
     throw Error(ErrorCode::kInvalidInput,
                 "colors and instances were both given, but instances of a part share one color: "
