@@ -18,7 +18,7 @@ namespace {
 struct ExtractCommand {
   std::string input, output, memory;
   SelectionOptions selection;
-  bool crop = false, force = false, quiet = false, json = false;
+  bool crop = false, majority = false, force = false, quiet = false, json = false;
   unsigned threads = default_threads();
 };
 
@@ -69,6 +69,7 @@ void run(const ExtractCommand& command, CommandContext& context) {
   const auto file = open_global_file(command.input);
   spec.selection = command.selection.selection(*file);
   spec.crop = command.crop;
+  spec.majority = command.majority;
   spec.output = command.output;
   spec.replace = command.force;
   spec.threads = command.threads;
@@ -87,6 +88,9 @@ void declare(Command& command, ExtractCommand& state) {
   state.selection.declare(command);
   command.flag("--crop", state.crop,
                "make the smallest octree cube around the region the new grid");
+  command.flag("--majority", state.majority,
+               "set a cell of a coarser level if at least half of its voxels are set, not if any "
+               "is (for solids)");
   command.option("--memory", state.memory,
                  "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
   command.threads_option(state.threads);

@@ -40,11 +40,13 @@ query::Selection selection_of(uint32_t grid_levels, const Corner& low, const Cor
 }
 
 std::string extract(const PathText& path, const PathText& output, uint32_t grid_levels,
-                    const Corner& low, const Corner& high, bool crop, const std::string& memory,
-                    unsigned threads, bool replace, nb::object progress) {
+                    const Corner& low, const Corner& high, bool crop, bool majority,
+                    const std::string& memory, unsigned threads, bool replace,
+                    nb::object progress) {
   query::ExtractSpec spec;
   spec.selection = selection_of(grid_levels, low, high);
   spec.crop = crop;
+  spec.majority = majority;
   spec.output = output.bytes;
   spec.replace = replace;
   spec.memory_bytes = memory_of(memory);
@@ -132,8 +134,8 @@ std::vector<std::tuple<std::string, std::string, std::string>> export_formats() 
 
 void bind_derive(nb::module_& module) {
   module.def("extract", &extract, nb::arg("path"), nb::arg("output"), nb::arg("grid_levels"),
-             nb::arg("low"), nb::arg("high"), nb::arg("crop"), nb::arg("memory"),
-             nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
+             nb::arg("low"), nb::arg("high"), nb::arg("crop"), nb::arg("majority"),
+             nb::arg("memory"), nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
   module.def("export", &export_file, nb::arg("path"), nb::arg("output"), nb::arg("format"),
              nb::arg("grid_levels"), nb::arg("low"), nb::arg("high"), nb::arg("memory"),
              nb::arg("gray"), nb::arg("replace"), nb::arg("progress").none());

@@ -17,6 +17,13 @@ def test_extract_a_level(path, dag, tmp_path):
         assert report["voxels"] == coarse.voxels
 
 
+def test_extract_by_majority(path, dag, tmp_path):
+    voxdag.extract(path, tmp_path / "coarse.vdag", level=4, majority=True)
+    counts = dag.dense().reshape(16, 4, 16, 4, 16, 4).sum(axis=(1, 3, 5))
+    with voxdag.open(tmp_path / "coarse.vdag") as coarse:
+        assert np.array_equal(coarse.dense(), counts >= 32)
+
+
 def test_extract_a_region(path, dag, tmp_path):
     region = (5, 0, 10, 30, 64, 40)
     voxdag.extract(path, tmp_path / "part.vdag", region=region, threads=2)

@@ -25,6 +25,7 @@ def extract(
     level: Optional[int] = None,
     world: bool = False,
     crop: bool = False,
+    majority: bool = False,
     memory: Union[int, str, None] = None,
     threads: int = 0,
     force: bool = False,
@@ -36,6 +37,8 @@ def extract(
     path, output          the .vdag file to read, and the .vdag file to write
     region, level, world  the part to write, as in Dag
     crop                  make the smallest octree-aligned cube around the region the new grid
+    majority              set a cell of a coarser level if at least half of its voxels are set, not
+                          if any is; the volume of a solid hardly changes
     memory                limit of the memory in bytes, or text such as "8GiB"; by default half of
                           the machine's memory
     threads               number of threads; 0 means all cores
@@ -57,6 +60,7 @@ def extract(
             low,
             high,
             crop,
+            majority,
             memory_text(memory),
             thread_count(threads),
             force,

@@ -113,6 +113,7 @@ class ExtractOptions(TypedDict, total=False):
     level: int | None
     world: bool
     crop: bool
+    majority: bool
     memory: int | str | None
     threads: int
     force: bool

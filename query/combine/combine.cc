@@ -19,6 +19,7 @@
 #include "query/combine/moved.h"
 #include "query/combine/pair_levels.h"
 #include "query/dag/locked_outputs.h"
+#include "query/dag/refuse_attributes.h"
 #include "query/dag/temporary_work.h"
 
 namespace voxdag::query {
@@ -31,14 +32,7 @@ constexpr uint64_t kSorterShare = 32;
 constexpr uint64_t kValueShare = 10;
 constexpr uint64_t kWindowShare = 32;
 constexpr uint64_t kListBufferBytes = uint64_t{16} << 10;
-
-void refuse_attributes(const voxdag_reader::File& file) {
-  const std::vector<Attribute> attributes = attributes_of(file).list();
-  if (!attributes.empty())
-    throw Error(ErrorCode::kInvalidInput, file.path() + " has " + traits_of(attributes[0]).plural +
-                                              ": expected a file without colors and other "
-                                              "attributes, which combine cannot join");
-}
+constexpr const char* kNoAttributes = "which combine cannot join";
 
 void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, bool is_moved) {
   const auto voxel_edge = [](const voxdag_reader::File& file) {
@@ -55,7 +49,7 @@ void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, 
                 "only files with equal hash bits can be combined: " + a.path() + " has " +
                     std::to_string(a.hash_bits()) + "; " + b.path() + " has " +
                     std::to_string(b.hash_bits()));
-  refuse_attributes(b);
+  refuse_attributes(b, kNoAttributes);
 }
 
 // The temporary folder of a combination, and its memory.
@@ -242,7 +236,7 @@ CombineReport combine_moved(const voxdag_reader::File& a, const voxdag_reader::F
 CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,
                       const CombineSpec& spec, FileSystem& files, Progress& progress,
                       const CancelToken& cancel) {
-  refuse_attributes(a);
+  refuse_attributes(a, kNoAttributes);
   refuse_unequal(a, b, spec.offset.has_value());
   LockedOutputs outputs(files, {{spec.output}, {a.path(), b.path()}, spec.replace});
   const WatchedFile watched_a(a), watched_b(b);
@@ -260,7 +254,7 @@ CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b
 
 CombineReport cut(const voxdag_reader::File& a, const Shape& shape, const CombineSpec& spec,
                   FileSystem& files, Progress& progress, const CancelToken& cancel) {
-  refuse_attributes(a);
+  refuse_attributes(a, kNoAttributes);
   LockedOutputs outputs(files, {{spec.output}, {a.path()}, spec.replace});
   const WatchedFile watched(a);
   const auto run = [&] {

@@ -21,7 +21,9 @@
 #include "core/geometry/octree_descent.h"
 #include "merge/merge.h"
 #include "query/dag/locked_outputs.h"
+#include "query/dag/refuse_attributes.h"
 #include "query/dag/temporary_work.h"
+#include "query/extract/majority_cells.h"
 #include "query/extract/node_reader.h"
 #include "query/extract/part_builder.h"
 #include "query/extract/part_colors.h"
@@ -69,6 +71,7 @@ class Extraction {
       progress_.warn(
           "the region has cells on both sides of a plane through the middle of the grid: the "
           "smallest octree cube around it is the complete grid");
+    find_majority_cells();
     const MergeInputs inputs = merge_inputs(build_parts());
     GlobalFileWriter out(files_, spec_.output, report_.grid, shape_.hash_bits, spec_.narrow_words);
     const MergeReport merged =
@@ -79,7 +82,9 @@ class Extraction {
     report_.merge_passes = merged.passes;
     report_.work_bytes += merged.scratch_bytes;
     if (merged.voxels == 0)
-      progress_.warn("the selection has no voxels: the file will have no nodes");
+      progress_.warn(majority_ ? "no cell of the selection has half of its voxels set: the file "
+                                 "will have no nodes"
+                               : "the selection has no voxels: the file will have no nodes");
     else
       with_reader_errors([&] {
         for (const Attribute attribute : attributes_of(file_).list())
@@ -104,7 +109,8 @@ class Extraction {
     Worker(Extraction& all, unsigned id, uint64_t share_bytes)
         : share(share_bytes, &all.budget_),
           reader(*all.source_, all.budget_, all.cancel_),
-          builder(all.file_, all.spec_.selection, reader, {share, pages}, all.cancel_),
+          builder(all.file_, all.spec_.selection, all.majority_.get(), reader, {share, pages},
+                  all.cancel_),
           segment(all.files_, all.work_.path(), id, all.budget_) {}
 
     MemoryBudget share;
@@ -130,6 +136,7 @@ class Extraction {
     return cube;
   }
 
+  void find_majority_cells();
   std::vector<ArtifactRef> build_parts();
   std::vector<SelectedPart> first_parts(Worker& worker, uint64_t wanted) const;
   uint64_t wanted_parts(unsigned workers, uint64_t share_bytes) const;
@@ -145,11 +152,22 @@ class Extraction {
   const Cube crop_;
   DagShape shape_;
   MemoryBudget budget_;
+  std::unique_ptr<MajorityCells> majority_;
   std::unique_ptr<CheckedReader> source_;
   TemporaryWork work_;
   std::mutex mutex_;  // guards report_ and the lists of parts and artifacts
   ExtractReport report_;
 };
+
+void Extraction::find_majority_cells() {
+  if (!spec_.majority || spec_.selection.grid_levels == file_.grid_levels()) return;
+  ScratchFolder folder(files_, work_.path() + "/counts");
+  with_reader_errors([&] {
+    majority_ = std::make_unique<MajorityCells>(file_, spec_.selection.grid_levels, folder, budget_,
+                                                progress_, cancel_);
+  });
+  report_.work_bytes += folder.bytes_written();
+}
 
 uint64_t Extraction::wanted_parts(unsigned workers, uint64_t share_bytes) const {
   uint64_t nodes = 0;
@@ -280,6 +298,7 @@ Cube crop_cube(const Selection& selection) {
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel) {
   check_grid(spec.selection, file.grid_levels());
+  if (spec.majority) refuse_attributes(file, "which an extract by majority cannot keep");
   LockedOutputs outputs(files, {{spec.output}, {file.path()}, spec.replace});
   const WatchedFile watched(file);  // colors are read in place
   return watched.run([&] {

@@ -26,6 +26,9 @@ namespace voxdag::query {
 
 struct ExtractSpec {
   Selection selection;
+  // If true, a cell of a coarser grid is set if at least half of its voxels are set; otherwise if
+  // any is set. Files with attributes are refused.
+  bool majority = false;
   // If true, the new grid is the smallest octree-aligned cube around the region; otherwise it is
   // the complete grid.
   bool crop = false;
@@ -58,8 +61,8 @@ Cube crop_cube(const Selection& selection);
 // Writes the selected part of `file` to spec.output, which gets its final name when it is complete.
 // Temporary files are in a folder next to the output; extract() removes the folder at the end, also
 // after an error. If the process is killed, the next extract with the same output removes the
-// folder. Throws Error: kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the
-// errors of LockedOutputs.
+// folder. Throws Error: kInvalidInput for attributes with `majority`, kCorrupt for a damaged file,
+// kNoSpace, kOutOfMemory, kCanceled, and the errors of LockedOutputs.
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel);
 

@@ -112,7 +112,15 @@ void PartBuilder::read_all_children(uint32_t level, PartLevel& nodes, PartLevel&
   });
 }
 
-// Returns the occupied octants of each node or brick. In the selected grid these octants are cells.
+uint8_t PartBuilder::cells_of_brick(uint64_t mask) const {
+  return majority_ ? MajorityCells::octants(mask) : coarser_cells(mask);
+}
+
+uint8_t PartBuilder::cells_of_node(const voxdag_reader::Node& node) const {
+  return majority_ ? majority_->children(node) : static_cast<uint8_t>(node.child_mask);
+}
+
+// Returns the octants of each node or brick that are set as cells of the selected grid.
 PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
   const uint32_t level = brick_level() + 1;
   const PartLevel::Sorted sorted = nodes.sort();
@@ -120,10 +128,9 @@ PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
   const bool bricks = level == file_.brick_level();
   reader_.for_each(
       level, sorted.span(), [&](const WantedNode& wanted, std::span<const uint32_t> words) {
-        cells[wanted.index] =
-            bricks
-                ? coarser_cells(reader_.parse_brick(wanted.offset, words))
-                : static_cast<uint8_t>(reader_.parse_node(level, wanted.offset, words).child_mask);
+        cells[wanted.index] = bricks
+                                  ? cells_of_brick(reader_.parse_brick(wanted.offset, words))
+                                  : cells_of_node(reader_.parse_node(level, wanted.offset, words));
       });
   return cells;
 }

@@ -8,6 +8,8 @@
 //     selected grid   nodes   ...   bricks          cells
 //     file            nodes   ...   nodes at l-2    their children's masks, at l-1
 //
+// With MajorityCells, cells with too few voxels are removed from these masks.
+//
 // Then the tree is built from these bricks up. Nodes that have become equal are merged
 // (hash-consing), with the same tables that are used to build subvolumes. Cells outside the region
 // are left out on the way down. The region cuts a node if only a part of the node's cube is in the
@@ -21,6 +23,7 @@
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
 #include "query/dag/selection.h"
+#include "query/extract/majority_cells.h"
 #include "query/extract/node_reader.h"
 #include "query/extract/part_level.h"
 #include "voxdag/cancel_token.h"
@@ -35,9 +38,17 @@ struct SelectedPart {
 
 class PartBuilder {
  public:
-  PartBuilder(const voxdag_reader::File& file, const Selection& selection, NodeReader& reader,
-              PooledMemory memory, const CancelToken& cancel)
-      : file_(file), selection_(selection), reader_(reader), memory_(memory), cancel_(cancel) {}
+  // `majority` has the set cells of the selected grid. If it is null, a cell is set if it has a
+  // voxel.
+  PartBuilder(const voxdag_reader::File& file, const Selection& selection,
+              const MajorityCells* majority, NodeReader& reader, PooledMemory memory,
+              const CancelToken& cancel)
+      : file_(file),
+        selection_(selection),
+        majority_(majority),
+        reader_(reader),
+        memory_(memory),
+        cancel_(cancel) {}
 
   // Passes the level arrays of the part to the sink; `shape` describes the new grid. If the budget
   // cannot hold the part, throws OutOfBudget before the first call of the sink.
@@ -78,6 +89,8 @@ class PartBuilder {
   void read_all_children(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);
   PooledArray<uint64_t> read_bricks(PartLevel& bricks);
   PooledArray<uint8_t> read_cells(PartLevel& nodes);
+  uint8_t cells_of_brick(uint64_t mask) const;
+  uint8_t cells_of_node(const voxdag_reader::Node& node) const;
   uint64_t selected_bits(const PartLevel::Position& brick) const;
   PooledArray<Built> build_bricks(PartLevel& bricks, SubDagTables& tables);
   PooledArray<Built> build_nodes(uint32_t level, uint64_t count, const Children& children,
@@ -85,6 +98,7 @@ class PartBuilder {
 
   const voxdag_reader::File& file_;
   const Selection& selection_;
+  const MajorityCells* const majority_;
   NodeReader& reader_;
   PooledMemory memory_;
   const CancelToken& cancel_;

@@ -44,6 +44,22 @@ TEST_F(Extract, LargeResultsWithinLittleMemory) {
   EXPECT_LE(part["peak_rss_bytes"], kAllowed);
 }
 
+// By majority, a solid keeps its volume at a coarser level. Files with colors are refused.
+TEST_F(Extract, Majority) {
+  ASSERT_EQ(run({"generate", "spheres", "b.glb", "--triangles", "2000"}).status, 0);
+  const Json solid =
+      run_json({"build", "b.glb", "-r", "256", "--solid", "winding", "-o", "b.vdag"});
+  const Json kept = run_json(
+      {"extract", "b.vdag", "-o", "kept.vdag", "--level", "5", "--majority", "--memory", "64MiB"});
+  const double volume = solid["voxels"].get<double>() / 512;
+  EXPECT_NEAR(kept["voxels"].get<double>(), volume, 0.05 * volume);
+  EXPECT_EQ(run_json({"verify", "kept.vdag"})["ok"], true);
+  ASSERT_EQ(run({"generate", "city", "c.glb", "--triangles", "1000", "--colors"}).status, 0);
+  run_json({"build", "c.glb", "-r", "64", "--color", "-o", "c.vdag"});
+  expect_error(2, "c.vdag has colors: expected a file without colors and other attributes",
+               {"extract", "c.vdag", "-o", "x.vdag", "--level", "4", "--majority"});
+}
+
 // The report has the same values as the outputs of info and verify.
 TEST_F(Extract, Report) {
   const Json report = run_json({"extract", "s.vdag", "-o", "c.vdag", "--resolution", "32"});

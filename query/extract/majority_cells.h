@@ -1,0 +1,48 @@
+// The cells of a coarser grid in which at least half of the voxels are set.
+//
+// The number of voxels below each node is computed once per unique node, from the bricks up to the
+// level of the cells. The nodes are read in the order of the file. The numbers of a level that do
+// not fit in memory are in a scratch file (query/combine/node_values.h). What remains is a bit for
+// each two words of the cells' level, because every node has at least two words.
+//
+// If the cells have two voxels per edge, they are octants of bricks and need no stored bits.
+// Immutable after construction; safe to use from several threads.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "core/base/progress.h"
+#include "core/format/global/voxdag_reader.h"
+#include "merge/load/scratch_file.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::query {
+
+class MajorityCells {
+ public:
+  // `grid_levels` is less than the file's. The bits remain charged to `budget`. Throws
+  // Error{kCorrupt}, Error{kCanceled}, Error{kOutOfMemory}, Error{kNoSpace} and
+  // voxdag_reader::Error.
+  MajorityCells(const voxdag_reader::File& file, uint32_t grid_levels, ScratchFolder& folder,
+                MemoryBudget& budget, Progress& progress, const CancelToken& cancel);
+
+  // Returns the octants of a brick with at least half of their voxels.
+  static uint8_t octants(uint64_t mask);
+  // Returns the children of a node one level above the cells with at least half of their voxels.
+  uint8_t children(const voxdag_reader::Node& node) const;
+
+ private:
+  void set_if_majority(uint64_t offset, uint64_t voxels) {
+    if (2 * voxels >= cell_voxels_) bits_[offset / 128] |= uint64_t{1} << offset / 2 % 64;
+  }
+  bool is_set(uint64_t offset) const;
+
+  const voxdag_reader::File& file_;
+  const uint32_t level_;  // the level of the cells
+  const uint64_t cell_voxels_;
+  PageBuffer<uint64_t> bits_;
+};
+
+}  // namespace voxdag::query
