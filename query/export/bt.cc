@@ -23,7 +23,8 @@ namespace {
 constexpr uint32_t kOctoMapLevels = 16;
 enum BtChild : uint32_t { kUnknown = 0, kFree = 1, kOccupied = 2, kInner = 3 };
 
-// Walks the octree depth first. Inside the region, cubes without voxels are written as free, even
+// Walks the octree depth first. A full cube of at least 8 cells per edge is one occupied leaf.
+// Inside the region, cubes without voxels are written as free, even
 // inside closed objects: a surface does not show which of its sides is solid (docs/export.md).
 template <class Inner>
 class BtWalk {
@@ -66,9 +67,13 @@ class BtWalk {
       const Position at = child_corner(corner, i, half);
       uint32_t state = job_.selection.region.contains(at, half) ? kFree : kUnknown;
       if (children.has(i) && has_cells(depth + 1, job_.dag.content(depth, children, i), at, half)) {
-        state = half == 1 ? kOccupied : kInner;
-        inner |= half == 1 ? 0 : 1u << i;
-        voxels += half == 1;
+        const bool is_leaf =
+            half == 1 || (half > kBrickEdge && state == kFree &&
+                          is_full(job_.dag, depth + 1, job_.dag.content(depth, children, i),
+                                  job_.selection.grid_levels));
+        state = is_leaf ? kOccupied : kInner;
+        inner |= is_leaf ? 0 : 1u << i;
+        voxels += is_leaf ? cells_of_cube(half) : 0;
       }
       nodes += state != kUnknown;
       bits |= state << 2 * octomap_child(i);

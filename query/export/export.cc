@@ -26,6 +26,10 @@ constexpr ExportFormat kFormats[] = {
 #endif
     {"ply", "point cloud: the centers of the voxels, world units", nullptr, nullptr, write_ply},
     {"npz", "numpy: the cells and the centers of the voxels", nullptr, nullptr, write_npz},
+    {"vtu", "VTK, ParaView: a hexahedron for each voxel, with shared points", nullptr, nullptr,
+     write_vtu},
+    {"inp", "Abaqus, CalculiX: an element C3D8 for each voxel, with shared nodes", nullptr, nullptr,
+     write_inp},
     {"glb", "glTF: a mesh of the surface, for regions", nullptr, nullptr, write_glb},
 };
 

@@ -69,11 +69,14 @@ uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t
     return job.file.voxels();
   ExportStage stage(job, "count", 0, "voxels");
   uint64_t voxels = 0;
-  for_each_brick(job.dag, selection, [&](const Brick& brick) {
-    const auto more = static_cast<uint64_t>(std::popcount(brick.mask));
+  const auto add = [&](uint64_t more) {
     stage.advance(more);
     return (voxels += more) <= limit;
-  });
+  };
+  for_each_brick_or_full_cube(
+      job.dag, selection,
+      [&](const Brick& brick) { return add(static_cast<uint64_t>(std::popcount(brick.mask))); },
+      [&](const Position&, int64_t edge) { return add(cells_of_cube(edge)); });
   return voxels;
 }
 
@@ -95,10 +98,14 @@ bool CellLimit::fits(uint32_t grid_levels) {
   if (counts.is_stored()) return counts.count(selection.region) <= limit_;
   CancelCheck check(job_);
   uint64_t voxels = 0;
-  for_each_brick(job_.dag, selection, [&](const Brick& brick) {
+  const auto add = [&](uint64_t more) {
     check.advance(1);
-    return (voxels += static_cast<uint64_t>(std::popcount(brick.mask))) <= limit_;
-  });
+    return (voxels += more) <= limit_;
+  };
+  for_each_brick_or_full_cube(
+      job_.dag, selection,
+      [&](const Brick& brick) { return add(static_cast<uint64_t>(std::popcount(brick.mask))); },
+      [&](const Position&, int64_t edge) { return add(cells_of_cube(edge)); });
   return voxels <= limit_;
 }
 

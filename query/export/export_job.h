@@ -160,6 +160,8 @@ ExportReport write_glb(const ExportJob& job);
 // Like write_glb(), with a different limit of the file's size in bytes. Tests use a small limit,
 // because writing files of 4 GiB takes too long.
 ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes);
+ExportReport write_vtu(const ExportJob& job);
+ExportReport write_inp(const ExportJob& job);
 ExportReport write_vdb(const ExportJob& job);
 ExportReport write_nvdb(const ExportJob& job);
 

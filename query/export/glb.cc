@@ -38,6 +38,12 @@ struct GlbBrick {
   uint64_t mask = 0;
 };
 
+// A full cube of at least 8 cells per edge. Only the bricks at its sides are visited.
+struct GlbCube {
+  uint64_t morton = 0;  // Morton code of the low corner, in bricks
+  int64_t edge = 0;     // in cells
+};
+
 // A rectangle of faces perpendicular to `axis`. `plane` is the coordinate of the faces on this
 // axis. The rectangle extends from u0 to u1 on the next axis, and from v0 to v1 on the axis after
 // that; z is followed by x. All coordinates are in cells.
@@ -54,11 +60,13 @@ class GlbSurface {
   // Finds the rectangles of the surface. Stops as soon as there are more than `max_quads`.
   GlbSurface(const ExportJob& job, uint64_t max_quads)
       : job_(job), max_quads_(max_quads), colors_(job.file) {
-    const uint64_t count = count_bricks();
-    bricks_charge_ = MemoryCharge(job.budget, count * sizeof(GlbBrick), kMemory);
-    bricks_.reserve(count);
-    find_bricks(count);
-    ExportStage stage(job, "find faces", 6 * count, "bricks");
+    const Sizes sizes = count_bricks();
+    bricks_charge_ = MemoryCharge(
+        job.budget, sizes.bricks * sizeof(GlbBrick) + sizes.cubes * sizeof(GlbCube), kMemory);
+    bricks_.reserve(sizes.bricks);
+    cubes_.reserve(sizes.cubes);
+    find_bricks(sizes);
+    ExportStage stage(job, "find faces", 6 * (sizes.bricks + sizes.side_bricks), "bricks");
     for (uint8_t axis = 0; axis < 3; ++axis)
       for (const bool upward : {false, true})
         if (quads_.size() <= max_quads_) add_quads(axis, upward, stage);
@@ -75,37 +83,78 @@ class GlbSurface {
   static constexpr int kCoordinateBits = 21;
   static constexpr uint64_t kCoordinateMask = (uint64_t{1} << kCoordinateBits) - 1;
 
-  uint64_t count_bricks() {
-    ExportStage stage(job_, "count", 0, "bricks");
-    uint64_t count = 0;
-    for_each_brick(job_.dag, job_.selection, [&](const Brick& brick) {
-      ++count;
-      voxels_ += static_cast<uint64_t>(std::popcount(brick.mask));
-      stage.advance(1);
-    });
-    if (count == 0) refuse_empty(job_);
-    return count;
+  struct Sizes {
+    uint64_t bricks = 0, cubes = 0;
+    uint64_t side_bricks = 0;  // bricks of one side of all cubes
+  };
+  static uint64_t side_bricks(int64_t edge) {
+    return static_cast<uint64_t>(edge / kBrickEdge) * static_cast<uint64_t>(edge / kBrickEdge);
+  }
+  static uint64_t brick_morton(const Position& low) {
+    return morton_encode(static_cast<uint32_t>(low[0] / kBrickEdge),
+                         static_cast<uint32_t>(low[1] / kBrickEdge),
+                         static_cast<uint32_t>(low[2] / kBrickEdge));
   }
 
-  void find_bricks(uint64_t count) {
-    ExportStage stage(job_, "read", count, "bricks");
-    for_each_brick(job_.dag, job_.selection, [&](const Brick& brick) {
-      stage.advance(1);
-      bricks_.push_back({morton_encode(static_cast<uint32_t>(brick.low[0] / kBrickEdge),
-                                       static_cast<uint32_t>(brick.low[1] / kBrickEdge),
-                                       static_cast<uint32_t>(brick.low[2] / kBrickEdge)),
-                         brick.mask});
-    });
+  Sizes count_bricks() {
+    ExportStage stage(job_, "count", 0, "bricks");
+    Sizes sizes;
+    for_each_brick_or_full_cube(
+        job_.dag, job_.selection,
+        [&](const Brick& brick) {
+          ++sizes.bricks;
+          voxels_ += static_cast<uint64_t>(std::popcount(brick.mask));
+          stage.advance(1);
+        },
+        [&](const Position&, int64_t edge) {
+          ++sizes.cubes;
+          sizes.side_bricks += side_bricks(edge);
+          voxels_ += cells_of_cube(edge);
+          stage.advance(1);
+        });
+    if (voxels_ == 0) refuse_empty(job_);
+    return sizes;
+  }
+
+  void find_bricks(const Sizes& sizes) {
+    ExportStage stage(job_, "read", sizes.bricks + sizes.cubes, "bricks");
+    for_each_brick_or_full_cube(
+        job_.dag, job_.selection,
+        [&](const Brick& brick) {
+          stage.advance(1);
+          bricks_.push_back({brick_morton(brick.low), brick.mask});
+        },
+        [&](const Position& low, int64_t edge) {
+          stage.advance(1);
+          cubes_.push_back({brick_morton(low), edge});
+        });
   }
 
   uint64_t mask_at(const Position& corner) const {
     for (const int64_t c : corner)
       if (c < 0 || c >= int64_t{1} << job_.selection.grid_levels) return 0;
-    const uint64_t morton = morton_encode(static_cast<uint32_t>(corner[0] / kBrickEdge),
-                                          static_cast<uint32_t>(corner[1] / kBrickEdge),
-                                          static_cast<uint32_t>(corner[2] / kBrickEdge));
+    const uint64_t morton = brick_morton(corner);
     const auto found = std::ranges::lower_bound(bricks_, morton, {}, &GlbBrick::morton);
-    return found != bricks_.end() && found->morton == morton ? found->mask : 0;
+    if (found != bricks_.end() && found->morton == morton) return found->mask;
+    const auto after = std::ranges::upper_bound(cubes_, morton, {}, &GlbCube::morton);
+    if (after == cubes_.begin()) return 0;
+    const GlbCube& cube = *std::prev(after);
+    return morton - cube.morton < cells_of_cube(cube.edge / kBrickEdge) ? ~uint64_t{0} : 0;
+  }
+
+  // Calls visit(corner, mask) for each brick that can have faces perpendicular to `axis` on its
+  // upper or lower side.
+  template <class Visit>
+  void for_each_outer_brick(uint8_t axis, bool upward, const Visit& visit) const {
+    for (const GlbBrick& brick : bricks_) visit(corner_of(brick.morton), brick.mask);
+    for (const GlbCube& cube : cubes_) {
+      Position low = corner_of(cube.morton), at = low;
+      if (upward) at[axis] += cube.edge - kBrickEdge;
+      const size_t u = (axis + 1u) % 3, v = (axis + 2u) % 3;
+      for (at[u] = low[u]; at[u] < low[u] + cube.edge; at[u] += kBrickEdge)
+        for (at[v] = low[v]; at[v] < low[v] + cube.edge; at[v] += kBrickEdge)
+          visit(at, ~uint64_t{0});
+    }
   }
 
   // Returns the mask of a brick's cells that have a face on the surface: a face perpendicular to
@@ -128,34 +177,31 @@ class GlbSurface {
     return faces;
   }
 
-  Position corner_of(const GlbBrick& brick) const {
+  static Position corner_of(uint64_t morton) {
     uint32_t x, y, z;
-    morton_decode(brick.morton, x, y, z);
+    morton_decode(morton, x, y, z);
     return {int64_t{x} * kBrickEdge, int64_t{y} * kBrickEdge, int64_t{z} * kBrickEdge};
   }
 
   void add_quads(uint8_t axis, bool upward, ExportStage& stage) {
     uint64_t count = 0;
-    for (const GlbBrick& brick : bricks_) {
-      count +=
-          static_cast<uint64_t>(std::popcount(exposed(corner_of(brick), brick.mask, axis, upward)));
+    for_each_outer_brick(axis, upward, [&](const Position& corner, uint64_t mask) {
+      count += static_cast<uint64_t>(std::popcount(exposed(corner, mask, axis, upward)));
       stage.advance(1);
-    }
+    });
     const MemoryCharge charge(job_.budget, count * sizeof(uint64_t), kMemory);
     std::vector<uint64_t> faces;
     faces.reserve(count);
     const size_t u = (axis + 1u) % 3, v = (axis + 2u) % 3;
-    for (const GlbBrick& brick : bricks_) {
-      const Position corner = corner_of(brick);
-      for_each_cell_of(
-          {corner, exposed(corner, brick.mask, axis, upward)}, [&](const Position& cell) {
-            const auto part = [&](size_t a, int64_t more = 0) {
-              return static_cast<uint64_t>(cell[a] - job_.selection.region.low[a] + more);
-            };
-            faces.push_back((part(axis, upward) << kCoordinateBits | part(v)) << kCoordinateBits |
-                            part(u));
-          });
-    }
+    for_each_outer_brick(axis, upward, [&](const Position& corner, uint64_t mask) {
+      for_each_cell_of({corner, exposed(corner, mask, axis, upward)}, [&](const Position& cell) {
+        const auto part = [&](size_t a, int64_t more = 0) {
+          return static_cast<uint64_t>(cell[a] - job_.selection.region.low[a] + more);
+        };
+        faces.push_back((part(axis, upward) << kCoordinateBits | part(v)) << kCoordinateBits |
+                        part(u));
+      });
+    });
     std::ranges::sort(faces);
     job_.cancel.check();
     merge(faces, axis, upward);
@@ -232,6 +278,7 @@ class GlbSurface {
   voxdag_reader::ColorCursor colors_;
   MemoryCharge bricks_charge_, quads_charge_;
   std::vector<GlbBrick> bricks_;
+  std::vector<GlbCube> cubes_;
   std::vector<GlbQuad> quads_;
   uint64_t voxels_ = 0;
 };

@@ -37,4 +37,21 @@ void check_grid_levels(const DagView& dag, uint32_t grid_levels) {
                                               std::to_string(dag.grid_levels()));
 }
 
+bool is_full(const DagView& dag, uint32_t depth, uint64_t content, uint32_t grid_levels) {
+  if (depth == grid_levels) return true;
+  const bool is_brick = depth + kBrickLevels == dag.grid_levels();
+  if (is_brick && grid_levels == dag.grid_levels()) return content == ~uint64_t{0};
+  const DagView::Children children = dag.children(depth, content);
+  if (children.mask != 255) return false;
+  if (depth + 1 == grid_levels) return true;
+  uint64_t before = 0;  // the child before, which is full; equal children need one look
+  for (int i = 0; i < 8; ++i) {
+    const uint64_t child = dag.content(depth, children, i);
+    if (i > 0 && child == before) continue;
+    if (!is_full(dag, depth + 1, child, grid_levels)) return false;
+    before = child;
+  }
+  return true;
+}
+
 }  // namespace voxdag::query

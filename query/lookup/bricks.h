@@ -40,7 +40,10 @@ uint64_t mask_within(const Region& region, const Position& low);
 // Throws Error{kInvalidInput} unless 0 <= grid_levels <= the file's levels.
 void check_grid_levels(const DagView& dag, uint32_t grid_levels);
 
-// The implementation of for_each_brick().
+// True if all cells of the grid are set in the cube of this depth and content (DagView).
+bool is_full(const DagView& dag, uint32_t depth, uint64_t content, uint32_t grid_levels);
+
+// The implementation of for_each_brick() and for_each_brick_or_full_cube().
 template <class Visit>
 class BrickWalk {
  public:
@@ -61,6 +64,12 @@ class BrickWalk {
   bool enter(uint32_t depth, const Position& low, uint64_t content) {
     if (depth + kBrickLevels == selection_.grid_levels)
       return brick(low, brick_of_cells(dag_, depth, content));
+    if constexpr (requires { visit_.full_cube(low, int64_t{1}); }) {
+      const int64_t edge = int64_t{1} << (selection_.grid_levels - depth);
+      if (selection_.region.contains(low, edge) &&
+          is_full(dag_, depth, content, selection_.grid_levels))
+        return visit([&] { return visit_.full_cube(low, edge); });
+    }
     const DagView::Children children = dag_.children(depth, content);
     const int64_t half = int64_t{1} << (selection_.grid_levels - depth - 1);
     for (int i = 0; i < 8; ++i) {
@@ -76,11 +85,16 @@ class BrickWalk {
   bool brick(const Position& low, uint64_t mask) {
     if (!selection_.region.contains(low, kBrickEdge)) mask &= mask_within(selection_.region, low);
     if (mask == 0) return true;
-    if constexpr (std::is_void_v<std::invoke_result_t<Visit&, const Brick&>>) {
-      visit_(Brick{low, mask});
+    return visit([&] { return visit_(Brick{low, mask}); });
+  }
+
+  template <class Call>
+  static bool visit(const Call& call) {
+    if constexpr (std::is_void_v<std::invoke_result_t<Call>>) {
+      call();
       return true;
     } else {
-      return visit_(Brick{low, mask});
+      return call();
     }
   }
 
@@ -98,6 +112,27 @@ template <class Visit>
 void for_each_brick(const DagView& dag, const Selection& selection, Visit&& visit) {
   check_grid_levels(dag, selection.grid_levels);
   BrickWalk<std::remove_reference_t<Visit>>(dag, selection, visit).run();
+}
+
+// Like for_each_brick(), but visits large cubes in which all cells are set, which solids have, in
+// one step: calls visit_cube(low, edge) for each largest octree cube of at least 8 cells per edge
+// that is completely in the region and full, and visit_brick(brick) for all other bricks. The order
+// is the Morton order. If the functions return a bool, false ends the iteration.
+template <class VisitBrick, class VisitCube>
+void for_each_brick_or_full_cube(const DagView& dag, const Selection& selection,
+                                 const VisitBrick& visit_brick, const VisitCube& visit_cube) {
+  struct Visitor {
+    const VisitBrick& visit_brick;
+    const VisitCube& visit_cube;
+    auto operator()(const Brick& brick) const { return visit_brick(brick); }
+    auto full_cube(const Position& low, int64_t edge) const { return visit_cube(low, edge); }
+  };
+  for_each_brick(dag, selection, Visitor{visit_brick, visit_cube});
+}
+
+// Returns the number of cells of a cube.
+constexpr uint64_t cells_of_cube(int64_t edge) {
+  return static_cast<uint64_t>(edge) * static_cast<uint64_t>(edge) * static_cast<uint64_t>(edge);
 }
 
 }  // namespace voxdag::query

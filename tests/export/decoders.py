@@ -7,6 +7,7 @@ set cells as an n x 3 array, in any order. The decoders share no code with the e
 import json
 import struct
 import subprocess
+from xml.etree import ElementTree
 
 import numpy
 
@@ -52,6 +53,74 @@ def npz(path, grid):
         assert (arrays["grid"] == [*grid.origin, grid.voxel]).all()
         assert (grid.cells(arrays["positions"]) == arrays["cells"]).all()
         return arrays["cells"]
+
+
+def hexahedra(points, corners, grid):
+    """Returns the cells of hexahedra, n x 8 numbers of points, in the order of VTK and Abaqus."""
+    places = (points - grid.origin) / grid.voxel
+    rounded = numpy.rint(places).astype(numpy.int64)
+    assert numpy.abs(places - rounded).max() < 1e-3, "points are not corners of voxels"
+    assert len(numpy.unique(rounded, axis=0)) == len(points), "a point comes twice"
+    assert len(numpy.unique(corners)) == len(points), "a point belongs to no voxel"
+    square = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    offsets = numpy.array([[*xy, z] for z in (0, 1) for xy in square])
+    cells = rounded[corners[:, 0]]
+    assert (rounded[corners] - cells[:, None] == offsets).all(), "other corners"
+    return cells
+
+
+def vtu_arrays(path):
+    """Returns the arrays by name, and the numbers of points and of cells."""
+    with open(path, "rb") as file:
+        text, data = file.read().split(b'<AppendedData encoding="raw">\n_', 1)
+    end = b"\n</AppendedData>\n</VTKFile>\n"
+    assert data.endswith(end)
+    document = ElementTree.fromstring(text + b"<AppendedData/></VTKFile>")
+    assert document.attrib == {
+        "type": "UnstructuredGrid",
+        "version": "1.0",
+        "byte_order": "LittleEndian",
+        "header_type": "UInt64",
+    }
+    (piece,) = document.iter("Piece")
+    arrays, at = {}, 0
+    for array in document.iter("DataArray"):
+        offset, components = int(array.get("offset")), int(array.get("NumberOfComponents"))
+        assert array.get("format") == "appended" and offset == at
+        (size,) = struct.unpack_from("<Q", data, offset)
+        at = offset + 8 + size
+        values = numpy.frombuffer(data[offset + 8 : at], array.get("type").lower())
+        arrays[array.get("Name")] = values.reshape(-1, components)
+    assert at + len(end) == len(data)
+    return arrays, int(piece.get("NumberOfPoints")), int(piece.get("NumberOfCells"))
+
+
+def vtu(path, grid):
+    arrays, points, cells = vtu_arrays(path)
+    assert len(arrays["Points"]) == points and arrays["Points"].shape[1] == 3
+    assert (arrays["offsets"][:, 0] == 8 * numpy.arange(1, cells + 1)).all()
+    assert len(arrays["types"]) == cells and (arrays["types"] == 12).all()
+    return hexahedra(arrays["Points"], arrays["connectivity"].reshape(cells, 8), grid)
+
+
+def vtu_colors(path, grid):
+    return vtu(path, grid), vtu_arrays(path)[0]["colors"].astype(numpy.int64)
+
+
+def inp(path, grid):
+    with open(path, encoding="ascii") as file:
+        lines = file.read().splitlines()
+    keywords = {line: i for i, line in enumerate(lines) if line.startswith("*")}
+    names = ["*HEADING", "*NODE, NSET=VOXELS", "*ELEMENT, TYPE=C3D8, ELSET=VOXELS"]
+    assert list(keywords) == names
+    nodes, elements = keywords[names[1]] + 1, keywords[names[2]] + 1
+    for line in lines[nodes : elements - 1][:: max(1, len(lines) // 1000)]:
+        assert max(map(len, line.split(","))) <= 20  # CalculiX reads 20 characters
+    points = numpy.array([line.split(",") for line in lines[nodes : elements - 1]], float)
+    corners = numpy.array([line.split(",") for line in lines[elements:]], numpy.int64)
+    for table in (points, corners):
+        assert (table[:, 0] == numpy.arange(1, len(table) + 1)).all()
+    return hexahedra(points[:, 1:], corners[:, 1:] - 1, grid)
 
 
 def words_of(data, count, at):
@@ -149,8 +218,7 @@ def voxel(path, grid):
         solid = found == 0xFF000000
         edge = 4 << meta["treeDepth"] - level
         if solid.any():
-            inside = numpy.stack(numpy.meshgrid(*[range(edge)] * 3), axis=-1).reshape(-1, 3)
-            cells.append((corners[solid][:, None] * edge + inside).reshape(-1, 3))
+            cells.append(cells_of_cubes(corners[solid] * edge, numpy.full(solid.sum(), edge)))
         found, corners = found[~solid], corners[~solid]
         if level == meta["treeDepth"]:
             break
@@ -169,16 +237,24 @@ def voxel(path, grid):
     return numpy.concatenate(cells)
 
 
+def cells_of_cubes(corners, edges):
+    cells = []
+    for edge in numpy.unique(edges):
+        inside = numpy.stack(numpy.meshgrid(*[range(edge)] * 3), axis=-1).reshape(-1, 3)
+        cells.append((corners[edges == edge][:, None] + inside).reshape(-1, 3))
+    return numpy.concatenate(cells)
+
+
 def bt(path, grid, reader):
     listed = subprocess.run([reader, path], capture_output=True, check=True)
     leaves = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 5)
     corners, edges, occupied = leaves[:, :3] - 32768, leaves[:, 3], leaves[:, 4] == 1
-    assert (edges[occupied] == 1).all()
+    assert ((edges[occupied] == 1) | (edges[occupied] >= 8)).all()
     # Known cells are in the region; in a complete grid all cells are known.
     assert (corners >= grid.low).all() and (corners + edges[:, None] <= grid.high).all()
     known = (edges.astype(numpy.int64) ** 3).sum()
     assert known == grid.resolution**3 or (grid.high - grid.low < grid.resolution).any()
-    return corners[occupied]
+    return cells_of_cubes(corners[occupied], edges[occupied])
 
 
 class VoxChunks:

@@ -47,6 +47,9 @@ CASES = [
     (512, ["--level", "8", "--region", "101,3,50,170,201,133"]),
 ]
 
+# Options of exports of the solid, whose resolution is 64.
+SOLID_CASES = [[], ["--level", "5"], ["--region", "5,0,16,64,49,60"]]
+
 
 class Grid:
     """The exported grid. Converts between its cells and world coordinates."""
@@ -96,6 +99,14 @@ class Test:
             self.files[resolution] = path, json.loads(self.run("info", path, "--json"))
         return self.files[resolution]
 
+    def solid(self):
+        """Builds a solid, which has full cubes of many sizes. Returns the .vdag file."""
+        if "solid" not in self.files:
+            self.run("generate", "menger", "solid.glb", "--level", "1")
+            self.run("build", "solid.glb", "-r", "64", "--solid", "winding", "-o", "solid.vdag")
+            self.files["solid"] = "solid.vdag", json.loads(self.run("info", "solid.vdag", "--json"))
+        return self.files["solid"]
+
     def expected(self, path, shift, grid):
         listed = subprocess.run(
             [self.list_voxels, path, str(shift)], capture_output=True, check=True
@@ -104,8 +115,8 @@ class Test:
         cells = cells[((cells >= grid.low) & (cells < grid.high)).all(axis=1)]
         return numpy.unique(keys(cells))
 
-    def check(self, resolution, options):
-        path, info = self.scene(resolution)
+    def check(self, resolution, options, solid=False):
+        path, info = self.solid() if solid else self.scene(resolution)
         given = dict(zip(options[::2], options[1::2]))
         full = resolution.bit_length() - 1
         region = [int(x) for x in given["--region"].split(",")] if "--region" in given else None
@@ -205,6 +216,8 @@ def main():
         test = Test(voxdag, list_voxels, name, tools)
         for resolution, options in CASES:
             test.check(resolution, options)
+        for options in SOLID_CASES:
+            test.check(64, options, solid=True)
         test.check_colors()
         test.check_refusals()
     return 0

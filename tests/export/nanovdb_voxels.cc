@@ -1,27 +1,48 @@
 // nanovdb_voxels FILE.nvdb [GRID]: writes, as doubles, the world coordinates of all voxels that are
-// on in the file's first grid. With GRID, writes the voxels of the grid of this name, each followed
-// by its three values. The program reads the file with NanoVDB's own reader.
+// on in the file's first grid, in leaves or in tiles. With GRID, writes the voxels of the grid of
+// this name, each followed by its three values. The program reads the file with NanoVDB's own
+// reader.
 #include <nanovdb/util/IO.h>
 
 #include <cstdio>
 
 namespace {
 
+// Calls add(coord) for the voxels of all active tiles of the tree's nodes at `kLevel`, 1 or 2.
+template <int kLevel, class Tree, class Add>
+void for_each_tile_voxel(const Tree& tree, const Add& add) {
+  for (uint32_t i = 0; i < tree.nodeCount(kLevel); ++i) {
+    const auto& node = tree.template getFirstNode<kLevel>()[i];
+    using Node = std::decay_t<decltype(node)>;
+    constexpr int kEdge = Node::ChildNodeType::DIM;
+    for (uint32_t tile = 0; tile < Node::SIZE; ++tile) {
+      if (!node.valueMask().isOn(tile) || node.childMask().isOn(tile)) continue;
+      const nanovdb::Coord low = node.offsetToGlobalCoord(tile);
+      for (int x = 0; x < kEdge; ++x)
+        for (int y = 0; y < kEdge; ++y)
+          for (int z = 0; z < kEdge; ++z) add(low + nanovdb::Coord(x, y, z));
+    }
+  }
+}
+
 template <class Value, class Write>
 bool list(const nanovdb::NanoGrid<Value>* grid, const Write& write) {
   if (!grid) return false;
   const auto& tree = grid->tree();
   uint64_t count = 0;
+  const auto add = [&](const nanovdb::Coord& coord) {
+    const nanovdb::Vec3d at = grid->indexToWorld(nanovdb::Vec3d(coord));
+    const double numbers[] = {at[0], at[1], at[2]};
+    std::fwrite(numbers, sizeof(numbers), 1, stdout);
+    write(tree.getValue(coord));
+    ++count;
+  };
   for (uint32_t i = 0; i < tree.nodeCount(0); ++i) {
     const auto& leaf = tree.template getFirstNode<0>()[i];
-    for (auto voxel = leaf.beginValueOn(); voxel; ++voxel, ++count) {
-      const nanovdb::Vec3d at = grid->indexToWorld(nanovdb::Vec3d(voxel.getCoord()));
-      const double numbers[] = {at[0], at[1], at[2]};
-      std::fwrite(numbers, sizeof(numbers), 1, stdout);
-      write(leaf.getValue(voxel.getCoord()));
-    }
+    for (auto voxel = leaf.beginValueOn(); voxel; ++voxel) add(voxel.getCoord());
   }
-  // The count differs if the tree has tiles, which stand for more voxels than the leaves have.
+  for_each_tile_voxel<1>(tree, add);
+  for_each_tile_voxel<2>(tree, add);
   return count == grid->activeVoxelCount();
 }
 

@@ -13,6 +13,7 @@
 #include <nanovdb/util/OpenToNanoVDB.h>
 #include <openvdb/io/Stream.h>
 
+#include <algorithm>
 #include <bit>
 #include <ostream>
 #include <streambuf>
@@ -40,6 +41,8 @@ constexpr VdbNodeBytes kNanoVdbBytes = {96, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
 // Minimum size of a leaf in a .vdb file, which stores the mask twice.
 constexpr uint64_t kVdbLeafBytes = 128;
+// Bytes of a tile of 4096^3 voxels in the root's table.
+constexpr uint64_t kRootTileBytes = 128;
 constexpr const char* kGridName = "voxels";
 constexpr const char* kColorGridName = "Cd";
 
@@ -125,10 +128,26 @@ class FileBuffer : public std::streambuf {
 struct VdbSize {
   uint64_t voxels = 0, bytes = 0;
 };
+// True if full cubes are tiles of the grid of voxels. A grid of colors has no tiles, because the
+// voxels of a cube have different colors.
+bool has_tiles(const ExportJob& job) { return !job.has_colors; }
+
+// Visits the bricks of a selection, and its full cubes if the job has tiles. Both functions return
+// a bool; false ends the iteration.
+template <class VisitBrick, class VisitCube>
+void for_each_vdb_part(const ExportJob& job, const Selection& selection,
+                       const VisitBrick& visit_brick, const VisitCube& visit_cube) {
+  if (has_tiles(job))
+    for_each_brick_or_full_cube(job.dag, selection, visit_brick, visit_cube);
+  else
+    for_each_brick(job.dag, selection, visit_brick);
+}
+
 // Counts the voxels of a selection, and the bytes of memory for its trees, whose nodes have the
 // sizes `node`. Stops when there are more than `limit` bytes. Bricks are visited in Morton order,
-// so all bricks of a node come one after the other and the node is counted once. Calls
-// steps.advance() for each brick.
+// so all bricks of a node come one after the other and the node is counted once. A full cube is a
+// tile of the node that contains it, or tiles of several nodes if it is larger than a node's child.
+// Calls steps.advance() for each brick and each full cube.
 template <class Steps>
 VdbSize vdb_size(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
                  uint64_t limit, Steps steps) {
@@ -140,14 +159,26 @@ VdbSize vdb_size(const ExportJob& job, const Selection& selection, const VdbNode
     last = cube;
     size.bytes += cost;
   };
-  for_each_brick(job.dag, selection, [&](const Brick& brick) {
-    steps.advance(1);
-    size.voxels += static_cast<uint64_t>(std::popcount(brick.mask));
-    count(brick.low, 3, leaf, node.leaf);
-    count(brick.low, 7, lower, node.lower);
-    count(brick.low, 12, upper, node.upper);
-    return size.bytes <= limit;
-  });
+  const auto add_nodes = [&](const Position& corner, int64_t edge) {
+    if (edge < 8) count(corner, 3, leaf, node.leaf);
+    if (edge < 128) count(corner, 7, lower, node.lower);
+    if (edge < 4096) count(corner, 12, upper, node.upper);
+  };
+  for_each_vdb_part(
+      job, selection,
+      [&](const Brick& brick) {
+        steps.advance(1);
+        size.voxels += static_cast<uint64_t>(std::popcount(brick.mask));
+        add_nodes(brick.low, kBrickEdge);
+        return size.bytes <= limit;
+      },
+      [&](const Position& low, int64_t edge) {
+        steps.advance(1);
+        size.voxels += cells_of_cube(edge);
+        size.bytes += cells_of_cube(edge / 4096) * kRootTileBytes;
+        add_nodes(low, edge);
+        return size.bytes <= limit;
+      });
   return size;
 }
 
@@ -190,35 +221,51 @@ typename GridType::Ptr empty_vdb_grid(const ExportJob& job, const char* name) {
   return grid;
 }
 
-// Returns a grid in which each selected voxel has the value value(cell).
-template <class GridType, class Value>
-typename GridType::Ptr make_vdb_grid(const ExportJob& job, const char* name, uint64_t voxels,
-                                     const Value& value) {
-  const auto grid = empty_vdb_grid<GridType>(job, name);
-  ExportStage stage(job, "build grid", voxels, "voxels");
-  typename GridType::Accessor accessor = grid->getAccessor();
-  for_each_brick(job.dag, job.selection, [&](const Brick& brick) {
-    auto* const leaf = accessor.touchLeaf(vdb_coord(brick.low));
-    for_each_cell_of(brick,
-                     [&](const Position& cell) { leaf->setValueOn(vdb_coord(cell), value(cell)); });
-    stage.advance(static_cast<uint64_t>(std::popcount(brick.mask)));
-  });
-  return grid;
+// Sets the voxels of a brick to value(cell).
+template <class Accessor, class Value>
+void set_brick(const Brick& brick, const Value& value, Accessor& accessor, ExportStage& stage) {
+  auto* const leaf = accessor.touchLeaf(vdb_coord(brick.low));
+  for_each_cell_of(brick,
+                   [&](const Position& cell) { leaf->setValueOn(vdb_coord(cell), value(cell)); });
+  stage.advance(static_cast<uint64_t>(std::popcount(brick.mask)));
 }
 
 template <class GridType>
 typename GridType::Ptr make_voxel_grid(const ExportJob& job, uint64_t voxels) {
-  return make_vdb_grid<GridType>(job, kGridName, voxels, [](const Position&) { return true; });
+  const auto grid = empty_vdb_grid<GridType>(job, kGridName);
+  ExportStage stage(job, "build grid", voxels, "voxels");
+  typename GridType::Accessor accessor = grid->getAccessor();
+  for_each_vdb_part(
+      job, job.selection,
+      [&](const Brick& brick) {
+        set_brick(
+            brick, [](const Position&) { return true; }, accessor, stage);
+        return true;
+      },
+      [&](const Position& low, int64_t edge) {
+        const int64_t last = edge - 1;
+        grid->tree().sparseFill(
+            {vdb_coord(low), vdb_coord({low[0] + last, low[1] + last, low[2] + last})}, true, true);
+        stage.advance(cells_of_cube(edge));
+        return true;
+      });
+  return grid;
 }
 
 openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job, uint64_t voxels) {
   voxdag_reader::ColorCursor colors(job.file);
   const auto& linear = linear_of_srgb();
   const auto light = [&](uint8_t channel) { return static_cast<float>(linear[channel]) / 65535; };
-  return make_vdb_grid<openvdb::Vec3SGrid>(job, kColorGridName, voxels, [&](const Position& cell) {
+  const auto linear_color = [&](const Position& cell) {
     const voxdag_reader::Rgb color = color_of_cell(job, colors, cell);
     return openvdb::Vec3f(light(color.r), light(color.g), light(color.b));
-  });
+  };
+  const auto grid = empty_vdb_grid<openvdb::Vec3SGrid>(job, kColorGridName);
+  ExportStage stage(job, "build grid", voxels, "voxels");
+  openvdb::Vec3SGrid::Accessor accessor = grid->getAccessor();
+  for_each_brick(job.dag, job.selection,
+                 [&](const Brick& brick) { set_brick(brick, linear_color, accessor, stage); });
+  return grid;
 }
 
 // Writes the output with write(stream), and publishes it. `min_bytes` is a lower bound on the
@@ -263,7 +310,7 @@ ExportReport write_vdb(const ExportJob& job) {
       // Half floats are precise enough to distinguish the linear values of all sRGB bytes.
       grids.back()->setSaveFloatAsHalf(true);
     }
-    const uint64_t min_bytes = grid->tree().leafCount() * kVdbLeafBytes;
+    const uint64_t min_bytes = std::max<uint64_t>(grid->tree().leafCount() * kVdbLeafBytes, 1);
     return write_grid_file(job, voxels, min_bytes, [&](std::ostream& stream) {
       // Does not compress, because some readers may lack the codec. Compression would gain little
       // for the grid of voxels, whose leaves consist of bits.

@@ -41,15 +41,21 @@ struct BtReader {
       ++nodes;
       if (state != 3) known += volume;
       if (state != 2) continue;
-      expect(depth == 15, "occupied voxels, no larger cubes");
-      const Corner key = child_of(corner, child, kZFirst);
-      digest.add(key[0] - zero, key[1] - zero, key[2] - zero);
+      add_cube(child_of(corner, child, kZFirst), int64_t{1} << (15 - depth));
     }
     for (uint32_t child = 0; child < 8; ++child) {
       if ((bits >> 2 * child & 3) != 3) continue;
       expect(depth < 15, "16 levels");
       node(child_of(corner, child, kZFirst), depth + 1);
     }
+  }
+  // `corner` is in units of `edge`.
+  void add_cube(const Corner& corner, int64_t edge) {
+    for (int64_t i = 0; i < edge; ++i)
+      for (int64_t j = 0; j < edge; ++j)
+        for (int64_t k = 0; k < edge; ++k)
+          digest.add(edge * corner[0] + i - zero, edge * corner[1] + j - zero,
+                     edge * corner[2] + k - zero);
   }
 };
 

@@ -182,7 +182,8 @@ TEST_P(ExportTruncated, IsAnError) {
 
 // The formats whose exports read the input while they write.
 INSTANTIATE_TEST_SUITE_P(Formats, ExportTruncated,
-                         testing::Values("hashdag", "svdag", "voxel", "vox", "bt", "ply", "npz"),
+                         testing::Values("hashdag", "svdag", "voxel", "vox", "bt", "ply", "npz",
+                                         "vtu", "inp"),
                          name_of);
 
 INSTANTIATE_TEST_SUITE_P(Formats, ExportKilled, testing::Values("hashdag", "ply"), name_of);

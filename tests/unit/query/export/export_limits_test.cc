@@ -3,6 +3,8 @@
 // small for any grid.
 #include <gtest/gtest.h>
 
+#include <bit>
+
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/format/global/global_writer.h"
@@ -18,11 +20,13 @@ namespace {
 
 class ExportLimits : public ::testing::Test {
  protected:
-  // Writes and opens a file of a grid in which every voxel is set.
-  std::unique_ptr<voxdag_reader::File> full_grid(uint32_t levels) {
+  // Writes and opens a file of a grid in which every voxel is set, or every brick has this mask.
+  std::unique_ptr<voxdag_reader::File> full_grid(uint32_t levels, uint64_t mask = ~uint64_t{0}) {
     const std::string path = folder_.file("full.vdag");
     GlobalFileWriter writer(system_files(), path, Grid::given({0, 0, 0}, 1, levels), 64);
-    const std::vector<uint32_t> brick = {~0u, ~0u}, node = {0xff, 0, 0, 0, 0, 0, 0, 0, 0};
+    const std::vector<uint32_t> brick = {static_cast<uint32_t>(mask),
+                                         static_cast<uint32_t>(mask >> 32)},
+                                node = {0xff, 0, 0, 0, 0, 0, 0, 0, 0};
     uint64_t svo_nodes = 0;
     for (uint32_t level = levels - 1; level-- > 0;) {
       const std::vector<uint32_t>& words = level + 2 == levels ? brick : node;
@@ -32,7 +36,7 @@ class ExportLimits : public ::testing::Test {
       writer.end_level({1, words.size()});
       svo_nodes += uint64_t{1} << 3 * level;
     }
-    writer.finish({uint64_t{1} << 3 * levels, svo_nodes});
+    writer.finish({static_cast<uint64_t>(std::popcount(mask)) << 3 * (levels - 2), svo_nodes});
     return open_global_file(path);
   }
 
@@ -86,6 +90,24 @@ TEST_F(ExportLimits, PlyNamesTheLevelThatFits) {
   }
 }
 
+// The limits of meshes of hexahedra, and the memory for two layers.
+TEST_F(ExportLimits, MeshesNameTheLevelThatFits) {
+  const auto file = full_grid(11);
+  const std::string vtu = refusal(*file, "vtu", "a.vtu", ErrorCode::kLimit, kMemory);
+  EXPECT_NE(vtu.find("8 589 934 592 voxels are selected, but readers of .vtu take at most "
+                     "2 147 483 647. --level 10 (1024 voxels per edge) fits"),
+            std::string::npos)
+      << vtu;
+  const std::string inp = refusal(*file, "inp", "a.inp", ErrorCode::kLimit, kMemory);
+  EXPECT_NE(inp.find("Abaqus has labels for at most 999 999 999. --level 9 (512 voxels per edge)"),
+            std::string::npos)
+      << inp;
+  const std::string memory =
+      refusal(*full_grid(8), "vtu", "a.vtu", ErrorCode::kOutOfMemory, 100'000);
+  EXPECT_NE(memory.find("a smaller --region or a coarser --level needs less"), std::string::npos)
+      << memory;
+}
+
 // The search for a level that fits begins with the coarsest level. In a full grid, counting the
 // voxels of a level that does not fit would take hours.
 TEST_F(ExportLimits, AreFoundAtOnce) {
@@ -111,7 +133,7 @@ TEST_F(ExportLimits, ProgressIsReported) {
     stages.expect_complete();
     EXPECT_TRUE(stages.stages.contains("export"));
     const bool is_counted =
-        std::string_view("bt vdb nvdb ply npz glb").find(format.name) != std::string::npos;
+        std::string_view("bt vdb nvdb ply npz vtu inp glb").find(format.name) != std::string::npos;
     EXPECT_EQ(stages.stages.contains("count"), is_counted);
   }
 }
@@ -133,7 +155,7 @@ TEST_F(ExportLimits, HashDagCountsVoxelsWith24Bits) {
 // Exports to vdb and nvdb, which build the file in memory, are refused if it does not fit. The
 // message names the level that fits.
 TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
-  const auto file = full_grid(9);
+  const auto file = full_grid(9, ~uint64_t{1});  // no cube is full
   for (const ExportFormat& format : export_formats()) {
     const std::string name = format.name;
     if (name == "vdb" || name == "nvdb") {
