@@ -31,6 +31,11 @@ struct FoundValue {
 
 template <class T>
 class NodeValues {
+  struct Entry {
+    uint64_t offset;
+    T value;
+  };
+
  public:
   // The values are in memory if they take at most `resident_bytes`.
   NodeValues(const SpillSpace& space, const voxdag_reader::Level& level, uint64_t resident_bytes)
@@ -79,7 +84,7 @@ class NodeValues {
     }
 
    private:
-    SpillReader<typename NodeValues::Entry> reader_;
+    SpillReader<Entry> reader_;
   };
   // Returns the result of a lookup from the slot of `offset`.
   static FoundValue<T> found(uint64_t offset, const Slot& slot) {
@@ -88,10 +93,6 @@ class NodeValues {
   static FoundValue<T> nothing() { return {}; }
 
  private:
-  struct Entry {
-    uint64_t offset;
-    T value;
-  };
   const uint64_t level_words_;
   PageBuffer<uint64_t> begins_;
   PageBuffer<T> values_;

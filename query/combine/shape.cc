@@ -13,7 +13,7 @@ constexpr uint64_t kMixed = 0;          // any value except kNoNode and Shape::k
 constexpr int kIndexBits = 20;          // kMaxGridLevels
 constexpr double kMaxLength = 1 << 24;  // so that sums of squares have less than 64 bits
 
-[[noreturn]] void refuse(const std::string& text) {
+[[noreturn]] void refuse_shape(const std::string& text) {
   throw Error(ErrorCode::kInvalidInput,
               "shape '" + text +
                   "': expected sphere:X,Y,Z,R with multiples of 0.5, or box:X0,Y0,Z0,X1,Y1,Z1 with "
@@ -22,7 +22,7 @@ constexpr double kMaxLength = 1 << 24;  // so that sums of squares have less tha
 
 // Returns the number in half voxels.
 int64_t halves_of(double number, const std::string& text) {
-  if (!(std::abs(number) <= kMaxLength) || std::floor(2 * number) != 2 * number) refuse(text);
+  if (!(std::abs(number) <= kMaxLength) || std::floor(2 * number) != 2 * number) refuse_shape(text);
   return static_cast<int64_t>(2 * number);
 }
 
@@ -32,27 +32,27 @@ constexpr std::array<int64_t, 3> voxel_of_bit(int bit) {
   return {axis(2), axis(1), axis(0)};
 }
 
-constexpr int64_t square(int64_t x) { return x * x; }
+constexpr int64_t squared(int64_t x) { return x * x; }
 
 }  // namespace
 
 Shape::Shape(const std::string& text) {
   const size_t colon = text.find(':');
-  if (colon == std::string::npos) refuse(text);
+  if (colon == std::string::npos) refuse_shape(text);
   const std::string kind = text.substr(0, colon), numbers = text.substr(colon + 1);
   if (kind == "box") {
     const auto box = parse_numbers<int64_t, 6>(numbers, ',');
-    if (!box) refuse(text);
+    if (!box) refuse_shape(text);
     is_box_ = true;
     for (size_t axis = 0; axis < 3; ++axis) {
       low_[axis] = (*box)[axis];
       high_[axis] = (*box)[axis + 3] - 1;
-      if (low_[axis] > high_[axis]) refuse(text);
+      if (low_[axis] > high_[axis]) refuse_shape(text);
     }
     return;
   }
   const auto sphere = parse_numbers<double, 4>(numbers, ',');
-  if (kind != "sphere" || !sphere || !((*sphere)[3] >= 0)) refuse(text);
+  if (kind != "sphere" || !sphere || !((*sphere)[3] >= 0)) refuse_shape(text);
   for (size_t axis = 0; axis < 3; ++axis) center_[axis] = halves_of((*sphere)[axis], text);
   radius_ = halves_of((*sphere)[3], text);
 }
@@ -73,11 +73,11 @@ uint64_t Shape::sphere_cover(const Position& low, const Position& high) const {
     const int64_t first = 2 * low[axis] + 1 - center_[axis],
                   last = 2 * high[axis] + 1 - center_[axis];
     const int64_t near = first > 0 ? first : last < 0 ? last : first & 1;
-    nearest += square(near);
-    farthest += std::max(square(first), square(last));
+    nearest += squared(near);
+    farthest += std::max(squared(first), squared(last));
   }
-  if (nearest > square(radius_)) return kNoNode;
-  return farthest <= square(radius_) ? kFull : kMixed;
+  if (nearest > squared(radius_)) return kNoNode;
+  return farthest <= squared(radius_) ? kFull : kMixed;
 }
 
 // Returns the cube of an edge at a position counted in such cubes.
