@@ -25,12 +25,13 @@
 //                     block memo                    1/16 of free                 BackendMemory
 //                     more retained pages           1/8, up to 128 MiB           nobody
 //                     cache key, before build()     7/8 of the share             ArtifactCache
-//   enclose       WorkerMemory, for every worker    7/8 of free / workers
+//   enclose       kept labels of parts              kept_label_bytes()           SpaceLabels
+//                 WorkerMemory, for every worker    7/8 of the rest / workers
 //                   segment writer                  1.5 MiB                      SegmentWriter
 //                   labels of a part                1/3 of the share             SpaceLabels
 //                   the part filled                 the share                    SubDagTables
 //                   quadtree of a face              1/16 of the share            nobody
-//                 components at all faces           the rest of free             ComponentSets
+//                 components at all faces           the rest                     ComponentSets
 //   color         surfaces; the rest is spilled     up to 1/3 of free            RecordStore
 //                   incomplete chunks of surfaces   1/8 of the budget            nobody
 //                 textures, or else spilled         up to 1/2 of the rest        TextureSet
@@ -90,6 +91,11 @@ struct MemoryPlan {
   }
   // Returns the maximum size of the sample rows of a solid's planned subvolume.
   static constexpr uint64_t solid_row_bytes(uint64_t budget_bytes) { return budget_bytes / 64; }
+  // Returns the memory for labels of an enclosed solid that are kept until their part is filled.
+  // With little memory, large parts are more important, so no labels are kept.
+  static constexpr uint64_t kept_label_bytes(uint64_t free_bytes) {
+    return free_bytes < uint64_t{512} << 20 ? 0 : free_bytes / 2;
+  }
   // Returns the budget of a pilot build when `free_bytes` are free.
   static constexpr uint64_t pilot_bytes(uint64_t free_bytes) { return free_bytes * 3 / 4; }
 };

@@ -27,9 +27,25 @@
 namespace voxdag {
 namespace {
 
+// Maximum memory of the nodes and labels of a part, per byte of its artifact.
+constexpr uint64_t kLabelsOverArtifact = 16;
+
 // Thrown if a part was labeled, but its filled sub-DAG does not fit the memory of a worker.
 struct PartTooLarge {
   Cube cube;
+};
+
+// A part of the grid in memory: its nodes and the labels of its empty space.
+struct LabeledSpace {
+  // The pages come from `pool`, or from a pool of this object if it is null.
+  LabeledSpace(uint64_t limit_bytes, MemoryBudget& parent, PagePool* pool)
+      : budget(limit_bytes, &parent), memory{budget, pool ? *pool : own_pool} {}
+
+  MemoryBudget budget;
+  PagePool own_pool;
+  PooledMemory memory;
+  std::optional<NodeLevels> levels;
+  std::optional<SpaceLabels> labels;
 };
 
 // Memory and files of a worker.
@@ -70,9 +86,11 @@ class Enclosure {
   }
 
   void begin_workers() {
+    const uint64_t free_bytes = job_.budget.available();
+    kept_budget_.emplace(MemoryPlan::kept_label_bytes(free_bytes), &job_.budget);
     // The components at the faces take the rest of the memory.
     const auto memory =
-        WorkerMemory::divide(job_.budget.available() / 8 * 7, job_.spec.run.threads);
+        WorkerMemory::divide((free_bytes - kept_budget_->limit()) / 8 * 7, job_.spec.run.threads);
     const uint32_t first_segment = job_.work.next_segment_id();
     for (unsigned i = 0; i < memory.workers; ++i) {
       workers_.push_back(std::make_unique<EncloseWorker>(job_.budget, memory.share_bytes));
@@ -117,17 +135,48 @@ class Enclosure {
   // Filling needs more memory than labeling, so labels get only a part of the share.
   void try_label(EncloseWorker& worker, const Cube& cube, const ArtifactRef& shell,
                  uint64_t divisor) {
-    MemoryBudget budget(worker.share.limit() / divisor, &worker.share);
-    PooledMemory memory{budget, worker.pool};
-    const auto levels = read(worker, cube, shell, memory);
-    if (!levels) return;
-    const SpaceLabels labels(memory, *levels);
+    const uint64_t limit = worker.share.limit() / divisor;
+    auto kept = label_to_keep(worker, cube, shell, limit);
+    const auto space =
+        kept ? nullptr : label_space(worker, cube, shell, limit, worker.share, &worker.pool);
+    if (!kept && !space) return;
+    const SpaceLabels& labels = *(kept ? kept : space)->labels;
     LabeledPart part{cube, shell, {}, seed_component(labels, cube), {}};
     part.touch.assign(labels.touch(0, 0), labels.touch(0, 0) + labels.count(0, 0));
     for (int face = 0; face < kFaces; ++face)
       part.faces[face] = faces_->append(encode_face(labels, face, worker.share.limit() / 16));
     const std::lock_guard lock(mutex_);
     parts_.push_back(std::move(part));
+    if (kept) kept_[cube] = std::move(kept);
+  }
+
+  // Reads a part and labels its empty space. Returns null if the part has no voxels.
+  std::unique_ptr<LabeledSpace> label_space(EncloseWorker& worker, const Cube& cube,
+                                            const ArtifactRef& shell, uint64_t limit_bytes,
+                                            MemoryBudget& parent, PagePool* pool) const {
+    auto space = std::make_unique<LabeledSpace>(limit_bytes, parent, pool);
+    space->levels = read(worker, cube, shell, space->memory);
+    if (!space->levels) return nullptr;
+    space->labels.emplace(space->memory, *space->levels);
+    return space;
+  }
+
+  // Labels a part in memory that fill_part() can use. Returns null if this memory has no room.
+  std::unique_ptr<LabeledSpace> label_to_keep(EncloseWorker& worker, const Cube& cube,
+                                              const ArtifactRef& shell, uint64_t limit_bytes) {
+    if (kept_budget_->available() / kLabelsOverArtifact < shell.bytes) return nullptr;
+    try {
+      auto space = label_space(worker, cube, shell, limit_bytes, *kept_budget_, nullptr);
+      if (space) space->own_pool.clear();
+      return space;
+    } catch (const OutOfBudget&) {
+      return nullptr;
+    }
+  }
+  std::unique_ptr<LabeledSpace> take_kept(const Cube& cube) {
+    const std::lock_guard lock(mutex_);
+    const auto found = kept_.find(cube);
+    return found == kept_.end() ? nullptr : std::move(found->second);
   }
 
   // Returns the component with the seed, if it is open in this part. Throws Error{kInvalidInput} if
@@ -178,10 +227,13 @@ class Enclosure {
   void fill_part(EncloseWorker& worker, const LabeledPart& part,
                  const std::vector<uint8_t>& is_outside) {
     try {
+      auto space = take_kept(part.cube);
+      if (!space)
+        space = label_space(worker, part.cube, part.shell, worker.share.limit(), worker.share,
+                            &worker.pool);
+      if (!space) return;
+      SpaceLabels& labels = *space->labels;
       PooledMemory memory{worker.share, worker.pool};
-      const auto levels = read(worker, part.cube, part.shell, memory);
-      if (!levels) return;
-      SpaceLabels labels(memory, *levels);
       const DagShape shape = job_.shape();
       SubDagTables tables(memory, static_cast<int>(shape.grid_levels - part.cube.level));
       if (seed_)
@@ -260,8 +312,10 @@ class Enclosure {
   const std::optional<Seed> seed_;
   std::vector<std::unique_ptr<EncloseWorker>> workers_;
   std::unique_ptr<RowFile> faces_;
-  std::mutex mutex_;  // guards parts_ while labels are computed
+  std::mutex mutex_;  // guards parts_ while labels are computed, and kept_
   std::vector<LabeledPart> parts_;
+  std::optional<MemoryBudget> kept_budget_;
+  std::map<Cube, std::unique_ptr<LabeledSpace>> kept_;  // labels that are not computed again
   std::atomic<bool> is_long_ = false;  // some parts were saved, so finish() saves the record
 };
 

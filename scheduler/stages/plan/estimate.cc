@@ -9,6 +9,7 @@
 #include "core/fields/json_fields.h"
 #include "scheduler/solid/row_sums.h"
 #include "scheduler/solid/solid_report.h"
+#include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/plan/pilots.h"
 
 namespace voxdag {
@@ -132,14 +133,17 @@ struct SolidNeeds {
   EstimateRange disk_bytes, memory_bytes;
 };
 SolidNeeds solid_needs(const GeometryOptions& options, const PreparedScene& scene,
-                       const EstimateRange& artifact_nodes, unsigned threads) {
+                       const EstimateRange& artifact_nodes, const StageContext& context) {
+  const unsigned threads = context.threads;
   if (solid_rule_of(options) != SolidRule::kNone) {
     const PlannedRows rows = planned_rows(scene);
     return {rows.all * kRowFilesOverRows, exactly(2 * rows.largest * threads)};
   }
   const double subvolumes = static_cast<double>(std::max<size_t>(scene.plan.size(), 1));
+  const bool keeps_labels = MemoryPlan::kept_label_bytes(context.budget.limit()) != 0;
+  const double in_memory = keeps_labels ? 1 : std::min(1.0, threads / subvolumes);
   return {kArtifactBytesPerNode * artifact_nodes,
-          kEncloseBytesPerNode * std::min(1.0, threads / subvolumes) * artifact_nodes};
+          kEncloseBytesPerNode * in_memory * artifact_nodes};
 }
 
 // Extrapolates the interior of a solid. Copies the numbers of sample rows from the finer pilot.
@@ -267,7 +271,7 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
       static_cast<double>(scene.triangles->record_bytes()) * static_cast<double>(records);
   estimate.memory_bytes = kMemoryBytesPerNode * estimate.dag_nodes + exactly(triangle_bytes);
   if (is_solid) {
-    const SolidNeeds needs = solid_needs(options, scene, artifact_nodes, context.threads);
+    const SolidNeeds needs = solid_needs(options, scene, artifact_nodes, context);
     estimate.disk_bytes = estimate.disk_bytes + needs.disk_bytes;
     estimate.memory_bytes = estimate.memory_bytes + needs.memory_bytes;
     estimate.solid = estimate_solid(options, pilots, doublings);
