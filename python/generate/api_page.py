@@ -34,7 +34,7 @@ OPTIONS_TEXT = {
     "VoxelOptions": f"`options` are the run options in {_TABLE}, and `hash_bits`, `attributes` and "
     "`color_resolution`.",
 }
-# The keyword options of a function.
+# The parameter of a function for keyword options, such as **options: Unpack[BuildOptions].
 OPTIONS = re.compile(r"\*\*(\w+): Unpack\[(\w+)\]")
 
 

@@ -31,9 +31,10 @@ std::string python_type(const Field& field) {
   }
 }
 
-// Collects the lines of _options.py: one line per keyword in `members` and in `documents`, and in
-// `paths` the quoted names of the keywords whose values are paths. Skips required options, because
-// they are parameters of the Python functions, not keywords.
+// Collects the texts of _options.py from the fields of a BuildSpec. Each field becomes one keyword:
+// a line in `members` with its type, and a line in `documents` with its description. `paths` has
+// the quoted names of the keywords whose values are paths. Skips required fields, because they are
+// parameters of the Python functions, not keywords.
 class KeywordWriter {
  public:
   template <class T>

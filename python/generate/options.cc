@@ -10,7 +10,8 @@
 
 namespace {
 
-// Options that have no meaning for voxels: the voxels determine the grid, and each of them is set.
+// Options that from_voxels(), from_dense() and from_points() do not have. These functions compute
+// the grid from the voxels and set exactly the given voxels, so the options would have no effect.
 constexpr std::array kOnlyForScenes = {
     "bounds", "voxel_size", "point_radius", "columns",          "color", "skip_invalid", "solid",
     "thin",   "cutouts",    "allow_empty",  "ignore_extension", "seed"};

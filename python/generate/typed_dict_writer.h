@@ -45,7 +45,8 @@ class TypedDictWriter {
     if (type == "number") return "float";
     if (type == "string") return "str";
     if (type == "array") {
-      const bool has_items = schema["items"].is_object();  // false for a fixed number of items
+      // False for an array with a fixed number of items.
+      const bool has_items = schema["items"].is_object();
       return "list[" + type_of(has_items ? schema["items"] : schema["prefixItems"][0], name) + "]";
     }
     if (!schema.contains("properties")) return "Any";

@@ -21,15 +21,15 @@
 namespace voxdag::python {
 namespace {
 
-// The vertices of a mesh, one per row. mesh_of() accepts floats and doubles.
+// The vertices of a mesh, one per row, as float32 or float64. mesh_of() throws for any other type.
 using Vertices = nb::ndarray<nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 template <class Number, ssize_t Columns>
 using Matrix = nb::ndarray<const Number, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
 
-// A scene file in memory: its path, which names it in messages, and its bytes.
+// A scene file in memory: a path, which is its name in messages, and its bytes.
 using FileBytes = std::pair<std::string, nb::bytes>;
 
-// A mesh of a scene: its path, which names it in messages; vertices; triangles; the colors of the
+// A mesh of a scene: a path, which is its name in messages; vertices; triangles; the colors of the
 // vertices; and a texture: the name of its material, the bytes of an image file, and the texture
 // coordinates of the vertices.
 using MeshArrays =
@@ -131,14 +131,16 @@ BuildSpec spec_of(uint64_t resolution, nb::dict options) {
   return spec;
 }
 
-// The parts of a scene: files, files in memory and meshes. Together they are one scene.
+// The parts of one scene. `bytes` are files in memory.
 struct SceneParts {
   std::vector<PathText> files;
   std::vector<FileBytes> bytes;
   std::vector<MeshArrays> meshes;
 };
 
-// Adds the scene to `spec` and returns work(spec, context).
+// Adds the paths of all parts of `scene` to `spec`, runs work(spec, context) with run_long_work(),
+// and returns its result. `context` has a file system in which these paths name the files and
+// meshes in memory.
 template <class Work>
 std::string run_with_scene(BuildSpec spec, SceneParts scene, nb::object progress,
                            const Work& work) {

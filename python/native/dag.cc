@@ -40,7 +40,8 @@ std::span<const query::Coordinates> coordinates_of(const Rows<const double>& row
   return {reinterpret_cast<const query::Coordinates*>(rows.data()), rows.shape(0)};
 }
 
-// `name` is the parameter's name in the native module.
+// Throws Error{kInvalidInput} unless an array has the expected length along one axis. `name` is the
+// array's parameter name in the native module.
 void expect_length(const char* name, size_t length, size_t expected) {
   if (length != expected)
     throw Error(ErrorCode::kInvalidInput, "the array " + std::string(name) + " has the length " +
@@ -57,8 +58,8 @@ void lookup(const query::DagFile& dag, const Rows<const int64_t>& points, uint32
   dag.lookup(positions_of(points), grid_levels, {set.data(), set.shape(0)}, threads_of(threads));
 }
 
-// Number of rays per batch. It limits the memory for `hits`, from which the results are copied to
-// the arrays.
+// Number of rays per call of DagFile::rays(). It limits the memory for `hits`, which holds the
+// results of one call until they are copied to the arrays.
 constexpr size_t kRays = size_t{1} << 16;
 
 void rays(const query::DagFile& dag, const Rows<const double>& origins,
@@ -108,7 +109,8 @@ void points(const query::DagFile& dag, const Position& low, const Position& high
                 dag.positions({grid_levels, {low, high}}, positions_of(found)));
 }
 
-// Finds the cell of each point of world space.
+// For each point of world space, writes the coordinates of the cell that contains it to `cells`.
+// The grid of cells has 2^grid_levels cells per edge.
 void world_to_cells(const query::DagFile& dag, const Rows<const double>& points,
                     uint32_t grid_levels, const Rows<int64_t>& cells) {
   expect_length("cells", cells.shape(0), points.shape(0));
@@ -126,8 +128,8 @@ std::pair<Position, Position> world_to_region(const query::DagFile& dag,
   return {region.low, region.high};
 }
 
-// Returns the number of rows that points() fills. Unlike count(), this function does not store
-// counts of all nodes of the file; it only visits the region.
+// Returns the number of rows that points() fills. Unlike count(), this function does not compute
+// and keep a count for every node of the file; it visits only the nodes in the region.
 uint64_t point_count(const query::DagFile& dag, const Position& low, const Position& high,
                      uint32_t grid_levels) {
   const nb::gil_scoped_release released;

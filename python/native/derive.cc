@@ -114,7 +114,8 @@ void combine(const PathText& a, const PathText& b, const std::string& operation,
   });
 }
 
-// Returns the files that an export would write.
+// Returns the paths of the files that an export to `output` writes. Some formats write several
+// files.
 std::vector<PathText> export_paths(const std::string& format, const PathText& output) {
   std::vector<PathText> paths;
   for (std::string& path : query::export_paths(query::export_format(format), output.bytes))
@@ -122,7 +123,7 @@ std::vector<PathText> export_paths(const std::string& format, const PathText& ou
   return paths;
 }
 
-// Returns the name, the summary and the required suffix ("" if none) of each format.
+// Returns the name, the summary and the required suffix ("" if none) of each export format.
 std::vector<std::tuple<std::string, std::string, std::string>> export_formats() {
   std::vector<std::tuple<std::string, std::string, std::string>> formats;
   for (const query::ExportFormat& format : query::export_formats())

@@ -21,7 +21,8 @@ namespace voxdag::python {
 
 namespace nb = nanobind;
 
-// Stores the newest progress of the work, and its warnings until they are taken. Thread-safe.
+// Stores the newest progress of the work. Also stores warnings until take_warnings() returns them.
+// Thread-safe: the work and the calling thread use it concurrently.
 class LatestProgress : public Progress {
  public:
   struct State {
@@ -46,12 +47,13 @@ class LatestProgress : public Progress {
   std::vector<std::string> warnings_;
 };
 
-// Interval at which the calling thread checks for signals, progress and the end of the work.
+// Interval at which the calling thread checks for signals and new progress, and whether the work
+// has ended.
 inline constexpr std::chrono::milliseconds kLookInterval{50};
 
-// Forwards warnings and new progress to Python. For progress, calls callback(stage, done, total,
-// unit) unless `callback` is None. Raises the exceptions of the called Python code, and
-// KeyboardInterrupt.
+// Forwards warnings and new progress to Python. pass_on() calls callback(stage, done, total, unit)
+// if the progress has changed and `callback` is not None. It raises exceptions of the called Python
+// code, and KeyboardInterrupt after Ctrl-C.
 class Messenger {
  public:
   explicit Messenger(nb::object callback) : callback_(std::move(callback)) {}

@@ -9,8 +9,8 @@
 
 namespace voxdag::python {
 
-// A path as bytes. In Python it is a str, in which bytes that are not UTF-8 are surrogates, as in
-// the results of os.fsdecode().
+// A path as bytes. In Python, the path is a str in which each byte that is not UTF-8 is a surrogate
+// character, as in the results of os.fsdecode().
 struct PathText {
   std::string bytes;
 };

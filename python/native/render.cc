@@ -24,7 +24,8 @@ namespace {
 using Point = std::array<double, 3>;
 using Pixels = nb::ndarray<uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
 
-// Converts a point of world space to voxel units. `what` names the point in messages.
+// Returns a point of world space in voxel units. `what` names the point in messages. Throws
+// Error{kInvalidInput} if a coordinate is not finite.
 query::Vec in_voxels(const Point& point, const char* what, const voxdag_reader::File& file) {
   query::Vec voxels;
   for (size_t axis = 0; axis < 3; ++axis) {

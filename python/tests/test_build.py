@@ -46,7 +46,7 @@ def test_the_same_bytes_from_floats_lists_and_integers(mesh, tmp_path):
 
 
 def test_doubles_stay_doubles(tmp_path):
-    # These x coordinates are equal as float32. As doubles they differ, so voxels are found at both.
+    # As float32, these x coordinates would be equal. As doubles they differ, so both have voxels.
     vertices = np.array([[1e9, 0, 0], [1e9 + 1, 0, 0], [1e9, 1, 0]])
     voxdag.build((vertices, [[0, 1, 2]]), resolution=16, output=tmp_path / "far.vdag")
     with voxdag.open(tmp_path / "far.vdag") as dag:
