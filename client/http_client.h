@@ -20,8 +20,8 @@ struct ClientResponse {
   int status = 0;
   HeaderMap headers;
   std::string body;  // empty if a sink received it
-  // Returns the value of the first field with this name, ignoring case; "" if there is no such
-  // field.
+  // Returns the value of the first header field with this name, ignoring case; "" if no field has
+  // the name.
   std::string header(std::string_view name) const;
 };
 
@@ -65,10 +65,11 @@ class HttpClient {
   std::unique_ptr<Impl> impl_;
 };
 
-// Returns the error code with this name (docs/errors.md). If no code has the name, returns kIo for
-// an HTTP status from 500 up, and kInvalidInput for a lower one.
+// Returns the error code named `name` in docs/errors.md. If there is no such code, returns kIo for
+// an HTTP status of 500 or above, and kInvalidInput for a lower status.
 ErrorCode error_code_of(const std::string& name, int http_status);
-// Throws the Error that a problem+json answer describes (status 400 and above).
+// Throws the Error that an answer in the form problem+json (RFC 9457) describes. Returns if the
+// status is below 400.
 void throw_if_problem(const ClientResponse& response);
 
 }  // namespace voxdag::client

@@ -55,8 +55,8 @@ class Download {
     return bytes <= size_ ? bytes : 0;
   }
 
-  // Requests the bytes from `offset` on and writes them to the partial file. Returns the number of
-  // seconds to wait before the next attempt, if a busy server requested a pause; otherwise 0.
+  // Requests the bytes from `offset` on and appends them to the partial file. Returns the number of
+  // seconds to wait before the next attempt: the time that a busy server requested, otherwise 0.
   double fetch_rest(uint64_t offset) {
     HeaderMap headers;
     if (offset > 0) {
@@ -91,9 +91,9 @@ class Download {
     return 0;
   }
 
-  // Runs `step`, which accesses the local file. If it throws, file_failed_ remains true. Errors of
-  // the local file and of the connection are both Error{kIo}, but only the connection's are worth a
-  // retry.
+  // Runs `step`, which accesses the local file. If `step` throws, file_failed_ remains true, and
+  // the download is not retried. This flag is necessary because an error of the connection, after
+  // which a retry may succeed, is also Error{kIo}.
   template <class Step>
   void guard_file(const Step& step) {
     file_failed_ = true;

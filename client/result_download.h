@@ -17,11 +17,12 @@ struct DownloadResult {
 };
 
 // Downloads the .vdag file of a succeeded job to `output`. `job` is the JSON object JOB of
-// docs/api.md. Until the file is verified, its name is `output`.<first 12 digits of the
-// SHA-256>.partial. A later call resumes the download. Failed attempts are repeated as RetryPolicy
-// allows; an attempt that makes progress restarts the policy. Throws Error{kNotFound} for a job
-// that has not succeeded, Error{kCorrupt} if the bytes do not match the SHA-256, and Error{kIo}
-// when no further retry is allowed.
+// docs/api.md. Until its SHA-256 is verified, the file has the name `output`.D.partial, where D is
+// the first 12 digits of the SHA-256. If this file exists, the download continues at its end.
+// Failed attempts are repeated as RetryPolicy (retry_policy.h) allows; an attempt that makes
+// progress restarts the policy. Throws Error{kNotFound} for a job that has not succeeded,
+// Error{kCorrupt} if the bytes do not match the SHA-256, and Error{kIo} when no further retry is
+// allowed.
 DownloadResult download_result(ServiceClient& service, FileSystem& files, const Json& job,
                                const std::string& output, Progress& progress);
 

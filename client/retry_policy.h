@@ -13,7 +13,7 @@ class RetryPolicy {
   explicit RetryPolicy(const CancelToken& cancel) : cancel_(cancel) {}
   // Waits before the next attempt, for at least `min_wait_s` seconds but not longer than five
   // minutes, and returns true. Returns false without waiting if the total time for retries is used
-  // up. Throws Error{kCanceled}.
+  // up. Throws Error{kCanceled} if the token is canceled.
   bool wait(double min_wait_s = 0);
   // Restarts the delays. Call it after an attempt that made progress.
   void reset() { waited_s_ = 0, pause_s_ = kFirstPauseS; }

@@ -18,9 +18,9 @@ constexpr uint64_t kPartBytes = 64 << 20;
 constexpr size_t kDigitsInName = 12;
 constexpr size_t kMaxStemChars = 100, kMaxEndingChars = 10;
 
-// Returns the name of a local file on the server: "/a/My hall.glb" becomes
-// "My-hall-3f2a91c05b77.glb". The API accepts this name if the service reads files with this
-// ending.
+// Returns the name that a local file has on the server: "/a/My hall.glb" becomes
+// "My-hall-3f2a91c05b77.glb". The digits are the beginning of `sha256`. The server accepts the name
+// if it can read files with this ending.
 std::string name_on_server(const std::string& path, const std::string& sha256) {
   std::string stem = path.substr(path.rfind('/') + 1);
   const size_t dot = stem.rfind('.');
@@ -89,11 +89,11 @@ class Upload {
     return false;
   }
 
-  // Sends the missing bytes in parts, one request each. So a crash of the server loses at most one
-  // part. The first part is small: a server that rejects the scene can answer after a small part,
-  // but closes the connection within a large one. If no bytes are missing, an empty part finishes
-  // the upload. Returns true if the upload is complete. Otherwise a retry is needed for the reason
-  // in failure_.
+  // Sends the missing bytes in parts, one request each, so that a crash of the server loses at most
+  // one part. The first part is small, because a server that rejects the scene can answer after a
+  // small part, but closes the connection during a large one. If no bytes are missing, sends an
+  // empty part, which finishes the upload. Returns true if the upload is complete. Otherwise
+  // failure_ has the reason, and the caller tries again.
   bool send_rest() {
     progress_.begin_stage("upload", size_, "bytes");
     progress_.resume_at(offset_);

@@ -12,8 +12,9 @@ namespace voxdag::client {
 // Uploads the local scene file `path` and returns its name on the server. This name is the file's
 // name with twelve digits of its SHA-256 before the ending, so that the upload replaces no other
 // scene. The server decides which endings it accepts, and refuses other endings before any byte is
-// sent. Bytes that the server already has, from this or an earlier call, are not sent again. Failed
-// attempts are repeated as RetryPolicy allows; an attempt that makes progress restarts the policy.
+// sent. Does not send bytes again that the server already has, from this or an earlier call. Failed
+// attempts are repeated as RetryPolicy (retry_policy.h) allows; an attempt that makes progress
+// restarts the policy.
 std::string upload_scene(ServiceClient& service, FileSystem& files, const std::string& path,
                          Progress& progress);
 

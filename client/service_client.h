@@ -20,20 +20,21 @@ class ServiceClient {
       : url_(options.url), cancel_(cancel), http_(options) {}
 
   // Sends a request that may safely be sent twice. Repeats the request while the server is busy
-  // (status 408, 429, 502 to 504), as long as RetryPolicy allows. If an earlier request of this
-  // client was answered, also repeats it while the server cannot be reached. Throws an Error for
-  // any other status of 400 or above.
+  // (status 408, 429, 502 to 504), as long as RetryPolicy (retry_policy.h) allows. If an earlier
+  // request of this client was answered, also repeats the request while the server cannot be
+  // reached. Throws an Error for any other status of 400 or above.
   using Request = std::function<ClientResponse(HttpClient& http)>;
   ClientResponse send_with_retries(const Request& request);
 
   Json get(const std::string& path);
   Json post(const std::string& path, const Json& body, const HeaderMap& headers = {});
-  // Returns a job as the JSON object JOB of docs/api.md.
+  // Returns a job as the JSON object that docs/api.md calls JOB.
   Json job(const std::string& id);
   // Posts an action ("cancel", "suspend", "resume", "retry"). Returns the JOB after the action.
   Json post_action(const std::string& id, const std::string& action);
-  // Fetches the JOB twice per second and calls on_job(JOB), until the job has ended. Returns the
-  // last JOB. Throws Error{kCanceled} if the cancel token is canceled; the job itself continues.
+  // Fetches the JOB twice per second and calls on_job(JOB) each time, until the job has ended.
+  // Returns the last JOB. Throws Error{kCanceled} if cancel() is canceled; the job itself
+  // continues.
   Json follow_job(const std::string& id, const std::function<void(const Json& job)>& on_job);
 
   HttpClient& http() { return http_; }
