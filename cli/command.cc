@@ -28,14 +28,15 @@ void read_config_file(const std::string& path, CLI::App& command) {
       throw Error(ErrorCode::kInvalidInput,
                   path + ": '" + item.fullname() + "' is not an option of " + command.get_name());
     if (option->count() > 0) continue;
-    // The command line may give the option after --config; then TakeLast lets the command line's
-    // value win.
+    // If the command line gives the option after --config, the option gets a second value later.
+    // TakeLast selects this later value.
     option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)->add_result(item.inputs);
   }
 }
 
-// Returns "" for a valid number, otherwise an error message. CLI11's own conversion is not used: it
-// turns -4 into 2^64 - 4, and its errors do not state the expected value.
+// Returns "" if `text` is a whole number that T can hold, otherwise an error message. CLI11's own
+// conversion is not used, because it turns -4 into 2^64 - 4 for unsigned types, and its errors do
+// not state the expected value.
 template <class T>
 std::string integer_problem(const std::string& text) {
   if (parse_numbers<T, 1>(text, ',')) return "";
@@ -44,8 +45,8 @@ std::string integer_problem(const std::string& text) {
          std::to_string(Limits::max());
 }
 
-// Returns the arguments with `help`, `version` and their short forms in CLI11's spelling: `help
-// build` becomes `build --help`.
+// Replaces forms of `help` and `version` that CLI11 does not know: `help build` becomes `build
+// --help`, and `--version` and `-V` become the command `version`.
 std::vector<std::string> in_full(std::vector<std::string> words) {
   if (words.empty()) return words;
   if (words[0] == "help") {
@@ -71,7 +72,7 @@ std::vector<std::string> long_options(const CLI::App& command) {
   return names;
 }
 
-// Throws unless the first argument is a command or an option.
+// Throws unless the first argument is the name of a command or begins with a dash, as options do.
 void check_command(const CLI::App& app, const std::vector<std::string>& words) {
   const std::string hint = "'voxdag --help' describes the commands";
   if (words.empty())
@@ -84,8 +85,9 @@ void check_command(const CLI::App& app, const std::vector<std::string>& words) {
                                             joined(names) + suggestion(word, names));
 }
 
-// Throws if the command line has arguments that the command does not know. CLI11 reports a missing
-// argument before unknown ones, although an unknown one is often the mistyped missing one.
+// Throws if the parsed command line has arguments that the command does not know. Called when
+// parsing fails. CLI11 reports a missing argument before unknown ones, but an unknown argument is
+// often a mistyped form of the missing one.
 void check_arguments(const CLI::App& app) {
   const auto commands = app.get_subcommands();
   const CLI::App& command = commands.empty() ? app : *commands.front();
@@ -218,7 +220,7 @@ Command CommandLine::add(const char* name, const char* description) {
 int CommandLine::run(int argc, char** argv) {
   std::vector<std::string> words = in_full({argv + 1, argv + argc});
   check_command(*app_, words);
-  std::reverse(words.begin(), words.end());  // CLI11 takes the arguments from the end
+  std::reverse(words.begin(), words.end());  // CLI11 requires the reverse order
   try {
     app_->parse(std::move(words));
   } catch (const CLI::ParseError& error) {

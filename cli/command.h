@@ -49,7 +49,8 @@ class Option {
   // option.
   Option environment(const char* variable);
   Option show_default();
-  // Takes one value of a list for each occurrence of the option, not all following arguments.
+  // For an option whose value is a list: takes one item after each occurrence of the option. By
+  // default, an occurrence takes all arguments up to the next option.
   Option one_value_each();
   Option positive();
   Option range(int low, int high);
@@ -70,12 +71,12 @@ class Option {
 class Command {
  public:
   explicit Command(CLI::App* app) : app_(app) {}
-  // Adds an option. It is a positional argument if `names` has no dashes. T is a number, a string,
-  // an optional double, or a vector of strings.
+  // Adds an option, or a positional argument if `names` has no dashes. T is a number, a string, an
+  // optional double, or a vector of strings.
   template <class T>
   Option option(const char* names, T& value, const char* description);
-  // Adds an option of any type. `set` parses the text, and throws Error if it is invalid.
-  // `value_name` is the placeholder for the value in the help.
+  // Adds an option of any type. `set` receives the text that the user gave, and throws Error if it
+  // is invalid. `value_name` is the placeholder for the value in the help.
   Option text_option(const char* names, const char* value_name,
                      std::function<void(const std::string& text)> set,
                      const std::string& description);
@@ -88,8 +89,8 @@ class Command {
   void quiet_flag(bool& value);
   // Adds --threads, 1 to 1024.
   void threads_option(unsigned& value);
-  // Adds the option --config, which names a TOML or INI file. The file sets options that the
-  // command line does not give.
+  // Adds the option --config, which names a TOML or INI file. The file sets options that are not on
+  // the command line.
   void config_option();
   bool given(const char* option) const;
   void hide();  // Hides the command from the help.
@@ -123,7 +124,7 @@ class CommandLine {
 
 // Adds a command whose options set the members of a `State`. The caller's file must define two
 // functions in the namespace of `State`: declare(command, state), which adds the options, and
-// run(state, context), which is called after they are parsed.
+// run(state, context), which is called after the command line is parsed.
 template <class State>
 State& add_command(CommandLine& line, const char* name, const char* description) {
   Command command = line.add(name, description);
@@ -135,7 +136,7 @@ State& add_command(CommandLine& line, const char* name, const char* description)
 
 void add_version_command(CommandLine& line);
 void add_build_command(CommandLine& line);
-// Adds the hidden command that a cluster's engine starts to build a batch.
+// Adds `build-batch`, the hidden command with which a cluster task builds one batch of subvolumes.
 void add_build_batch_command(CommandLine& line);
 void add_stop_tasks_command(CommandLine& line);
 void add_plan_command(CommandLine& line);

@@ -35,7 +35,7 @@ uint64_t level_bytes(const voxdag_reader::Level& level) {
   return level.word_count * sizeof(uint32_t);
 }
 
-// Returns the bytes of the nodes, without colors, checksums and padding.
+// Returns the total size of the nodes in bytes, without colors, checksums and padding.
 uint64_t node_bytes(const voxdag_reader::File& file) {
   uint64_t bytes = 0;
   for (uint32_t l = 0; l <= file.brick_level() && !file.empty(); ++l)
@@ -49,7 +49,8 @@ double bits_per_voxel(const voxdag_reader::File& file) {
              : 8 * static_cast<double>(node_bytes(file)) / static_cast<double>(file.voxels());
 }
 
-// Returns the number of DAG nodes of encodings whose leaves are 2x2x2 voxels.
+// Returns the number of nodes of the same DAG with leaves of 2x2x2 voxels instead of bricks of
+// 4x4x4 voxels. Publications such as SymVox count nodes in this way.
 uint64_t dag_nodes_2(const FileFacts& facts) {
   return facts.file->dag_nodes() + facts.stats->octant_masks;
 }
@@ -87,7 +88,8 @@ ordered_json info_json(const FileFacts& facts) {
   return json;
 }
 
-// Returns a member of a JSON object as a field of a line of CSV (RFC 4180).
+// Returns a JSON value as a field of a CSV line (RFC 4180). Quotes a string with a comma, a space
+// or a quote.
 std::string csv_field(const ordered_json& value) {
   if (!value.is_string()) return value.dump();
   std::string text;
@@ -96,7 +98,8 @@ std::string csv_field(const ordered_json& value) {
   return text.find_first_of(",\" ") == std::string::npos ? text : "\"" + text + "\"";
 }
 
-// Adds the numbers of nodes with 1 to 8 children as columns.
+// Replaces the array `nodes_by_children` of a level by the members children_1 to children_8,
+// because each member becomes a column of the CSV table.
 void flatten(ordered_json& row) {
   if (!row.contains("nodes_by_children")) return;
   const ordered_json counts = row["nodes_by_children"];
@@ -104,7 +107,7 @@ void flatten(ordered_json& row) {
   for (size_t i = 0; i < counts.size(); ++i) row["children_" + std::to_string(i + 1)] = counts[i];
 }
 
-// Returns the lines of the table: one for each file, or with --levels one for each level of each
+// Returns the rows of the CSV table: one for each file, or with --levels one for each level of each
 // file.
 std::vector<ordered_json> csv_rows(const InfoCommand& command, const std::vector<FileFacts>& all) {
   std::vector<ordered_json> rows;

@@ -11,8 +11,8 @@ namespace voxdag::cli {
 
 class OptionDeclarer {
  public:
-  // A field's scope is the first of the commands that have the field as an option. Fields with a
-  // later scope than `scope` are not declared.
+  // Declares only fields whose scope is `scope` or an earlier one. A field's scope is the first
+  // command that has the field as an option, in the order submit, plan, build.
   OptionDeclarer(Command& command, Scope scope) : command_(command), scope_(scope) {}
 
   template <class T>
@@ -27,7 +27,7 @@ class OptionDeclarer {
   }
   void object(const char*, const auto& visit_members) { visit_members(*this); }
 
-  // Returns a declared option, for example to add an option that needs it.
+  // Returns the option that was declared for a field, for example to add an option that needs it.
   Option at(const std::string& field_name) const { return options_.at(field_name); }
 
  private:
@@ -52,7 +52,8 @@ class OptionDeclarer {
     }
   }
 
-  // Returns "scene", "--hash-bits" or "-r,--resolution".
+  // Returns the names under which a field's option is declared: "scene" for a positional argument,
+  // "--hash-bits", or "-r,--resolution" for an option with a short form.
   static std::string option_names(const Field& field) {
     if (field.is_positional) return field.name;
     const std::string separator = *field.shorthand ? "," : "";

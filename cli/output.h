@@ -15,8 +15,8 @@ namespace voxdag::cli {
 // bytes that are not UTF-8.
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
-// Prints the JSON on one line. Commands that print several objects, or that continue after they
-// have printed one, print each on a line, so that readers need not find the end of an object.
+// Prints the JSON on one line. For commands that print several objects over time: a reader can then
+// take each line as an object.
 void print_json_line(const nlohmann::ordered_json& json);
 void print_json_line(const nlohmann::json& json);
 // Prints JSON text, with escapes for characters that are not printable.
@@ -25,8 +25,8 @@ void print_json_text(const std::string& json);
 // Returns the resolution, the number of cells and the bytes of a section with colors or another
 // attribute.
 nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section);
-// Adds the members `colors` and `attributes` with facts about the file's sections. `attributes`
-// also has the names of the materials.
+// Adds the members `colors` and `attributes` with the section_facts() of each attribute of the
+// file. Materials also have their names.
 void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json);
 
 // Returns true if voxdag wrote the file and the file has the type that the command is about to
@@ -38,14 +38,17 @@ struct OutputFile {
   std::string path;
   bool force = false;
   void declare_force(Command& command);
-  // Guards the output and its temporary name, unless --force is given. Call it before check().
+  // Unless --force is given, makes `files` refuse to replace a file that another program creates at
+  // the output's path or temporary path while the command runs (core/io/outputs/guarded_outputs.h).
+  // Call it before check().
   void guard(GuardedOutputs& files) const;
   // Throws Error{kInvalidInput} if writing would destroy `input`. Unless --force is given, also
   // throws it if writing would destroy a file for which `is_own` returns false. Makes the same
   // checks for path + ".partial", the temporary name of write_file_atomically(). Also throws Error
   // if the output's folder does not exist.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
-  // Makes the checks of existing files for one name, such as path + ".partial".
+  // Makes the checks of check() above, except for the folder, for one name, such as path +
+  // ".partial".
   void check(FileSystem& files, const std::string& name, const std::string& input,
              const IsOwnFile& is_own) const;
 };

@@ -21,7 +21,8 @@ namespace voxdag::cli {
 namespace {
 
 constexpr int kMaxPictureEdge = 16384;
-// Endings of picture formats that are not written.
+// Name endings of picture formats that voxdag does not write. check_ending() refuses them for -o,
+// because the output would be a PNG file.
 constexpr const char* kOtherPictures[] = {".jpg", ".jpeg", ".webp", ".avif", ".gif", ".bmp",
                                           ".tif", ".tiff", ".ppm",  ".pgm",  ".exr", ".hdr"};
 
@@ -39,7 +40,7 @@ struct RenderCommand {
   bool json = false;
 };
 
-// Parses a point that an option gives in world space. Returns it in voxel units.
+// Parses a point that an option gives in world space. Returns the point in voxel units.
 query::Vec parse_point(const std::string& text, const std::string& option,
                        const voxdag_reader::File& file) {
   const auto world = parse_list<double, 3>(option, text, ',', "three numbers X,Y,Z");

@@ -11,7 +11,7 @@ struct RunTimes {
   double cpu_s = 0;  // of all threads of the process
 };
 
-// Measures the time since its construction.
+// Measures the wall time and CPU time since its construction.
 class RunTimer {
  public:
   RunTimes elapsed() const {

@@ -42,7 +42,9 @@ struct Sample {
   std::optional<query::ColorSampleReport> colors;  // for a file with attributes
 };
 
-// Returns the cutouts that the build left out.
+// Returns the cutouts (the transparent parts of triangles) that the build left out, or nullopt if
+// it left out none. Without --cutouts, assumes that a build with colors left them out and that a
+// build without colors kept them.
 std::optional<Cutouts> cutouts_of(const VerifyCommand& command, const voxdag_reader::File& file,
                                   const TriangleSource& scene, MemoryBudget& budget,
                                   CommandContext& context) {

@@ -33,8 +33,8 @@ ClusterOptions::MergeJobOptions merge_job(const BuildClusterOptions& cluster,
                                           const RunOptions& run) {
   ClusterOptions::MergeJobOptions job;
   job.arguments = own_arguments();
-  // Inserts the flag after the first word, the command. It cannot be appended, because words after
-  // "--" are scenes.
+  // Inserts the flag after the first word, which is the name of the command. It cannot be appended,
+  // because words after "--" are scenes.
   job.arguments.insert(job.arguments.begin() + 1, kMergeJobFlag);
   job.folder = std::filesystem::current_path().string();
   if (run.memory_bytes > 0)
@@ -47,14 +47,15 @@ ClusterOptions::MergeJobOptions merge_job(const BuildClusterOptions& cluster,
   return job;
 }
 
-// Called in the process of a merge job. Sets memory and threads, if the user did not give them, to
+// Called in the process of a merge job. Memory and threads that the user did not give are set to
 // the values of the job's Slurm allocation.
 void take_allocation(RunOptions& run) {
   const Allocation given = slurm_allocation();
   if (run.memory_bytes == 0 && given.memory_bytes > 0)
     run.memory_bytes = batch_budget(given.memory_bytes);
   if (run.threads == 0) run.threads = given.cpus;
-  // An earlier attempt at this job may still be ending on another node, and then it holds the lock.
+  // An earlier attempt at this job may still be ending on another node. Until it ends, it holds the
+  // lock of the build, so wait longer than other commands do.
   run.lock_wait_s = 300;
   run.restart = false;
 }

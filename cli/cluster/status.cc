@@ -20,7 +20,8 @@ std::optional<ClusterState> read_state(FileSystem& files, const std::string& wor
   }
 }
 
-// Prints the unbuilt batches, grouped by the state of their tasks, and the last failure of a task.
+// Prints the number of built batches, the unbuilt batches by the state of their tasks, and the
+// batches of each node. If a task of an unbuilt batch has failed, also prints one such failure.
 void print(const ClusterState& cluster) {
   std::map<std::string, size_t> by_state, by_node;
   const OpenBatch* failed = nullptr;

@@ -15,7 +15,7 @@
 namespace voxdag::cli {
 namespace {
 
-// The options that name the second file, one for each operation.
+// An option that selects an operation and names the second file of the operation.
 struct OperationOption {
   const char* name;
   query::Operation operation;
@@ -30,13 +30,14 @@ constexpr OperationOption kOperationOptions[] = {
 
 struct CombineCommand {
   std::string a, output, memory;
-  std::string b[std::size(kOperationOptions)];  // given for one of the operations
+  std::string b[std::size(kOperationOptions)];  // the second file, at the index of its operation
   std::optional<std::array<int64_t, 3>> offset;
   bool clip = false, force = false, quiet = false, json = false;
   unsigned threads = default_threads();
 };
 
-// Returns the index of the operation in kOperationOptions.
+// Returns the index in kOperationOptions of the operation that the user gave. Throws Error unless
+// the user gave exactly one.
 size_t operation_of(const CombineCommand& command) {
   size_t found = 0, given = 0;
   for (size_t i = 0; i < std::size(kOperationOptions); ++i) {

@@ -27,7 +27,8 @@ struct EditCommand {
   unsigned threads = default_threads();
 };
 
-// A file that is pasted, and the voxel to which its voxel 0,0,0 comes.
+// The value of --paste: a .vdag file, and the voxel of the edited grid at which the file's voxel
+// 0,0,0 is placed.
 struct Part {
   explicit Part(const std::string& text) {
     const size_t at = std::min(text.rfind('@'), text.size());
@@ -39,8 +40,8 @@ struct Part {
   std::array<int64_t, 3> offset = {};
 };
 
-// Applies the edits one after the other. Every edit reads the file that the edit before it wrote to
-// the temporary folder.
+// Applies the edits in turn: first all cuts, then the scenes of --add, then all pasted files. Each
+// edit writes a new file to a temporary folder, and the next edit reads it.
 class Edit {
  public:
   Edit(const EditCommand& command, CommandContext& context, FileSystem& files)
@@ -95,7 +96,8 @@ class Edit {
       return query::combine(file, *other, spec_, files_, *progress_, context_.cancel);
     });
   }
-  // Builds the scenes on the grid of the file.
+  // Builds the scenes of --add as one DAG, with the grid of the edited file, and writes it to
+  // scenes_path().
   void build_scenes() {
     const auto file = open_global_file(current_);
     BuildSpec build;

@@ -25,8 +25,9 @@ void print(const Json& answer) {
   if (!answer.at("next_cursor").is_null()) std::printf("(more: raise --limit)\n");
 }
 
-// Returns up to command.limit jobs in the form of one page. A page of the service may have fewer
-// jobs than its limit, so this requests further pages.
+// Returns up to command.limit jobs as one JSON object, in the form of a page of jobs (docs/api.md).
+// A page from the service can have fewer jobs than its limit, so this function may request several
+// pages and join them.
 Json get_jobs(const JobsCommand& command, ServiceClient& service) {
   const auto page = [&](size_t limit, const std::string& cursor) {
     std::string path = "/api/v1/jobs?limit=" + std::to_string(limit) + cursor;
@@ -53,8 +54,8 @@ void run(const JobsCommand& command, ServiceClient& service, CommandContext&) {
     print(answer);
 }
 
-// Returns "" if `states` has only characters that need no escape in a URL, otherwise the expected
-// value. The server checks the states themselves.
+// Returns "" if `states` has only characters that are allowed in a URL without an escape, otherwise
+// an error message. The server checks whether the states exist.
 std::string check_states(const std::string& states) {
   const bool fine = states.find_first_not_of("abcdefghijklmnopqrstuvwxyz,") == std::string::npos;
   return fine ? "" : "'" + states + "': expected states such as running,queued";

@@ -10,8 +10,9 @@
 
 namespace voxdag::cli {
 
-// Calls run(), which must last until stop() is called. When `cancel` is canceled, another thread
-// calls stop(): a signal handler may only cancel the token. Throws the exceptions of run().
+// Calls run(), which must return after stop() is called. When `cancel` is canceled, a second thread
+// calls stop(). The signal handler cannot call stop() itself, because only few functions are safe
+// in a signal handler. Throws the exceptions of run().
 template <class Run>
 void run_until_canceled(CancelToken& cancel, const Run& run, const std::function<void()>& stop) {
   allow_slow_stop();

@@ -35,7 +35,8 @@ void log_line(const std::string& line) {
                line.c_str());
 }
 
-// Returns the settings from the configuration file. Options on the command line override them.
+// Returns the settings of the service from the configuration file and the command line, whose
+// options take precedence.
 server::ServerConfig settings(const ServeCommand& command, const Command& line, FileSystem& files) {
   server::ServerConfig config;
   if (!command.config_file.empty()) server::read_config(files, command.config_file, config);
@@ -85,7 +86,7 @@ void run(const TokenCommand& command, CommandContext&) {
   std::printf("%s\n", made.line.c_str());
 }
 
-// Adds the command that the service starts for each job.
+// Adds the hidden command `run-job`, which the service starts as a child process for each job.
 void add_run_job_command(CommandLine& line) {
   Command command = line.add("run-job", "run one job of the service");
   command.hide();

@@ -21,8 +21,8 @@ struct SubmitCommand {
   bool json = false;
 };
 
-// Uploads the scenes that are local files. Returns the server's names of all scenes. A scene that
-// is not a local file must already be on the server.
+// Uploads the scenes that are local files. Returns the name of every scene on the server. A scene
+// that is not a local file must already be on the server.
 std::vector<std::string> upload(const std::vector<std::string>& scenes, FileSystem& files,
                                 ServiceClient& service, bool quiet) {
   const auto progress = make_progress_bar(quiet);

@@ -8,10 +8,10 @@ namespace {
 
 constexpr size_t kMinPrefix = 3;
 
-// Returns the number of insertions, deletions, replacements and swaps of neighbors that turn one
-// word into the other (the optimal string alignment distance).
+// Returns the minimum number of insertions, deletions, replacements and swaps of neighbors that
+// turn one word into the other (the optimal string alignment distance).
 size_t edit_distance(const std::string& a, const std::string& b) {
-  // Row i has the distances between the first i characters of `a` and each beginning of `b`.
+  // rows[i][j] is the distance between the first i characters of `a` and the first j of `b`.
   std::vector<std::vector<size_t>> rows(a.size() + 1, std::vector<size_t>(b.size() + 1));
   for (size_t j = 0; j <= b.size(); ++j) rows[0][j] = j;
   for (size_t i = 1; i <= a.size(); ++i) {

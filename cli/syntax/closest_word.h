@@ -1,4 +1,4 @@
-// Finds the word that a user probably meant by a mistyped word.
+// Finds the word that a user probably meant when the typed word is unknown.
 #pragma once
 
 #include <string>
@@ -7,11 +7,12 @@
 namespace voxdag::cli {
 
 // Returns the most similar of `words`, or "" if none is similar. A word is similar if it begins
-// with `typed` (three characters or more), or if few characters differ: at most a third of them,
-// where two swapped neighbors count as one.
+// with `typed`, which then needs three characters or more without leading dashes. A word is also
+// similar if at most one edit, or one per three characters of `typed`, turns `typed` into it. An
+// edit inserts, deletes or replaces a character, or swaps two neighbors.
 std::string closest_word(const std::string& typed, const std::vector<std::string>& words);
 
-// Returns "; did you mean WORD?" for the most similar of `words`, or "" if none is similar.
+// Returns "; did you mean WORD?", where WORD is closest_word(), or "" if no word is similar.
 std::string suggestion(const std::string& typed, const std::vector<std::string>& words);
 
 }  // namespace voxdag::cli

@@ -23,7 +23,7 @@ constexpr size_t kNameWidth = 11;
 constexpr const char* kClearLine = "\r\033[K";
 
 // Returns a count with a unit prefix and two decimals: 1234567 becomes "1.23 M". A count below 1000
-// has neither.
+// is rounded to a whole number and has no prefix.
 std::string short_count(double count) {
   const char* suffix = "";
   for (const char* larger : {"k", "M", "G", "T"}) {

@@ -29,7 +29,8 @@ void on_signal(int signal) {
   errno = before;
 }
 
-// Runs on its own thread. Ends the process if the command does not.
+// Runs on its own thread. Waits for the first signal, and ends the process if the command has not
+// ended kMaxStopS later. Does nothing if allow_slow_stop() was called.
 void end_after_signal() {
   while (sem_wait(&g_signaled) != 0) {
   }
@@ -44,7 +45,8 @@ void start_thread() {
   try {
     std::thread(end_after_signal).detach();
   } catch (const std::system_error&) {
-    // The system has no more threads. The command checks the token itself.
+    // The system allows no more threads. The command can then end only by its own checks of the
+    // token, or by a second signal.
   }
 }
 

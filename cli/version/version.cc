@@ -21,7 +21,8 @@ bool is_included(const Feature& feature) { return feature.state == std::string_v
 // Returns the commit, or "unknown" for sources that are not in a Git repository.
 std::string commit() { return *kCommit ? kCommit : "unknown"; }
 
-// Returns the way to include a feature that this build lacks.
+// For a feature that this build does not include: returns the packages to install if they were
+// missing, otherwise the feature's state.
 std::string advice(const Feature& feature) {
   const bool is_missing = feature.state == std::string_view("missing");
   return is_missing ? std::string("install ") + feature.packages + ", and build voxdag again"
