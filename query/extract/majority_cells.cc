@@ -15,11 +15,11 @@ namespace {
 
 // Divisors of the memory: for the numbers of one level, of which there are two at any time, and for
 // the windows and buckets of lookups.
-constexpr uint64_t kNumberShare = 4;
-constexpr uint64_t kWindowShare = 32;
-constexpr uint64_t kListShare = 1024;
-constexpr uint64_t kMaxListBytes = uint64_t{1} << 20;
-constexpr uint64_t kListBufferBytes = uint64_t{16} << 10;
+constexpr uint64_t kCountShare = 4;
+constexpr uint64_t kCountWindowShare = 32;
+constexpr uint64_t kCountListShare = 1024;
+constexpr uint64_t kMaxCountListBytes = uint64_t{1} << 20;
+constexpr uint64_t kCountBufferBytes = uint64_t{16} << 10;
 
 // The number of voxels below each node of a level.
 using VoxelNumbers = NodeValues<uint64_t>;
@@ -85,16 +85,16 @@ MajorityCells::MajorityCells(const voxdag_reader::File& file, uint32_t grid_leve
       bits_(budget, bit_words(file, grid_levels), "the cells with a majority of voxels") {
   if (bits_.size() == 0 || file.empty()) return;
   const uint64_t free_bytes = budget.available();
-  const SpillSpace space{folder, budget, std::min(free_bytes / kListShare, kMaxListBytes),
-                         kMaxListBytes, kListBufferBytes};
+  const SpillSpace space{folder, budget, std::min(free_bytes / kCountListShare, kMaxCountListBytes),
+                         kMaxCountListBytes, kCountBufferBytes};
   DagInput input(file, budget.limit(), cancel);
   std::unique_ptr<VoxelNumbers> below;
   progress.begin_stage("count", file.brick_level() + 2 - level_, "levels");
   // The level above the cells is read to check its pointers to the cells.
   for (uint32_t level = file.brick_level() + 1; level-- > level_ - 1;) {
     auto numbers =
-        std::make_unique<VoxelNumbers>(space, file.level(level), free_bytes / kNumberShare);
-    VoxelCursor node(input, level, below.get(), space, free_bytes / kWindowShare);
+        std::make_unique<VoxelNumbers>(space, file.level(level), free_bytes / kCountShare);
+    VoxelCursor node(input, level, below.get(), space, free_bytes / kCountWindowShare);
     for (; !node.at_end(); node.next()) {
       const uint64_t voxels = node.voxels();
       if (level == level_) set_if_majority(node.offset(), voxels);

@@ -7,7 +7,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr const char* kMemory =
+constexpr const char* kMeshMemory =
     "two layers of the mesh (a smaller --region or a coarser --level needs less)";
 
 // The bits of a brick's mask at which bit 0, or bit 1, of the coordinate on an axis is set. `step`
@@ -61,7 +61,7 @@ HexSweep::Slab<HexSweep::HexBrick> HexSweep::read_slab(int64_t slab) const {
                              ? slabs_.brick_counts[static_cast<size_t>(slab)]
                              : 0;
   if (count == 0) return bricks;
-  bricks.items = PageBuffer<HexBrick>(job_.budget, count, kMemory);
+  bricks.items = PageBuffer<HexBrick>(job_.budget, count, kMeshMemory);
   Selection layer = job_.selection;
   const int64_t low = (slabs_.first + slab) * kBrickEdge;
   layer.region.low[0] = std::max(layer.region.low[0], low);
@@ -109,7 +109,7 @@ void HexSweep::number_points() {
   merge_points([&](uint64_t, uint64_t) { ++count; });
   points_ = {};
   if (count == 0) return;
-  points_.items = PageBuffer<PointBrick>(job_.budget, count, kMemory);
+  points_.items = PageBuffer<PointBrick>(job_.budget, count, kMeshMemory);
   merge_points([&](uint64_t place, uint64_t mask) {
     points_.items[points_.count++] = {place, mask, next_point_};
     next_point_ += static_cast<uint64_t>(std::popcount(mask));
