@@ -61,6 +61,23 @@ TEST_F(Hostile, AnUnreadBodyClosesTheConnection) {
   EXPECT_NE(answer.find("Connection: close"), std::string::npos) << answer;
 }
 
+// A client, or a proxy, that looks for the answer only after it has sent the body gets the answer.
+TEST_F(Hostile, ARefusalReachesAClientThatSendsAllFirst) {
+  start();
+  const std::string body(8 << 20, 'x');
+  const int socket = raw_connect(port());
+  const std::string request =
+      "PUT /api/v1/scenes/a.glb HTTP/1.1\r\nHost: localhost\r\nContent-Encoding: gzip\r\n"
+      "Content-Length: " +
+      std::to_string(body.size()) + "\r\n\r\n" + body;
+  EXPECT_EQ(send(socket, request.data(), request.size(), MSG_NOSIGNAL),
+            static_cast<ssize_t>(request.size()));
+  std::string answer(4096, '\0');
+  EXPECT_GT(recv(socket, answer.data(), answer.size(), 0), 0);
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 415 ")) << answer;
+  close(socket);
+}
+
 TEST_F(Hostile, TooLargeBodiesAreRejected) {
   config_.transfers.max_scene_bytes = 1000;
   start();

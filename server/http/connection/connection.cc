@@ -13,7 +13,9 @@ namespace {
 
 constexpr size_t kBufferBytes = 16384;
 constexpr double kLingerS = 1;
-constexpr size_t kLingerBytes = 1 << 20;
+// More than the kernel and a proxy buffer. A proxy reads the answer only after it has sent the
+// bytes that it has.
+constexpr size_t kLingerBytes = 16 << 20;
 constexpr double kSteadyRates = 8;  // the steady rate as a multiple of the minimum rate
 
 }  // namespace
