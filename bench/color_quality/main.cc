@@ -34,7 +34,7 @@ struct Arguments {
   std::vector<std::string> files;
 };
 
-// Cells with the triangles near them.
+// For each sampled cell, the triangles that touch it or are near it.
 struct Neighborhood {
   std::vector<FixedSurface> surfaces;
   std::vector<std::vector<uint32_t>> near;  // per cell: indices of the surfaces near it

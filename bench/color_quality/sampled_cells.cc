@@ -27,7 +27,8 @@ uint64_t count_colored(const voxdag_reader::File& file) {
   return cells;
 }
 
-// Calls `visit` for each set cell of a level: nodes, bricks, or octants or voxels of bricks.
+// Calls `visit` for each set cell of a level. Depending on the level, a cell is a node, a brick, an
+// octant of a brick or a voxel.
 template <class Visit>
 struct CellVisitor {
   uint32_t level;  // of the cells

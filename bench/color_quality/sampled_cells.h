@@ -25,8 +25,8 @@ class SampledCells {
   uint64_t file_cells() const { return file_cells_; }
   // log2 of a cell's edge in lattice units (1/256 voxel).
   int cell_bits() const { return cell_bits_; }
-  // Appends the indices in positions() of all cells that the closed triangle touches, and of some
-  // cells near it.
+  // Appends the indices (in positions()) of all sampled cells that the triangle touches. Also
+  // appends some cells that are near the triangle and do not touch it.
   void find_near(const FixedTriangle& triangle, std::vector<uint32_t>& cells) const;
 
  private:

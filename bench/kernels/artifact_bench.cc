@@ -1,4 +1,5 @@
-// Speed of artifacts: writing a sub-DAG to a segment and reading it back, in rows per second.
+// Measures the speed of writing a sub-DAG to a segment file as an artifact, and of reading it back,
+// in rows (bricks and nodes) per second.
 #include <benchmark/benchmark.h>
 
 #include <filesystem>
@@ -15,7 +16,7 @@ namespace {
 
 constexpr uint32_t kLevels = 11;
 
-// A sub-DAG of random triangles of about 30 voxels, as in a scan. It is built once.
+// The sub-DAG of random triangles with an extent of about 30 voxels, like the triangles of a scan.
 struct Sample {
   MemoryBudget budget{uint64_t{4} << 30};
   SubDag dag;

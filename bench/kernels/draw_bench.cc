@@ -1,4 +1,5 @@
-// Speed of the rasterizer: overlap tests of octree cubes, and drawing into a tile.
+// Measures the speed of the rasterizer's two steps: testing which octants of a cube a triangle
+// overlaps, and drawing a triangle into a tile.
 #include <benchmark/benchmark.h>
 
 #include <memory>
@@ -14,7 +15,8 @@ namespace {
 constexpr size_t kTriangles = 1024;
 constexpr int kTileVoxels = 1 << kTileLog2;
 
-// Random triangles near a tile at the origin, `edge` voxels long and `width` voxels wide.
+// Returns random triangles with one vertex in the tile at the origin. Their edges are up to about
+// `edge` and `width` voxels long.
 std::vector<NarrowTriangle> triangles(int edge, int width) {
   std::mt19937_64 random(1);
   const auto between = [&](int low, int high) {
@@ -73,8 +75,8 @@ void test_octants(benchmark::State& state, const Kernels* k) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * kTriangles));
 }
 
-// Items are bricks. Arguments are the length and the width of the triangles in voxels: triangles of
-// a scan, triangles of a wall, and slivers.
+// The benchmark's items are bricks. The arguments are `edge` and `width` of triangles(): (32, 32)
+// as in a scan, (512, 512) as in a wall, and (64, 1) for slivers.
 BENCHMARK_CAPTURE(draw, avx512, avx512_kernels())->Args({32, 32})->Args({512, 512})->Args({64, 1});
 BENCHMARK_CAPTURE(draw, avx2, avx2_kernels())->Args({32, 32})->Args({512, 512})->Args({64, 1});
 BENCHMARK_CAPTURE(draw, portable, &portable_kernels())

@@ -1,5 +1,5 @@
-// Speed of hash consing: lookups of bricks and nodes in tables of a given size, prefetched in
-// batches as in the tile reducer. Every lookup succeeds.
+// Measures the speed of hash consing: lookups of bricks and nodes in tables of a given size. The
+// lookups are prefetched in batches, as in the tile reducer. Each lookup finds an existing entry.
 #include <benchmark/benchmark.h>
 
 #include <random>
@@ -20,7 +20,7 @@ struct Setting {
   PooledMemory memory{budget, pool};
 };
 
-// Entry numbers in random order, enough for 256 batches.
+// Returns random entry numbers from 1 to `count`, enough for 256 batches.
 std::vector<uint64_t> random_entries(uint64_t count) {
   std::mt19937_64 random(2);
   std::vector<uint64_t> out(256 * kBatch);

@@ -19,7 +19,8 @@ namespace {
 constexpr uint64_t kRows = 8'000'000;
 constexpr uint64_t kGiB = uint64_t{1} << 30;
 
-// The artifacts for each number of runs, generated once, in a temporary folder.
+// For each number of runs, synthetic artifacts in a temporary folder. They are generated when they
+// are first used.
 class Fixtures {
  public:
   ~Fixtures() { std::filesystem::remove_all(folder_); }
@@ -45,7 +46,8 @@ Fixtures& fixtures() {
   return all;
 }
 
-// The complete merge, including writing the global file. Arguments: number of runs, memory in MiB.
+// Measures the complete merge, including writing the global file. Arguments: number of runs, memory
+// in MiB.
 void BM_Merge(benchmark::State& state) {
   const SyntheticRuns& runs = fixtures().of(static_cast<size_t>(state.range(0)));
   MergeInputs inputs;
@@ -78,7 +80,7 @@ BENCHMARK(BM_Merge)
     ->Args({512, 40})
     ->Unit(benchmark::kMillisecond);
 
-// The rows of a slice of a partition, from first to last.
+// Iterates over the rows of a slice: the rows that a partition has from one run.
 class SliceRows {
  public:
   SliceRows(const HashPartition& partition, const RunSlice& slice)
@@ -97,7 +99,8 @@ class SliceRows {
   uint64_t row_, end_, word_;
 };
 
-// One level of all runs in memory, for the steps of a merge that write no file.
+// One level of all runs. The member functions run steps of the merge on this level, without writing
+// an output file.
 class OneLevel {
  public:
   OneLevel(size_t runs, uint32_t levels_above_bricks)
@@ -171,7 +174,7 @@ class OneLevel {
     return unique;
   }
 
-  // Runs all steps, with an output that discards its data.
+  // Runs all steps of the merge of this level. The output discards the merged rows.
   void merge(bool bricks) {
     struct Nowhere : LevelOutput {
       bool in_words() const override { return true; }
@@ -207,14 +210,15 @@ class OneLevel {
   uint64_t total_ = 0;
 };
 
-// Arguments of this benchmark and the next ones: number of runs, levels above the bricks.
+// Measures decoding. Arguments of this benchmark and the next ones: number of runs, levels above
+// the bricks.
 void BM_Decode(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
   for (auto _ : state) level.decode();
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
 }
 
-// Decodes and rewires the rows of a level into a hash partition.
+// Measures loading: decoding the rows of a level, and rewiring them, into a hash partition.
 void BM_LoadPartition(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
   for (auto _ : state) {
@@ -224,14 +228,15 @@ void BM_LoadPartition(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
 }
 
-// Decoding, rewiring and merging, without output.
+// Measures decoding, rewiring and merging, without output.
 void BM_MergeLevel(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));
   for (auto _ : state) level.merge(state.range(1) == 0);
   state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * level.rows()));
 }
 
-// Sorts a loaded partition into the total order: by buckets, or by a k-way heap merge of the runs.
+// Measures sorting a loaded partition into the total order: by buckets, or by a k-way heap merge of
+// the runs.
 template <bool kByHeap>
 void BM_SortPartition(benchmark::State& state) {
   OneLevel level(static_cast<size_t>(state.range(0)), static_cast<uint32_t>(state.range(1)));

@@ -13,8 +13,8 @@
 namespace voxdag {
 
 // A run consists of blocks; a block is a small DAG. Two runs that contain the same block share its
-// nodes. The children of a node are random nodes of its block. This is realistic, because runs are
-// sorted by hash, so the children of a real node are far apart.
+// nodes. The children of a node are random nodes of its block. In real runs, the children of a node
+// are also far apart, because runs are sorted by hash.
 class SyntheticRuns {
  public:
   static constexpr uint32_t kLevels = 5;  // levels of nodes above the bricks

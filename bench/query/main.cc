@@ -42,7 +42,8 @@ uint64_t sum(const std::vector<uint8_t>& set) {
   return found;
 }
 
-// True if a cell is set: the file has a voxel at its position or, for a coarser grid, a node.
+// True if cell `p` is set: the file has a voxel at `p` or, if the grid is coarser than the file's,
+// a node or brick. The grid with half the file's resolution is not supported.
 bool reader_has(const voxdag_reader::File& file, uint32_t grid_levels, const Position& p) {
   if (grid_levels == file.grid_levels()) return file.voxel(p[0], p[1], p[2]);
   uint64_t offset = 0;

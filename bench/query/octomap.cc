@@ -13,8 +13,8 @@ std::optional<Timings> measure_octomap(const DagFile& dag, uint32_t grid_levels,
                                        const QuerySet& queries) {
   octomap::OcTree tree(1.0);
   const auto half = static_cast<double>(int64_t{1} << (grid_levels - 1));
-  // Keys are relative to the middle of the grid, so that grids of up to 2^16 cells fit in the
-  // tree's keys.
+  // OctoMap's coordinate 0 has the key 32768, and keys have 16 bits. The middle of the grid gets
+  // this key, so that grids of up to 2^16 cells per edge fit.
   const auto key_of = [&](const Position& p) {
     const int64_t zero = 32768 - (int64_t{1} << (grid_levels - 1));
     return octomap::OcTreeKey(static_cast<octomap::key_type>(p[0] + zero),

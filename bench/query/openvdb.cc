@@ -26,7 +26,8 @@ std::optional<Timings> measure_openvdb(const DagFile& dag, uint32_t grid_levels,
       }
     });
   }
-  // Cells are centered at whole numbers in OpenVDB.
+  // OpenVDB's cells are centered at integer coordinates, so the rays below are shifted by half a
+  // cell.
   Timings timings;
   const auto look_up = [&](const std::vector<Position>& points) {
     return best_of_three(points.size(), [&] {

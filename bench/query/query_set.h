@@ -15,8 +15,8 @@ struct QuerySet {
   std::vector<Coordinates> origins, directions;  // rays of a picture, in tiles of 8 x 8 pixels
 };
 
-// Number of boxes, and their edge in cells. Box i is around the i-th set cell of the queries. A box
-// at the border of the grid extends beyond it.
+// Number of boxes, and their edge in cells. box_around() returns box i, which is centered on the
+// i-th set cell of the queries. A box near the border of the grid extends beyond the grid.
 inline constexpr size_t kBoxes = 2000;
 inline constexpr int64_t kBoxEdge = 64;
 Region box_around(const QuerySet& queries, size_t i);

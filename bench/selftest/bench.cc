@@ -30,7 +30,8 @@ bool touches(const FixedTriangle& t, const Cube& cube, uint32_t grid_levels) {
   return triangle_touches_cube(t, low, edge);
 }
 
-// Divides a subvolume's triangles among subvolumes with an edge of options.subvolume_edge.
+// Splits a subvolume into octants until their edge is at most options.subvolume_edge voxels.
+// Appends the octants that contain triangles to `out`.
 void divide(Subvolume whole, const BenchOptions& options, std::vector<Subvolume>& out) {
   if (whole.triangles.empty()) return;
   if (whole.cube.edge_voxels(options.grid_levels) <= options.subvolume_edge) {

@@ -17,7 +17,7 @@ struct Subject {
   std::function<std::unique_ptr<Backend>()> open;
 };
 
-// Builds scenes of every kind with each subject and with the CPU backend, compares every level
+// Builds all scenes of scenes.h with each subject and with the CPU backend. Compares every level
 // array and count, and prints a table. `quick` limits the test to small cubes. Returns true if all
 // results are equal.
 bool compare_with_cpu(const std::vector<Subject>& subjects, bool quick);

@@ -12,13 +12,13 @@ struct Point {
   double x, y, z;  // the grid is [0, 1]^3
 };
 
-// Adds surfaces as meshes of columns x rows quads.
+// Adds surfaces to a scene. Each surface becomes a mesh of columns x rows quads of two triangles.
 class SurfaceMesher {
  public:
   SurfaceMesher(Scene& scene, uint32_t grid_levels)
       : scene_(scene), scale_(128 * std::ldexp(1.0, static_cast<int>(grid_levels))) {}
 
-  // `at` maps [0, 1]^2 to the surface.
+  // `at` maps the square [0, 1]^2 to points of the surface.
   void add(uint64_t columns, uint64_t rows, const std::function<Point(double, double)>& at) {
     const auto point = [&](uint64_t c, uint64_t r) {
       return at(static_cast<double>(c) / static_cast<double>(columns),

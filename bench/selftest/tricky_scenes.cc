@@ -15,8 +15,8 @@ class Maker {
     for (int a = 0; a < 3; ++a) low_[a] = cube.position[a] * edge_;
   }
 
-  // A triangle whose vertices are within `reach` units, along each axis, of a random point of the
-  // cube.
+  // Returns a triangle around a random point of the cube. Each coordinate of its vertices is within
+  // `reach` units of the point's coordinate.
   FixedTriangle near(int64_t reach) {
     FixedTriangle t;
     for (int a = 0; a < 3; ++a) {
@@ -46,8 +46,9 @@ class Maker {
     for (auto& v : t.v) v[axis] = t.v[0][axis];
     return t;
   }
-  // A triangle whose vertices are corners of voxels, all moved by the same number of units. So
-  // planes and edges of 45 degrees touch voxels exactly at their corners.
+  // Returns a triangle whose vertices are corners of voxels, moved along each axis by 1 or -1 unit,
+  // because coordinates must be odd. All three vertices are moved by the same vector. So planes and
+  // edges of 45 degrees touch voxels exactly at their corners.
   FixedTriangle diagonal() {
     FixedTriangle t;
     for (int a = 0; a < 3; ++a) {

@@ -9,9 +9,11 @@
 //   - until no cell is wider than one pixel, for each of five views and for all five together.
 //
 // Then it encodes the tiles of all five views in random order, and prints sizes and speeds for four
-// cases: after the file was dropped from memory (if no other process keeps it there), from memory,
-// with checksum blocks that are compared at their first use, and with checksum blocks that are
-// already compared.
+// cases:
+// - cold: the file was dropped from the page cache (unless another process keeps it there);
+// - warm: the file is in memory;
+// - comparing: the checksum of each block of the file is compared at the first use of the block;
+// - compared: as before, but all checksums have been compared.
 //
 // VIEWS is a file whose lines have a name and the camera options of `voxdag render`. With it, only
 // these views are measured, until no cell is wider than P pixels. The viewer uses P = 0.75.

@@ -76,7 +76,9 @@ class NeededTiles {
     }
   }
 
-  // True if the ray ends in the cell.
+  // Follows the ray through the cells inside this cell, nearest first, and marks the tiles that
+  // contain them. `span` is the part of the ray inside this cell. Returns true if the ray ends in
+  // this cell.
   bool visit(uint32_t level, uint64_t content, const Vec& low, const Span& span) {
     const double edge = static_cast<double>(dag_.resolution()) / static_cast<double>(1ull << level);
     if (level == dag_.grid_levels() || edge <= pixels_ * spread_ * span.enter) return true;
@@ -105,7 +107,8 @@ class NeededTiles {
   double inverse_[3] = {};
   int nearest_ = 0;                  // the child that a ray of this direction meets first
   std::array<uint64_t, 24> path_{};  // contents of the cells on the current path, by level
-  std::array<std::array<uint64_t, 24>, kMaxTileLevels + 1> marked_{};  // content + 1, by depth
+  std::array<std::array<uint64_t, 24>, kMaxTileLevels + 1> marked_{};  // last marked content + 1,
+                                                                       // by depth and level
   std::vector<Addresses> tiles_;
 };
 
