@@ -17,7 +17,7 @@ enum class ErrorCode {
   kOutOfMemory,         // the memory budget or the machine is too small
   kDevice,              // the GPU or its driver failed
   kCanceled,            // the user canceled the operation
-  kLimit,               // a limit of the format or of the arithmetic; the message names the limit
+  kLimit,               // the input exceeds a limit of the format or of the arithmetic
 };
 
 // An error. The message is one sentence: the problem, its place (file, subvolume, scene node) and

@@ -21,8 +21,8 @@ struct Mesh {
   // vertices are white.
   std::span<const uint8_t> colors = {};
   // The texture: the bytes of an image file, and its coordinates s and t for each vertex. t is 0 at
-  // the lower edge of the image. A mesh with a texture has only the colors of the texture. If one
-  // of the spans is empty, the mesh has no texture.
+  // the lower edge of the image. A mesh with a texture has only the colors of the texture; `colors`
+  // is ignored. If `texture` or `texture_coordinates` is empty, the mesh has no texture.
   std::span<const std::byte> texture = {};
   std::span<const float> texture_coordinates = {};
   // Name of the texture's material. Meshes of one scene that have different textures must have

@@ -7,7 +7,7 @@
 //
 // The file is mapped, not read. A batch function takes any number of items in one call, works on up
 // to `threads` threads including the caller's, and allocates nothing per item. The results do not
-// depend on the threads. All spans of one call have the same length.
+// depend on the threads. All spans of a call of a batch function have the same length.
 //
 // All functions are const and thread-safe. They throw Error{kInvalidInput} for invalid arguments,
 // and Error{kCorrupt} that names the file if the bytes they read are damaged. They check the
@@ -46,8 +46,8 @@ inline constexpr uint32_t kNoMaterial = UINT32_MAX;
 
 struct RayLimits {
   double max_distance = std::numeric_limits<double>::infinity();  // in voxels
-  // A ray stops at set cells with an edge of at most `stop_size` voxels, and hits such a cell as
-  // one cube. With values below 2, rays stop at voxels.
+  // A ray ends at the first set cell with an edge of at most `stop_size` voxels, and hits this cell
+  // as one solid cube. With values below 2, rays end at voxels.
   double stop_size = 0;
 };
 
