@@ -55,9 +55,9 @@ struct SubvolumeTask {
   uint32_t grid_levels = 2;  // L: the grid has 2^L voxels per edge
   Cube cube;                 // its level is at most L-2
   uint32_t hash_bits = 64;   // 4 to 64
-  // If not null, also fills the interior of the solid (core/geometry/solid_rule.h). The entry has
-  // the views, as that file defines them, at the cube's low faces. Null for the shell and for thin
-  // voxels. Only the CPU backend fills solids.
+  // If not null, build() also fills the interior of the solid (core/geometry/solid_rule.h). `solid`
+  // then has the solid's rule, and the views at the cube's low faces. Only the CPU backend fills
+  // solids.
   const SolidEntry* solid = nullptr;
   VoxelRule rule = VoxelRule::kShell;  // must be kShell if `solid` is set
 

@@ -11,8 +11,8 @@
 
 namespace voxdag {
 
-// Sums of weights and of weighted intensities. Intensities are linear with 16 bits; alpha has 8
-// bits.
+// Sums of weights and of weighted intensities. The weight of a surface is proportional to its area
+// in the cell (covered_surface.h). Intensities are linear with 16 bits; alpha has 8 bits.
 struct ColorSum {
   std::array<uint64_t, 3> seen{};   // sums of weight x alpha x intensity: red, green, blue
   uint64_t seen_weight = 0;         // sum of weight x alpha

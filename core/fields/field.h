@@ -300,8 +300,8 @@ std::string default_text(const Field& field, const T& value) {
   }
 }
 
-// Returns the help of a field with its default, which is `value`. Includes the field's limits if
-// `has_limits`.
+// Returns the documentation of a field: its help, its limits if `has_limits` is true, and its
+// default, which is `value`.
 template <class T>
 std::string documentation(const Field& field, const T& value, bool has_limits) {
   using Inner = typename OptionalValue<T>::type;

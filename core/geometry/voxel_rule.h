@@ -1,5 +1,5 @@
 // The rules that decide which voxels a scene sets. A rule is a geometry option: it determines the
-// bytes of the result. A new rule is a new value and a line of the table.
+// bytes of the result. To add a rule, add a value to VoxelRule and a row to kVoxelRules.
 #pragma once
 
 #include <array>

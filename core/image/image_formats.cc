@@ -9,7 +9,8 @@
 namespace voxdag {
 namespace {
 
-// Advice in messages: how to convert the images of a glTF file, and an image file.
+// Remedies for error messages: commands that convert all images of a glTF scene, or a single image
+// file, to a format that voxdag reads.
 constexpr const char* kConvertScene =
     "convert the scene with: gltf-transform png IN.glb OUT.glb --formats '*'";
 constexpr const char* kConvertImage = "convert it to PNG with: magick IN OUT.png";

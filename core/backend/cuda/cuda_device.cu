@@ -133,7 +133,8 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   return memory;
 }
 
-// If the call fails, clears the thread's last error, because CUB would return it as its own result.
+// If the call fails, clears the CUDA runtime's last error of this thread, because the next call of
+// CUB would return this error as its own result.
 void CudaDevice::release(void* memory) noexcept {
   if (cudaFreeAsync(memory, stream()) != cudaSuccess) cudaGetLastError();
 }

@@ -1,4 +1,4 @@
-// The cutouts of a scene: for each material, the texels that it cuts out.
+// The cutouts of a scene: for each material, the texels that it makes invisible (cuts out).
 #pragma once
 
 #include <cstdint>

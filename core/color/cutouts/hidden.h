@@ -9,7 +9,8 @@
 
 namespace voxdag::color {
 
-// Converts an alpha value of 16 bits to 8 bits, by the material's alpha mode.
+// Returns the alpha, 0 to 255, that the material's alpha mode makes of `alpha`, which is 0 to
+// 65535.
 VOXDAG_HD inline uint32_t alpha_by_mode(const Material& material, uint32_t alpha) {
   if (material.alpha_mode == AlphaMode::kOpaque) return 255;
   if (material.alpha_mode == AlphaMode::kMask) return alpha >= material.alpha_cutoff ? 255 : 0;

@@ -89,7 +89,8 @@ void VisiblePart::clip(const Polygon& from, int axis, double sign, double bound,
   }
 }
 
-// Returns the part of the triangle in a cube, which is enlarged by `margin` on all sides.
+// Returns the part of the triangle in a cube with the low corner `low` and the edge `edge`, in
+// lattice units. First enlarges the cube by `margin` on all sides.
 VisiblePart::Polygon VisiblePart::part_in(const std::array<int64_t, 3>& low, int64_t edge,
                                           double margin) const {
   Polygon parts[2];
@@ -121,8 +122,8 @@ VisiblePart::Sight VisiblePart::sight(const Cube& cube) const {
   return sight_of(part_in(low_corner(cube, grid_levels_), edge, kCubeMargin));
 }
 
-// Tests all texels in the polygon's box, by blocks of the level at which the box is at most five
-// blocks wide.
+// Returns whether all, none or some of the texels in the polygon's box are visible. Tests blocks of
+// the first level at which the box is at most five blocks wide.
 VisiblePart::Sight VisiblePart::sight_of(const Polygon& polygon) const {
   if (polygon.count == 0) return Sight::kMixed;
   Range range[2];

@@ -51,7 +51,7 @@ class VisiblePart {
     int count = 0;
     Point points[kMaxPoints];
   };
-  // A box of texels, or of blocks of texels.
+  // A box in the image, with coordinates in texels.
   struct Box {
     double low[2], high[2];
   };
@@ -75,7 +75,8 @@ class VisiblePart {
   static void clip(const Polygon& from, int axis, double sign, double bound, Polygon& inside);
   Polygon part_in(const std::array<int64_t, 3>& low, int64_t edge, double margin) const;
   Sight sight_of(const Polygon& polygon) const;
-  // True if the polygon reaches `depth` into a visible texel or, without `visible`, a hidden texel.
+  // True if the polygon reaches `depth`, in texels, into a visible texel (or, if `visible` is
+  // false, into a hidden texel). With a negative depth, the texels are enlarged instead.
   bool covers(const Polygon& polygon, bool visible, double depth) const;
   bool covers(const Outline& outline, bool visible, double depth, uint32_t level, uint32_t x,
               uint32_t y) const;
@@ -87,7 +88,7 @@ class VisiblePart {
   const AlphaMask* mask_;
   std::array<Wrap, 2> wrap_;
   const uint32_t grid_levels_;
-  bool is_hidden_;       // completely
+  bool is_hidden_;       // the material cuts out the complete triangle
   double texels_[3][2];  // positions of the corners in the image
 };
 

@@ -22,7 +22,8 @@ class TouchedVoxels {
       wide_.emplace(triangle, kUnitBits);
   }
 
-  // Calls visit(voxel) for each touched voxel of the cube with the low corner `low`, in voxels.
+  // Calls visit(voxel) for each touched voxel of the cube with the low corner `low` and the edge
+  // `edge`, in voxels.
   template <class Visit>
   void for_each(const std::array<int64_t, 3>& low, int64_t edge, const Visit& visit) const {
     narrow_ ? for_each_of(*narrow_, low, edge, visit) : for_each_of(*wide_, low, edge, visit);

@@ -11,8 +11,8 @@ namespace {
 
 using Sight = VisiblePart::Sight;
 
-// A rectangle of up to this many rows becomes one segment per row; a larger rectangle, two
-// triangles.
+// A rectangle of up to this many rows becomes one segment (a degenerate triangle) per row. A larger
+// rectangle becomes two triangles.
 constexpr size_t kMaxSegments = 2;
 
 // Returns an odd coordinate near the middle of a voxel.
@@ -31,8 +31,9 @@ VisiblePatches::VisiblePatches(uint32_t grid_levels)
       block_level_(grid_levels > kBlockLevels ? grid_levels - kBlockLevels : 0),
       rows_(kBlockEdge * kBlockEdge) {}
 
-// Rows are along the axis on which the triangle's plane rises least, and layers across the axis on
-// which it rises most. So rows and rectangles are large.
+// Chooses the axes for a triangle. Rows are along the axis of the normal's smallest component, and
+// layers are perpendicular to the axis of its largest component. This makes rows and rectangles
+// large.
 VisiblePatches::Axes VisiblePatches::axes_of(const FixedTriangle& triangle) {
   double normal[3];
   for (int a = 0; a < 3; ++a) {
@@ -59,7 +60,8 @@ bool VisiblePatches::for_each(const VisiblePart& part, const Visit& visit) {
   return descend({part, TouchedVoxels(triangle), visit}, start, false);
 }
 
-// `is_visible`: the triangle is visible in all voxels of the cube that it touches.
+// Visits the patches in a cube. `is_visible` is true if the triangle is known to be visible in all
+// voxels of the cube that it touches.
 bool VisiblePatches::descend(const Source& source, const Cube& cube, bool is_visible) {
   if (cube.level >= block_level_) {
     mark_visible(source, cube, is_visible);
@@ -121,8 +123,8 @@ bool VisiblePatches::visit_rows(const Voxel& low, const Visit& visit) {
   return is_complete;
 }
 
-// Visits the patches of the first run of a row and of the equal runs in the next rows of the layer.
-// Removes these runs.
+// Visits the patches of the first run (of consecutive visible voxels) of a row and of the equal
+// runs in the next rows of the layer. Removes these runs.
 bool VisiblePatches::visit_run(const Voxel& low, size_t row, const Visit& visit) {
   const int first = std::countr_zero(rows_[row]);
   const int count = std::countr_one(rows_[row] >> first);

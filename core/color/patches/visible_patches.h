@@ -52,8 +52,8 @@ class VisiblePatches {
 
   const uint32_t grid_levels_, block_level_;
   Axes axes_{};
-  // The bits of a block along axes_.along, one word for each position across (slowest) and aside.
-  // All words are 0 between two blocks.
+  // The visible voxels of a block. There is one word for each position across (slowest) and aside,
+  // with one bit for each position along axes_.along. All words are 0 between two blocks.
   std::vector<uint64_t> rows_;
   size_t first_row_ = kBlockEdge * kBlockEdge, last_row_ = 0;  // range of the rows that are not 0
 };

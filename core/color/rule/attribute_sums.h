@@ -1,6 +1,6 @@
 // The sums of a region's cells for the attributes that do not follow from the ColorSum: normals and
-// materials. There is a list of classes, one for each such attribute. RegionCells numbers the
-// cells.
+// materials. AttributeSums has a list of classes, one for each such attribute. A cell is given by
+// its number in RegionCells, and columns are explained in columns.h.
 //
 // A class of the list has
 //     static constexpr Attribute kAttribute;

@@ -89,10 +89,10 @@ class RegionBaker {
     add_waiting();
     return cells_.count() <= max_cells_;
   }
-  // Like the other add(), but adds the triangles in parts. If `wanted` needs sums, calls
-  // charge(bytes) after each part. `bytes` is the memory that these sums have allocated so far; it
-  // grows by at most 16 MiB between two calls. If charge() returns false, add() stops and returns
-  // false.
+  // Like the other add(), but adds the triangles in parts. If normals or materials are wanted,
+  // calls charge(bytes) after each part. `bytes` is the memory that their sums have allocated so
+  // far; it grows by at most 16 MiB between two calls. If charge() returns false, add() stops and
+  // returns false.
   template <class Charge>
   bool add(std::span<const FixedSurface> triangles, const Charge& charge) {
     constexpr size_t kTrianglesPerCharge = 16;
@@ -113,7 +113,8 @@ class RegionBaker {
 
  private:
   static constexpr size_t kMaxWaiting = 1 << 16;
-  // A triangle that touches a cell and covers no column (cell_triangle.h) of the cell.
+  // A triangle that touches a cell and covers no column (cell_triangle.h) of the cell. It waits
+  // because it contributes only if no triangle covers a column of the cell.
   struct Waiting {
     uint32_t triangle, code;
   };
@@ -304,7 +305,7 @@ class RegionBaker {
   uint32_t spread_[3][64];  // [axis][coordinate]: the coordinate's bits in a code
   std::span<const FixedSurface> triangles_;
   uint32_t max_cells_ = 0;
-  int64_t first_[3] = {}, last_[3] = {};  // cells of the region
+  int64_t first_[3] = {}, last_[3] = {};  // range of the region's cells, by axis
   color::RegionCells cells_;
   std::vector<Waiting> waiting_;
   std::vector<CellValues> values_;  // values that finish(cells) discards

@@ -11,6 +11,9 @@
 //     | . . . .
 //     +--------- axis 0
 //
+// A triangle covers a column of a cell if the column, which is a line, crosses the triangle within
+// the closed cell.
+//
 // Every test is the sign of a linear function with integer coefficients at a cell or column.
 // Divided by E (for cells) or E/4 (for columns), the function is A p + B q + C with integers A and
 // B. C is a quotient. It is rounded down or up to an integer, which changes no sign.
@@ -18,10 +21,9 @@
 // Bounds. Int is int64_t for triangles in the narrow box: coordinates v with 0 <= v + 2^27 < 2^29
 // (coordinates in the grid are at most 2^28). There, edges are below 2^29 and normals at most 2^58.
 // Edge functions are below 2^59 anywhere in the box, and at most 2^62 when added over 16 columns
-// inside the triangle. Values of the plane at columns of cells that the plane touches are below
-// 10 n_2 < 2^62 in quarters; other intermediate values wrap around.
-// Int is int128 for all other triangles: coordinates are at most 2^40, normals at most 2^82, and
-// n.v is below 2^124.
+// inside the triangle. Values of the plane at columns of cells that the plane touches are below 10
+// n_2 < 2^62 in quarters; other intermediate values wrap around. Int is int128 for all other
+// triangles: coordinates are at most 2^40, normals at most 2^82, and n.v is below 2^124.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
-// A triangle that covers columns of cells: its weight and its mean point in a cell.
+// Computes the weight of a triangle in a cell in which it covers columns (cell_triangle.h), and the
+// mean of the triangle's points on these columns.
 #pragma once
 
 #include <cstdint>

@@ -36,9 +36,9 @@ VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
 
 // Returns the level of the image's pyramid that has one to two texels along the edge of a color
 // cell, on average over the triangle: the largest l with 4^l <= texels in the triangle / its area
-// in cells. `area`: twice the triangle's area, in square lattice units. A triangle without area
-// counts as a square over its longest edge, or over a lattice unit. All values are computed in IEEE
-// doubles, in the order written here.
+// in cells. `area`: twice the triangle's area, in square lattice units. A triangle without area is
+// treated as a square whose side is the triangle's longest edge, or a lattice unit if all edges
+// have the length 0. All values are computed in IEEE doubles, in the order written here.
 template <class Textures>
 VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& textures,
                                         uint32_t image, int cell_bits, double area) {
@@ -126,7 +126,8 @@ VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, 
 template <class Textures>
 class SurfaceLook {
  public:
-  // `is_cut`: the material has a mask, so the texels of its image are multiplied by alpha.
+  // `is_cut` is true if the material has a mask (Cutouts). The colors in its image are then
+  // multiplied by alpha.
   VOXDAG_HD SurfaceLook(const FixedSurface& surface, const Material& material, Textures& textures,
                         int cell_bits, double area, bool is_cut = false)
       : corners_(surface.corners.data()),
@@ -223,7 +224,9 @@ class SurfaceLook {
     return corners_[0].texture[static_cast<size_t>(a)] + change;
   }
 
-  // Converts an alpha value of 16 bits to 8 bits, by the material's alpha mode.
+  // Returns the alpha, 0 to 255, that the material's alpha mode makes of `alpha`, which is 0 to
+  // 65535. With a mask, the mode kMask always gives 255, because the mask has already excluded
+  // hidden texels.
   VOXDAG_HD uint32_t alpha_of(uint32_t alpha) const {
     if (material_.alpha_mode == AlphaMode::kOpaque) return 255;
     if (material_.alpha_mode == AlphaMode::kMask)

@@ -87,7 +87,8 @@ class TouchedCells {
     lowest_ = wrapping_sum(wrapping_sum(at_cell, t_.plane_ceil), fall_);
     correct();
   }
-  // Updates first_, last_, highest_ and lowest_ from the previous column of cells in the row.
+  // Updates first_, last_, highest_ and lowest_, which are for the previous column of cells in the
+  // row.
   VOXDAG_HD void climb() {
     if (t_.degenerate) return;
     // From one column of cells to the next, the plane rises or falls by at most one cell, so one

@@ -50,8 +50,9 @@ std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
 template <class Slot, class Tag, class Less>
 void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
   if (slots.empty()) return;
-  // First pass, from the back to the front: carries a slot forward until it meets a slot whose tag
-  // is not larger, then carries that slot. This does most of the work, almost without branches.
+  // First pass, from the back to the front: carries a slot toward the front until it meets a slot
+  // whose tag is not larger, then carries that slot instead. This does most of the work, almost
+  // without branches.
   Slot down = slots.back();
   for (size_t i = slots.size() - 1; i-- > 0;) {
     const Slot other = slots[i];

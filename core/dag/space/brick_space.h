@@ -22,7 +22,7 @@ constexpr uint8_t outer_faces(int octant) {
   return faces;
 }
 
-// Masks of the voxels with coordinate c along axis a.
+// of[a][c] is the mask of the voxels whose coordinate along axis a is c.
 struct BrickLayers {
   uint64_t of[3][kBrickEdge] = {};
   constexpr BrickLayers() {
@@ -37,10 +37,12 @@ constexpr uint64_t brick_face(int face) {
   return kBrickLayers.of[face / 2][face % 2 != 0 ? kBrickEdge - 1 : 0];
 }
 
-// Returns the number of bits by which the high face of a brick is shifted to become the low face.
+// Returns the difference of the bit numbers of opposite voxels at the high and the low face of a
+// brick. A mask of voxels at the high face, shifted right by this number, is a mask of the opposite
+// voxels at the low face.
 constexpr int brick_face_shift(int axis) { return 36 >> axis; }
 
-// Returns the neighbors of the voxels in `mask`.
+// Returns the 6-neighbors, in the brick, of the voxels in `mask`.
 constexpr uint64_t brick_neighbors(uint64_t mask) {
   uint64_t out = 0;
   for (int a = 0; a < 3; ++a) {
@@ -52,7 +54,8 @@ constexpr uint64_t brick_neighbors(uint64_t mask) {
   return out;
 }
 
-// Returns the voxels of `empty` that walks within `empty` reach from `seed`.
+// Returns the voxels of `empty` that are reached from voxels of `seed` by steps between 6-neighbors
+// within `empty`.
 constexpr uint64_t brick_flood(uint64_t seed, uint64_t empty) {
   uint64_t reached = seed & empty;
   while (true) {

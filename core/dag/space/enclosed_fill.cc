@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// A node, the part of its components that is outside, and the result.
+// A node, the set of its components that are outside, and the node that replaces it.
 struct FilledNode {
   uint64_t outside = 0;  // bit c: component c is outside
   uint64_t hash = 0;
@@ -18,10 +18,11 @@ struct FilledNode {
   uint32_t id = 0;
 };
 
-// The filled nodes of one depth: an open-addressing table.
+// The filled nodes of one depth, in a table with open addressing.
 class FilledNodes {
  public:
-  // Returns the slot of a node: its own, or a free one.
+  // Returns the slot of the node `row` with the outside components `outside`, or a free slot if the
+  // table does not contain it.
   FilledNode& find(PooledMemory& memory, uint32_t row, uint64_t outside) {
     if (count_ + 1 > entries_for(used_slots_)) grow(memory);
     return slot(row, outside);
@@ -69,7 +70,8 @@ class Filler {
     fill(0, {true, 0, 0});
   }
 
-  // Also fills the component of a voxel, if it is closed. `labels` are this object's labels.
+  // Also fills the component that contains the voxel `seed`, if this component is closed. `labels`
+  // are this object's labels.
   void run(std::span<const uint8_t> is_outside, SpaceLabels& labels, const CubeVoxel& seed) {
     const SeedPlace place = find_seed(labels, seed);
     if (place.kind != SeedPlace::Kind::kClosed) return run(is_outside);
@@ -78,7 +80,9 @@ class Filler {
   }
 
  private:
-  // Fills a cube around a closed component. Its node differs from equal nodes in other places.
+  // Fills a cube that contains the seed's closed component. Equal nodes at other places of the
+  // octree do not contain the seed, so they are filled differently and the result is not added to
+  // filled_.
   NodeRef fill_around(int depth, const LabeledCube& cube, SpaceLabels& labels,
                       const CubeVoxel& seed, const SeedPlace& place) {
     if (depth == labels_.levels().brick_depth()) {
@@ -124,8 +128,9 @@ class Filler {
     return node;
   }
 
-  // Sets `outside` to the key of the cube's components. Returns false if they are too many for a
-  // key. If all components are outside, or none is, the key does not depend on their number.
+  // Sets bit c of `outside` if component c of the cube is outside. If all components are outside,
+  // sets all bits. Returns false if 64 bits are too few for the components, some of which are
+  // outside and some not.
   bool pack_outside(int depth, const LabeledCube& cube, uint64_t& outside) const {
     const uint32_t count = labels_.count(depth, cube.row);
     uint32_t ones = 0;
@@ -186,7 +191,7 @@ class Filler {
   SubDagTables& tables_;
   std::vector<FilledNodes> filled_;  // by depth
   std::vector<NodeRef> full_;        // by log2 of the edge
-  // 1 for a component that is outside, for the components of the cubes on the path
+  // For each component of each cube on the current path: 1 if it is outside, otherwise 0.
   std::vector<uint32_t> numbers_;
 };
 

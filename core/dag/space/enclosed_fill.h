@@ -1,6 +1,6 @@
-// The second walk over a sub-DAG: sets all empty voxels of its cube, except the voxels of
-// components that reach the outside. Equal nodes whose components are outside in the same way are
-// filled once. So the cost depends on the number of unique nodes.
+// Fills the enclosed space of a sub-DAG: sets all empty voxels of its cube, except the voxels of
+// components (space_labels.h) that reach the outside. Equal nodes with the same outside components
+// are filled once. So the cost depends on the number of unique nodes.
 #pragma once
 
 #include <cstdint>

@@ -9,7 +9,8 @@ namespace {
 constexpr uint32_t kNoLabel = UINT32_MAX;
 constexpr int kMaxFaceDepth = 32;
 
-// Returns the 16 voxels of a brick at a face, in the order of their bits.
+// Returns the voxels of `mask` at a face of the brick: a bit for each of the 16 voxels at the face,
+// in the order of their bits in `mask`.
 uint16_t face_voxels(uint64_t mask, int face) {
   uint16_t out = 0;
   int at = 0;
@@ -84,7 +85,8 @@ class FaceEncoder {
   const int face_;
   const uint64_t max_bytes_;
   std::vector<std::byte>& out_;
-  std::vector<uint32_t> numbers_;  // labels of the root, by component of the cubes on the path
+  std::vector<uint32_t> numbers_;  // the root's component that contains each component of the cubes
+                                   // on the path
 };
 
 [[noreturn]] void refuse_face() {

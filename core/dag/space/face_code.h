@@ -1,12 +1,14 @@
-// The components at a face of a sub-DAG's cube, as a quadtree in bytes. Two neighbors are joined by
-// reading both quadtrees together.
+// The components (space_labels.h) at a face of a sub-DAG's cube, encoded as a quadtree in bytes.
+// The components of two neighboring cubes are joined by reading the quadtrees of their common face
+// together.
 //
 //   quadtree = 0                  no empty voxel
 //            | 1 quadtree (4x)    the quadrants, in the order of their octants
 //            | 2 label            all voxels are empty and in one component
 //            | 3 count (label, mask of 16 voxels) (count times)    the face of a brick
 //
-// Labels are the component numbers of the root, in bytes of seven bits, the lowest first.
+// A label is a component number of the root, encoded with seven bits per byte, the lowest bits
+// first.
 #pragma once
 
 #include <cstddef>
@@ -32,10 +34,10 @@ class FaceReader {
     uint32_t label;
     uint16_t voxels;
   };
-  // A part of the face: a square, without its quadrants.
+  // A square of the quadtree, without its quadrants.
   struct Square {
     Kind kind = Kind::kSet;
-    std::vector<Piece> pieces;  // one for kEmpty; the components of a brick's face
+    std::vector<Piece> pieces;  // kEmpty: one; kBrick: the components at the face
   };
 
   explicit FaceReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -56,8 +58,9 @@ class FaceReader {
   size_t at_ = 0;
 };
 
-// Calls unite(label_a, label_b) for components of two squares that meet. Both readers are behind
-// their square; afterwards, they are behind its quadrants.
+// Calls unite(label_a, label_b) for each component of one square that touches a component of the
+// other square. `in_a` and `in_b` are the squares that `a` and `b` have just read. Reads and skips
+// the quadrants of these squares.
 template <class Unite>
 void join_squares(FaceReader& a, const FaceReader::Square& in_a, FaceReader& b,
                   const FaceReader::Square& in_b, const Unite& unite) {

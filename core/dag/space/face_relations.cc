@@ -7,13 +7,14 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMinSlots = uint64_t{1} << 10, kMaxSlots = uint64_t{1} << 15;
-constexpr uint64_t kBudgetPart = 32;  // the cache takes at most this part of the budget
+constexpr uint64_t kBudgetPart = 32;  // the cache takes at most 1/kBudgetPart of the budget
 
 constexpr uint64_t pair_bit(uint32_t low, uint32_t high) {
   return uint64_t{1} << (FaceRelations::kMaxComponents * low + high);
 }
 
-// Returns the pairs of all components of two sets, given as bits.
+// Returns all pairs (as Meeting::pairs) of a component in `low` and a component in `high`. Both are
+// sets of components, as bits.
 uint64_t all_pairs(uint32_t low, uint32_t high) {
   uint64_t pairs = 0;
   for (uint32_t rest = low; rest != 0; rest &= rest - 1)

@@ -1,8 +1,9 @@
-// The pairs of components of two nodes that meet at a common face of the nodes' cubes.
+// Finds the pairs of components (space_labels.h), one of each of two nodes, that meet at a common
+// face of the nodes' cubes.
 //
-// The pairs follow from the pairs of the octants at the face. A cache remembers the pairs of recent
-// nodes, because equal nodes are often neighbors of equal nodes. The cache only saves time: a lost
-// entry is computed again. Not thread-safe.
+// The pairs are computed from the pairs of the octants at the face. A cache remembers the pairs of
+// recent nodes, because equal nodes are often neighbors of equal nodes. The cache only saves time:
+// a lost entry is computed again. Not thread-safe.
 #pragma once
 
 #include <bit>
@@ -28,8 +29,9 @@ class FaceRelations {
   // `labels` must have the labels of the depths that are passed to find(). Throws OutOfBudget.
   FaceRelations(PooledMemory& memory, const SpaceLabels& labels);
 
-  // Returns the pairs of two nodes or bricks: `low` is below `high` along the axis. Returns nullopt
-  // if one of them, or of the smaller cubes at the face, has more than kMaxComponents components.
+  // Returns the pairs of two nodes or bricks at rows `low` and `high` of a depth. The cube of `low`
+  // is the lower neighbor, along `axis`, of the cube of `high`. Returns nullopt if one of them, or
+  // of the smaller cubes at the face, has more than kMaxComponents components.
   std::optional<Meeting> find(int depth, uint32_t low, uint32_t high, int axis);
 
  private:
@@ -43,7 +45,8 @@ class FaceRelations {
   uint32_t at_face(int depth, uint32_t row, int face) const;
   Meeting meet_bricks(uint32_t low, uint32_t high, int axis) const;
   std::optional<Meeting> meet_octants(int depth, uint32_t low, uint32_t high, int axis);
-  // Returns the pairs of the octants `o` of `low` and `p` of `high`, as pairs of their components.
+  // Returns the pairs of octant `o` of node `low` and octant `p` of node `high`, as pairs of the
+  // octants' components.
   std::optional<Meeting> meet_pair(int depth, uint32_t low, int o, uint32_t high, int p, int axis);
 
   const SpaceLabels& labels_;

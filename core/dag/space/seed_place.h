@@ -1,4 +1,5 @@
-// The component of the empty space that has a given voxel of a sub-DAG's cube.
+// Finds the component of the empty space (space_labels.h) that contains a given voxel of a
+// sub-DAG's cube.
 #pragma once
 
 #include <array>
@@ -23,7 +24,7 @@ struct SeedPlace {
                            // around the voxel
 };
 
-// Returns the octant that has the voxel, of a node at depth `depth` around the voxel.
+// Returns the octant that contains the voxel, of the node at depth `depth` whose cube contains it.
 inline int octant_around(const CubeVoxel& voxel, int brick_depth, int depth) {
   const int bit = brick_depth + kBrickLevels - 1 - depth;
   return static_cast<int>((voxel[0] >> bit & 1) << 2 | (voxel[1] >> bit & 1) << 1 |

@@ -40,7 +40,7 @@ LabeledCube octant_of(const SpaceLabels& labels, int depth, const LabeledCube& c
 // Computes the labels, level by level from the bricks upwards.
 class SpaceLabeler {
  public:
-  // `out` must have the labels of the depths below the nodes that are labeled.
+  // `out` must have the labels of all depths below the nodes that will be labeled.
   SpaceLabeler(PooledMemory& memory, SpaceLabels& out)
       : memory_(memory), levels_(out.levels_), out_(out), relations_(memory, out) {}
 
@@ -61,7 +61,8 @@ class SpaceLabeler {
   }
 
  private:
-  // Completes a row whose components were appended.
+  // Completes a row after its components were appended to `depth.touch`, which then has `used`
+  // elements. `open`: the faces at which all voxels are empty.
   void end_row(SpaceLabels::Depth& depth, uint64_t row, uint64_t used, uint8_t open) {
     SpaceLabels::Row& out = depth.rows[row];
     const uint64_t count = used - out.first;
@@ -194,7 +195,7 @@ class SpaceLabeler {
   }
 
   struct Side {
-    uint32_t first = kNone;  // the set of a component at the face; kNone: it has no component
+    uint32_t first = kNone;  // the set of a component at the face; kNone: none
     bool is_one = true;      // all components at the face are in this set
     bool is_open = false;    // all voxels at the face are empty
   };

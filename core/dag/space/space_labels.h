@@ -58,20 +58,21 @@ class SpaceLabels {
  private:
   friend class SpaceLabeler;
 
-  // The components of a node. Most nodes have few, so that one access of memory is enough.
+  // The components of a node. If there are at most kFew, as in most nodes, `touch` has their faces,
+  // so that one memory access is enough.
   struct Row {
     static constexpr uint8_t kFew = 2, kMany = 255;
 
     uint32_t first = 0;  // index in Depth::touch
-    uint8_t count = 0;   // kMany: the next row's `first` tells it
+    uint8_t count = 0;   // kMany: use the next row's `first`
     uint8_t open = 0;    // faces at which all voxels are empty
     uint8_t touch[kFew] = {};
   };
   struct Depth {
     PooledArray<Row> rows;  // one more than the nodes
     PooledArray<uint8_t> touch;
-    // By row: index in `maps` of the starts of the octants' labels, relative to this index. The
-    // labels follow.
+    // For each row, an index in `maps`. From this index on, `maps` has the start of each octant's
+    // labels (relative to this index), and then the labels.
     PooledArray<uint32_t> first_map;
     PooledArray<uint16_t> maps;
   };
@@ -88,7 +89,7 @@ class SpaceLabels {
 std::vector<uint8_t> connected_components(PooledMemory& memory, SpaceLabels& labels, int depth,
                                           uint32_t row, int octant, uint32_t component);
 
-// A node, a brick or an empty cube, as a place whose components have numbers given by the caller.
+// A node, a brick or an empty cube at one place of the octree. The caller numbers its components.
 struct LabeledCube {
   bool exists = false;  // false: the cube is empty
   uint32_t row = 0;

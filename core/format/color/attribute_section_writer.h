@@ -24,8 +24,8 @@ namespace voxdag {
 
 class AttributeSectionWriter {
  public:
-  // Encodes the colors of a region in a tier above tier 0. The sum of a cell adds up the totals of
-  // the finer tier's regions that are inside the cell.
+  // Encodes the colors of a region in a tier coarser than tier 0. The sum of a cell adds up the
+  // totals of the finer tier's regions that are inside the cell.
   using EncodeColors = std::function<EncodedRegion(uint32_t tier, uint64_t morton,
                                                    std::span<const ColoredCell> cells)>;
 

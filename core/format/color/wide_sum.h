@@ -37,9 +37,9 @@ struct WideSum {
     return high == 0 ? 0 : static_cast<int>(std::bit_width(high)) + 1;
   }
 
-  // Returns the sum without its lowest `bits` bits. If the seen_weight of the result (or its
-  // weight, if all surfaces are transparent) would be below kPrecise, rounding could change the
-  // color. In this case, returns the mean color of the sum, with a weight of at least 1.
+  // Returns the sum divided by 2^bits, which has the same color. If the seen_weight of the result
+  // (or its weight, if all surfaces are transparent) would be below kPrecise, rounding could change
+  // the color. In this case, returns the mean color of the sum, with a weight of at least 1.
   ColorSum narrow(int bits) const {
     constexpr uint64_t kPrecise = uint64_t{1} << 16;
     ColorSum sum;

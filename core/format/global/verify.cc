@@ -311,8 +311,8 @@ void Verifier::check_all_used(uint32_t level) const {
                });
 }
 
-// Counts the occurrences of each node in the octree, from the root down, and computes the number of
-// voxels from them.
+// Checks the numbers of voxels and octree nodes in the header. To compute these numbers, counts the
+// occurrences of each node in the octree, from the root down.
 void Verifier::check_counts() const {
   std::atomic<uint64_t> svo_nodes = 0, voxels = 0;
   PageBuffer<uint64_t> times(budget_, file_.empty() ? 0 : 1, "counts of a level");

@@ -1,6 +1,6 @@
-// Protects files at the output paths of a command that other programs create or change while the
-// command runs. A command checks its outputs at the start, and writes some of them only hours
-// later.
+// Protects files of other programs from being overwritten by a command: files that these programs
+// create or change at the command's output paths while the command runs. This matters because a
+// command checks its outputs at the start, and writes some of them only hours later.
 //
 // The command guards its output paths, including the temporary names, then checks them, and writes
 // all outputs through this file system. create(), rename() and remove() of a guarded path accept

@@ -48,13 +48,14 @@ uint64_t SpaceReserve::free_space(const std::string& path) {
 
 void SpaceReserve::use(const std::string& path, uint64_t bytes) {
   if (unchecked_bytes_.fetch_add(bytes) + bytes < kCheckBytes) return;
-  // Asks for the free space of the folder, because the file's name may already have been removed.
+  // Reads the free space at the path of the folder, because the file's name may already have been
+  // removed.
   const uint64_t free_bytes = free_space(parent_directory(path));
   if (free_bytes < bytes)
     throw Error(ErrorCode::kNoSpace, "write " + path + ": the disk has " + size_text(free_bytes) +
                                          " free besides the " + size_text(reserve_bytes_) +
                                          " that stay reserved");
-  // Near the reserve, every write looks at the disk.
+  // Near the reserve, every write reads the free space again.
   unchecked_bytes_ = free_bytes < 2 * kCheckBytes ? kCheckBytes : 0;
 }
 

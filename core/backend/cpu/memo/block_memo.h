@@ -33,7 +33,8 @@ class BlockMemo {
 
   explicit BlockMemo(PooledMemory& memory);
 
-  // True if the memo should be used for the next `count` blocks.
+  // True if the memo should be used for the next `count` blocks, which count as lookups; false
+  // while the memo is bypassed (kBypass).
   bool is_worthwhile(int count) {
     if (bypassed_ > 0) {
       bypassed_ -= count;

@@ -11,7 +11,8 @@ class FullNodes {
   explicit FullNodes(SubDagTables& tables) : tables_(tables) {}
 
   // Returns the node of a full cube with an edge of 2^size_log2 voxels. Does not change the tables'
-  // counts (full_counts()). The caller must use the node: every node of the tables is emitted.
+  // counts; the caller adds full_counts() to them. The caller must use the node, because every node
+  // of the tables becomes a node of the sub-DAG.
   const NodeRef& node(int size_log2) {
     NodeRef& full = nodes_[size_log2];
     if (!full.exists) full = make(size_log2);

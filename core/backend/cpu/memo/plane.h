@@ -49,8 +49,8 @@ struct Plane {
   // True if a plane with this normal and with the offset f from a cube sets voxels of the cube.
   // Requires fits().
   bool crosses(int64_t f, int size_log2) const;
-  // True if a cube that the plane does not cross is on the plane's upper side, where n.p is larger.
-  // `f`: as for crosses().
+  // True if the plane is below a cube that it does not cross: n.p + c is positive in the cube. `f`
+  // is as for crosses().
   bool is_below(int64_t f, int size_log2) const;
   // Sets `f` to the plane's offset from the cube. Returns false if the plane sets no voxel of the
   // cube; `f` is then unchanged. Requires fits().
@@ -58,7 +58,8 @@ struct Plane {
 };
 
 // Returns the plane of a triangle whose vertices have equal coordinates along an axis, and nullopt
-// for all other triangles. Unlike plane_of(), also accepts wide and degenerate triangles.
+// for all other triangles. Unlike plane_of(), it also accepts degenerate triangles and wide
+// triangles (triangle_set.h).
 template <class Int>
 std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t, VoxelRule rule) {
   for (int a = 0; a < 3; ++a) {
@@ -71,7 +72,7 @@ std::optional<Plane> axis_aligned_plane(const Triangle<Int>& t, VoxelRule rule) 
   return {};
 }
 
-// Returns the sign of a component of the triangle's normal.
+// Returns the sign of the component `axis` of the triangle's normal: 1, 0 or -1.
 template <class Int>
 int normal_sign(const Triangle<Int>& t, int axis) {
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;
@@ -99,15 +100,15 @@ struct PlaneRange {
 
   PlaneRange(int64_t least, int64_t most) : low(least), high(most) {}
   PlaneRange(int64_t up, int64_t width, int64_t f) : low(-(f + up)), high(low + width) {}
-  // Returns the range with all voxels of the inner sides.
+  // Returns this range, extended to all voxels of the inner sides.
   PlaneRange with(InnerSides inner) const {
     return {inner.below ? std::numeric_limits<int64_t>::min() : low,
             inner.above ? std::numeric_limits<int64_t>::max() : high};
   }
 };
 
-// Returns the voxels of a brick that a plane with offset f from the brick sets, and all voxels of
-// the inner sides.
+// Returns a brick's mask: the voxels that a plane with offset f from the brick sets, and all voxels
+// of the inner sides.
 inline uint64_t plane_brick(const Plane& plane, int64_t f, InnerSides inner = {}) {
   const PlaneRange crossed = PlaneRange(plane.up, plane.width, f).with(inner);
   uint64_t mask = 0;

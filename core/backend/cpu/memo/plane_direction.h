@@ -3,9 +3,9 @@
 // voxels has 729 corners, so the sorted values -n.k divide all offsets f into at most 730
 // intervals. All planes with offsets in one interval produce the same node. This node is made once
 // and then looked up. The same is true for nodes that also contain the inner sides of the plane
-// (InnerSides), because their voxels have the same bounds. With the rule kThin, a voxel k changes
-// only at the offsets -n.k and -n.(k + e), where e is the unit vector along the dominant axis. So
-// the same intervals are valid.
+// (InnerSides), because their voxels have the same bounds. The same intervals are also valid for
+// the rule kThin: whether a voxel k is set changes only at the offsets -n.k and -n.(k + e), where e
+// is the unit vector along the dominant axis.
 #pragma once
 
 #include <cstdint>
@@ -44,7 +44,8 @@ class PlaneDirection {
   int64_t min_offset() const { return min_offset_; }
   int64_t max_offset() const { return max_offset_; }
 
-  // Returns the node at an offset within [min_offset(), max_offset()].
+  // Returns the node of a cube of 8^3 voxels from which the plane has the offset `f`. Requires
+  // min_offset() <= f <= max_offset().
   const Known& node(int64_t f, SubDagTables& tables, const Kernels& kernels) {
     Known& known = known_[interval(f)];
     if (known.nodes == 0) make(f, tables, kernels, known);

@@ -242,7 +242,7 @@ void PlaneMemo::reserve_small_nodes() {
     if (old[i].key != 0) small_slot(old[i].key) = old[i];
 }
 
-// Returns the slot of a key, or the free slot for it.
+// Returns the slot that contains the key or, if no slot contains it, the free slot for this key.
 PlaneMemo::SmallNode& PlaneMemo::small_slot(uint64_t key) {
   uint64_t at = key * 0x9e3779b97f4a7c15ull >> 20;
   while (true) {

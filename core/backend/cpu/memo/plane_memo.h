@@ -54,10 +54,10 @@ class PlaneMemo {
              NodeRef& node);
   // Returns the plane of a triangle that covers a cube, or nothing if build() would return false.
   std::optional<Found> find_plane(const TriangleSet& triangles, Entry entry, int size_log2);
-  // Sets `node` to the node of a cube with an edge of at most 64 voxels, in which the plane and the
-  // voxels of its inner sides are set; `f` is the plane's offset, and the plane crosses the cube.
-  // Adds the voxels of the inner sides to `filled`. Returns false if the memo has no memory for
-  // this direction.
+  // Sets `node` to the node of a cube that the plane crosses, with an edge of at most 64 voxels.
+  // The node has the voxels that the plane sets and all voxels of its inner sides. `f` is the
+  // plane's offset from the cube (plane.h). Sets `filled` to the number of voxels that only the
+  // inner sides set. Returns false if the budget has no memory for the plane's direction.
   bool build_tile(const Found& found, InnerSides inner, int64_t f, int size_log2, NodeRef& node,
                   uint64_t& filled);
   // True if build() would succeed for cubes of up to 64^3 voxels that the triangle covers.
@@ -84,7 +84,9 @@ class PlaneMemo {
   static constexpr uint32_t kWorthwhile = 24;
   static constexpr uint32_t kNever = UINT32_MAX;
 
-  // Returns the number of a triangle's plane.
+  // Returns the index in planes_ of a triangle's plane; nullopt if the memo does not have the
+  // plane. Adds `tiles` to the tiles that the triangle has covered, and adds the plane to the memo
+  // when there are kWorthwhile tiles.
   std::optional<uint32_t> find(const TriangleSet& triangles, Entry entry, uint64_t tiles);
   uint32_t add_plane(const Plane& plane);
   PlaneDirection* direction_of(KnownPlane& known, InnerSides inner);
@@ -96,7 +98,9 @@ class PlaneMemo {
   NodeRef full_node(int size_log2);
   NodeRef node(const Plane& plane, PlaneDirection& direction, int64_t f, int size_log2);
   NodeRef tile_node(PlaneDirection& direction, InnerSides inner, int64_t f, int size_log2);
-  // Adds the cubes of 8^3 voxels on the inner sides of a plane to `existing`.
+  // Adds the full cubes of 8^3 voxels on the inner sides of a plane to the bit set `existing`,
+  // which has the cubes that the plane crosses. Adds the nodes and voxels of the full cubes to
+  // `counts`.
   void add_full(const int64_t* offsets, int count, InnerSides inner, const PlaneRange& crossed,
                 uint64_t (&existing)[8], OctreeCounts& counts);
   SmallNode& small_slot(uint64_t key);
@@ -116,7 +120,7 @@ class PlaneMemo {
   PooledArray<SmallNode> small_nodes_;
   uint64_t small_slots_ = 0;  // a power of two
   uint64_t small_count_ = 0;
-  uint64_t filled_ = 0;  // voxels of inner sides, like the tables' counts
+  uint64_t filled_ = 0;  // voxels that only inner sides set, in all nodes returned so far
 };
 
 }  // namespace voxdag::cpu

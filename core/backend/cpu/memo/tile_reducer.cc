@@ -83,7 +83,8 @@ int TileReducer::add_full_blocks(const uint64_t* full, int words, int count) {
   const auto times = static_cast<uint64_t>(added);
   tables_.counts() += {times * counts.nodes, times * counts.voxels};
   const int total = count + added;
-  // Goes from the last node to the first, because the nodes move to higher positions.
+  // Goes from the last node to the first, because nodes move to higher positions in the same
+  // arrays.
   for (int w = words, to = total; w-- > 0;) {
     existing_.words[w] |= full[w];
     for (uint64_t rest = existing_.words[w]; rest != 0;) {

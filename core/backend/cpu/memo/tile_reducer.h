@@ -26,8 +26,9 @@ class TileReducer {
 
   // Returns the node of a tile with an edge of 2^size_log2 voxels, or a NodeRef without a node if
   // the tile has no voxels. Adds the tile's octree nodes and voxels to the tables' counts, and
-  // empties the tile. `full`: bit set of the full voxel blocks of a solid, in Morton order, which
-  // are empty in the tile. Null: there are none.
+  // empties the tile. `full` is a bit set, in Morton order, of the voxel blocks that are full
+  // because they are inside a solid. These blocks are empty in `tile`. Null if there are no such
+  // blocks.
   NodeRef reduce_bricks(TileBricks& tile, int size_log2, const uint64_t* full = nullptr);
 
   // Returns the node of a cube with an edge of 2^size_log2 voxels, from its nodes with an edge of
@@ -70,7 +71,9 @@ class TileReducer {
   // blocks_, and clears these blocks in the tile.
   void find_blocks(TileBricks& tile, int count);
   void find_new_blocks(TileBricks& tile, int count, bool insert);
-  // Adds full voxel blocks to the `count` nodes of the current level. Returns the new number.
+  // Inserts the nodes of full voxel blocks into ids_ and hashes_, which have `count` nodes of voxel
+  // blocks. `full` is as for reduce_bricks() and has `words` words. Returns the new number of
+  // nodes.
   int add_full_blocks(const uint64_t* full, int words, int count);
   NodeRef reduce(int words, int count, int from_log2, int size_log2);
   // Finds or adds the nodes of `parents`. `hashes` and `ids` contain the children's values before

@@ -8,14 +8,15 @@
 namespace voxdag::cpu {
 namespace {
 
-// Voxels of a brick are numbered in Morton order: axis a owns bits 2 - a and 5 - a.
+// Voxels of a brick are numbered in Morton order: bits 2 - a and 5 - a of a voxel's number are its
+// coordinate along axis a.
 constexpr int low_bit(int axis) { return 4 >> axis; }
 constexpr int high_bit(int axis) { return 32 >> axis; }
 constexpr int voxel_bits(int axis, int k) {
   return (k & 1 ? low_bit(axis) : 0) | (k & 2 ? high_bit(axis) : 0);
 }
 
-// The four voxels of the line along `axis` that starts at voxel 0.
+// Returns the four voxels of the line along `axis` that starts at voxel 0.
 constexpr uint64_t line_along(int axis) {
   return 1 | uint64_t{1} << low_bit(axis) | uint64_t{1} << high_bit(axis) |
          uint64_t{1} << (low_bit(axis) + high_bit(axis));
@@ -45,9 +46,9 @@ uint64_t plane_mask(const VoxelOffsets<Int>& offsets, Int at_first, Int width) {
   return mask;
 }
 
-// Removes the voxels whose column along `axis` is on the outer side of an edge. If the value of an
-// edge (TileTriangle::Edge) is not negative anywhere in the brick, the edge removes nothing and is
-// skipped. This is the usual case, because most edges cross few bricks.
+// Removes from `mask` the voxels whose column along `axis` is on the outer side of an edge. If the
+// value of an edge (TileTriangle::Edge) is not negative anywhere in the brick, the edge removes
+// nothing and is skipped. This is the usual case, because most edges cross few bricks.
 template <class Edge>
 void cut_by_edges(const Edge (&edges)[3], int axis, const int (&brick)[3], uint64_t& mask) {
   const int p = (axis + 1) % 3, q = (axis + 2) % 3;

@@ -1,7 +1,7 @@
-// The kernels of solids (core/backend/cpu/raster/kernels.h), for voxels in slices (slices.h). The
-// eight words are a vector; compilers translate operations on vectors to the instruction set of the
-// source that includes this header. All functions have internal linkage and are inlined, so each
-// instruction set has its own code.
+// Implements the kernels of solids (find_components, flood and add_slices in kernels.h). The eight
+// words of Slices (slices.h) are one vector; compilers translate operations on vectors to the
+// instruction set of the source that includes this header. All functions have internal linkage and
+// are inlined, so each instruction set has its own code.
 #pragma once
 
 #include <cstdint>
@@ -25,9 +25,9 @@ VOXDAG_SLICES_INLINE bool is_zero(const Words& words) {
   return any == 0;
 }
 
-// The eight lanes form pairs of an upper and a lower lane. The upper lane's bits `low` and the
-// lower lane's bits `low` << `shift` change places. `swapped`: `words` with the lanes of each pair
-// exchanged. `upper`: all ones in the upper lanes.
+// Exchanges bits within pairs of an upper and a lower lane: the upper lane's bits `low` and the
+// lower lane's bits `low` << `shift` change places. `swapped` is `words` with the lanes of each
+// pair exchanged. `upper` has all ones in the upper lanes.
 VOXDAG_SLICES_INLINE void exchange_lanes(Words& words, const Words& swapped, const Words& upper,
                                          int shift, uint64_t low) {
   const Words to_upper = (words & ~low) | ((swapped >> shift) & low);
@@ -35,9 +35,10 @@ VOXDAG_SLICES_INLINE void exchange_lanes(Words& words, const Words& swapped, con
   words = (to_upper & upper) | (to_lower & ~upper);
 }
 
-// Exchanges Morton order and slices. A voxel's number (word | bit) has the bits x2 y2 z2 | x1 y1 z1
-// x0 y0 z0 in Morton order, and x2 x1 x0 | y2 y1 y0 z2 z1 z0 in slices. Three exchanges of two bits
-// each turn one order into the other, so the function is its own inverse.
+// Converts voxels from Morton order to slices, or from slices to Morton order. A voxel's number
+// (word | bit) has the bits x2 y2 z2 | x1 y1 z1 x0 y0 z0 in Morton order, and x2 x1 x0 | y2 y1 y0
+// z2 z1 z0 in slices. Three exchanges of two bits each turn one order into the other, so the
+// function is its own inverse.
 VOXDAG_SLICES_INLINE void exchange_order(Words& words) {
   constexpr uint64_t k1 = ~uint64_t{0};
   // The exchanged bits are y2 and x1, then z2 and x0, then z1 and y0.
@@ -49,7 +50,9 @@ VOXDAG_SLICES_INLINE void exchange_order(Words& words) {
   words ^= differ ^ (differ << 6);
 }
 
-// Extends `reached` along lines of eight voxels, whose bits are kStep apart, in both directions.
+// Extends `reached` in both directions along lines of eight voxels, whose bits are kStep apart.
+// `empty_above` has the empty voxels that a step to a higher bit may enter, `empty_below` the empty
+// voxels that a step to a lower bit may enter.
 template <int kStep>
 VOXDAG_SLICES_INLINE void fill_lines(Words& reached, const Words& empty_above,
                                      const Words& empty_below) {
@@ -63,7 +66,7 @@ VOXDAG_SLICES_INLINE void fill_lines(Words& reached, const Words& empty_above,
   reached = up | down;
 }
 
-// Extends `reached` along lines of the same bit in all lanes, in both directions.
+// Extends `reached` through empty voxels in both directions along x, from lane to lane.
 VOXDAG_SLICES_INLINE void fill_lanes(Words& reached, const Words& empty) {
   constexpr Words k0{};
   Words up = reached, down = reached, up_free = empty, down_free = empty;
@@ -80,14 +83,14 @@ VOXDAG_SLICES_INLINE void fill_lanes(Words& reached, const Words& empty) {
   reached = up | down;
 }
 
-// Extends `reached` along all three axes.
+// Extends `reached` through empty voxels, once along each of the three axes.
 VOXDAG_SLICES_INLINE void grow(Words& reached, const Words& empty) {
   fill_lines<1>(reached, empty & ~kLowZ, empty & ~(kLowZ << 7));
   fill_lines<8>(reached, empty, empty);
   fill_lanes(reached, empty);
 }
 
-// True if a voxel of `a` is a neighbor of a voxel of `b`.
+// True if a voxel of `a` shares a face with a voxel of `b`.
 VOXDAG_SLICES_INLINE bool touch(const Words& a, const Words& b) {
   Words both = (a & (b << 8)) | (b & (a << 8));
   both |= ((a & (b << 1)) | (b & (a << 1))) & ~kLowZ;
@@ -102,8 +105,8 @@ VOXDAG_SLICES_INLINE void flood(const Words& empty, Words& reached) {
   } while (touch(reached, empty ^ reached));
 }
 
-// Returns the corner voxels of a block that are in a set of voxels. The block has an edge of kLast
-// + 1 voxels.
+// Returns a bit set, by child index, of a block's corner voxels that are in `voxels`. The block has
+// an edge of kLast + 1 voxels.
 template <int kLast>
 VOXDAG_SLICES_INLINE uint32_t corners_in(const Words& voxels) {
   uint64_t corners = 0;

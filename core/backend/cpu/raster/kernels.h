@@ -54,15 +54,15 @@ struct Kernels {
   // Copies the non-empty bricks of a voxel block to the front of `bricks`, which has space for
   // eight.
   VoxelBlockContent (*unpack)(const VoxelBlock& block, uint64_t* bricks);
-  // The kernels of solids (core/backend/cpu/raster/slices.h). find_components() finds the
-  // components of a block's empty voxels. classes[c] is the class of corner c
+  // This kernel and the next two are for solids. Finds the components of a block's empty voxels
+  // (see BlockComponents in slices.h). classes[c] is the class of corner c
   // (TileViews::classes_at()).
   void (*find_components)(const VoxelBlock& block, const int32_t (&classes)[8],
                           BlockComponents& out);
-  // Adds the voxels of `empty` that walks of 6-neighbors through `empty` reach from `reached`, a
-  // part of `empty`.
+  // Adds to `reached`, which must be a part of `empty`, all voxels of `empty` that are connected to
+  // it by steps between 6-neighbors within `empty`.
   void (*flood)(const Slices& empty, Slices& reached);
-  // Adds voxels to a block, which has none of them. Returns their number.
+  // Adds `voxels` to a block, in which they must be empty. Returns their number.
   uint32_t (*add_slices)(const Slices& voxels, VoxelBlock& block);
 };
 

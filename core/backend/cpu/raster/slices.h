@@ -21,8 +21,8 @@ struct Slices {
 };
 
 // The 6-connected components of a block's empty voxels that contain a corner of the block. Several
-// components may be in one entry if all their corners have the same class, because they get the
-// same decision.
+// components may be in one entry if all their corners have the same class, because they are then
+// all inside the solid or all outside.
 struct BlockComponents {
   int count;
   uint32_t corners[8];  // bit sets, by child index

@@ -27,8 +27,8 @@ template <class Coordinate>
 bool ThinTriangle<Coordinate>::set_planes(const int64_t (&v)[3][3], const Int (&size)[3],
                                           int64_t tile_voxels) {
   const auto& n = this->normal;
-  // If the value is 0, its sign is the sign of the normal's first component that is not 0. If this
-  // component is negative, subtracting 1 makes the value negative.
+  // A value n.(p - v0) of 0 counts as having the sign of the normal's first component that is not
+  // 0. If this component is negative, subtracting 1 makes the value negative.
   int128 origin = (n[0] != 0 ? n[0] : n[1] != 0 ? n[1] : n[2]) < 0 ? -1 : 0;
   for (int a = 0; a < 3; ++a) origin -= static_cast<int128>(n[a]) * v[a][0];
   int128 lowest_of[3];
@@ -58,7 +58,8 @@ void ThinTriangle<Coordinate>::set_rows(const int64_t (&v)[3][3], const int64_t 
     const int64_t sign = this->normal[d] < 0 ? -1 : 1;
     for (int i = 0; i < 3; ++i) {
       const int64_t a = -half[q][i] * sign, b = half[p][i] * sign;
-      // If the value is 0, its sign is the sign of the factor that belongs to the first axis.
+      // A value of 0 counts as having the sign of the factor of the first axis or, if this factor
+      // is 0, of the other factor.
       const int64_t first = p < q ? a : b, second = p < q ? b : a;
       const bool inside_at_zero = first != 0 ? first > 0 : second > 0;
       const Int c = static_cast<Int>(a) * (kHalfVoxel - v[p][i]) +

@@ -9,8 +9,8 @@ namespace {
 
 constexpr int kBlocks = RunningRows::kRows - 1;  // along a tile's edge
 
-// True if points of the plane count as above it. The rule of crossings moves every point by an
-// infinitely small vector (core/geometry/crossing.h).
+// True if points on the plane count as above it, because the rule of crossings moves every point by
+// an infinitely small vector (core/geometry/crossing.h).
 bool ties_are_above(const Plane& plane) {
   return (plane.n[0] != 0 ? plane.n[0] : plane.n[1] != 0 ? plane.n[1] : plane.n[2]) > 0;
 }
@@ -47,7 +47,8 @@ std::optional<PlaneViews::Sides> PlaneViews::read(const Plane& plane, int64_t f,
   int32_t sums[2] = {0, 0};
   for (const auto& views : views_)
     for (int side = 0; side < 2; ++side) sums[side] += views[side];
-  // If no corner is on a side, all voxels of this side are in the shell, so it has no inside.
+  // If no corner is on a side, all voxels of this side are in the shell, so no voxel of it can be
+  // filled.
   const InnerSides inner{lowest < 0 && is_inside(sums[0]), highest >= 0 && is_inside(sums[1])};
   const bool below = inner.below && is_disputed(sums[0]);
   const bool above = inner.above && is_disputed(sums[1]);
@@ -55,8 +56,8 @@ std::optional<PlaneViews::Sides> PlaneViews::read(const Plane& plane, int64_t f,
   return Sides{inner, below || above};
 }
 
-// Sets views_[axis] to the views below and above the plane. Returns false if rows on the same side
-// of the plane have different views.
+// Sets views_[axis] to the views of the rows below and above the plane. Returns false if rows on
+// the same side of the plane have different views.
 bool PlaneViews::read(int axis, bool is_turned) {
   const Face low = face(axis, false);
   const int32_t* rows = rows_[axis];

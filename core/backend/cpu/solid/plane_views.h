@@ -1,6 +1,7 @@
-// The views around a plane that covers a tile and is the tile's only surface. If all corners of
-// blocks on one side of the plane have equal views, the plane and the inner sides determine the
-// tile, so its node can be in the plane memo. Not thread-safe.
+// The views (core/geometry/solid_rule.h) on both sides of a plane that covers a tile and is the
+// tile's only surface. If all corners of blocks on the same side of the plane have equal views, the
+// plane and its inner sides (plane.h) determine the tile's voxels, so the tile's node can be in the
+// plane memo. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,8 @@ namespace voxdag::cpu {
 
 class PlaneViews {
  public:
-  // The inner sides, and whether the directions disagree on their voxels.
+  // The plane's inner sides, and whether the views along different axes disagree about the voxels
+  // of these sides (UnitViews::is_disputed()).
   struct Sides {
     InnerSides inner;
     bool is_disputed;
@@ -31,8 +33,8 @@ class PlaneViews {
  private:
   static constexpr int kRows = RunningRows::kRows;
 
-  // A face's corners with the first corner at `base`: a corner is above the plane iff its value is
-  // >= 0.
+  // The plane's values at the corners of blocks on one face of the tile. `base` is the value at the
+  // face's first corner. A corner is above the plane iff its value is >= 0.
   struct Face {
     int64_t base, first_step, second_step;
 
@@ -44,8 +46,8 @@ class PlaneViews {
 
   const SolidRule rule_;
   RunningRows& running_;
-  int64_t base_ = 0;      // value of the tile's low corner
-  int64_t step_[3] = {};  // from one corner of a block to the next
+  int64_t base_ = 0;      // the plane's value at the tile's low corner
+  int64_t step_[3] = {};  // difference of the values at adjacent corners
   int32_t* rows_[3] = {};
   int32_t views_[3][2] = {};  // [axis][is above]
 };

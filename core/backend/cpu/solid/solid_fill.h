@@ -1,5 +1,6 @@
-// The state of a solid's interior while a subvolume is built: running rows, and the views and the
-// units of the current tile. Used for one build, by one thread. Throws OutOfBudget.
+// Decides which empty voxels of a subvolume are inside a solid (core/geometry/solid_rule.h), and
+// fills them, while the subvolume is built. Holds the running rows, and the views and units of the
+// current tile. Used for one build, by one thread. Throws OutOfBudget.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +25,8 @@ class SolidFill {
 
   // For a tile of 64^3 voxels whose only surface is a plane that covers it (PlaneViews): returns
   // the plane's inner sides, or nothing if the tile needs the calls below. If the tile's node can
-  // be made with these sides, call pass_plane() with the number of filled voxels.
+  // be made with these sides, call pass_plane() with the number of filled voxels. `f` and
+  // `is_turned` are as for PlaneViews::read().
   std::optional<PlaneViews::Sides> read_plane(const Plane& plane, int64_t f, bool is_turned,
                                               const LatticeCube& tile);
   void pass_plane(const PlaneViews::Sides& sides, uint64_t filled);
@@ -33,8 +35,9 @@ class SolidFill {
   // fill_tile().
   void begin_tile(const LatticeCube& tile);
   void add(const FixedTriangle& triangle) { views_.add(triangle); }
-  // Fills the units of the tile that are inside, except full_blocks(). Returns false, and fills
-  // nothing, if the tile has no voxel of the shell.
+  // Fills the units (solid_rule.h) of the tile that are inside the solid. Leaves the blocks of
+  // full_blocks() empty; TileReducer treats them as full. Returns false, and fills nothing, if the
+  // tile has no voxel of the shell.
   bool fill_tile(TileBricks& bricks, int size_log2,
                  const TileFiller::ForEachTriangle& for_each_triangle);
   // Bit set of the tile's full voxel blocks, for TileReducer.
@@ -44,7 +47,8 @@ class SolidFill {
   // tile. The tiles before the cube and in the cube must be finished, and no later tile may have
   // begun.
   UnitViews empty_cube(const LatticeCube& cube);
-  // Returns the node of an empty cube that is a unit: full if it is inside, otherwise none.
+  // Returns the node of an empty cube that is a unit with the given views: the node of a full cube
+  // if the unit is inside the solid, otherwise no node.
   NodeRef decide(const UnitViews& unit, int size_log2);
 
   const FilledVoxels& filled() const { return filled_; }

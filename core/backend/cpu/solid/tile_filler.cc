@@ -22,7 +22,8 @@ int cube_coordinate(int index, int axis) {
   return (bits & 1) | (bits >> 2 & 2) | (bits >> 4 & 4);
 }
 
-// Returns the sum of the signs of the triangle's crossings with the walk.
+// Returns the sum of the signs of the triangle's crossings with the walk from `from` to `to` along
+// z, y and x.
 int64_t walk_crossings(const FixedTriangle& t, const int64_t (&from)[3], const int64_t (&to)[3]) {
   int64_t p[3] = {from[0], from[1], from[2]};
   int64_t sum = 0;
@@ -74,7 +75,7 @@ void TileFiller::list_occupied(const TileBricks& tile, int size_log2) {
       occupied_[level][w / 8] |= uint64_t{octants(occupied_[level - 1][w])} << 8 * (w % 8);
 }
 
-// `level` is log2 of the cubes' edge in blocks.
+// `level` is log2 of the edge of the occupied cubes, in blocks.
 void TileFiller::fill_empty_children(int level) {
   for (int w = 0; w < kTileBlocks / 64; ++w)
     for (uint64_t rest = occupied_[level][w]; rest != 0; rest &= rest - 1) {
@@ -85,7 +86,8 @@ void TileFiller::fill_empty_children(int level) {
     }
 }
 
-// `index`: the cube's number in Morton order.
+// Fills an empty cube if it is inside the solid. `index` is the cube's number in Morton order, and
+// `level` log2 of its edge in blocks.
 void TileFiller::fill_empty(int level, int index) {
   int low[3];
   for (int a = 0; a < 3; ++a) low[a] = cube_coordinate(index, a) << level;

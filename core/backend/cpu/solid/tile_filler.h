@@ -39,12 +39,13 @@ class TileFiller {
   // full_blocks() empty.
   bool fill(TileBricks& tile, int size_log2, const int64_t (&low)[3], const TileViews& views,
             const ForEachTriangle& for_each_triangle, FilledVoxels& filled);
-  // Bit set of the blocks in empty cubes that are inside, in Morton order.
+  // Returns a bit set, in Morton order, of the blocks in those empty cubes that are inside the
+  // solid.
   const uint64_t* full_blocks() const { return full_; }
 
  private:
-  // A component without a corner, and the walk to it: along z, y and x, from the block's low corner
-  // to the center of the component's first voxel in Morton order.
+  // A component without a corner of its block, and the walk to it: along z, y and x, from the
+  // block's low corner to the center of the component's first voxel in Morton order.
   struct BlindComponent {
     int block;  // index in TileBricks
     Slices voxels;
@@ -54,11 +55,11 @@ class TileFiller {
   };
 
   void list_occupied(const TileBricks& tile, int size_log2);
-  // Finds the maximal empty cubes in the occupied cubes of a level.
+  // Finds the empty children of the occupied cubes of a level, and fills those inside the solid.
   void fill_empty_children(int level);
   void fill_empty(int level, int index);
   void fill_block(int index);
-  // Returns the views from a corner of a block; `block` is in blocks.
+  // Returns the sum of the views from a corner of the block at the position `block` (in blocks).
   int32_t view_at(const int (&block)[3], int corner) const;
   // Adds the components of `rest` to blind_.
   void add_blind(int index, const int (&low)[3], Slices& rest);

@@ -14,10 +14,11 @@ class TileViews {
 
   // Starts a tile.
   void begin(const SampleRows& rows);
-  // Adds the crossings of a triangle.
+  // Adds the crossings of a triangle with the tile's sample rows.
   void add(const FixedTriangle& triangle);
-  // Sets the views of all corners from the views at the tile's low faces, and advances these to the
-  // high faces. `tile`: the tile's position in the subvolume, in tiles.
+  // Sets the views of all corners from the views in `running`, which are at the tile's low faces,
+  // and from the added crossings. Advances the views in `running` to the tile's high faces. `tile`
+  // is the tile's position in the subvolume, in tiles.
   void finish(SolidRule rule, RunningRows& running, const int (&tile)[3]);
 
   // Returns the sum of the three views from a corner; coordinates are in blocks.

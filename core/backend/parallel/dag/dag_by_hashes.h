@@ -147,8 +147,8 @@ struct Survivors {
   SpaceArray<Space, uint64_t> hashes;  // ascending, no duplicates
 };
 
-// Returns the children of `parents` without duplicates. Writes mask and child list of each parent
-// to `level`.
+// Returns the children of `parents` without duplicates. Sets the counts, masks and children of
+// `level`, the level of `parents`.
 template <class Space>
 Survivors<Space> reduce_children(Space& space, const OctreeNodes& nodes,
                                  const Survivors<Space>& parents, const uint64_t* octree_hashes,

@@ -10,9 +10,9 @@
 
 namespace voxdag::parallel {
 
-// Returns the voxels of a brick in which a triangle crosses a row along `axis` through their
-// centers, as bits numbered by cell_bit(). `test`: a RowTest of the triangle and the axis. `low`:
-// the brick's low corner in lattice units.
+// Returns the voxels of a brick in which a triangle crosses the row along `axis` through the
+// voxel's center, as bits numbered by cell_bit(). `test` is a RowTest (crossing.h) of the triangle
+// and the axis. `low` is the brick's low corner in lattice units.
 template <class Test>
 VOXDAG_HD inline uint64_t crossed_along(const Test& test, int axis, const int64_t (&low)[3]) {
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;

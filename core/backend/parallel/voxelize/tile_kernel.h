@@ -21,7 +21,8 @@ inline constexpr uint32_t kTileBricks = 1u << 3 * (kTileLevels - kBrickLevels);
 inline constexpr int kTileCodeBits =
     3 * (kTileLevels - kCellLevels);  // bits of a cell's code within its tile
 
-// The pairs of some tiles, and the arrays for their bricks.
+// The pairs of all tiles, and output arrays for a wave: the tiles from `first_tile` on that are
+// drawn concurrently, each by one thread block.
 struct TileWave {
   CubePlace place;
   const FixedTriangle* triangles;

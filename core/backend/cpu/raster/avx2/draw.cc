@@ -13,8 +13,8 @@ namespace {
 template <int D>
 struct ByteOrder {
   alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel column's number
-  alignas(32) int8_t height[4][2][32] = {};  // voxels above the floor of the first of four bricks
-  alignas(32) int8_t depth[4][2][32] = {};   // voxels below the highest voxel of the four bricks
+  alignas(32) int8_t height[4][2][32] = {};  // height above the floor of the first of four bricks
+  alignas(32) int8_t depth[4][2][32] = {};   // distance below the highest voxel of the four bricks
   constexpr ByteOrder() {
     for (int voxel = 0; voxel < 64; ++voxel) {
       const int p = brick_coordinate(voxel, kP<D>), q = brick_coordinate(voxel, kQ<D>);
@@ -35,9 +35,9 @@ inline constexpr ByteOrder<D> kByteOrder;
 template <int D>
 class Spread {
  public:
-  // The high bit of a voxel column's q selects the half of `bounds` that has the bounds of the
-  // voxel column. For D = 1, this bit also selects the vector that has the voxels of the voxel
-  // column. Otherwise it selects the half of each vector.
+  // The high bit of a voxel column's coordinate q (tile_columns.h) selects the half of `bounds`
+  // that has the bounds of the voxel column. For D = 1, this bit also selects the vector that has
+  // the voxels of the voxel column. Otherwise it selects the half of each vector.
   VOXDAG_INLINE explicit Spread(HeightBounds bounds) {
     const __m256i halves[2] = {D == 1 ? _mm256_permute4x64_epi64(bounds, 0x44) : bounds,
                                D == 1 ? _mm256_permute4x64_epi64(bounds, 0xee) : bounds};

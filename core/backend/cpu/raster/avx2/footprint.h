@@ -1,6 +1,7 @@
 // The footprint of a triangle: the voxel columns, and the columns of bricks, inside the triangle's
 // edges in the projection along the columns. The footprint is also limited to the triangle's box.
-// Exact: these are the overlap test's edge and box tests in this projection.
+// The footprint is exact, because it applies the overlap test's edge and box tests in this
+// projection.
 //
 // A row of bricks is processed as four rows of 64 voxel columns, one bit for each voxel column. In
 // each of the four rows, the triangle's edges and box give the first and the last voxel column of
@@ -22,7 +23,7 @@ namespace {
 // columns of bricks that they list: kShell lists kInside, kThin lists kTouched.
 enum class FootprintColumns {
   kInside,   // columns of bricks that have a voxel column inside
-  kTouched,  // also columns that the triangle touches away from the voxel columns' centers
+  kTouched,  // columns of bricks that the triangle touches, even if no voxel column is inside
 };
 
 template <int D>

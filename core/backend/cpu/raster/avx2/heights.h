@@ -48,8 +48,8 @@ VOXDAG_INLINE int64_t magnitude(int64_t a) { return a < 0 ? -a : a; }
 template <int D>
 class Heights {
  public:
-  // The plane touches the voxels k with 0 <= normal.k + lowest <= width. The reference must outlive
-  // this object.
+  // The plane touches the voxels k with 0 <= normal.k + lowest <= width. `normal` must outlive this
+  // object.
   VOXDAG_INLINE Heights(const int64_t (&normal)[3], int64_t lowest, int64_t width)
       : normal_(normal), lowest_(lowest), width_(width) {
     const int64_t np = normal[P], nq = normal[Q];

@@ -12,11 +12,12 @@ namespace {
 // Tables indexed by the voxel of a brick.
 template <int D>
 struct VoxelBytes {
-  // Positions in HeightBounds (sides.h) of the two bounds that apply to the voxel's column.
+  // Byte indexes in HeightBounds (sides.h) of the lower bound (`below`) and the upper bound
+  // (`over`) of the voxel's column.
   alignas(64) uint8_t below[64] = {};
   alignas(64) uint8_t over[64] = {};
-  alignas(64) uint8_t height[4][64] = {};  // voxels above the floor of the first of four bricks
-  alignas(64) uint8_t depth[4][64] = {};   // voxels below the highest voxel of the four bricks
+  alignas(64) uint8_t height[4][64] = {};  // height above the floor of the first of four bricks
+  alignas(64) uint8_t depth[4][64] = {};   // distance below the highest voxel of the four bricks
   constexpr VoxelBytes() {
     for (int voxel = 0; voxel < 64; ++voxel) {
       const int p = brick_coordinate(voxel, kP<D>), q = brick_coordinate(voxel, kQ<D>);
