@@ -47,7 +47,7 @@ class SolidPlans : public Reference {
   }
 
   LastInputWarning warned_;
-  const voxdag::CancelToken never_;
+  voxdag::CancelToken never_;
 };
 
 // Also if equal triangles count twice, and if triangles leave the grid.

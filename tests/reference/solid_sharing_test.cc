@@ -44,7 +44,7 @@ class SolidSharing : public Reference {
     return voxdag::run_build(spec, {voxdag::system_files(), progress_, never_});
   }
   PartsOfEnclose progress_;
-  const voxdag::CancelToken never_;
+  voxdag::CancelToken never_;
 };
 
 // The labels of the empty space of a subvolume exceed the memory, although the subvolume could be
