@@ -11,19 +11,19 @@
 namespace voxdag {
 namespace {
 
-// Maximum total rows of the artifacts that a pass merges into one. This keeps every level of the
-// merged artifact within 2^32 rows, the format's limit.
+// Maximum total rows of artifacts that a pass merges into one artifact. The total bounds the rows
+// of each merged level, and the format allows at most 2^32 of them.
 constexpr uint64_t kMaxArtifactRows = uint64_t{1} << 32;
 
-// Runs merge passes until all artifacts fit in one pass. The last pass then writes the global file
-// or one artifact.
+// Runs merge passes until one more pass can merge all artifacts. This last pass writes the global
+// file or one artifact.
 class Merger {
  public:
   Merger(const MergeInputs& inputs, const MergeContext& context, uint64_t narrow_words,
          Checkpoint* checkpoint)
       : inputs_(inputs),
         context_(context),
-        // In passes before the final one, the writer of a segment is also in memory.
+        // Passes before the final one also need memory for the writer of their segment.
         pass_bytes_(context.plan.partition_bytes -
                     std::min(context.plan.partition_bytes, kSegmentWriterBytes)),
         pending_(inputs, narrow_words),
@@ -62,7 +62,7 @@ class Merger {
     return context_.report.input_nodes + (fit_at_once() ? 1 : 2) * pending_.rows();
   }
 
-  // Runs passes until all artifacts fit in one pass.
+  // Runs passes until one pass can merge all pending artifacts.
   void run_passes() {
     while (!fit_at_once()) {
       run_pass();
@@ -100,9 +100,9 @@ class Merger {
     }
     segment.finish();
     ++context_.report.passes;
-    // Waits for a running save to end, because is_due() returns false during a save. The save after
-    // this pass must not be skipped for this reason: it releases the bytes that the pass has
-    // merged.
+    // Waits for a running save, because is_due() would return false during it. Then the save after
+    // this pass could be skipped, and the input bytes that the pass has merged would not be
+    // released.
     recovery_.wait();
     const bool is_due = recovery_.is_due();
     const std::vector<SurveyedArtifact> before = pending_.replace_all(merged, segment);
@@ -166,7 +166,8 @@ ArtifactRef merge_to_artifact(const MergeInputs& inputs, FileSystem& files, Segm
   MergeProgress rows_merged(progress);
   const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
                              rows_merged, cancel, report};
-  // UINT64_MAX: no level is wide, because positions in an artifact are row indices of 32 bits.
+  // With a `narrow_words` of UINT64_MAX no level is wide: positions in an artifact are row indices,
+  // which have 32 bits.
   const ArtifactRef merged = Merger(inputs, context, UINT64_MAX, nullptr).run(out);
   report.scratch_bytes += scratch.bytes_written();
   return merged;

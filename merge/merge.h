@@ -11,12 +11,12 @@
 //   output   buckets are written in the order of their hashes, and the position of every row is
 //            stored for the level above
 //
-// Because runs are sorted, the merge can find the frames of a partition and the rows of a bucket.
-// The k-way heap merge also needs sorted runs. It merges rows that a sort cannot hold, which occur
-// with truncated hashes. The budget bounds the memory for any scene. If not all runs fit in one
-// pass, neighboring artifacts are first merged with each other, in one or more passes.
-// docs/architecture.md, "Why the merge is right", has the proof; merge/load/row.h defines the
-// terms.
+// Runs are sorted, so the merge finds the frames of a partition and the rows of a bucket by their
+// hashes. With truncated hashes, a bucket or a single hash can have more rows than fit in memory; a
+// k-way heap merge of the sorted runs merges these rows one by one. The memory budget is an upper
+// limit for every scene. If not all runs fit in one pass, neighboring artifacts are first merged
+// with each other, in one or more passes. docs/architecture.md, "Why the merge is right", has the
+// proof; merge/load/row.h defines the terms.
 #pragma once
 
 #include "core/base/memory_budget.h"
@@ -41,9 +41,9 @@ MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalF
 
 // Merges sub-DAGs into one artifact at the end of `out`, with all their roots. Equal rows of
 // different sub-DAGs become one, so a later merge has fewer rows to read. There must be at least
-// one input. Throws Error{kOutOfMemory} if the sub-DAGs need several passes, but every two
-// neighbors exceed the budget or have over 2^32 rows together. Throws Error{kLimit} if a level of
-// the artifact would have over 2^32 rows.
+// one input. Throws Error{kOutOfMemory} if one pass cannot merge all sub-DAGs and no two neighbors
+// can be merged either: together they need more memory than the budget has, or have over 2^32 rows.
+// Throws Error{kLimit} if a level of the artifact would have over 2^32 rows.
 ArtifactRef merge_to_artifact(const MergeInputs& inputs, FileSystem& files, SegmentWriter& out,
                               MemoryBudget& budget, unsigned threads, Progress& progress,
                               const CancelToken& cancel, MergeReport& report);

@@ -9,8 +9,8 @@
 namespace voxdag {
 namespace {
 
-// Minimum size, in bytes, of a range passed to Checkpoint::release(). A shorter range waits for a
-// later call that also covers the next levels.
+// Minimum size, in bytes, of a range passed to Checkpoint::release(). newly_merged() omits a
+// shorter range; a later call returns these bytes together with the frames of the next levels.
 constexpr uint64_t kMinReleasedBytes = uint64_t{32} << 10;
 
 }  // namespace
@@ -152,7 +152,7 @@ std::vector<SegmentRange> MergeRecovery::newly_merged(std::span<const ArtifactRe
   for (size_t i = 0; i < readers.size(); ++i) {
     const ArtifactRef& ref = pending_.artifacts()[i].ref;
     if (is_pass_segment(ref.segment)) continue;
-    // The levels of an artifact are stored one after another, bricks first.
+    // An artifact stores its levels one after another, bricks first.
     uint64_t end = ref.offset;
     for (const ArtifactLevel& l : readers[i].levels())
       if (l.level >= level && !l.frames.empty())

@@ -26,14 +26,15 @@ class MergeRecovery {
         pending_(pending),
         saver_(checkpoint, inputs.checkpoint_interval_s) {}
 
-  // Resumes the saved state if there is one and it belongs to the same inputs: changes the pending
-  // artifacts, the report and `out`, and returns the progress of the final pass. A damaged state,
-  // or a state of other inputs, is discarded with a warning. Throws Error{kInvalidInput} if the
-  // state was saved for another output path, Error{kOutOfMemory} if the artifacts of an interrupted
-  // final pass do not fit the memory of this merge.
+  // Resumes the merge from the saved state if one exists and its inputs are the same. Restores the
+  // pending artifacts, the report, and the finished levels of `out`, and returns the progress of
+  // the final pass (default values if that pass has no finished level). Discards a damaged state,
+  // or a state of other inputs, with a warning. Throws Error{kInvalidInput} if the interrupted
+  // final pass was writing to another output path, and Error{kOutOfMemory} if this merge has too
+  // little memory for the artifacts of the interrupted final pass.
   PassProgress restore(GlobalFileWriter& out);
 
-  // True if it is time to save a state. Rethrows the last save's error.
+  // True if a state should be saved now; see StateSaver::is_due(). Rethrows the last save's error.
   bool is_due() { return saver_.is_due(); }
   // Saves a state within a pass: the artifacts `merged`, in `segment`, replace the pending
   // artifacts before index `next`.
@@ -56,8 +57,8 @@ class MergeRecovery {
   // Returns the intermediates (outputs of earlier passes) among the pending artifacts from index
   // `begin` on.
   std::vector<ArtifactRef> intermediates_from(size_t begin) const;
-  // Returns the inputs' frames of all levels from the bricks up to `level`, except frames that
-  // earlier calls returned.
+  // Returns the ranges of the input segments with the frames of the levels from the bricks up to
+  // `level`. Omits ranges that earlier calls returned, and ranges that are still short.
   std::vector<SegmentRange> newly_merged(std::span<const ArtifactReader> readers, uint32_t level);
 
   const MergeContext& context_;

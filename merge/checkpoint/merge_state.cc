@@ -73,8 +73,8 @@ namespace {
 constexpr uint64_t kMagic = 0x0a4752454d474456;  // "VDGMERG\n"
 constexpr uint32_t kVersion = 3;
 
-// Encodes or decodes the members that fields() lists. `Derived` handles words, counts, flags and
-// texts.
+// Base class of Put, which encodes, and of Get, which decodes, all members that fields() lists. The
+// derived class provides the functions for words, counts, flags and texts.
 template <class Derived>
 class Coder {
  public:
@@ -126,8 +126,9 @@ class Get : public Coder<Get> {
   void word(T& word) {
     word = in_.get<T>();
   }
-  // Reads the number of `items`. Every item takes at least `min_bytes` bytes. So a damaged count
-  // cannot allocate more memory than the remaining bytes justify.
+  // Reads a count and resizes `items` to it. Each item takes at least `min_bytes` of the input, so
+  // a count is damaged if it exceeds the number of items for which bytes are left. Such a count
+  // never allocates memory.
   void count(auto& items, size_t min_bytes) {
     const uint64_t n = in_.get<uint64_t>();
     if (n <= in_.left() / min_bytes)

@@ -1,6 +1,7 @@
-// K-way heap merge, row by row, for rows that the bucket sort cannot hold: many rows with few
-// distinct hashes (truncated hashes). Each run is in the total order, so a heap with one cursor per
-// run is enough for any number of equal hashes. Not thread-safe.
+// Merges sorted runs row by row, with a heap of one cursor per run. Used for rows that are too many
+// to sort in memory, which occurs if hashes are truncated and many rows share few distinct hashes.
+// Memory does not depend on the number of rows with equal hashes, because each run is already in
+// the total order (merge/load/row.h). Not thread-safe.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +14,8 @@
 
 namespace voxdag {
 
-// Receives rows in the total order, deduplicates them and writes them.
+// Receives rows in the total order, removes duplicates, and writes the unique rows to a
+// LevelOutput.
 class OrderedRowWriter {
  public:
   // The first row gets the position `first_position`.
@@ -24,17 +26,17 @@ class OrderedRowWriter {
         buffer_(budget, format, kBuffered),
         flushed_(first_position) {}
 
-  // Adds a row, which must not be before the previous row. Returns its position in the merged
-  // level.
+  // Receives a row, which must not be before the previous row in the total order. Returns its
+  // position in the merged level.
   uint64_t add(const RowKey& row) {
     if (!any_ || compare_rows(format_, last_, row) != 0) push(row);
     return last_position_;
   }
-  // Writes the remaining rows of the buffer.
+  // Writes the rows that are still in the buffer.
   void flush();
 
   uint64_t nodes() const { return nodes_; }
-  // Returns the position of the next new row.
+  // Returns the position that the next unique row will get.
   uint64_t end_position() const { return flushed_ + buffered_positions(); }
   static uint64_t bytes() { return MergedRows::bytes_for(kBuffered); }
 

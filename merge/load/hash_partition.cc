@@ -6,9 +6,9 @@
 namespace voxdag {
 namespace {
 
-// Returns the number of bits b for buckets of 2^b hashes each. If the hashes are spread evenly, a
-// bucket has about `bucket_rows` rows. With many slices it has more, so that the table of bucket
-// begins takes at most about four bytes per row.
+// Returns b, for buckets that cover 2^b hashes each. If the hashes are spread evenly, a bucket has
+// about `bucket_rows` rows. With many slices, a bucket has more rows, so that the table of bucket
+// begins (one entry per bucket and slice) takes at most about four bytes per row.
 unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_t bucket_rows,
                             size_t slices) {
   const uint64_t max_buckets = std::max<uint64_t>(
@@ -21,8 +21,8 @@ unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_
 }  // namespace
 
 uint64_t HashPartition::bytes_for(const RowCount& count, uint32_t position_words) {
-  // Per row: hash, mask, bucket begins (see choose_bucket_bits) and position. Per child word: the
-  // word, and one bit during rewiring.
+  // Memory per row: hash, mask, bucket begins (at most 4 bytes; see choose_bucket_bits()) and
+  // position. Memory per word: the word itself, and one bit while children are replaced.
   return count.rows * (8 + 1 + 4 + 4 * position_words) + count.words * 4 + count.words / 8;
 }
 
@@ -81,7 +81,7 @@ void PartitionMemory::reserve(const RowCount& count, uint32_t position_words,
   if (rows <= hashes_.size() && words <= words_.size() &&
       position_words * rows <= positions_.size())
     return;
-  release();  // frees all columns first, so that the peak is the size of one partition
+  release();  // frees all columns before it allocates any
   hashes_ = PageBuffer<uint64_t>(budget, rows, "a hash partition of the merge");
   masks_ = PageBuffer<uint8_t>(budget, rows, "a hash partition of the merge");
   words_ = PageBuffer<uint32_t>(budget, words, "a hash partition of the merge");

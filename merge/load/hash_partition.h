@@ -1,5 +1,5 @@
-// A hash partition: all rows of one level with a hash in an interval, from all runs, in memory,
-// with their children replaced by positions.
+// A hash partition: the rows of all runs of one level whose hashes are in an interval. The rows are
+// in memory, and their children are replaced by positions (merge/load/row.h defines these terms).
 //
 //   columns:   [slice of run 0] [slice of run 1] ...
 //   buckets:   the interval, divided into shares of 2^bucket_bits hashes
@@ -41,8 +41,9 @@ struct RowOffset {
   uint32_t word = 0;
 };
 
-// The memory of a partition's columns. The next partition reuses it, because zeroing the pages of
-// new memory would take the system as long as the merge takes to fill them with rows.
+// The memory of a partition's columns. Each partition reuses the memory of the previous one. In new
+// memory, the operating system would have to zero every page, which takes as long as filling the
+// page with rows.
 class PartitionMemory {
  public:
   // Makes space for `count` rows, each with `position_words` words for its position. The previous
@@ -67,7 +68,7 @@ struct PartitionWorkers {
 
 // An upper bound of the memory of a Frame with kFrameRows rows.
 inline constexpr uint64_t kFrameMemoryBytes = uint64_t{640} << 10;
-// Maximum size of a partition, so that 32 bits can count its words.
+// Maximum bytes of a partition, so that the number of its words has at most 32 bits.
 inline constexpr uint64_t kMaxPartitionBytes = uint64_t{8} << 30;
 
 class HashPartition {
@@ -85,8 +86,9 @@ class HashPartition {
   static std::vector<RunSlice> slices_within(std::span<const LevelRun* const> runs,
                                              const HashInterval& interval);
 
-  // Buckets get about `bucket_rows` rows if hashes are spread evenly. Two partitions must not use
-  // the same `memory` at the same time.
+  // Creates a partition of the rows of `slices`, which load() reads. Buckets get about
+  // `bucket_rows` rows if hashes are spread evenly. Two partitions must not use the same `memory`
+  // at the same time.
   HashPartition(std::span<const LevelRun* const> runs, std::vector<RunSlice> slices,
                 const HashInterval& interval, uint64_t bucket_rows, uint32_t position_words,
                 PartitionMemory& memory, MemoryBudget& budget);

@@ -34,7 +34,8 @@ class LevelRun {
   uint64_t rows() const { return rows_; }
   const RowFormat& format() const { return format_; }
   bool bricks() const { return format_.bricks; }
-  // True if children are positions, not indices into the run's level below.
+  // True if children are positions; otherwise they are row indices in the artifact's next deeper
+  // level.
   bool is_rewired() const { return rewired_; }
 
   // Returns the number of rows before frame `index`, which may be one past the last frame.
@@ -50,7 +51,8 @@ class LevelRun {
     return {rows_before(frames.end) - rows_before(frames.begin),
             words_before(frames.end) - words_before(frames.begin)};
   }
-  // Returns the frames that may have rows of the interval, found by the frames' first hashes.
+  // Returns all frames that may have rows with a hash in the interval, judged by the first hash of
+  // each frame.
   FrameSpan frames_within(const HashInterval& interval) const;
 
  protected:
@@ -72,7 +74,7 @@ class LevelRun {
 // The run of one level of an artifact. The run has no rows if the artifact has no such level.
 class ArtifactRun : public LevelRun {
  public:
-  // `wide`: positions in the merged level below take two words.
+  // `wide` is true if positions in the merged level below take two words.
   ArtifactRun(const ArtifactReader& artifact, uint32_t level, bool wide);
   void read_frame(size_t index, Frame& out) const override {
     artifact_.read_frame(level_, index, out);

@@ -9,13 +9,14 @@
 namespace voxdag {
 namespace {
 
-// Frames per work item if the maps are in memory. With this number of frames in a row, the thread
-// finds most of the run's map in its cache.
+// Frames per work item if the position maps are in memory. A thread that loads this many
+// consecutive frames of a run finds most of the run's map in its cache.
 constexpr size_t kFramesPerItem = 16;
 
-// Looks up the positions of the rows `children` in `map` and writes them to `out`, as two words
-// each if `wide` is set. The map may be wide although `wide` is false: the width of a map is chosen
-// before its level is merged, and the width of references to the level afterwards.
+// Replaces row indices by positions: writes map[child] to `out` for each of `children`, as two
+// words if `wide` is set. `map` may have two words per position although `wide` is false. The width
+// of a map is chosen before its level is merged, for the case that no rows are equal; `wide` is
+// chosen afterwards, for the merged level.
 void replace_all(std::span<const uint32_t> children, const uint32_t* map, bool wide_map, bool wide,
                  uint32_t* out) {
   if (!wide_map) {
@@ -51,8 +52,9 @@ class HashPartition::Loader {
     }
   }
 
-  // Returns the work items; each has frames of one slice. A spilled map is loaded once for all
-  // frames of a slice.
+  // Returns the work items: consecutive frames of one slice each. slice_of_item[i] is the index of
+  // the slice of item i. If the position maps are spilled, an item has all frames of its slice, so
+  // that the slice's map is loaded only once.
   std::vector<FrameSpan> items(std::vector<size_t>& slice_of_item) const {
     std::vector<FrameSpan> spans;
     for (size_t s = 0; s < partition_.slices_.size(); ++s) {
@@ -94,7 +96,7 @@ class HashPartition::Loader {
     std::vector<bool> replaced;  // one flag per child of a slice; see HashPartition::bytes_for()
   };
 
-  // Copies a frame into the columns. If `map` is null, the children are not replaced.
+  // Copies a frame into the columns. If `map` is null, copies the children without replacing them.
   void place(const RunSlice& slice, const LevelRun& run, size_t f, const Frame& frame,
              const uint32_t* map) {
     const uint64_t row = slice.row_base + run.rows_before(f) - slice.first_row;
@@ -119,15 +121,17 @@ class HashPartition::Loader {
       for (const uint32_t child : frame.children) out = put_position(out, child, true);
   }
 
-  // Loads the positions of `rows` rows of the slice's run, starting at row `first`.
+  // Loads the positions of `rows` rows of the slice's run, from row `first` on, into the worker's
+  // window. Returns the window's first word.
   const uint32_t* load_window(Worker& worker, const RunSlice& slice, uint64_t first,
                               uint64_t rows) const {
     maps_->load(slice.run, first, {worker.window.data(), rows * maps_->position_words()});
     return worker.window.data();
   }
 
-  // Returns the number of buckets that begin at or before this hash. Adds one, for the end of the
-  // last bucket, if the hash is after that bucket.
+  // Returns the number of buckets that begin at or before `hash`. If `hash` is after the
+  // partition's last hash, returns the number of all buckets plus one, which also counts the end of
+  // the last bucket.
   size_t begins_up_to(uint64_t hash) const {
     const HashInterval& interval = partition_.interval_;
     if (hash < interval.first) return 0;
@@ -167,7 +171,8 @@ class HashPartition::Loader {
                                              : hash > partition_.interval_.last;
   }
 
-  // Replaces the children window by window, for a map that is larger than a worker's memory.
+  // Replaces the children of a slice whose position map is larger than the worker's memory. Loads
+  // the map window by window, and for each window replaces the children with positions in it.
   void replace_by_windows(Worker& worker, const RunSlice& slice, const CancelToken& cancel) {
     const bool wide = partition_.format().wide;
     const uint64_t children = slice.size.words >> wide;

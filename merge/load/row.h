@@ -13,8 +13,9 @@
 // half first. A brick is represented as a node of mask 3 whose two words are the high and the low
 // half of its voxel mask. So (hash, mask, words lexicographically) is the total order of both.
 //
-// kMaxRowWords words are readable from the first word of any row, even if the row has fewer words.
-// So a row is copied without a branch on its number of words, which would be mispredicted.
+// The memory after a row is readable: kMaxRowWords words from the first word of any row, even if
+// the row has fewer words. So a row is copied without a branch on its number of words, which the
+// CPU would often mispredict.
 #pragma once
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // Files in the merge's folder, for data that does not fit in memory or must survive a crash.
 //
-// A file is removed when the last reference to its ScratchPath ends, unless it is retained for a
-// later run that resumes the merge. Reading returns the words that were written, or throws
+// A file is removed when its ScratchPath is destroyed, unless the file is retained for a later
+// run that resumes the merge. Reading returns the words that were written, or throws
 // Error{kCorrupt}.
 #pragma once
 
@@ -36,8 +36,8 @@ class ScratchFolder {
   uint32_t next_id() { return next_id_++; }
   uint32_t next_id() const { return next_id_; }
   void set_next_id(uint32_t id) { next_id_ = id; }
-  // Removes the files left by an earlier merge, except `names`. Does not touch files with names
-  // that a merge never uses.
+  // Removes the files that earlier merges left in this folder, except `names`. Keeps all files
+  // whose names do not have the form of a scratch file.
   void remove_all_but(const std::set<std::string>& names);
 
  private:
@@ -47,7 +47,7 @@ class ScratchFolder {
   std::atomic<uint64_t> bytes_written_{0};
 };
 
-// Owns a file name in the folder.
+// Owns the file with this name in the folder: the destructor removes it.
 class ScratchPath {
  public:
   ScratchPath(ScratchFolder& folder, std::string name) : folder_(folder), name_(std::move(name)) {}
@@ -67,7 +67,7 @@ class ScratchPath {
   bool retained_ = false;
 };
 
-// State from which a scratch file is opened again.
+// Saved data with which a later merge opens the scratch file again.
 struct ScratchFileState {
   uint32_t id = 0;
   uint64_t words = 0;

@@ -33,7 +33,8 @@ TopTreeRun::TopTreeRun(uint32_t hash_bits, std::vector<PlacedNode> children, boo
   divide_into_frames();
 }
 
-// `children` are in Morton order, so siblings are adjacent, in child order.
+// Adds a node for each parent of `children`, which are in Morton order. So the children of one
+// parent are adjacent and in child order.
 void TopTreeRun::add_parents(const std::vector<PlacedNode>& children, uint32_t hash_bits) {
   for (size_t begin = 0, end; begin < children.size(); begin = end) {
     Node node;

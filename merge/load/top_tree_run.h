@@ -1,5 +1,6 @@
-// One level of the top tree: the nodes whose children are roots of subvolumes or other top nodes.
-// It is an additional run of its level. Its children are already positions.
+// A run with one level of the top tree: nodes whose children are roots of subvolumes or other top
+// nodes. The merge treats it like the runs of the artifacts, but its children are already
+// positions.
 #pragma once
 
 #include <cstdint>

@@ -24,7 +24,7 @@ class MergedRows {
   static uint64_t bytes_for(const RowCount& max) { return 12 * max.rows + 4 * max.words; }
 
   void clear() { word_count_ = row_count_ = 0; }
-  // Appends a row. There must be space for it.
+  // Appends a row. The list must have fewer rows and words than the constructor's `max`.
   void push(uint64_t hash, uint8_t mask, const uint32_t* row_words) {
     hashes_[row_count_++] = hash;
     uint32_t* out = words_.data() + word_count_;

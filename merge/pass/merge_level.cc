@@ -16,7 +16,8 @@ namespace {
 
 // Rows per bucket: as many as fit in a core's cache while they are sorted.
 constexpr uint64_t kBucketRows = 8192;
-// With many runs buckets are larger, so that each run has enough rows per bucket.
+// Minimum rows per bucket and run, on average. With many runs, buckets are larger than kBucketRows,
+// so that a bucket has several adjacent rows of each run.
 constexpr uint64_t kMinBucketRowsPerRun = 16;
 
 // Walks the rows of one slice within one bucket.
@@ -78,7 +79,7 @@ class PartitionMerge {
     return size;
   }
 
-  // True if a worker can sort a bucket of this size.
+  // True if a bucket of this size can be sorted within a worker's memory.
   bool fits(const RowCount& size) const {
     return size.rows <= BucketSorter::kMaxRows &&
            BucketSorter::bytes_for(size) <= context_.plan.worker_bytes;
@@ -133,7 +134,8 @@ class PartitionMerge {
     end_turn({out.nodes(), out.end_position() - position_});
   }
 
-  // Adds the extent of the bucket whose turn it is, and ends the turn.
+  // Adds the size of the merged bucket to the partition's totals, and passes the turn to the next
+  // bucket. Called by the worker whose turn it is.
   void end_turn(const LevelExtent& bucket) {
     extent_.nodes += bucket.nodes;
     extent_.positions += bucket.positions;
@@ -141,8 +143,9 @@ class PartitionMerge {
     turns_.end();
   }
 
-  // Returns where to write the positions of the rows of slice `s` in a bucket: to the run's map if
-  // it is in memory, otherwise to the partition, from which store_positions() copies them.
+  // Returns the address for the positions of the bucket's rows in slice `s`. It is in the run's map
+  // if the maps are in memory, otherwise in the partition, from which store_positions() copies
+  // them.
   uint32_t* positions_of(size_t bucket, size_t s) {
     const RunSlice& slice = partition_.slices()[s];
     const uint64_t row = partition_.bucket_begin(bucket, s).row;
@@ -172,7 +175,7 @@ class PartitionMerge {
 
 uint64_t bucket_rows(const MergeContext& context, const LevelTask& task) {
   const uint64_t rows = std::max<uint64_t>(kBucketRows, kMinBucketRowsPerRun * task.runs.size());
-  // Plans buckets for half of a worker's memory, because buckets differ in size.
+  // A bucket of average size may take half of a worker's memory, because some buckets are larger.
   const uint64_t row_bytes = BucketSorter::bytes_for({1, task.format.max_words()});
   return std::min(rows, context.plan.worker_bytes / (2 * row_bytes));
 }

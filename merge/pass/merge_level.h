@@ -11,8 +11,8 @@ namespace voxdag {
 // Returns the bytes that all workers need together, without the partition and the maps.
 uint64_t bytes_for_workers(const MergeMemory& plan);
 
-// Merges the level of `task`. Adds its numbers of partitions, streamed groups and rows to the
-// report.
+// Merges the level of `task`, and returns the size of the merged level. Adds the numbers of hash
+// partitions, streamed groups and rows to the merge's report.
 LevelExtent merge_level(const MergeContext& context, const LevelTask& task);
 
 }  // namespace voxdag

@@ -79,14 +79,15 @@ class Pass {
       memory_.release();
   }
 
-  // Returns the maximum number of positions that the rows take in the output, reached if no two
-  // rows are equal.
+  // Returns the positions that `rows` take in the output if no two of them are equal, which is the
+  // maximum.
   uint64_t max_positions(const RowCount& rows) const {
     return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }
 
-  // Allocates memory for a partition that can hold the largest level, if the budget allows it.
-  // Otherwise each partition that is larger than the memory so far allocates it again.
+  // Allocates the memory for hash partitions in one step, for the largest level in one partition,
+  // if the budget allows it. Otherwise every partition that is larger than all before it allocates
+  // new memory.
   void reserve_memory() {
     std::vector<RowCount> levels(task_.shape.grid_levels);
     for (const ArtifactReader& artifact : task_.artifacts)
@@ -103,13 +104,13 @@ class Pass {
       memory_.reserve(max, 0, context_.budget);
   }
 
-  // Returns the bytes that merging a level needs without the partition: the workers' memory and one
+  // Returns the bytes for merging a level in addition to the partition: the workers' memory and one
   // level's position maps.
   uint64_t bytes_besides_partition() const {
     return bytes_for_workers(context_.plan) + context_.plan.resident_bytes;
   }
 
-  // Finds the positions of the top nodes and subvolume roots of this level.
+  // Stores the positions of this level's top nodes and subvolume roots in done_.
   void place(uint32_t level, const TopTreeRun& top, const PositionMaps& maps) {
     done_.placed.clear();
     for (size_t row = 0; row < top.rows(); ++row)

@@ -21,18 +21,20 @@ struct PassTask {
   std::span<const ArtifactReader> artifacts;
 };
 
-// The progress of a pass: data of the merged levels that merging the next level needs.
+// The state of a pass between two levels: the results that the merge of the next level needs.
 struct PassProgress {
   std::optional<uint32_t> level;     // the last merged level; nullopt before the first
   std::optional<PositionMaps> maps;  // position maps of this level
   bool wide = false;                 // true if references to rows of this level are wide
   std::vector<PlacedNode> placed;    // top nodes and subvolume roots of this level
-  // Roots of subvolumes in this level and below; `index` is their position in the output.
+  // Roots of the subvolumes in this level and below. `index` is the root's position in the output,
+  // truncated to 32 bits.
   std::vector<ArtifactRoot> roots;
 };
 
 // Runs the pass, continuing from `progress`. Calls `after_level`, if set, after every level.
-// Returns the roots of the subvolumes; `index` is their position in `output`.
+// Returns the roots of the subvolumes. `index` is the root's position in `output`, truncated to 32
+// bits.
 std::vector<ArtifactRoot> run_merge_pass(
     const MergeContext& context, const PassTask& task, LevelOutput& output, PassProgress progress,
     const std::function<void(const PassProgress&)>& after_level);

@@ -94,7 +94,8 @@ uint64_t min_partition_bytes(const ArtifactReader& reader, bool wide) {
 // runs.
 constexpr uint64_t kMinRunBytes = uint64_t{64} << 10;
 
-// Returns the Morton code of the cube's low corner, in cubes of level kMaxGridLevels.
+// Returns the Morton code of the cube's low corner. The unit is a cube of level kMaxGridLevels, so
+// that the codes of cubes of different levels are comparable.
 uint64_t morton_code_of(const Cube& cube) {
   const uint64_t code = morton_encode(cube.position[0], cube.position[1], cube.position[2]);
   return code << 3 * (kMaxGridLevels - cube.level);

@@ -6,11 +6,11 @@
 namespace voxdag {
 namespace {
 
-// Maximum number of rows with equal digits (see distribute()) that only the insertion sort orders.
-// More rows are first sorted by comparison.
+// If more rows than this have equal digits (see distribute()), std::sort() sorts them before the
+// insertion sort, which is fast for a few rows only.
 constexpr uint32_t kMaxInsertionRows = 32;
-// Each slice has only a few rows in a bucket, and the slices are at scattered addresses. The rows
-// are prefetched this many slices ahead.
+// Number of slices ahead whose rows are prefetched. A bucket has only a few rows of each slice, and
+// the slices are at scattered addresses.
 constexpr size_t kSlicesAhead = 8;
 
 template <class T>
@@ -49,9 +49,9 @@ void BucketSorter::sort(const HashPartition& partition, size_t bucket, bool in_w
   emit_unique(in_words);
 }
 
-// Fills entries_ in the order of the hash: distributes the rows by a digit of their hashes, then
-// sorts the rows within each digit. The digit is the highest bits of the hash below the bits that
-// all rows of the bucket share.
+// Fills entries_ with the bucket's rows in the order of their hashes. First distributes the rows by
+// a digit of their hashes, then sorts the rows with equal digits. The digit consists of the highest
+// bits below the bits that are equal in all hashes of the bucket.
 void BucketSorter::distribute(const HashPartition& partition, size_t bucket) {
   const auto slices = partition.slices();
   size_t rows = 0;
@@ -119,8 +119,8 @@ bool BucketSorter::same_row(const Entry& a, const Entry& b) const {
   return true;
 }
 
-// Collects the unique rows and the position of every row. A hash usually occurs in a single row, or
-// in equal rows of several runs; only other groups of equal hashes are sorted.
+// Collects the unique rows and the position of every row. Usually all rows with the same hash are
+// equal: one row, or copies from several runs. Only if they are not, they are sorted.
 void BucketSorter::emit_unique(bool in_words) {
   unique_.clear();
   extent_ = 0;
