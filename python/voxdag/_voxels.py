@@ -235,6 +235,7 @@ def _dag_of(
         with warnings.catch_warnings():
             if len(cells) == 0:
                 warnings.filterwarnings("ignore", "mesh in memory: .* all outside the grid")
+            warnings.filterwarnings("ignore", ".*the scene has no colors")  # white is a color here
             build(scene, resolution=resolution, output=path, progress=progress, **chosen)
         return Dag(path) if folder is None else Dag._temporary(path, folder)
     except BaseException:

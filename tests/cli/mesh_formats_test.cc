@@ -148,7 +148,9 @@ TEST_F(MeshFormats, ReportWarnings) {
     const std::string output = file.name + ".vdag";
     const Answer answer = run({"build", file.name, "-r", "64", "--color", "--json", "-o", output});
     EXPECT_NE(answer.err.find("warning"), std::string::npos) << answer.err;
-    const Json warnings = Json::parse(answer.out)["warnings"];
+    Json warnings = Json::parse(answer.out)["warnings"];
+    std::erase_if(warnings.get_ref<Json::array_t&>(),
+                  [](const Json& warning) { return warning["code"] == "no-colors"; });
     ASSERT_EQ(warnings.size(), 1u) << warnings;
     EXPECT_EQ(warnings[0]["code"], file.code);
     EXPECT_EQ(warnings[0]["count"], file.count);

@@ -1,5 +1,8 @@
 #include "scheduler/stages/attributes/bin_surfaces.h"
 
+#include <algorithm>
+#include <array>
+
 #include "core/color/snap_surface.h"
 #include "core/format/checksum.h"
 #include "scheduler/stages/ingest/ingest.h"
@@ -10,6 +13,15 @@
 
 namespace voxdag {
 namespace {
+
+bool is_white(const std::array<uint16_t, 4>& color) {
+  return color[0] == kFullIntensity && color[1] == kFullIntensity && color[2] == kFullIntensity;
+}
+
+bool has_color(const FixedSurface& surface, const Material& material) {
+  return material.image != Material::kNoImage || !is_white(material.factor) ||
+         !std::ranges::all_of(surface.corners, is_white, &SurfaceCorner::color);
+}
 
 // A piece of the scene as records, with the bins of each record.
 class SurfacePiece {
@@ -29,12 +41,14 @@ class SurfacePiece {
     triangles_.clear();
     places_.clear();
     late_ = kNone;
+    has_colors_ = false;
     cursor.read_surfaces(first, count, [this](std::span<const SurfaceTriangle> batch) {
       for (const SurfaceTriangle& surface : batch) add(surface);
     });
     checksum_ = checksum128(triangles_);
   }
   const Checksum128& checksum() const { return checksum_; }
+  bool has_colors() const { return has_colors_; }
 
   void copy(ChunkWriter& writer, std::span<BinContent> contents) {
     const auto copy_to = [&](size_t bin, const Record& record) {
@@ -83,6 +97,7 @@ class SurfacePiece {
     const size_t begin = bytes_.size(), record = records_.size();
     append_identity(surface, binning_.cutouts, binning_.record_bytes, triangles_);
     append_surface(surface, has_image(surface.material), bytes_);
+    has_colors_ = has_colors_ || has_color(surface, binning_.materials[surface.material]);
     records_.push_back({static_cast<uint32_t>(begin),
                         static_cast<uint32_t>(bytes_.size() - begin),
                         surface.material,
@@ -107,6 +122,7 @@ class SurfacePiece {
   std::vector<Record> records_;               // their data is in bytes_
   std::vector<Place> places_;
   size_t late_ = kNone;  // first record whose places were not added
+  bool has_colors_ = false;
   Checksum128 checksum_;
 };
 
@@ -126,6 +142,7 @@ BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning
       scene, position, context, [&](auto& piece) { piece.emplace(binning, tree, context.budget); },
       [&](SurfacePiece& piece, uint64_t end) {
         piece.copy(writer, binned.contents);
+        binned.have_colors |= piece.has_colors();
         digest.add(piece.checksum());
         position = end;
       });

@@ -31,6 +31,7 @@ struct SurfaceBinning {
 struct BinnedSurfaces {
   std::vector<ChunkList> bins;       // one per cube, in the order of `cubes`
   std::vector<BinContent> contents;  // contents of each bin
+  bool have_colors = false;          // a surface in the grid has an image, or a color but white
 };
 
 // Throws Error{kInvalidInput} if the triangles differ from the triangles that ingest read. This

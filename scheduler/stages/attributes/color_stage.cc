@@ -103,6 +103,7 @@ struct ColorStage::State {
   std::optional<Cutouts> cutouts_found;
   std::vector<StoredAttribute> attributes;
   std::vector<std::string> images;  // digests of the images
+  bool have_problems = false;       // a warning explains why materials have no colors
   // Set after the surfaces are read:
   std::optional<MemoryBudget> share;
   std::optional<RecordStore> store;
@@ -124,6 +125,7 @@ struct ColorStage::State {
   // The cutouts that the build leaves out, or null.
   const Cutouts* cutouts() const { return cutouts_found ? &*cutouts_found : nullptr; }
   void read_surfaces();
+  void warn_of_white() const;
   std::unique_ptr<TextureSet> decode_images(const ColorStore& artifacts);
   bool is_stored(const ColorStore& artifacts, size_t cube) const;
   void store_parts(ColorStore& artifacts, size_t cube, const CubeBaker::Records& records,
@@ -150,6 +152,7 @@ void ColorStage::State::open() {
   find_cutouts();
   if (!wanted.use_images()) materials.drop_images();
   const WarningList warnings = std::exchange(materials.warnings, {});
+  have_problems = !warnings.list().empty();
   for (const Warning& warning : warnings.list()) build.progress.warn_of_input(warning);
   images = image_digests(build.files, materials.images, context.threads, build.cancel);
 }
@@ -181,12 +184,25 @@ void ColorStage::State::read_surfaces() {
   surfaces = bin_surfaces(source.scene.open(), binning, *store, context);
   source.scene.close();
   trim_heap();
+  warn_of_white();
   for (const StoredAttribute& attribute : attributes)
     for (auto& of_attribute = keys.emplace_back(); of_attribute.size() < cubes.size();) {
       const size_t i = of_attribute.size();
       of_attribute.push_back(attribute_key(attribute, grid, cubes[i], surfaces.contents[i]));
     }
   parts.resize(attributes.size(), std::vector<std::vector<ColorStore::Place>>(cubes.size()));
+}
+
+// Warns if the user asks for the colors of a scene that has none.
+void ColorStage::State::warn_of_white() const {
+  const bool is_wanted = source.options.attributes.has(Attribute::kColor);
+  const bool is_empty = std::ranges::all_of(
+      surfaces.contents, [](const BinContent& content) { return content.surfaces == 0; });
+  if (!is_wanted || is_empty || have_problems || surfaces.have_colors) return;
+  context.build.progress.warn_of_input(
+      {"no-colors", source.options.scenes.front(),
+       "the scene has no colors: its materials and vertices are white, without images. So all "
+       "voxels are white; leave out --color"});
 }
 
 // Decodes the images that are needed to bake the cubes whose records are not stored.

@@ -80,6 +80,24 @@ TEST_F(SceneWarnings, AreErrorsInAStrictBuild) {
   EXPECT_EQ(message(), "");
 }
 
+TEST_F(SceneWarnings, ColorsOfAWhiteSceneAreWorthOne) {
+  write_scene("3 0 1 2\n", 1);
+  spec_.geometry.attributes.add(Attribute::kColor);
+  spec_.geometry.color_resolution = 64;
+  const std::vector<Warning> warnings = build().warnings;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].code, "no-colors");
+  EXPECT_EQ(warnings[0].place, spec_.geometry.scenes[0]);
+  EXPECT_EQ(build().warnings, warnings) << "the second run uses the work folder";
+  spec_.run.restart = true;
+  std::ofstream(spec_.geometry.scenes[0])
+      << "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+         "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+         "element face 1\nproperty list uchar uint vertex_indices\nend_header\n"
+         "0 0 0 255 255 255\n1 0 0 255 255 255\n1 1 0 255 254 255\n3 0 1 2\n";
+  EXPECT_TRUE(build().warnings.empty());
+}
+
 TEST_F(SceneWarnings, AnEmptySceneIsAnErrorThatSaysWhy) {
   write_scene("2 0 1\n", 1);
   EXPECT_THAT(message(), HasSubstr("has no triangles; "));
