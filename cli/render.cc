@@ -23,8 +23,8 @@ namespace {
 constexpr int kMaxPictureEdge = 16384;
 // Name endings of picture formats that voxdag does not write. check_ending() refuses them for -o,
 // because the output would be a PNG file.
-constexpr const char* kOtherPictures[] = {".jpg", ".jpeg", ".webp", ".avif", ".gif", ".bmp",
-                                          ".tif", ".tiff", ".ppm",  ".pgm",  ".exr", ".hdr"};
+constexpr const char* kOtherPictures[] = {".webp", ".avif", ".gif", ".bmp", ".tif",
+                                          ".tiff", ".ppm",  ".pgm", ".exr", ".hdr"};
 
 struct RenderCommand {
   std::string input;
@@ -33,6 +33,7 @@ struct RenderCommand {
   std::string view = "auto";
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
+  std::string background = "sky";
   std::string size = "1280x720", memory;
   query::RenderOptions options{.threads = default_threads()};
   bool gray = false;
@@ -98,11 +99,17 @@ void check_ending(std::string name) {
     if (name.ends_with(ending))
       throw Error(
           ErrorCode::kInvalidInput,
-          "-o " + name + ": pictures are written as PNG: expected a name that ends in .png");
+          "-o " + name +
+              ": pictures are written as PNG or JPEG: expected a name that ends in .png or .jpg");
 }
 
 void check_outputs(const RenderCommand& command, GuardedOutputs& files) {
   check_ending(command.output.path);
+  if (query::is_jpeg_name(command.output.path) &&
+      command.options.background == query::Background::kTransparent)
+    throw Error(ErrorCode::kInvalidInput, "-o " + command.output.path +
+                                              ": a JPEG file cannot be transparent: expected "
+                                              "a name that ends in .png");
   if (command.output.path.empty() && command.depth.empty())
     throw Error(ErrorCode::kInvalidInput,
                 "no output was given: expected --output, --depth or both");
@@ -111,7 +118,7 @@ void check_outputs(const RenderCommand& command, GuardedOutputs& files) {
                 "--output and --depth are both '" + command.depth + "': expected two files");
   if (!command.output.path.empty()) command.output.guard(files);
   if (!command.output.path.empty())
-    command.output.check(files, command.input, query::is_rendered_png);
+    command.output.check(files, command.input, query::is_rendered_picture);
   if (command.depth.empty()) return;
   const OutputFile depth{command.depth, command.output.force};
   depth.guard(files);
@@ -125,8 +132,9 @@ void check_memory(const RenderCommand& command) {
   const uint64_t limit = memory_limit(command.memory);
   // The picture is written and freed before the depth map is computed, so they are never in memory
   // together. If both are requested, the picture's memory is checked, because it is larger.
-  const uint64_t of_pixel =
-      command.output.path.empty() ? query::kDepthBytesPerPixel : query::kRenderBytesPerPixel;
+  const uint64_t of_pixel = command.output.path.empty()
+                                ? query::kDepthBytesPerPixel
+                                : query::render_bytes_per_pixel(command.options.background);
   const uint64_t bytes = of_pixel * static_cast<uint64_t>(command.options.width) *
                          static_cast<uint64_t>(command.options.height);
   if (bytes > limit)
@@ -141,6 +149,7 @@ void run(RenderCommand& command, CommandContext& context) {
     throw Error(ErrorCode::kInvalidInput, "--size '" + command.size +
                                               "': expected a width and a height of 1 to " +
                                               std::to_string(kMaxPictureEdge) + " pixels");
+  command.options.background = query::background_named(command.background);
   command.options.width = width;
   command.options.height = height;
   GuardedOutputs files(context.files);
@@ -157,7 +166,8 @@ void run(RenderCommand& command, CommandContext& context) {
   if (!command.output.path.empty()) {
     const query::Picture picture =
         query::render_picture(dag, placement, command.options, *progress, context.cancel);
-    write_file_atomically(files, command.output.path, query::encode_png(picture));
+    write_file_atomically(files, command.output.path,
+                          query::encode_picture(picture, command.output.path));
   }
   if (!command.depth.empty()) {
     const query::DepthMap map =
@@ -169,7 +179,7 @@ void run(RenderCommand& command, CommandContext& context) {
 
 void declare(Command& command, RenderCommand& state) {
   command.option("input", state.input, "the .vdag file").required();
-  command.output_option("-o,--output", state.output.path, "the .png file to write");
+  command.output_option("-o,--output", state.output.path, "the .png or .jpg file to write");
   command.output_option(
       "--depth", state.depth,
       "the .npy file to write: distances in voxels, inf where there is no surface");
@@ -183,6 +193,9 @@ void declare(Command& command, RenderCommand& state) {
   command.option("--size", state.size, "WIDTHxHEIGHT in pixels").show_default();
   command.option("--samples", state.options.samples, "N: N * N samples per pixel")
       .range(1, 8)
+      .show_default();
+  command.option("--background", state.background, "what pixels without a surface show")
+      .one_of(query::background_names())
       .show_default();
   command.flag("--gray", state.gray, "leave out the colors that the file may have");
   command.option("--memory", state.memory,

@@ -1,4 +1,4 @@
-// The only file that calls libjpeg-turbo. The library reports errors by longjmp() to this file,
+// Decodes JPEG images with libjpeg-turbo. The library reports errors by longjmp() to this file,
 // which skips destructors. So functions that call the library must have no objects to destroy.
 #include <cstdio>
 // <jpeglib.h> needs FILE.

@@ -22,7 +22,7 @@ namespace voxdag::python {
 namespace {
 
 using Point = std::array<double, 3>;
-using Pixels = nb::ndarray<uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+using Pixels = nb::ndarray<uint8_t, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 // Returns a point of world space in voxel units. `what` names the point in messages. Throws
 // Error{kInvalidInput} if a coordinate is not finite.
@@ -41,10 +41,12 @@ query::Vec in_voxels(const Point& point, const char* what, const voxdag_reader::
 // Throws Error{kOutOfMemory} if the renderer's memory and the array of pixels together exceed the
 // limit `memory`. voxdag.render() calls this function before it allocates the array, because the
 // system can end a process that allocates too much memory.
-void check_memory(int width, int height, const std::string& memory) {
+void check_memory(int width, int height, const std::string& background, const std::string& memory) {
   const uint64_t limit = memory_of(memory);
-  const uint64_t bytes = (query::kRenderBytesPerPixel + 3) * static_cast<uint64_t>(width) *
-                         static_cast<uint64_t>(height);
+  const query::Background kind = query::background_named(background);
+  const uint64_t of_pixel =
+      query::render_bytes_per_pixel(kind) + static_cast<uint64_t>(query::channels_of(kind));
+  const uint64_t bytes = of_pixel * static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
   if (bytes > limit)
     throw Error(ErrorCode::kOutOfMemory,
                 "a picture of " + std::to_string(width) + " x " + std::to_string(height) +
@@ -55,12 +57,14 @@ void check_memory(int width, int height, const std::string& memory) {
 // Fills `pixels` with the picture. If `camera` is nullopt, the view named `view` determines the
 // camera.
 void render(const PathText& path, const std::string& view, const std::optional<Point>& camera,
-            const Point& target, std::optional<double> fov_degrees, int samples, bool gray,
-            unsigned threads, nb::object progress, const Pixels& pixels) {
+            const Point& target, std::optional<double> fov_degrees, int samples,
+            const std::string& background, bool gray, unsigned threads, nb::object progress,
+            const Pixels& pixels) {
   query::RenderOptions options;
   options.height = static_cast<int>(pixels.shape(0));
   options.width = static_cast<int>(pixels.shape(1));
   options.samples = samples;
+  options.background = query::background_named(background);
   options.threads = threads ? threads : default_threads();
   uint8_t* const to = pixels.data();
   run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
@@ -77,7 +81,7 @@ void render(const PathText& path, const std::string& view, const std::optional<P
     else if (!dag.empty())
       placement = query::named_view(view, dag, aspect, fov_degrees, cancel);
     const query::Picture picture = query::render_picture(dag, placement, options, relay, cancel);
-    std::ranges::copy(picture.rgb, to);
+    std::ranges::copy(picture.bytes, to);
     return true;
   });
 }
@@ -86,10 +90,10 @@ void render(const PathText& path, const std::string& view, const std::optional<P
 
 void bind_render(nb::module_& module) {
   module.def("check_render_memory", &check_memory, nb::arg("width"), nb::arg("height"),
-             nb::arg("memory"));
+             nb::arg("background"), nb::arg("memory"));
   module.def("render", &render, nb::arg("path"), nb::arg("view"), nb::arg("camera").none(),
-             nb::arg("target"), nb::arg("fov").none(), nb::arg("samples"), nb::arg("gray"),
-             nb::arg("threads"), nb::arg("progress").none(), nb::arg("pixels"));
+             nb::arg("target"), nb::arg("fov").none(), nb::arg("samples"), nb::arg("background"),
+             nb::arg("gray"), nb::arg("threads"), nb::arg("progress").none(), nb::arg("pixels"));
 }
 
 }  // namespace voxdag::python

@@ -29,6 +29,14 @@ def test_a_picture_shows_the_mesh(path):
     )
 
 
+def test_the_background_can_be_transparent_or_white(path):
+    options = {"view": "top", "size": (48, 32), "samples": 1}
+    picture = voxdag.render(path, background="transparent", **options)
+    assert picture.shape == (32, 48, 4)
+    assert np.all(picture[0] == 0) and picture[:, :, 3].max() == 255
+    assert np.all(voxdag.render(path, background="white", **options)[0] > 250)  # a faint shadow
+
+
 def test_a_camera_is_placed_in_scene_units(path):
     def picture(distance):
         return voxdag.render(
@@ -51,6 +59,8 @@ def test_a_camera_is_placed_in_scene_units(path):
         ({"camera": (1, 2, 3), "target": (0, 0, 0), "view": "top"}, "invalid_input"),
         ({"fov": 171}, "invalid_input"),
         ({"samples": 9}, "invalid_input"),
+        ({"background": "blue"}, "invalid_input"),
+        ({"background": ["sky"]}, "invalid_input"),
         ({"size": (-1, 10)}, "invalid_input"),
         ({"size": (2**31, 2**31)}, "invalid_input"),
         ({"size": (10**30, 1)}, "invalid_input"),

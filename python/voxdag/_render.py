@@ -12,6 +12,7 @@ from ._progress import Progress, shown
 from ._types import Bytes
 
 _MAX_EDGE = 16384  # pixels
+_BACKGROUNDS = ("sky", "white", "transparent")
 
 
 def render(
@@ -23,12 +24,14 @@ def render(
     fov: Optional[float] = None,
     size: tuple[int, int] = (1280, 720),
     samples: int = 2,
+    background: str = "sky",
     gray: bool = False,
     memory: Union[int, str, None] = None,
     threads: int = 0,
     progress: Progress = None,
 ) -> Bytes:
-    """Renders the same picture as `voxdag render`. Returns it as (height, width, 3) uint8, sRGB.
+    """Renders the same picture as `voxdag render`. Returns it as (height, width, 3) uint8, sRGB,
+    or with a transparent background as (height, width, 4), where the last channel is alpha.
 
     view             auto, iso, front, back, left, right, top or inside
     camera, target   the camera's position and a point that it looks at, in the units of the
@@ -37,6 +40,7 @@ def render(
                      50 degrees with a camera
     size             width and height in pixels
     samples          N: N * N samples per pixel, 1 to 8
+    background       what pixels without a surface show: "sky", "white" or "transparent"
     gray             leave out the colors that the file may have
     memory           limit of the memory in bytes, or text such as "8GiB"; by default half of the
                      machine's memory. A picture takes about 66 bytes per pixel; if this exceeds
@@ -59,6 +63,10 @@ def render(
     degrees = None if fov is None else _number(fov)
     if degrees is not None and not 1 <= degrees <= 170:
         raise Error(f"fov {fov!r}: expected 1 to 170 degrees", "invalid_input")
+    if background not in _BACKGROUNDS:
+        raise Error(
+            f"background {background!r}: expected one of {', '.join(_BACKGROUNDS)}", "invalid_input"
+        )
     if not isinstance(gray, (bool, np.bool_)):
         raise Error(f"gray {gray!r}: expected True or False", "invalid_input")
     samples = _whole(samples, 1, 8, f"samples {samples!r}: expected 1 to 8")
@@ -66,11 +74,21 @@ def render(
     place = None if camera is None else _point(camera, "camera")
     aim = (0.0, 0.0, 0.0) if target is None else _point(target, "target")
     file = path_text(path)
-    _native.check_render_memory(width, height, memory_text(memory))
-    pixels = np.empty((height, width, 3), np.uint8)
+    _native.check_render_memory(width, height, background, memory_text(memory))
+    pixels = np.empty((height, width, 4 if background == "transparent" else 3), np.uint8)
     with shown(progress) as callback:
         _native.render(
-            file, view, place, aim, degrees, samples, bool(gray), threads, callback, pixels
+            file,
+            view,
+            place,
+            aim,
+            degrees,
+            samples,
+            background,
+            bool(gray),
+            threads,
+            callback,
+            pixels,
         )
     return pixels
 

@@ -142,6 +142,7 @@ class RenderOptions(TypedDict, total=False):
     fov: float | None
     size: tuple[int, int]
     samples: int
+    background: str
     gray: bool
     memory: int | str | None
     threads: int

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "query/render/albedo.h"
 #include "query/render/g_buffer.h"
@@ -107,7 +108,57 @@ GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighti
   return p;
 }
 
+// The light behind a row of the picture.
+Vec background_of(Background background, double height) {
+  if (background == Background::kSky) return mix(kTopColor, kBottomColor, height);
+  return {{1, 1, 1}};
+}
+
+// The light of a pixel before it is rounded, and the share of it that hides what is behind.
+struct FinalPixel {
+  Vec color;
+  double alpha = 1;
+};
+
+// Converts the light of surfaces to the picture's colors.
+struct ColorGrading {
+  const Lighting& lighting;
+  Background kind;
+  double exposure, haze_start, diagonal;
+
+  FinalPixel of(const GBufferPixel& p, const Vec& background) const {
+    if (kind == Background::kTransparent) return {lit(p), p.coverage};
+    Vec color = background * p.floor;
+    if (p.coverage > 0) {
+      const double depth = std::max(0.0, length(p.offset) - haze_start) / std::max(1.0, diagonal);
+      const Vec surface = mix(lit(p), background, kMaxHaze * (1 - std::exp(-depth * depth)));
+      color = mix(color, surface, p.coverage);
+    }
+    return {color};
+  }
+
+ private:
+  Vec lit(const GBufferPixel& p) const {
+    if (p.coverage == 0) return {};
+    return tone_map(lighting.reflected(p.albedo, p.normal, p.sky, p.sun) * exposure);
+  }
+};
+
 }  // namespace
+
+const std::vector<std::string>& background_names() {
+  static const std::vector<std::string> names = {"sky", "white", "transparent"};
+  return names;
+}
+
+Background background_named(const std::string& name) {
+  const auto& names = background_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw Error(ErrorCode::kInvalidInput,
+                "background '" + name + "': expected one of sky, white, transparent");
+  return static_cast<Background>(found - names.begin());
+}
 
 Picture render_picture(const DagView& dag, const Placement& placement, const RenderOptions& options,
                        Progress& progress, const CancelToken& cancel) {
@@ -136,22 +187,17 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
   });
   progress.end_stage();
 
-  Picture picture(width, height);
+  Picture picture(width, height, channels_of(options.background));
+  const ColorGrading grading{lighting, options.background, exposure, haze_start, box.diagonal()};
   for_each_row([&](unsigned, int y) {
     constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
-    const Vec background = mix(kTopColor, kBottomColor, (y + 0.5) / height);
+    const Vec background = background_of(options.background, (y + 0.5) / height);
     for (int x = 0; x < width; ++x) {
-      const GBufferPixel p = buffer.smoothed(x, y, camera.pixel_spread());
-      Vec color = background * p.floor;
-      if (p.coverage > 0) {
-        const Vec lit = tone_map(lighting.reflected(p.albedo, p.normal, p.sky, p.sun) * exposure);
-        const double depth =
-            std::max(0.0, length(p.offset) - haze_start) / std::max(1.0, box.diagonal());
-        const Vec surface = mix(lit, background, kMaxHaze * (1 - std::exp(-depth * depth)));
-        color = mix(color, surface, p.coverage);
-      }
+      const FinalPixel shown = grading.of(buffer.smoothed(x, y, camera.pixel_spread()), background);
       const double dither = (kBayer[y % 4][x % 4] + 0.5) / 16;
-      for (int c = 0; c < 3; ++c) picture.pixel(x, y)[c] = srgb_byte(color[c], dither);
+      uint8_t* const pixel = picture.pixel(x, y);
+      for (int c = 0; c < 3; ++c) pixel[c] = srgb_byte(shown.color[c], dither);
+      if (picture.channels == 4) pixel[3] = static_cast<uint8_t>(std::lround(255 * shown.alpha));
     }
   });
   return picture;

@@ -1,6 +1,9 @@
 // Renders a picture of a DAG on several threads. The pixels do not depend on the number of threads.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "core/base/progress.h"
 #include "query/dag/dag_view.h"
 #include "query/render/camera.h"
@@ -10,18 +13,34 @@
 
 namespace voxdag::query {
 
+// What pixels without a surface show: a gradient, white, or nothing. On the first two, the scene
+// throws a shadow.
+enum class Background { kSky, kWhite, kTransparent };
+// Returns "sky", "white" and "transparent".
+const std::vector<std::string>& background_names();
+// Throws Error{kInvalidInput} for an unknown name.
+Background background_named(const std::string& name);
+
 struct RenderOptions {
   int width = 1280, height = 720;
   int samples = 2;  // along each side of a pixel: samples^2 samples per pixel
   unsigned threads = 1;
+  Background background = Background::kSky;
   // The DAG's file, for its colors; null for gray.
   const voxdag_reader::File* colors = nullptr;
 };
 
+// Number of channels of a picture, of one byte each.
+constexpr int channels_of(Background background) {
+  return background == Background::kTransparent ? 4 : 3;
+}
 // Bytes that render_picture() allocates per pixel, including the picture.
-inline constexpr uint64_t kRenderBytesPerPixel = sizeof(GBufferPixel) + 3;
+constexpr uint64_t render_bytes_per_pixel(Background background) {
+  return sizeof(GBufferPixel) + static_cast<uint64_t>(channels_of(background));
+}
 
-// Renders a picture. If the DAG is empty, the picture shows a plain background. Throws
+// Renders a picture. It has alpha if the background is transparent. If the DAG is empty, the
+// picture shows only the background. Throws
 // Error{kCorrupt} for a damaged DAG, and Error{kCanceled}.
 Picture render_picture(const DagView& dag, const Placement& placement, const RenderOptions& options,
                        Progress& progress, const CancelToken& cancel);

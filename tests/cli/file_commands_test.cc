@@ -265,9 +265,24 @@ TEST_F(FileCommands, GenerateIsSeeded) {
   expect_error(2, "expected one of", {"generate", "cathedral", "g.glb"});
 }
 
-// Pictures are PNG files, and names for other formats are refused.
+// The ending of the name selects PNG or JPEG. Own pictures are replaced without --force.
+TEST_F(FileCommands, RenderWritesJpeg) {
+  const std::vector<std::string> render = {"render", "m.vdag", "-o", "m.JPG", "--size", "64x48"};
+  run_json(render);
+  EXPECT_EQ(contents("m.JPG").substr(0, 3), "\xff\xd8\xff");
+  run_json(render);
+  put("m.JPG", contents("m.JPG").substr(0, 20));
+  expect_error(2, "--force", render);
+  expect_error(2, "cannot be transparent: expected a name that ends in .png",
+               {"render", "m.vdag", "-o", "x.jpeg", "--background", "transparent"});
+  expect_error(2, "--background", {"render", "m.vdag", "-o", "x.png", "--background", "blue"});
+  run_json({"render", "m.vdag", "-o", "t.png", "--size", "64x48", "--background", "transparent"});
+  EXPECT_EQ(contents("t.png")[25], 6) << "expected RGBA";
+}
+
+// Names for other formats of pictures are refused.
 TEST_F(FileCommands, RefusesNamesOfOtherPictureFormats) {
-  for (const char* name : {"p.jpg", "p.JPEG", "p.webp", "p.exr"})
+  for (const char* name : {"p.WebP", "p.tiff", "p.exr"})
     expect_error(2, "ends in .png", {"render", "x.vdag", "-o", name});
 }
 

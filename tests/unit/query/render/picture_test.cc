@@ -22,8 +22,10 @@ uint32_t big_endian(const std::string& bytes, size_t at) {
   return value;
 }
 
-Picture render(const VoxelScene& scene, const Placement& placement, unsigned threads) {
+Picture render(const VoxelScene& scene, const Placement& placement, unsigned threads,
+               Background background = Background::kSky) {
   RenderOptions options;
+  options.background = background;
   options.width = 64;
   options.height = 48;
   options.threads = threads;
@@ -50,6 +52,19 @@ TEST(Picture, IsAPngOfItsSize) {
   EXPECT_EQ(png.substr(png.size() - 8, 4), "IEND");
 }
 
+TEST(Picture, IsAJpegByItsName) {
+  const Picture picture(20, 10);
+  EXPECT_EQ(encode_picture(picture, "p.png"), encode_png(picture));
+  EXPECT_EQ(encode_picture(picture, "jpg"), encode_png(picture));
+  for (const char* name : {"p.jpg", "P.JpEg"}) {
+    const std::string jpeg = encode_picture(picture, name);
+    EXPECT_EQ(jpeg.substr(0, 2), "\xff\xd8") << name;
+    EXPECT_EQ(jpeg.substr(20, 10), std::string("\xff\xfe\0\x08voxdag", 10)) << name;
+    EXPECT_EQ(jpeg.substr(jpeg.size() - 2), "\xff\xd9") << name;
+  }
+  EXPECT_THROW(encode_picture(Picture(20, 10, 4), "p.jpg"), Error);
+}
+
 TEST(Picture, IsWrittenWhole) {
   const auto folder = std::filesystem::temp_directory_path() / "voxdag_picture_test";
   std::filesystem::create_directories(folder);
@@ -65,8 +80,8 @@ TEST(Picture, IsWrittenWhole) {
 
 // The pixels are the same for any number of threads.
 TEST(Renderer, ThreadsDoNotChangeThePicture) {
-  EXPECT_EQ(render(VoxelScene::block(), kFromTheFront, 1).rgb,
-            render(VoxelScene::block(), kFromTheFront, 3).rgb);
+  EXPECT_EQ(render(VoxelScene::block(), kFromTheFront, 1).bytes,
+            render(VoxelScene::block(), kFromTheFront, 3).bytes);
 }
 
 // The block is in the center of the picture, in front of the background, and lit.
@@ -91,6 +106,26 @@ TEST(Renderer, ShowsTheBlockInTheMiddle) {
   // The block is neither black nor overexposed.
   EXPECT_GT(with.pixel(32, 24)[0], 60);
   EXPECT_LT(with.pixel(32, 24)[0], 250);
+}
+
+TEST(Renderer, ATransparentBackgroundHasAlpha) {
+  Picture picture = render(VoxelScene::block(), kFromTheFront, 2, Background::kTransparent);
+  ASSERT_EQ(picture.channels, 4);
+  EXPECT_EQ(encode_png(picture)[25], 6) << "expected RGBA";
+  EXPECT_EQ(picture.pixel(32, 24)[3], 255);
+  for (int c = 0; c < 4; ++c) EXPECT_EQ(picture.pixel(1, 1)[c], 0);
+  // The shadow on the floor is left out: only pixels of the block are visible.
+  int visible = 0;
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) visible += picture.pixel(x, y)[3] > 0;
+  EXPECT_LT(visible, 700);
+}
+
+TEST(Renderer, AWhiteBackgroundIsWhite) {
+  Picture picture = render(VoxelScene::block(), kFromTheFront, 2, Background::kWhite);
+  ASSERT_EQ(picture.channels, 3);
+  for (int c = 0; c < 3; ++c) EXPECT_EQ(picture.pixel(1, 1)[c], 255);
+  EXPECT_LT(picture.pixel(32, 24)[0], 250);
 }
 
 TEST(Renderer, StopsWhenCanceled) {

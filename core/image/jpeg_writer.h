@@ -1,0 +1,17 @@
+// Writes JPEG images.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace voxdag {
+
+// Returns the bytes of a JPEG file of 8-bit sRGB pixels: rows from the top, 3 bytes per pixel. The
+// file's first comment is `comment`, which is 20 bytes from its start. Throws
+// Error{kInvalidInput} if this program was built without libjpeg, and Error{kOutOfMemory}.
+std::string encode_jpeg(uint32_t width, uint32_t height, std::span<const uint8_t> rgb,
+                        std::string_view comment);
+
+}  // namespace voxdag
