@@ -1,8 +1,10 @@
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "cli/cluster.h"
 #include "cli/option_fields.h"
 #include "cli/output.h"
+#include "cli/syntax/resolutions.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
@@ -15,6 +17,7 @@ namespace {
 
 struct BuildCommand {
   BuildSpec spec;
+  std::vector<uint64_t> resolutions;
   BuildClusterOptions cluster;
   bool quiet = false;
   bool json = false;
@@ -61,28 +64,46 @@ void print(const BuildReport& r) {
       size_text(r.peak_rss_bytes).c_str(), size_text(r.memory_bytes).c_str());
 }
 
-void run(const BuildCommand& command, CommandContext& context) {
-  BuildSpec spec = command.spec;
-  apply_cluster(command.cluster, spec.run);
-  refuse_result_of_other_scene(context.files, spec);
-  const auto progress = make_progress_bar(command.quiet);
-  const BuildReport report = with_option_names([&] {
+BuildReport build(const BuildSpec& spec, bool quiet, CommandContext& context) {
+  const auto progress = make_progress_bar(quiet);
+  return with_option_names([&] {
     try {
       return run_build(spec, {context.files, *progress, context.cancel});
     } catch (const DoesNotFit& error) {
       throw Error(error.code(), error.message() + " (--force builds anyway)");
     }
   });
-  if (command.json)
-    print_json_text(report_json(report));
-  else
-    print(report);
+}
+
+void run(const BuildCommand& command, CommandContext& context) {
+  BuildSpec spec = command.spec;
+  apply_cluster(command.cluster, spec.run);
+  const std::vector<BuildSpec> builds = builds_of(spec, command.resolutions);
+  if (builds.size() > 1 && spec.run.cluster && spec.run.cluster->merge_job)
+    throw Error(ErrorCode::kInvalidInput,
+                "--resolution: expected one resolution with --cluster-merge");
+  for (const BuildSpec& one : builds) refuse_result_of_other_scene(context.files, one);
+  auto reports = nlohmann::ordered_json::array();
+  for (const BuildSpec& one : builds) {
+    const BuildReport report = build(one, command.quiet, context);
+    if (!command.json)
+      print(report);
+    else if (builds.size() == 1)
+      print_json_text(report_json(report));
+    else
+      reports.push_back(nlohmann::ordered_json::parse(report_json(report)));
+  }
+  if (!reports.empty()) print_json(nlohmann::ordered_json{{"builds", reports}});
 }
 
 void declare(Command& command, BuildCommand& state) {
+  command.text_option(  // not required: --voxel-size can replace it
+      "-r,--resolution", "N,...",
+      [&state](const std::string& text) { state.resolutions = parse_resolutions(text); },
+      resolutions_help());
   OptionDeclarer options(command, Scope::kBuild);
+  options.leave_out("resolution");
   fields(options, state.spec);
-  options.at("resolution").optional();  // --voxel-size can replace it
   command.config_option();
   declare_cluster(command, state.cluster);
   command

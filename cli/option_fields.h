@@ -15,9 +15,12 @@ class OptionDeclarer {
   // command that has the field as an option, in the order submit, plan, build.
   OptionDeclarer(Command& command, Scope scope) : command_(command), scope_(scope) {}
 
+  // Leaves out the field of this name, which the command declares itself.
+  void leave_out(const char* field_name) { left_out_ = field_name; }
+
   template <class T>
   void operator()(const Field& field, T& value) {
-    if (field.scope > scope_) return;
+    if (field.scope > scope_ || field.name == left_out_) return;
     Option option = declare(field, value);
     if (*field.heading) option.group(field.heading);
     if (field.is_required) option.required();
@@ -76,6 +79,7 @@ class OptionDeclarer {
 
   Command& command_;
   const Scope scope_;
+  std::string left_out_;
   std::map<std::string, Option> options_;
 };
 

@@ -52,6 +52,27 @@ TEST_F(BuildCommand, LeavesFileAndReportOnly) {
   EXPECT_TRUE(exists("work"));
 }
 
+// Several resolutions are built into files with the resolution in their names. Each file equals
+// the file of its own build.
+TEST_F(BuildCommand, BuildsSeveralResolutions) {
+  const Json reports =
+      run_json({"build", "m.glb", "-r", "32,64,128", "-o", "s.vdag", "--report", "s.json"});
+  ASSERT_EQ(reports["builds"].size(), 3u);
+  EXPECT_EQ(reports["builds"][1]["resolution"], 64);
+  for (const char* name : {"s-32.vdag", "s-64.vdag", "s-32.json", "s-128.json"})
+    EXPECT_TRUE(exists(name)) << name;
+  EXPECT_FALSE(exists("s.vdag"));
+  build();
+  EXPECT_EQ(contents("s-128.vdag"), contents("m.vdag"));
+  EXPECT_EQ(reports["builds"][2]["sha256"], Json::parse(contents("s-128.json"))["sha256"]);
+  put("n-64.vdag", contents("m.vdag"));
+  expect_error(2, "n-64.vdag", {"build", "m.glb", "-r", "32,64", "-o", "n.vdag"});
+  EXPECT_FALSE(exists("n-32.vdag")) << "all outputs are checked first";
+  for (const char* list : {"32,", "32,32", "32,33", "32;64"})
+    expect_error(2, "--resolution: '" + std::string(list) + "': expected",
+                 {"build", "m.glb", "-r", list, "-o", "x.vdag"});
+}
+
 // Without --json, a text report is on standard output and progress on standard error.
 TEST_F(BuildCommand, PrintsATextReport) {
   const Answer answer = run({"build", "m.glb", "-r", "64", "-o", "m.vdag"});

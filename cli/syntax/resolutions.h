@@ -1,0 +1,22 @@
+// `build -r 1k,2k,4k`: one build for each resolution.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "scheduler/spec/build_spec.h"
+
+namespace voxdag::cli {
+
+// Parses the value of --resolution: one or several resolutions, separated by commas. Throws
+// Error{kInvalidInput}.
+std::vector<uint64_t> parse_resolutions(const std::string& text);
+// Returns the documentation of the option.
+std::string resolutions_help();
+
+// Returns the builds of a command, in the order of the resolutions. If there are several, the files
+// and the work folder of each have its resolution in their names: OUT.vdag becomes OUT-1024.vdag.
+std::vector<BuildSpec> builds_of(const BuildSpec& spec, const std::vector<uint64_t>& resolutions);
+
+}  // namespace voxdag::cli
