@@ -184,3 +184,14 @@ def test_ctrl_c(tmp_path):
     whole = voxdag.build(scene, resolution=16384, output=tmp_path / "whole.vdag")
     assert resumed["sha256"] == whole["sha256"]
     assert not [name for name in os.listdir(tmp_path) if name.endswith(".ply")]
+
+
+def test_a_voxel_size_alone_chooses_the_resolution(tmp_path):
+    mesh = ([[0, 0, 0], [3, 0, 0], [0, 3, 1]], [[0, 1, 2]])
+    report = voxdag.build(mesh, voxel_size=0.25, output=tmp_path / "a.vdag")
+    assert report["resolution"] == 16 and report["bounds"]["edge"] == 4
+    same = voxdag.build(mesh, resolution=16, voxel_size=0.25, output=tmp_path / "b.vdag")
+    assert same["sha256"] == report["sha256"]
+    assert voxdag.plan(mesh, voxel_size=0.25)["triangles"] == 1
+    with pytest.raises(voxdag.Error, match="expected a resolution, or a voxel_size"):
+        voxdag.build(mesh, output=tmp_path / "c.vdag")

@@ -16,6 +16,7 @@ from ._dag import Dag, Hits, open
 from ._derive import combine, export, export_formats, extract
 from ._error import Error
 from ._mesh import Mesh
+from ._notebook import Viewer
 from ._progress import Progress
 from ._render import render
 from ._reports import BuildReport
@@ -34,6 +35,7 @@ __all__ = [
     "Progress",
     "Region",
     "Scene",
+    "Viewer",
     "build",
     "combine",
     "export",

@@ -37,7 +37,7 @@ Scene = Union[_Item, tuple[ArrayLike, ArrayLike], Sequence[_Item]]
 def build(
     scene: Scene,
     *,
-    resolution: SupportsIndex,
+    resolution: SupportsIndex | None = None,
     output: Path,
     progress: Progress = None,
     **options: Unpack[BuildOptions],
@@ -52,7 +52,8 @@ def build(
                       scene together. Do not change arrays before build() returns. A LAZ file is
                       decompressed to a temporary LAS file next to the output, which needs laspy
                       and lazrs
-    resolution        voxels per edge of the grid, a power of two from 4 to 2^20
+    resolution        voxels per edge of the grid, a power of two from 4 to 2^20; None: the
+                      smallest that fits `voxel_size`, which is then required
     output            the .vdag file to write
     progress          called with the stage's name, the number of units done, their total number
                       (0 if unknown) and the unit's name, up to 20 times a second; if it raises an
@@ -75,7 +76,7 @@ def build(
 def plan(
     scene: Scene,
     *,
-    resolution: SupportsIndex,
+    resolution: SupportsIndex | None = None,
     output: Path | None = None,
     progress: Progress = None,
     **options: Unpack[BuildOptions],
@@ -96,17 +97,13 @@ def plan(
 def _call(
     function: Callable[..., str],
     scene: Scene,
-    resolution: SupportsIndex,
+    resolution: SupportsIndex | None,
     output: str,
     progress: Progress,
     options: BuildOptions,
     las_prefix: str,
 ) -> Any:
-    resolution = operator.index(resolution)
-    if not 0 < resolution < 1 << 63:
-        raise Error(
-            f"resolution={resolution}: expected a power of two from 4 to 2^20", "invalid_input"
-        )
+    edge = _edge_of(resolution, options)
     given: dict[str, Any] = {**options, "output": output}
     if given.get("bounds") is not None:
         given["bounds"] = [float(number) for number in given["bounds"]]
@@ -120,7 +117,19 @@ def _call(
     contents = [(f"file in memory {i}", _bytes_of(stream)) for i, stream in enumerate(streams)]
     arrays = native_meshes(meshes, with_colors, bool(given.get("skip_invalid")))
     with shown(progress) as callback, decompressed(files, las_prefix) as readable:
-        return json.loads(function(readable, contents, arrays, resolution, callback, given))
+        return json.loads(function(readable, contents, arrays, edge, callback, given))
+
+
+def _edge_of(resolution: SupportsIndex | None, options: BuildOptions) -> int:
+    """Returns the resolution; 0 if the build must find it."""
+    if resolution is None:
+        if options.get("voxel_size") is None:
+            raise Error("expected a resolution, or a voxel_size", "invalid_input")
+        return 0
+    edge = operator.index(resolution)
+    if not 0 < edge < 1 << 63:
+        raise Error(f"resolution={edge}: expected a power of two from 4 to 2^20", "invalid_input")
+    return edge
 
 
 def _parts_of(scene: Any) -> tuple[list[str], list[IO[bytes]], list[Mesh]]:

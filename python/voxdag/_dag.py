@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from ._derive import Operation
+    from ._notebook import Viewer
     from ._types import ExportOptions, ExportReport, ExtractOptions, ExtractReport, RenderOptions
 
 # For each attribute's name: the number of components of a value, and the numpy type of a component.
@@ -311,10 +312,22 @@ class Dag(DagFile):
         return export(self, output, **options)
 
     def render(self, **options: Unpack[RenderOptions]) -> Bytes:
-        """Renders a picture, (height, width, 3) uint8. It has the options of voxdag.render()."""
+        """Renders a picture, (height, width, 3 or 4) uint8. It has the options of
+        voxdag.render()."""
         from ._render import render
 
         return render(self, **options)
+
+    def view(self, *, open_browser: bool | None = None, program: str = "voxdag") -> Viewer:
+        """Starts the viewer of the program voxdag, and opens it in the browser. Returns a Viewer,
+        which has the `url`, and ends with close(), as a context manager, or with this program.
+
+        open_browser   open the page; by default True, except in a notebook, which shows a link
+        program        the program voxdag, which the package does not contain
+        """
+        from ._notebook import view
+
+        return view(self, open_browser, program)
 
     def _values(
         self, attribute: str, points: ArrayLike, level: int | None, world: bool
