@@ -43,7 +43,7 @@ BuildSpec checked(const BuildSpec& spec) {
     throw Error(ErrorCode::kInvalidInput,
                 "no scene was given: expected at least one " + list_scene_endings() + " file");
   check_options(spec);
-  choose_grid(g, WorldBounds{});  // throws for a cube or a voxel size that cannot be a grid
+  choose_grid(g, WorldBounds{});  // throws if no grid has these bounds or this voxel size
   check_backend(r, g.rule());
   if (solid_rule_of(g) != SolidRule::kNone) check_solid(r, g.solid);
   if (r.report == "none" && r.cluster && r.cluster->merge_job)
@@ -64,7 +64,7 @@ BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context) {
   const GeometryOptions& g = spec.geometry;
   if (g.resolution || !g.voxel_size) return spec;
   BuildSpec out = spec;
-  out.geometry.resolution = kMaxOptionEdge;  // for the checks before the scan
+  out.geometry.resolution = kMaxOptionEdge;  // any valid value, for checked()
   const BuildSpec full = checked(out);
   MemoryBudget budget(full.run.memory_bytes);
   const auto scene =

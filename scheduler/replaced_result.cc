@@ -39,7 +39,7 @@ std::optional<BuildReport> report_of_output(FileSystem& files, const RunOptions&
   return report ? report : report_at(files, default_report_path(run.output), output_bytes);
 }
 
-// Returns names as they are in the JSON of a report, which has U+FFFD for bytes that are not UTF-8.
+// Returns names as the JSON of a report contains them: bytes that are not UTF-8 become U+FFFD.
 std::vector<std::string> as_reported(const std::vector<std::string>& names) {
   const FieldJson json = names;
   const auto replace = FieldJson::error_handler_t::replace;

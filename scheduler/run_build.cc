@@ -36,8 +36,8 @@ constexpr int64_t kWorkFormatVersion = 4;
 // merged at most kMaxMerges times if they are damaged.
 constexpr int kMaxReads = 3, kMaxMerges = 3;
 
-// Refuses a stored job with another format version or other geometry options before the scene is
-// read.
+// Throws Error if the stored job has another format version or other geometry options. Called
+// before the scene is read.
 void refuse_other_options(const BuildJob& job) {
   const auto stored = job.store->job();
   if (!stored) return;
@@ -66,7 +66,8 @@ void prepare_work_folder(BuildJob& job) {
   job.work.remove_spilled();
 }
 
-// A scene without triangles in the grid is an error, or a warning with --allow-empty.
+// Called for a scene without triangles in the grid. Throws Error{kInvalidInput}, or only warns with
+// --allow-empty. `declared` is the number of triangles that the scene's files declare.
 void check_empty(BuildJob& job, uint64_t declared) {
   const BuildReport& report = job.report;
   std::string message = "has no triangles in the grid";
@@ -163,13 +164,15 @@ void open_solid(BuildJob& job, const std::string& scene_digest) {
   job.rows->load();
 }
 
-// A strict build refuses warnings that an earlier run of the job only reported.
+// Throws the first warning that an earlier run of the job recorded, if this build is strict: a
+// strict build treats warnings about the scene as errors.
 void refuse_stored_warnings(BuildJob& job) {
   if (!job.spec.run.strict) return;
   for (const Warning& warning : job.store->warnings()) refuse_warning(warning);
 }
 
-// Adds the interior of a solid to the report. Warns if its surface is not closed.
+// Adds the numbers of a solid's interior voxels and sample rows to the report. Reports the warning
+// of solid_warning(), if any.
 void report_solid(BuildJob& job) {
   if (!job.has_rows()) return;
   uint64_t interior = 0, disputed = 0;

@@ -7,9 +7,9 @@
 
 namespace voxdag {
 
-// Runs or resumes the build in the work folder. Throws Error. The output path is created only by
-// the final rename, so it never holds a partial file. The report is also written to output +
-// ".report.json".
+// Runs or resumes the build in the work folder, and returns its report. Throws Error. The output
+// path is created only by the final rename, so it never holds a partial file. The report is also
+// written to report_path(), unless this path is "".
 BuildReport run_build(const BuildSpec& spec, const BuildContext& context);
 
 }  // namespace voxdag

@@ -39,12 +39,13 @@ std::unique_ptr<ClusterBuilder> make_cluster_builder(BuildJob& job);
 
 // A cluster build whose merge is also a job of the cluster (`--cluster-merge`). The submitting
 // process submits the tasks and a merge job that depends on them, and unlocks the work folder. Then
-// it follows the merge job. The merge job runs the same voxdag command: it resumes the work folder
-// as any later run does, resubmits failed batches, waits for their tasks and merges. If the process
-// that follows the merge job is stopped, the same command follows the job again. It also submits
-// the merge job again if Slurm has lost it. A process finds a running merge job by the job's name,
-// which contains the id of the build in cluster.json. It finds an ended merge job by the report
-// next to the output, which contains the job's request().
+// it follows the merge job: it shows the job's progress until the job ends. The merge job runs the
+// same voxdag command: it resumes the work folder as any later run does, resubmits failed batches,
+// waits for their tasks and merges. If the process that follows the merge job is stopped, the user
+// can run the same command again. That run follows the job again, or submits it again if Slurm has
+// lost it. A process finds a running merge job by the job's name, which contains the id of the
+// build in cluster.json. It finds an ended merge job by the report next to the output, which
+// contains the job's request().
 class MergeJob {
  public:
   virtual ~MergeJob() = default;
@@ -58,8 +59,8 @@ class MergeJob {
   // True if the work folder still has a job store although the build does not keep its work folder.
   // Then the merge job is still removing the folder, or it was stopped before it did so.
   virtual bool has_remaining_work() const = 0;
-  // Removes the report that finished() returns, if any, so that it is not taken for the report of a
-  // new merge job.
+  // Removes the report that finished() returns, if any, so that nobody mistakes it for the report
+  // of a new merge job.
   virtual void forget_finished() = 0;
   // True if the work folder's merge job is waiting or running. Repeats the query until Slurm
   // answers.
@@ -76,8 +77,9 @@ std::unique_ptr<MergeJob> make_merge_job(const BuildSpec& spec, const TriangleSo
 // Builds with and without cluster options call the following functions, because an earlier run in
 // the same work folder may have started tasks.
 
-// Records the results of tasks that an earlier run started for the scene with this digest. Throws
-// Error{kInvalidInput} if there are such tasks and this program has no cluster support.
+// Records in the job store the results of tasks that an earlier run started for the scene with this
+// digest. Throws Error{kInvalidInput} if there are such tasks and this program has no cluster
+// support.
 void accept_earlier_tasks(BuildJob& job, const std::string& scene_digest);
 // Stops the cluster tasks of the work folder and removes their files. Only warns if Slurm does not
 // accept the request: a remaining task will fail because its batch file is missing.

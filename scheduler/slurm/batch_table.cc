@@ -40,9 +40,9 @@ void BatchTable::resume(const std::string& scene_digest, const DagShape& shape) 
     if (const uint32_t segment = subvolume.artifact.segment; segment >= kFirstClusterSegment)
       state_.next_batch = std::max(state_.next_batch, segment - kFirstClusterSegment + 1);
   }
-  // Drops open batches without a batch file, with subvolumes that the job store does not have, or
-  // with built subvolumes. In the last case the earlier process accepted the record and was killed
-  // before it saved this table.
+  // Drops an open batch if its batch file is missing, or if one of its subvolumes is not in the job
+  // store or already built. A subvolume is already built if the earlier process accepted the record
+  // and was killed before it saved this table.
   std::erase_if(state_.open, [&](const OpenBatch& batch) { return !is_valid(batch); });
   save();
 }
@@ -116,8 +116,8 @@ uint64_t BatchTable::tasks_for(double weight, uint64_t subvolumes) const {
       static_cast<uint64_t>(std::llround(static_cast<double>(cluster_.options.tasks) * share)), 1);
 }
 
-// Writes the batch files and adds the batches to the table as open. Calls after_each() for each
-// file. The caller saves the table.
+// Writes the files of the batches `cut` and adds these batches to the table as open. Calls
+// after_each() after each file. The caller saves the table.
 void BatchTable::open_batches(CutBatches cut, std::span<const BinId> bins,
                               const TriangleStore& triangles, unsigned threads,
                               const std::function<void()>& after_each) {

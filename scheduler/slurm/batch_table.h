@@ -58,8 +58,8 @@ class BatchTable {
   void record_failed_attempt() { ++state_.totals.attempts; }
   // Forgets earlier failures, so that each batch has the full number of retries in this run.
   void forget_failures();
-  // Removes a batch and its file, and throws Error{code, why}. The batch file may be the cause of
-  // the error, so the next run writes a new one from the triangles of the scene.
+  // Removes a batch and its file, and throws Error{code, why}. The next run writes a new batch file
+  // from the triangles of the scene, because the removed file may have caused the error.
   [[noreturn]] void give_up(uint32_t batch, ErrorCode code, const std::string& why);
 
   void save();

@@ -20,8 +20,8 @@ std::vector<size_t> cut_into_batches(std::span<const double> weights, uint64_t b
     const double wanted =
         total * static_cast<double>(ends.size() + 1) / static_cast<double>(batches);
     const bool is_last = i + 1 == weights.size();
-    // An item that crosses the ideal end of a batch belongs to the batch with the larger share of
-    // the item's weight.
+    // The ideal batches have equal weights. An item that crosses the ideal end of a batch belongs
+    // to the batch with the larger share of the item's weight.
     if (is_last || (ends.size() + 1 < batches && sum + weights[i + 1] / 2 > wanted))
       ends.push_back(i + 1);
   }

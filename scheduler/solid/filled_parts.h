@@ -3,8 +3,8 @@
 // scene and on the geometry options, so a part of an earlier run remains right even if the grid is
 // divided in another way.
 //
-// save() writes the complete record and renames it. Thread-safe, except load(), complete() and
-// forget().
+// add_durable() and save() replace the record on the disk atomically (by renaming). Thread-safe,
+// except load(), complete() and forget().
 #pragma once
 
 #include <cstdint>
@@ -44,8 +44,9 @@ class FilledParts {
   // Adds parts whose segments are synced, and saves the record.
   void add_durable(const std::vector<FilledPart>& parts);
 
-  // Sets the parts that together have all voxels. Their segments need not be synced yet.
-  // `segments` are the segments of this run, which must be completed.
+  // Replaces the parts by the complete result: parts that together have all voxels of the solid.
+  // `segments` are the segments that this run wrote, after SegmentWriter::complete(). They need not
+  // be synced yet; save() syncs them.
   void complete(std::vector<FilledPart> parts,
                 std::vector<std::unique_ptr<SegmentWriter>> segments);
   bool is_complete() const { return is_complete_; }

@@ -9,13 +9,13 @@
 
 namespace voxdag {
 
-// Appends an artifact with a root for each cube. It has one node per level, which all roots share.
-// There must be at least one cube.
+// Appends an artifact with a root for each cube. The artifact has one node per level, which all
+// roots share. There must be at least one cube.
 ArtifactRef add_full_cubes(SegmentWriter& segment, const DagShape& shape,
                            std::span<const Cube> cubes);
 
-// Returns the counts of a cube in which all voxels are interior. If `is_disputed`, all of them also
-// count as disputed.
+// Returns the summary of a cube in which all voxels are set and interior. If `is_disputed`, all of
+// them also count as disputed.
 SubDagSummary full_summary(const Cube& cube, const DagShape& shape, bool is_disputed);
 
 }  // namespace voxdag

@@ -7,9 +7,9 @@
 namespace voxdag {
 namespace {
 
-// Computes the views (core/geometry/solid_rule.h) from a part's low faces: starts with the views
-// from the low faces of the split subvolume, and adds the crossings between those faces and the
-// part's faces.
+// Computes the views (core/geometry/solid_rule.h) from the low faces of a part. Starts with the
+// views on the same rows from the low faces of the split subvolume. Updates them by the crossings
+// between the low faces of the subvolume and of the part.
 class PartEntry {
  public:
   PartEntry(const SolidEntry& whole_entry, const SampleRows& whole, const SampleRows& part)

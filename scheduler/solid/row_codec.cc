@@ -14,7 +14,7 @@ class VarintSource {
  public:
   explicit VarintSource(std::span<const std::byte> bytes) : bytes_(bytes) {}
   bool is_empty() const { return next_ == bytes_.size(); }
-  // Returns false if the number is incomplete or has more than ten bytes.
+  // Reads the next number. Returns false if it is incomplete or has more than ten bytes.
   bool get(uint64_t& value) {
     value = 0;
     for (int shift = 0; shift < 64 && next_ < bytes_.size(); shift += 7) {
@@ -30,7 +30,8 @@ class VarintSource {
   size_t next_ = 0;
 };
 
-// Maps small differences of either sign to small numbers.
+// Maps a difference (modulo 2^32) to a number that is small if the difference is close to 0, above
+// or below.
 uint64_t zigzag(uint32_t difference) {
   return difference << 1 ^ (difference >> 31 != 0 ? UINT32_MAX : 0);
 }

@@ -1,6 +1,6 @@
-// Compresses the numbers of sample rows as runs of equal numbers: each run is the difference from
-// the previous run's number and the run's length, both as variable-length integers. Most rows have
-// the number of their neighbor.
+// Compresses the numbers of sample rows (row_sums.h) as runs of equal numbers. A run is encoded as
+// the difference from the previous run's number and the run's length, both as variable-length
+// integers. Most rows have the same number as their neighbor, so runs are long.
 #pragma once
 
 #include <cstddef>

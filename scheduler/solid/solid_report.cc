@@ -9,8 +9,9 @@
 namespace voxdag {
 namespace {
 
-// Fractions of the sample rows. If more rows than kClosed are open, a warning says that the surface
-// is not closed; if more than kScene are, that it is more likely a scene than an object.
+// Limits for the open sample rows, as a fraction of all crossed rows. Above kClosed, a warning
+// reports that the surface is not closed. Above kScene, the warning adds that it is more a scene
+// than an object.
 constexpr double kClosed = 0.001, kScene = 0.05;
 
 std::string percent_text(double part) {

@@ -25,8 +25,8 @@ double solid_volume(const Grid& grid, uint64_t voxels);
 // Returns the warning for a seed whose space reaches the border of the grid.
 Warning seed_warning(const Seed& seed, const std::string& scene);
 
-// Returns a warning if the surface is open, if its faces are oriented inconsistently, or if they
-// cancel each other.
+// Returns a warning if the surface is open, if its faces are oriented inconsistently, if the faces
+// cancel each other, or if an enclosed solid has no interior.
 std::optional<Warning> solid_warning(const SolidReport& report, const std::string& scene);
 
 }  // namespace voxdag

@@ -1,5 +1,5 @@
-// The durable state of a solid between the stages `rows`, `build` and `merge`: the views from the
-// low faces of each subvolume, and the full cubes.
+// The durable state of a solid between the stages `rows`, `build` and `merge`: for each subvolume,
+// the views (core/geometry/solid_rule.h) from its low faces; and the full cubes.
 //
 //   header    magic, place of the last index, checksum
 //   rows      compressed views of one subvolume along one axis
@@ -58,7 +58,7 @@ class SolidRows {
             std::string identity);
   ~SolidRows();
 
-  // Loads the last save(). Returns false if there is none for this job.
+  // Loads the state that save() stored last. Returns false if this job has none.
   bool load();
   // True after load() returned true, and after start().
   bool is_ready() const { return file_ != nullptr; }

@@ -182,7 +182,7 @@ void fields(Visitor& visit, BuildSpec& spec) {
   fields(visit, spec.run);
 }
 
-// Forwards the fields for which `keep` is true.
+// Forwards to `visit` the fields for which keep(field) is true.
 template <class Visitor, class Keep>
 class FieldFilter {
  public:

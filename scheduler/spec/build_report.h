@@ -25,7 +25,7 @@ struct SolidReport {
   uint64_t rows = 0;                          // sample rows that cross the surface
   uint64_t open_rows = 0;  // sample rows that enter the solid more or less often than they leave it
   uint64_t odd_rows = 0;   // sample rows with an odd number of crossings
-  uint64_t disputed = 0;   // voxels of the interior on which the directions disagree
+  uint64_t disputed = 0;   // interior voxels whose views disagree (core/geometry/solid_rule.h)
 };
 
 struct BuildReport {

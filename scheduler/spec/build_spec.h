@@ -84,8 +84,8 @@ struct ClusterOptions {
   // Seconds until the record of an ended task must be visible on the shared disk.
   double grace_s = 15;
   double slurm_interval_s = 5;  // seconds between two queries to Slurm
-  // Seconds for which a refusal because of missing nodes is retried: Slurm may have just started
-  // and not know its nodes yet.
+  // Seconds for which a submission is repeated if Slurm refuses it because of missing nodes. Slurm
+  // knows no nodes just after it was started.
   double slurm_start_s = 15;
   // Options of the merge job (MergeJob). Without them this process merges.
   struct MergeJobOptions {

@@ -91,8 +91,8 @@ struct MemoryPlan {
   }
   // Returns the maximum size of the sample rows of a solid's planned subvolume.
   static constexpr uint64_t solid_row_bytes(uint64_t budget_bytes) { return budget_bytes / 64; }
-  // Returns the memory for labels of an enclosed solid that are kept until their part is filled.
-  // With little memory, large parts are more important, so no labels are kept.
+  // Returns the memory for labels of an enclosed solid that are kept until their part is filled. If
+  // little memory is free, no labels are kept, so that the workers can process large parts.
   static constexpr uint64_t kept_label_bytes(uint64_t free_bytes) {
     return free_bytes < uint64_t{512} << 20 ? 0 : free_bytes / 2;
   }
@@ -102,8 +102,8 @@ struct MemoryPlan {
 
 // Memory of the workers of the color stage.
 struct ColorMemory {
-  // Memory for baking one region of the color grid. With the minimum, kRegionBytes, a large region
-  // is baked in pieces. kSolidRegionBytes is enough to bake any region in one piece.
+  // Memory for baking one region of the color grid. kRegionBytes is the minimum; with it, a large
+  // region is baked in pieces. kSolidRegionBytes is enough to bake any region in one piece.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
   static constexpr uint64_t kSolidRegionBytes = uint64_t{46} << 20;
   // Memory for the attributes other than color in a region. Includes kValueSumBytes for the sums of

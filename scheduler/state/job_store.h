@@ -113,8 +113,9 @@ class JobStore {
   // the triangles of built subvolumes were released.
   void mark_for_rebuild(const StoredSubvolume& lost);
 
-  // Returns the progress of scan, ingest and partition that save_ingest() stored: of the stored job
-  // or of the next one. Throws Error{kCorrupt} if it does not match its checksum.
+  // Returns the progress of scan, ingest and partition that save_ingest() stored. It belongs to the
+  // stored job, or to a job that has not been started yet. Throws Error{kCorrupt} if the progress
+  // does not match its checksum.
   std::optional<std::vector<std::byte>> ingest();
   void save_ingest(std::span<const std::byte> record);
   // Removes the progress of ingest, and the warnings. Does not write if the store has neither.

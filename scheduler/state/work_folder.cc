@@ -162,7 +162,8 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
   }
 }
 
-// Running tasks may add files at any time. Then the folder remains.
+// Removes the files, and the folder if it is then empty. Running tasks may add files at any time;
+// the folder remains if they do.
 void WorkFolder::remove_cluster_files() {
   if (!files_.exists(cluster_path())) return;
   for (const DirectoryEntry& entry : files_.list(cluster_path())) {

@@ -53,7 +53,8 @@ void DurableStore::read_chain() {
   charge_.try_resize(list_bytes_);
 }
 
-// A link contains the extent of the previous link and the chunks added since then.
+// Appends a link to the chain if chunks were added. The link contains the extent of the previous
+// link and the chunks added since then.
 DurableStoreState DurableStore::checkpoint() {
   if (!unnamed_.empty()) {
     std::vector<std::byte> link(sizeof last_link_ + unnamed_.size() * sizeof(NamedChunk));

@@ -33,8 +33,8 @@ class RecordStore {
 
   // Adds a chunk of `count` records to the list.
   void add(ChunkList& list, std::span<const std::byte> records, uint32_t count);
-  // Returns the chunk's records, which remain in memory or are read from the file into `buffer`.
-  // Throws DamagedTriangles if the file is damaged.
+  // Returns the chunk's records. If they are in the file, reads them into `buffer`. Throws
+  // DamagedTriangles if the file is damaged.
   std::span<const std::byte> read(const Chunk& chunk, std::vector<std::byte>& buffer) const;
   // Moves the lists' records from memory to the file.
   void move_to_file(std::span<ChunkList> lists);

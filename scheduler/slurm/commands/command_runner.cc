@@ -60,7 +60,7 @@ class FileActions {
 
 class Attributes {
  public:
-  // Resets signals that this process may ignore to their defaults in the started program.
+  // Restores the default actions, in the started program, of signals that this process may ignore.
   Attributes() {
     posix_spawnattr_init(&attributes_);
     sigset_t defaults;
@@ -78,7 +78,7 @@ class Attributes {
   posix_spawnattr_t attributes_;
 };
 
-// Appends the available bytes to `out`. Returns false at the end of the file.
+// Appends the bytes that `fd` has now to `out`. Returns false at the end of the program's output.
 bool read_some(int fd, std::string& out) {
   std::array<char, 65536> buffer;
   const ssize_t n = ::read(fd, buffer.data(), buffer.size());

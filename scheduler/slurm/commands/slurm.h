@@ -73,8 +73,8 @@ struct SlurmJob {
 
 class Slurm {
  public:
-  // Canceling `cancel` ends a running command. For some seconds after its start, Slurm knows no
-  // nodes and refuses all submissions. Such a refusal counts as temporary for `start_s` seconds
+  // Canceling `cancel` ends a running command. For some seconds after Slurm was started, it knows
+  // no nodes and refuses all submissions. Such a refusal counts as temporary for `start_s` seconds
   // after the first one: check() repeats its request, and submissions throw Error{kIo}, so that the
   // caller tries again later.
   Slurm(CommandRunner& commands, const CancelToken& cancel, double start_s = 0)

@@ -18,8 +18,8 @@ class AttributeSections {
   // attributes.
   void add_to(GlobalFileWriter& out);
   // Returns a digest of all inputs of the sections; "" for a build without attributes. After
-  // add_to() it returns the digest of the inputs that add_to() used. Otherwise it reads the inputs,
-  // and fills in the color report from the output file of an earlier run.
+  // add_to(), this is the digest of the inputs that add_to() used. Before add_to(), reads the
+  // inputs, and fills in the color report from the output file of an earlier run.
   std::string digest();
 
  private:

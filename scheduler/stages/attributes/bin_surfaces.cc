@@ -74,14 +74,14 @@ class SurfacePiece {
     uint32_t material;
     Checksum128 digest;
   };
-  // A record and one of its bins.
+  // The indexes of a record and of a bin that gets this record.
   struct Place {
     uint32_t bin, record;
   };
   static constexpr size_t kNone = ~size_t{0};
-  // Maximum number of places in memory. A piece whose triangles touch many bins needs more. Then
-  // the places of the records from late_ on are not added, and copy() finds the bins of these
-  // records.
+  // Maximum number of places in memory. If the triangles of a piece touch so many bins that the
+  // places could exceed this number, places_ omits the records from late_ on. copy() then finds the
+  // bins of these records.
   static constexpr size_t kMaxPlaces = 4 * kPieceTriangles;
 
   std::span<const std::byte> bytes_of(const Record& record) const {

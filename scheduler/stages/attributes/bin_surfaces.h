@@ -34,8 +34,9 @@ struct BinnedSurfaces {
   bool have_colors = false;          // a surface in the grid has an image, or a color but white
 };
 
-// Throws Error{kInvalidInput} if the triangles differ from the triangles that ingest read. This
-// happens if the scene was changed during the build.
+// Puts the surfaces of the scene into the bins of the cubes, and returns the bins. Their records
+// are in `store`. Throws Error{kInvalidInput} if the triangles differ from the triangles that
+// ingest read, which happens if the scene was changed during the build.
 BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning,
                             RecordStore& store, const StageContext& context);
 

@@ -15,8 +15,8 @@ constexpr uint32_t kColorVersion = 2;
 std::vector<Checksum128> look_digests(std::span<const Material> materials,
                                       std::span<const std::string> images,
                                       const AttributeSet& attributes, const Cutouts* cutouts) {
-  // Cutouts also decide which cells a material's triangles touch. So the look of every material
-  // that is not opaque contains the digest of all cutouts.
+  // Cutouts also decide which cells a material's triangles touch. So the look (see look_digests())
+  // of every material that is not opaque contains the digest of all cutouts.
   const Checksum128 cut = cutouts ? cutout_digest(*cutouts) : Checksum128{};
   std::vector<Checksum128> digests;
   digests.reserve(materials.size());

@@ -18,8 +18,8 @@
 
 namespace voxdag {
 
-// Set of images. Image i is bit i modulo 256, the set's size. So in a scene with more images,
-// adding one image also adds all images with the same bit.
+// A set of images. Bit i % 256 stands for image i. In a scene with more than 256 images, several
+// images share a bit, and adding one of them adds all of them.
 using ImageClasses = std::bitset<256>;
 
 // Summary of the surfaces in a bin.

@@ -13,8 +13,8 @@
 namespace voxdag {
 namespace {
 
-// Memory of a surface: the surface, and a copy for its region. Up to 14 nested cubes also list its
-// index and the mask of the children that it touches.
+// Memory of a surface: the surface, and a copy for its region. Up to 14 nested cubes also list the
+// surface's index and the mask of the children that the surface touches.
 constexpr uint64_t kSurfaceBytes =
     2 * sizeof(FixedSurface) + 14 * (sizeof(uint32_t) + sizeof(uint8_t));
 // Bytes of records that are collected for a child cube before they go to the store.
@@ -149,7 +149,8 @@ void CubeBaker::bake_in_parts(const Cube& region, ChunkList& bin, const Sink& si
   touching_ = {};
 }
 
-// add_surfaces(add) calls add() with all surfaces, in one part or several. If a region has too many
+// Bakes a region, and appends its record for each attribute to sink.records. add_surfaces(add) must
+// call add() with all surfaces of the region, in one part or several. If the region has too many
 // cells for the memory, its eight children are baked separately.
 template <class AddSurfaces>
 void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces, const Sink& sink) {
@@ -198,8 +199,8 @@ bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfac
 }
 
 // Charges the memory of the sums of normals and materials, `bytes` in all. Returns false if the
-// sums do not fit. The charge is kept for the next region unless it exceeds the need by over
-// kSlackBytes.
+// sums do not fit. Keeps an existing charge (of an earlier region) if it is large enough and
+// exceeds the sums by at most kSlackBytes.
 bool CubeBaker::charge_sums(uint64_t bytes) {
   constexpr uint64_t kSlackBytes = uint64_t{4} << 20;
   const uint64_t more = bytes - std::min(bytes, ColorMemory::kValueSumBytes);

@@ -173,7 +173,8 @@ class Worker {
         built);
   }
 
-  // Sets the artifact and the summary. Returns false if the subvolume must be split.
+  // Builds the subvolume, and sets the artifact and the summary of `built`. Returns false if the
+  // subvolume must be split.
   bool build_artifact(const SubvolumeTask& task, TriangleStream& triangles,
                       StoredSubvolume& built) {
     ArtifactWriter artifact(segment_, options_.shape);

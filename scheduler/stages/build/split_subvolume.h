@@ -19,9 +19,9 @@ struct SplitSolid {
   MemoryBudget& budget;
 };
 
-// Replaces `whole` in the job store by its octants that have triangles; in a solid, also by octants
-// without triangles that are inside. Returns these octants with a bin for each, and releases the
-// bin of `whole`. The edge of `whole` must be longer than kSmallestEdge.
+// Replaces `whole` in the job store by its octants that have triangles. For a solid, octants
+// without triangles that are inside the solid also replace it. Returns these octants with a bin for
+// each, and releases the bin of `whole`. The edge of `whole` must be longer than kSmallestEdge.
 std::vector<QueuedSubvolume> split_subvolume(const QueuedSubvolume& whole, uint32_t grid_levels,
                                              TriangleStore& triangles, JobStore& jobs,
                                              Progress& progress, const CancelToken& cancel,

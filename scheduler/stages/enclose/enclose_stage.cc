@@ -27,7 +27,7 @@
 namespace voxdag {
 namespace {
 
-// Maximum memory of the nodes and labels of a part, per byte of its artifact.
+// Estimated maximum memory of a part's nodes and labels, per byte of its artifact.
 constexpr uint64_t kLabelsOverArtifact = 16;
 
 // Thrown if a part was labeled, but its filled sub-DAG does not fit the memory of a worker.
@@ -88,7 +88,7 @@ class Enclosure {
   void begin_workers() {
     const uint64_t free_bytes = job_.budget.available();
     kept_budget_.emplace(MemoryPlan::kept_label_bytes(free_bytes), &job_.budget);
-    // The components at the faces take the rest of the memory.
+    // Leaves 1/8 of the remaining memory for the components at the faces (find_outside()).
     const auto memory =
         WorkerMemory::divide((free_bytes - kept_budget_->limit()) / 8 * 7, job_.spec.run.threads);
     const uint32_t first_segment = job_.work.next_segment_id();
@@ -110,7 +110,8 @@ class Enclosure {
     std::ranges::sort(parts_, {}, &LabeledPart::cube);
   }
 
-  // Labels a cube, or its octants if it exceeds the memory or if they are separate sub-DAGs.
+  // Labels the components of a cube's empty space. Labels the cube's octants separately instead if
+  // the cube does not fit in memory, or if the artifact has separate roots inside the cube.
   void label_part(EncloseWorker& worker, const Cube& cube, const ArtifactRef& shell) {
     job_.context.cancel.check();
     const bool is_smallest = cube.edge_voxels(job_.shape().grid_levels) <= kSmallestEdge;
@@ -132,7 +133,9 @@ class Enclosure {
     for (int octant = 0; octant < 8; ++octant) label_part(worker, cube.child(octant), shell);
   }
 
-  // Filling needs more memory than labeling, so labels get only a part of the share.
+  // Labels a cube with at most 1/`divisor` of the worker's share. Filling the cube later needs more
+  // memory than labeling it, so a cube that needs more for its labels would not fit then. Throws
+  // OutOfBudget.
   void try_label(EncloseWorker& worker, const Cube& cube, const ArtifactRef& shell,
                  uint64_t divisor) {
     const uint64_t limit = worker.share.limit() / divisor;
@@ -161,7 +164,8 @@ class Enclosure {
     return space;
   }
 
-  // Labels a part in memory that fill_part() can use. Returns null if this memory has no room.
+  // Labels a part in the memory of kept_budget_, where the labels can remain until fill_part() uses
+  // them. Returns null if this memory has no room for them, or if the part has no voxels.
   std::unique_ptr<LabeledSpace> label_to_keep(EncloseWorker& worker, const Cube& cube,
                                               const ArtifactRef& shell, uint64_t limit_bytes) {
     if (kept_budget_->available() / kLabelsOverArtifact < shell.bytes) return nullptr;
@@ -179,8 +183,8 @@ class Enclosure {
     return found == kept_.end() ? nullptr : std::move(found->second);
   }
 
-  // Returns the component with the seed, if it is open in this part. Throws Error{kInvalidInput} if
-  // the seed's voxel is set.
+  // Returns the component with the seed if this component reaches a face of the cube. Throws
+  // Error{kInvalidInput} if the seed's voxel is set.
   std::optional<uint32_t> seed_component(const SpaceLabels& labels, const Cube& cube) const {
     const auto voxel = seed_in(seed_, cube, job_.shape().grid_levels);
     if (!voxel) return std::nullopt;
@@ -266,7 +270,8 @@ class Enclosure {
     is_long_ = true;
   }
 
-  // Adds the enclosed cubes between the parts, and completes the record.
+  // Collects all filled parts, adds the empty cubes outside the parts that are enclosed (as full
+  // cubes), and marks FilledParts as complete.
   void finish(const OutsideSpace& outside) {
     std::vector<FilledPart> all;
     for (const LabeledPart& part : parts_)

@@ -88,7 +88,8 @@ class PartJoiner {
   }
 
  private:
-  // Gives each leaf the numbers of its components, and returns their total.
+  // Numbers the components of all leaves consecutively. Stores each leaf's first number in first_,
+  // and returns the number of components.
   uint64_t number_components() {
     uint64_t count = 0;
     for (const PartTree::Leaf& leaf : tree_.leaves()) {
@@ -118,7 +119,7 @@ class PartJoiner {
   }
 
   // Marks the component with the seed and returns it. Returns nullopt if there is no seed, or if
-  // its component is closed within a part.
+  // the seed's component reaches no face of its part.
   std::optional<uint32_t> mark_seed() {
     for (size_t i = 0; i < tree_.leaves().size(); ++i) {
       const PartTree::Leaf& leaf = tree_.leaves()[i];
@@ -152,7 +153,7 @@ class PartJoiner {
       out.of_parts[leaf.part].push_back(is_outside(first + static_cast<uint32_t>(c)) ? 1 : 0);
   }
 
-  // A cube of the tree, or a part of a leaf's face: the square at a path of quadrants.
+  // A cube of the tree, or a square on the face of a leaf, which the quadrants in `path` select.
   struct Place {
     PartTree::Ref ref;
     std::vector<uint8_t> path;
@@ -167,7 +168,7 @@ class PartJoiner {
           join({tree_.child(ref, o), {}}, {tree_.child(ref, o | 4 >> axis), {}}, axis);
   }
 
-  // Joins two neighbors: `a` is below `b` along the axis.
+  // Joins the components of two neighbors where they meet. `a` is below `b` along the axis.
   void join(const Place& a, const Place& b, int axis) {
     if (a.ref.is_leaf && b.ref.is_leaf) return join_leaves(a, b, axis);
     uint8_t quadrant = 0;
@@ -206,7 +207,8 @@ class PartJoiner {
                 "number of a component");
   }
 
-  // The quadtree that was read last. A large cube has many small neighbors.
+  // The face quadtree that was read last. It is kept because a large cube has many small neighbors
+  // at the same face.
   struct LoadedFace {
     uint32_t leaf = UINT32_MAX;
     int face = 0;

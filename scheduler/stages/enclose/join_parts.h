@@ -14,15 +14,15 @@
 namespace voxdag {
 
 struct OutsideSpace {
-  std::vector<std::vector<uint8_t>> of_parts;  // by part, by component: 1 if it is outside
+  std::vector<std::vector<uint8_t>> of_parts;  // for each part and component: 1 if it is outside
   std::vector<Cube> enclosed_cubes;            // empty cubes between the parts that are not outside
   bool is_seed_outside = false;                // a walk leads from the seed to the border
 };
 
-// If the build has a seed, components that do not reach the seed are outside as well.
-//
-// `faces` has the quadtrees of the parts. Throws Error{kOutOfMemory} if the budget cannot hold five
-// bytes for each component.
+// Joins the components where parts and empty cubes meet, and finds the components that are outside.
+// A component is outside if it reaches the border of the grid or, in a build with a seed, does not
+// reach the seed. `faces` has the quadtrees of the parts. Throws Error{kOutOfMemory} if the budget
+// cannot hold five bytes for each component.
 OutsideSpace find_outside(const std::vector<LabeledPart>& parts, const RowFile& faces,
                           const std::optional<Seed>& seed, uint32_t grid_levels,
                           MemoryBudget& budget, const CancelToken& cancel);

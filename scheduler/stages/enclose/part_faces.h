@@ -17,9 +17,10 @@ struct LabeledPart {
   Cube cube;
   ArtifactRef shell;           // the artifact that has the part's shell
   std::vector<uint8_t> touch;  // by component: the faces at which it has a voxel
-  // The component with the build's seed, if the seed's space is open in this part.
+  // The component with the build's seed, if the seed is in this part and its component reaches a
+  // face.
   std::optional<uint32_t> seed_component;
-  RowExtent faces[kFaces];  // their quadtrees (core/dag/space/face_code.h)
+  RowExtent faces[kFaces];  // quadtrees of the part's faces (core/dag/space/face_code.h)
 };
 
 }  // namespace voxdag

@@ -57,8 +57,9 @@ void TopTree::Tally::clear() {
   last_cell_ = {};
 }
 
-// Consecutive triangles of a scene usually touch the same few cells. last_entry_ finds the entries
-// of these cells, so that few triangles need new entries.
+// Adds the triangle to the entries of the cells that it touches. Consecutive triangles of a scene
+// usually touch the same few cells. last_entry_ finds the entries of these cells, so that few
+// triangles need new entries.
 void TopTree::Tally::add(const FixedTriangle& triangle, double weight) {
   if (last_cell_.contains(triangle)) {
     entries_[entry_of_last_cell_].weight += static_cast<float>(weight);

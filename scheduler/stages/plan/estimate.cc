@@ -25,8 +25,8 @@ constexpr double kGrowthDecay = 0.75;
 // Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
 constexpr double kSpreadPerDoubling = 1.12;
 // Bytes of the global file per node. A pilot's file has fewer bytes per node, because coarse levels
-// repeat more. So its number is multiplied by kBytesGrowthPerDoubling with each doubling of R, up
-// to kMaxBytesPerNode.
+// repeat more. So the pilot's bytes per node are multiplied by kBytesGrowthPerDoubling with each
+// doubling of R, up to kMaxBytesPerNode.
 constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;
 // Measured on real scenes: nodes of all artifacts per node of the global DAG, and compressed bytes

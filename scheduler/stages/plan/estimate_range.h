@@ -23,7 +23,7 @@ inline EstimateRange operator*(double factor, const EstimateRange& a) {
 inline nlohmann::ordered_json range_json(const EstimateRange& r) {
   return {{"low", r.low}, {"likely", r.likely}, {"high", r.high}};
 }
-// Returns the JSON of a number of bytes or of things, as whole numbers.
+// Returns the JSON of an estimated number (of bytes, nodes, ...), rounded down to whole numbers.
 inline nlohmann::ordered_json count_json(const EstimateRange& r) {
   const auto whole = [](double count) { return static_cast<uint64_t>(std::min(count, 0x1p63)); };
   return {{"low", whole(r.low)}, {"likely", whole(r.likely)}, {"high", whole(r.high)}};

@@ -17,7 +17,8 @@ constexpr uint64_t kPilotPiece = 1 << 16;
 constexpr size_t kPilotBatch = 1024;
 constexpr size_t kPilotChunk = 1024;
 
-// Streams triangles on a grid that is 2^shift times coarser. Coordinates remain odd.
+// Streams triangles on a grid that is 2^shift times coarser. Coordinates remain odd, as
+// FixedTriangle requires, so that no vertex is on a voxel boundary.
 class CoarserStream : public TriangleStream {
  public:
   CoarserStream(std::unique_ptr<TriangleStream> fine, uint32_t shift)

@@ -1,4 +1,4 @@
-// The publish stage: from a complete partial file to the output file under its name.
+// The publish stage: completes the partial global file and renames it to the output path.
 //
 // Resume rule: the job store records the file's SHA-256 before the rename. A later run verifies the
 // output by this digest and does not write it again.

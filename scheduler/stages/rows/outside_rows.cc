@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint64_t kBytesOfTile = sizeof(OutsideTile) + 96;  // with the map's node
 
-// Triangles of a piece of the scene that leave the grid and that sample rows of the grid can cross.
+// Triangles of a piece of the scene that extend beyond the grid and that its sample rows can cross.
 class LeavingPiece {
  public:
   explicit LeavingPiece(const Grid& grid)

@@ -1,5 +1,6 @@
-// The crossings of the grid's sample rows outside the grid, which exist only with --bounds. They
-// are in no subvolume. Not thread-safe.
+// The crossings of sample rows with triangles outside the grid. A sample row is a line that
+// continues beyond the grid. Only a grid that is given by --bounds can have triangles outside. No
+// subvolume has these crossings. Not thread-safe.
 #pragma once
 
 #include <array>
@@ -16,7 +17,7 @@ namespace voxdag {
 
 class OutsideRows {
  public:
-  // Memory for rows that are crossed outside the grid is charged to `budget`. Throws
+  // Charges the memory for rows with crossings outside the grid to `budget`. Throws
   // Error{kOutOfMemory}.
   OutsideRows(uint32_t grid_levels, MemoryBudget& budget);
   // Adds all triangles of the scene. Throws Error{kLimit} for a triangle that a sample row can
@@ -24,10 +25,12 @@ class OutsideRows {
   void read(TriangleSource& scene, const Grid& grid, const StageContext& context);
   void add(const FixedTriangle& triangle);
 
-  // Returns the crossings outside the grid on the rows along `axis` that meet a tile, also at its
-  // border; null if there are none. (first, second): the tile's position on the other two axes.
+  // Returns the crossings outside the grid of the rows along `axis` that go through a tile or along
+  // its border; null if none exist. (`first`, `second`) is the tile's position on the other two
+  // axes.
   const OutsideTile* find(int axis, int first, int second) const;
-  // Calls visit(axis, first, second, tile) for all tiles with rows that are crossed.
+  // Calls visit(axis, first, second, tile) for each tile with a sample row that a triangle crosses
+  // outside the grid. The arguments are as for find().
   template <class Visit>
   void for_each(Visit visit) const {
     for (const auto& [key, tile] : tiles_) visit(key[0], key[1], key[2], tile);

@@ -34,7 +34,7 @@ struct TileGrid {
   int blocks;       // blocks along a tile's edge, at most 8
 };
 
-// The crossings outside the grid on the rows of a tile's square, including the rows on its border.
+// The crossings outside the grid of the rows through a tile's square, including its border.
 struct OutsideTile {
   int32_t before[81] = {};  // sums of the signs of the crossings in front of the grid
   int32_t total[81] = {};   // numbers (row_sums.h) of all crossings outside the grid
@@ -51,8 +51,8 @@ class RowColumn {
             MemoryBudget& budget);
   static uint64_t bytes(const TileGrid& grid, const Cube& square);
 
-  // Order of calls: add_total() for all subvolumes of the column and add_outside(), then begin(),
-  // then entry() and advance() for each subvolume in Morton order.
+  // Call the functions in this order: add_total() for all subvolumes of the column, and
+  // add_outside(); then begin(); then entry() and advance() for each subvolume in Morton order.
   void add_total(const Cube& cube, const std::vector<int32_t>& numbers);
   // Adds the column's rows to the counts; each row of the grid counts once. Call it before begin().
   void count(RowCounts& counts) const;

@@ -15,7 +15,7 @@
 namespace voxdag {
 namespace {
 
-// The sums of a subvolume's rows in the temporary file.
+// A subvolume, and its row sums (RowSums) in the temporary file, one extent for each axis.
 struct SumsOfCube {
   Cube cube;
   bool is_occupied = false;
@@ -39,7 +39,7 @@ struct Column {
     int first, second;
     const OutsideTile* tile;
   };
-  std::vector<Outside> outside;  // tiles with rows that are crossed outside the grid
+  std::vector<Outside> outside;  // tiles whose rows have crossings outside the grid
 };
 
 class RowsStage {
@@ -131,7 +131,7 @@ class RowsStage {
 
   void find_columns() {
     for (int a = 0; a < 3; ++a) {
-      std::map<Square, size_t> known;  // squares of subvolumes, and then their columns
+      std::map<Square, size_t> known;  // index of the column that has this square
       std::vector<size_t> by_level(cubes_.size());
       for (size_t i = 0; i < by_level.size(); ++i) by_level[i] = i;
       std::stable_sort(by_level.begin(), by_level.end(), [&](size_t i, size_t j) {
@@ -155,7 +155,8 @@ class RowsStage {
       known_[a] = std::move(known);
     }
   }
-  // Adds the view from a corner of an empty cube on a row that is in no column.
+  // Adds the view from corner `c` of an empty cube along `axis`. No column has the corner's row, so
+  // the row has crossings only outside the grid.
   void add_outside_view(size_t e, int c, int axis) {
     const Square tile = tile_at(empty_[e], c, axis);
     const OutsideTile* outside =

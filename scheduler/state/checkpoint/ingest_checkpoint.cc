@@ -14,7 +14,8 @@ namespace voxdag {
 namespace {
 
 // Upper bounds, in ns, of the steps in which the clock for file times advances. The step is usually
-// at most ten milliseconds. If no time has a fraction of a second, it may be up to two seconds.
+// at most ten milliseconds. If no file time has a fraction of a second, it may be up to two
+// seconds.
 constexpr int64_t kSecondNs = 1'000'000'000;
 constexpr int64_t kTickNs = kSecondNs / 10;
 constexpr int64_t kCoarseTickNs = 2 * kSecondNs;
