@@ -22,8 +22,8 @@ struct voxdag_file {
 
 namespace {
 
-// The message that voxdag_error() returns. The array has a fixed size, so that set_error()
-// allocates nothing and also works after a lack of memory.
+// The message that voxdag_error() returns. The array has a fixed size, so set_error() allocates
+// nothing and also works when memory has run out.
 thread_local std::array<char, 1024> last_error;
 
 void set_error(const char* text) {
@@ -51,7 +51,8 @@ voxdag_status status_of(voxdag::ErrorCode code) {
   }
 }
 
-// Runs `ask` and returns the status for C. Catches all exceptions, because none may pass into C.
+// Runs `ask`, which answers one query, and returns the status for C. Catches all exceptions,
+// because C code cannot handle them.
 template <class Ask>
 voxdag_status answer(const Ask& ask) {
   try {
@@ -96,8 +97,9 @@ voxdag::query::Selection selection_of(uint32_t grid_levels, const voxdag_region*
 // number means that the caller left struct_size uninitialized.
 constexpr size_t kMaxStructBytes = 4096;
 
-// Throws Error{kInvalidInput} if a caller's struct_size is impossible. `name` is the name of the
-// struct. `first_bytes` is its size in the oldest voxdag.h that has the struct, the minimum.
+// Throws Error{kInvalidInput} unless a caller's struct_size is from `first_bytes` to
+// kMaxStructBytes. `name` is the name of the struct. `first_bytes` is the size of the struct in the
+// oldest voxdag.h that has it.
 void check_struct_size(const char* name, size_t struct_size, size_t first_bytes) {
   if (struct_size < first_bytes || struct_size > kMaxStructBytes)
     refuse(std::string(name) + " has the struct_size " + std::to_string(struct_size) +

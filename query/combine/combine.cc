@@ -25,8 +25,9 @@
 namespace voxdag::query {
 namespace {
 
-// Divisors of the memory limit. There are up to nine lists for each level, and up to six sorters
-// and four levels of values at any time.
+// Divisors of the memory limit. They give the memory of one list, one sorter, the values of one
+// level, and one window of lookups (node_values.h). There are up to nine lists for each level, and
+// up to six sorters and four levels of values at any time.
 constexpr uint64_t kListShare = 1024;
 constexpr uint64_t kSorterShare = 32;
 constexpr uint64_t kValueShare = 10;
@@ -52,7 +53,7 @@ void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, 
   refuse_attributes(b, kNoAttributes);
 }
 
-// The temporary folder of a combination, and its memory.
+// The folder of the temporary files of one combine() or cut(), and the memory for its data.
 struct Workspace {
   Workspace(const CombineSpec& combine_spec, FileSystem& file_system)
       : spec(combine_spec),
@@ -76,7 +77,9 @@ struct Workspace {
   const LookupMemory memory;
 };
 
-// The nodes of a new file before they are written.
+// The data from which write_levels() makes a new file. For each level, index 0 for the root: the
+// results of Join (join.h), and the pairs and kept nodes (pair_levels.h). For the bricks, also the
+// combined bricks.
 struct NewLevels {
   explicit NewLevels(const SpillSpace& space) : bricks(space) {}
   std::vector<std::unique_ptr<JoinedLevel>> joined;
@@ -90,7 +93,8 @@ struct NewCounts {
   uint64_t dag_nodes = 0;
 };
 
-// Writes the levels of a new file that has the grid of A.
+// Writes the levels of a new file from `levels`, from the bricks up. Returns the numbers of voxels
+// and nodes. The new file has the resolution of `a`.
 NewCounts write_levels(DagInput& a, DagInput& b, NewLevels& levels, const Workspace& work,
                        GlobalFileWriter& out, Progress& progress) {
   const size_t count = levels.pairs.size();
@@ -124,7 +128,7 @@ class Combination {
         a_(a, work.spec.memory_bytes, cancel),
         b_(b, work.spec.memory_bytes, cancel) {}
 
-  // Writes the output. Calls before_publish() before the output gets its final name. If
+  // Writes the output. Calls before_publish() just before the output gets its final name. If
   // before_publish() throws, the output is discarded.
   CombineReport run(const std::function<void()>& before_publish) {
     GlobalFileWriter out(work_.files, work_.spec.output, grid_of(a_.file()), a_.file().hash_bits(),
@@ -153,7 +157,9 @@ class Combination {
  private:
   uint32_t level_count() const { return a_.file().brick_level() + 1; }
 
-  // Returns the facts about all levels, from the root to the bricks.
+  // Joins every level of the two files (join.h), from the bricks up. For each level, returns the
+  // hashes of both files' nodes, the pairs of equal nodes, and the full nodes. Index 0 is the
+  // root's level.
   std::vector<std::unique_ptr<JoinedLevel>> join() {
     std::vector<std::unique_ptr<JoinedLevel>> joined(level_count());
     progress_.begin_stage("join", a_.file().dag_nodes() + b_.file().dag_nodes(), "nodes");
@@ -187,11 +193,13 @@ class Combination {
   DagInput b_;
 };
 
-// Writes the second file at its offset in the grid of the first one to a temporary file.
+// Writes the second file, moved by work.spec.offset into the grid of the first file, to a temporary
+// file. Returns this file, opened.
 std::unique_ptr<voxdag_reader::File> move_file(const voxdag_reader::File& a,
                                                const voxdag_reader::File& b, Workspace& work,
                                                Progress& progress, const CancelToken& cancel) {
-  // Beyond this distance no voxel is in the grid.
+  // Limits the offset to prevent overflow. At this distance, all voxels of `b` are already outside
+  // the grid of `a`.
   constexpr int64_t kFar = int64_t{1} << (kMaxGridLevels + 1);
   std::array<int64_t, 3> offset = *work.spec.offset;
   for (int64_t& distance : offset) distance = std::clamp(distance, -kFar, kFar);
@@ -207,7 +215,7 @@ std::unique_ptr<voxdag_reader::File> move_file(const voxdag_reader::File& a,
   return open_global_file(path);
 }
 
-// Returns a temporary file of the same grid without nodes.
+// Writes a temporary file with the grid of `a` but without nodes. Returns this file, opened.
 std::unique_ptr<voxdag_reader::File> empty_file(const voxdag_reader::File& a, Workspace& work) {
   const std::string path = work.folder.path() + "/empty.vdag";
   GlobalFileWriter out(work.files, path, grid_of(a), a.hash_bits(), work.spec.narrow_words);

@@ -8,12 +8,12 @@
 //   moved.h         the second file at an offset, which is written to a temporary file first
 //   shape.h         spheres and boxes as the second operand
 //
-// pair_levels.h goes from the root down to the bricks, the others from the bricks up to the root.
+// pair_levels.h works from the root down to the bricks, the others from the bricks up to the root.
 //
-// The time depends on the sizes of the files and on the number of distinct pairs. The memory
-// depends on the budget: longer lists and the values of large levels are in a scratch folder. Only
-// the marks of the kept and of the counted nodes must be in memory, one bit for each two words of
-// two consecutive levels.
+// The time depends on the sizes of the files and on the number of distinct pairs. The memory is
+// limited by the budget: lists that exceed their share, and the values of large levels, are stored
+// in a scratch folder. Only the marks of kept and counted nodes (pair_levels.h) must be in memory.
+// They take one bit for each two words of two consecutive levels.
 #pragma once
 
 #include <array>
@@ -35,17 +35,18 @@ namespace voxdag::query {
 struct CombineSpec {
   Operation operation = Operation::kUnion;
   std::string output;
-  // Voxel (0, 0, 0) of the second file comes to this voxel of the first file. Then the grids may
-  // differ, except in the edge of a voxel.
+  // If set, moves the second file: its voxel (0, 0, 0) is placed at this voxel of the first file's
+  // grid. Then the two grids may differ, except in the edge of a voxel.
   std::optional<std::array<int64_t, 3>> offset;
   bool clip = false;     // drop moved voxels outside of the grid; otherwise they are an error
   bool replace = false;  // replace an existing file
   uint64_t memory_bytes = uint64_t{1} << 30;
   unsigned threads = 1;  // with 2 or more, the digest is computed while the file is read back
-  // Maximum number of words in a narrow level (GlobalFileWriter). Tests use a smaller limit.
+  // Maximum number of words in a narrow level. A level with more words is wide: pointers into it
+  // have 64 bits instead of 32. Tests use a smaller limit.
   uint64_t narrow_words = global_layout::kNarrowLevelWords;
-  // Maximum memory of a list, or of the values of a level, if it is less than their share of
-  // memory_bytes. Tests use a small limit.
+  // Additional limit for the memory of each list and of the values of each level, which otherwise
+  // get a fixed share of memory_bytes. Tests set a small limit.
   uint64_t list_bytes = ~uint64_t{0};
 };
 
@@ -64,14 +65,16 @@ struct CombineReport {
 // Writes the result to spec.output, which gets its final name when it is complete. Temporary files
 // are in a folder next to the output; combine() removes the folder at the end, also after an error.
 // If the process is killed, the next combine with the same output removes the folder. Throws Error:
-// kInvalidInput if the grids or the hash bits of the files differ, if a file has attributes, or if
-// moved voxels are outside of the grid;
-// kCorrupt for a damaged file, kNoSpace, kOutOfMemory, kCanceled, and the errors of LockedOutputs.
+// - kInvalidInput if the grids or the hash bits of the files differ, if a file has attributes, or
+//   if moved voxels are outside of the grid and spec.clip is false;
+// - kCorrupt for a damaged file; kNoSpace, kOutOfMemory, kCanceled; and the errors of
+//   LockedOutputs.
 CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,
                       const CombineSpec& spec, FileSystem& files, Progress& progress,
                       const CancelToken& cancel);
 
-// Removes the voxels of a shape. Uses neither the operation nor the offset in `spec`.
+// Writes `a` without the voxels in the shape to spec.output, in the same way as combine(). Uses
+// neither the operation nor the offset in `spec`.
 CombineReport cut(const voxdag_reader::File& a, const Shape& shape, const CombineSpec& spec,
                   FileSystem& files, Progress& progress, const CancelToken& cancel);
 

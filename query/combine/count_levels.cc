@@ -6,7 +6,8 @@
 
 namespace voxdag::query {
 
-// Computes the change of each pair: the sum of the changes of its places.
+// Called before the next coarser level. Computes the change of the counts of each of its pairs: the
+// sum of the changes of the pair's places.
 void CountLevels::sum_pairs() {
   auto sums = std::make_unique<SpillList<KeyedCounts>>(space_);
   places_->finish();
@@ -44,7 +45,9 @@ void CountLevels::add_nodes(uint32_t level, PairLevel& pairs) {
   add_nodes(b_, level, pairs.counted_b, below_b_);
 }
 
-// Counts the marked nodes of a level of a file, and adds the changes of the places that use them.
+// Counts the voxels and octree nodes below each counted node of a level (`nodes`, pair_levels.h).
+// Adds or subtracts these counts at the places that use the node. `below` has the counts of the
+// next finer level, and receives the counts of this level.
 void CountLevels::add_nodes(DagInput& input, uint32_t level, CountedNodes& nodes,
                             std::unique_ptr<Counts>& below) {
   const std::unique_ptr<Counts> finer = std::exchange(below, nullptr);

@@ -1,9 +1,12 @@
-// Computes how many voxels and octree nodes the new file has.
+// Computes how many voxels and octree nodes the new file has. result_rows.h defines places and
+// pairs.
 //
-// The counts of the new file are the counts of the *reference* file (reference_of()), changed at
-// the places where the result is not the reference's node. Changes go up with the levels: the
-// change of a pair is the sum of the changes of its places. Only the nodes that are added or left
-// out at a place, and the nodes below them, must be counted. All sums are modulo 2^64.
+// The counts of the new file are the counts of the *reference* file, which is one of the two files
+// (reference_of()), plus changes. The counts change at each place where the result is not the
+// reference file's node. The change of a pair is the sum of the changes of its places, so the
+// changes are computed from the bricks up. Only the nodes that are added or left out at a place,
+// and the nodes below them, must be counted. All sums are modulo 2^64, so they also represent
+// negative changes.
 #pragma once
 
 #include <memory>
@@ -19,7 +22,7 @@ namespace voxdag::query {
 
 class CountLevels {
  public:
-  // `bricks` has the changes of the pairs of bricks.
+  // `bricks` has, for each pair of bricks, the change of the counts relative to the reference file.
   CountLevels(DagInput& a, DagInput& b, Outcome reference, const SpillList<KeyedCounts>& bricks,
               const SpillSpace& space, const LookupMemory& memory)
       : a_(a),
@@ -29,8 +32,8 @@ class CountLevels {
         memory_(memory),
         pair_changes_(&bricks) {}
 
-  // Call these for each level, from the bricks up, in this order. Call add_pair() for each place
-  // whose result is the result of a pair, by increasing numbers of the pairs.
+  // Call these functions in this order for each level, from the bricks up. Call add_pair() for each
+  // place whose result is the result of a pair, by increasing numbers of the pairs.
   void begin_level();
   // `has_node` is false if the result of the pair is empty.
   void add_pair(const PairUse& use, bool has_node);
@@ -50,13 +53,13 @@ class CountLevels {
   const Outcome reference_;
   const SpillSpace& space_;
   const LookupMemory memory_;
-  // Changes of the pairs of the current level.
+  // Changes of the counts of the current level's pairs.
   const SpillList<KeyedCounts>* pair_changes_;
   std::unique_ptr<SpillList<KeyedCounts>> sums_;
   std::optional<SpillReader<KeyedCounts>> next_pair_;
-  // Changes of the places of the current level.
+  // Changes of the counts of the places whose results are pairs or nodes of the current level.
   std::unique_ptr<SpillSorter<KeyedCounts>> places_;
-  // The counted nodes of the level added last.
+  // The counts of the counted nodes of the level that was added last, for each file.
   std::unique_ptr<Counts> below_a_, below_b_;
 };
 

@@ -97,7 +97,8 @@ class LevelCursor {
     ++count_;
     load();
   }
-  // Returns words that are probably pointers of nodes visited soon.
+  // Returns words of the level some distance ahead. Most of them are pointers in nodes that next()
+  // will reach soon, so the caller can prefetch the data of their targets.
   std::span<const uint32_t> words_ahead() const {
     const uint64_t first = offset_ + kWordsAhead;
     if (wide_ || is_brick_level_ || first + size_ > checked_) return {};

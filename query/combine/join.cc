@@ -14,8 +14,8 @@ namespace voxdag::query {
 struct HashOfA {
   uint64_t hash = 0;
 };
-// A node of the second file. `number_in_a` is the offset of the equal node of the first file plus
-// 1, or 0 if there is no such node.
+// The hash of a node of the second file. `number_in_a` is 1 plus the offset of the equal node of
+// the first file, or 0 if the first file has no such node.
 struct HashOfB {
   uint64_t hash = 0;
   uint64_t number_in_a = 0;
@@ -26,12 +26,13 @@ namespace {
 uint64_t number_in_a(const HashOfA&, uint64_t offset) { return offset + 1; }
 uint64_t number_in_a(const HashOfB& node, uint64_t) { return node.number_in_a; }
 
-// Hashes the nodes of a level in the order of the file.
+// Visits the nodes of a level in the order of the file, and computes their hashes. `Hash` is
+// HashOfA for the first file and HashOfB for the second.
 template <class Hash>
 class HashCursor {
  public:
-  // `below` has the hashes of the next finer level; null for bricks. `full_below` is the offset of
-  // the full cube of that level.
+  // `below` has the hashes of the nodes of the next finer level; it is null for bricks.
+  // `full_below` is the offset of the node of that level in which all voxels are set.
   HashCursor(DagInput& input, uint32_t level, const NodeValues<Hash>* below, uint64_t full_below,
              const SpillSpace& space, uint64_t window_bytes)
       : input_(input), level_(level), full_below_(full_below), cursor_(input, level) {
@@ -46,9 +47,11 @@ class HashCursor {
   uint64_t offset() const { return cursor_.offset(); }
   uint64_t hash() const { return own().hash; }
   bool is_full() const { return is_full_; }
-  // True if the first file has all children, so that it may have the node.
+  // True if all children of the node exist in the first file. Otherwise the first file cannot have
+  // the node.
   bool is_comparable() const { return is_comparable_; }
-  // Returns the node with its children's offsets in the first file. Requires is_comparable().
+  // Returns the node with the offsets that its children have in the first file. Requires
+  // is_comparable().
   const Row& row() const { return kIsA ? own() : joined_; }
   void next() {
     has_previous_ = true;

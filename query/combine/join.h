@@ -1,13 +1,13 @@
-// Finds the equal nodes of two files. Without this step, the pairs of two large files that differ
-// in a small place would be almost all of their nodes.
+// Finds the equal nodes of two files. Without this step, combine() would visit almost all nodes of
+// two large files that differ only in a small place.
 //
 // From the bricks up, the nodes of a level are hashed, and the levels of both files, which are
 // sorted by hash, are merged. A node of the second file is equal to a node of the first file if
 // their masks are equal and their children are equal nodes. So the result does not depend on hashes
 // that are equal by chance.
 //
-// Also checks what later steps rely on: every pointer points to a node, and the nodes of a level
-// are in the total order. Throws Error{kCorrupt} otherwise.
+// Also checks two conditions that later steps rely on: every pointer points to a node, and the
+// nodes of a level are in the total order (docs/format.md). Throws Error{kCorrupt} otherwise.
 #pragma once
 
 #include <cstdint>
@@ -19,14 +19,14 @@
 
 namespace voxdag::query {
 
-// The share of the memory for the values of one level of one file, and for the windows and buckets
-// of its lookups.
+// The memory for the values (node_values.h) of one level of one file, and the memory for the
+// windows and buckets of lookups in these values.
 struct LookupMemory {
   uint64_t value_bytes = 0;
   uint64_t window_bytes = 0;
 };
 
-// Facts about a level of both files.
+// The results of Join for one level of both files. A node is named by its word offset in its level.
 struct JoinedLevel {
   explicit JoinedLevel(const SpillSpace& space) : hashes_a(space), hashes_b(space), equal(space) {}
 
@@ -34,7 +34,7 @@ struct JoinedLevel {
   SpillList<uint64_t> hashes_a;
   SpillList<uint64_t> hashes_b;
   SpillList<NodePair> equal;  // both offsets increase
-  NodePair full;              // the nodes in which all voxels are set
+  NodePair full;              // the nodes in which all voxels are set, if any
 };
 
 class Join {
@@ -42,7 +42,7 @@ class Join {
   Join(DagInput& a, DagInput& b, const SpillSpace& space, const LookupMemory& memory);
   ~Join();
 
-  // Joins the levels, which must be passed from the bricks up.
+  // Joins one level, and fills `joined`. Call it for each level, from the bricks up.
   void add_level(uint32_t level, JoinedLevel& joined);
 
  private:

@@ -8,15 +8,17 @@
 
 namespace voxdag::query {
 
-// Word offsets of kept nodes in the new file.
+// For each kept node (pair_levels.h) of a level of an input file: its word offset in the new file.
 using KeptPlaces = NodeValues<uint64_t>;
 
 namespace {
 
-// Visits the kept nodes of a level of a file, with their children's offsets in the new file.
+// Visits the kept nodes of a level of an input file. Returns each as a Row (result_rows.h) with its
+// children's offsets in the new file.
 class KeptCursor {
  public:
-  // `below` has the kept nodes of the next finer level; null for bricks.
+  // `below` has the new offsets of the kept nodes of the next finer level; it is null for bricks.
+  // `hashes` are the hashes of all nodes of the level.
   KeptCursor(DagInput& input, uint32_t level, const KeptNodes& kept,
              const SpillList<uint64_t>& hashes, const KeptPlaces* below, const SpillSpace& space,
              uint64_t window_bytes)
@@ -33,7 +35,7 @@ class KeptCursor {
   bool at_end() const { return !cursor_ || cursor_->at_end(); }
   uint64_t offset() const { return cursor_->offset(); }
   const Row& row() const { return row_; }
-  // Returns the hash of the current row; at the end, the maximum of uint64_t.
+  // Returns the hash of the current row. At the end of the level, returns the maximum of uint64_t.
   uint64_t hash() const { return at_end() ? ~uint64_t{0} : row_.hash; }
   void next() {
     step();
@@ -54,7 +56,7 @@ class KeptCursor {
     cursor_->next();
     hashes_.pop();
   }
-  // Goes to the next kept node, unless the current node is kept.
+  // Moves to the next kept node, unless the current node is kept. Loads its row.
   void find() {
     while (!cursor_->at_end() && !bits_.has(cursor_->offset())) step();
     if (!cursor_->at_end()) load();
@@ -92,7 +94,7 @@ class RowWriter {
 
   uint64_t nodes() const { return nodes_; }
   uint64_t words() const { return written_ + count_; }
-  // Returns the word offset of the row.
+  // Appends the row, and returns its word offset in the new level.
   uint64_t add(const Row& row) {
     if (count_ + kMaxRowWords > kBufferWords) flush();
     const uint64_t position = words();
@@ -132,16 +134,17 @@ class RowWriter {
   uint64_t nodes_ = 0;
 };
 
-// The kept nodes of a level of a file, with their places in the new file, the places of pairs that
-// use them (`uses`), and the results of these places (`parents`).
+// The kept nodes of a level of an input file, one of the sources of a new level. `placed` receives
+// their offsets in the new file. `uses` has the places (result_rows.h) whose result is a kept node.
+// `parents` receives the results of these places.
 struct KeptSource {
   KeptCursor& cursor;
   KeptPlaces& placed;
   SpillSorter<NodeUse>& uses;
   SpillSorter<KeyedNode>& parents;
 
-  // Stores the place of the current node, adds the results of all places that use the node, and
-  // advances the cursor.
+  // Stores the new offset of the current node, adds the node as the result of all places that use
+  // it, and advances the cursor. `node` is the current node in the new file.
   void pass(const NewNode& node) {
     const uint64_t offset = cursor.offset();
     placed.add(offset, node.position);
@@ -153,13 +156,15 @@ struct KeptSource {
   void pass_equal(const Row& row, const NewNode& node) {
     if (!cursor.at_end() && compare_rows(cursor.row(), row) == 0) pass(node);
   }
-  // Copies the nodes whose hashes are less than `hash`: no other source has such a node.
+  // Copies the nodes whose hashes are less than `hash`, the smallest hash of the other sources. No
+  // other source can have an equal node, so the rows need not be compared.
   void copy_before(uint64_t hash, RowWriter& writer) {
     while (cursor.hash() < hash) pass({writer.add(cursor.row()), cursor.row().hash});
   }
 };
 
-// Merges the three sources of a level.
+// Writes a level: merges its three sources, which are the kept nodes of both files and the rows of
+// pairs. Writes equal rows once. Adds the new node of each pair to `results`.
 void merge_sources(KeptSource a, KeptSource b, SpillSorter<PairRow>& rows,
                    SpillSorter<KeyedNode>& results, RowWriter& writer) {
   const auto hash_of_rows = [&] { return rows.at_end() ? ~uint64_t{0} : rows.front().row.hash; };
@@ -195,7 +200,8 @@ LevelsWriter::LevelsWriter(DagInput& a, DagInput& b, const SpillSpace& space,
     : a_(a), b_(b), space_(space), memory_(memory), counts_(counts), out_(out) {}
 LevelsWriter::~LevelsWriter() = default;
 
-// Makes the rows of pairs from the results of their children.
+// Makes the row of each pair of the level from the results of the pair's children, and frees these
+// results.
 void LevelsWriter::make_rows(SpillSorter<PairRow>& rows) {
   SpillSorter<KeyedNode>& children = *children_;
   children.finish();
@@ -217,7 +223,8 @@ void LevelsWriter::make_rows(SpillSorter<PairRow>& rows) {
   children_.reset();
 }
 
-// Adds the results of all places whose results are pairs.
+// For each place whose result is the result of a pair: adds this result, and the change of the
+// counts.
 void LevelsWriter::add_pair_results(const SpillList<PairUse>& uses,
                                     SpillSorter<KeyedNode>& results) {
   results.finish();

@@ -1,6 +1,6 @@
-// Writes the levels of a combined DAG, from the bricks up: merges three sorted sequences of rows,
-// which are the kept nodes of both files and the rows made from pairs. Equal rows become one. So
-// the levels are canonical, as after a build.
+// Writes the levels of a combined DAG, from the bricks up. Each level is merged from three sorted
+// sequences of rows (result_rows.h): the kept nodes of each file, and the rows made from pairs.
+// Equal rows become one node. So the levels are canonical, as after a build.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +24,8 @@ class LevelsWriter {
                CountLevels& counts, GlobalFileWriter& out);
   ~LevelsWriter();
 
-  // Writes a level. Levels must be passed from the bricks up. `rows` has the rows of pairs of
-  // bricks for the first level, and otherwise must be empty. Writes nothing if the level has no
+  // Writes a level. Call it for each level, from the bricks up. `rows` has the rows of the pairs of
+  // bricks in the first call, and must be empty in later calls. Writes nothing if the level has no
   // nodes.
   void write_level(uint32_t level, const JoinedLevel& joined, PairLevel& pairs,
                    SpillSorter<PairRow>& rows);
@@ -42,7 +42,7 @@ class LevelsWriter {
   const LookupMemory memory_;
   CountLevels& counts_;
   GlobalFileWriter& out_;
-  // Results of places of the level that is written next.
+  // The results of the places in the level that is written next.
   std::unique_ptr<SpillSorter<KeyedNode>> children_;
   std::unique_ptr<Below> below_;  // the level written last
   uint64_t dag_nodes_ = 0;

@@ -8,12 +8,13 @@
 namespace voxdag::query {
 namespace {
 
-// Returns bit `axis` of an index of 2 x 2 x 2 cubes.
+// Returns the position, 0 or 1, on `axis` of cube `index` among 2 x 2 x 2 cubes.
 constexpr int64_t axis_bit(size_t index, size_t axis) {
   return static_cast<int64_t>(index >> (2 - axis) & 1);
 }
 
-// Returns the bit of a voxel in the mask of a brick; the coordinates are from 0 to 3.
+// Returns the number of the bit that stands for a voxel in a brick's mask. The coordinates, 0 to 3,
+// are the voxel's position in the brick.
 constexpr int voxel_bit(int64_t x, int64_t y, int64_t z) {
   const auto octant = [](int64_t high, int64_t middle, int64_t low) {
     return static_cast<int>(4 * high + 2 * middle + low);
@@ -23,7 +24,8 @@ constexpr int voxel_bit(int64_t x, int64_t y, int64_t z) {
 
 }  // namespace
 
-// Returns the cube of the edge of the new grid at a position counted in such cubes.
+// Returns the word offset of a cube of the input. `index` is its position, counted in cubes as
+// large as the new grid. Returns kNoNode if the cube is empty or outside the input's grid.
 uint64_t MovedLevels::cube_at(const std::array<int64_t, 3>& index) const {
   const int64_t depth = std::max<int64_t>(input_level(0), 0);
   for (const int64_t i : index)
@@ -52,7 +54,8 @@ MovedLevels::Cubes MovedLevels::root() const {
   return cubes;
 }
 
-// Returns the children of a cube of the input with the edge of the new file's level.
+// Returns the children of a cube of the input. `level` is the level of the new file with cubes of
+// the same edge.
 std::array<uint64_t, 8> MovedLevels::children(uint32_t level, uint64_t cube) const {
   std::array<uint64_t, 8> children;
   children.fill(kNoNode);
@@ -68,7 +71,8 @@ void MovedLevels::add(Open& to, const Cubes& cubes, uint64_t place) const {
     if (cube != kNoNode) return to.requests->add({cubes, place});
 }
 
-// Finds the distinct groups among the requests.
+// Sorts the requests of a level to find its distinct groups, and numbers these groups. Stores the
+// number of the group for each requesting place.
 void MovedLevels::number_groups(Open& level) const {
   SpillSorter<Request>& requests = *level.requests;
   requests.finish();
@@ -86,8 +90,9 @@ void MovedLevels::number_groups(Open& level) const {
 }
 
 void MovedLevels::expand_groups(const Open& level, Open& below) const {
-  // Along an axis, the first finer cube is the second child of the first cube if the remainder is
-  // at least the finer edge.
+  // On each axis, the first child of the new cube begins in the first (0) or in the second (1)
+  // child of the group's first cube. It begins in the second one if the remainder is at least the
+  // child's edge.
   std::array<int64_t, 3> first;
   for (size_t axis = 0; axis < 3; ++axis)
     first[axis] = remainder(level.level, axis) >= edge(below.level) ? 1 : 0;
@@ -113,7 +118,8 @@ void MovedLevels::expand_groups(const Open& level, Open& below) const {
   }
 }
 
-// Returns the mask of the brick of a group.
+// Returns the mask of a new brick, whose voxels are in the up to 2 x 2 x 2 input bricks of its
+// group.
 uint64_t MovedLevels::brick(const Cubes& cubes) const {
   uint64_t masks[8], mask = 0;
   for (size_t i = 0; i < 8; ++i) masks[i] = cubes[i] == kNoNode ? 0 : input_.brick(cubes[i]);

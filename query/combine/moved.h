@@ -1,9 +1,10 @@
-// Moves a file by a whole number of voxels in the grid of another file.
+// Moves a file by a whole number of voxels into the grid of another file.
 //
-// A cube of the new file overlaps up to 2 x 2 x 2 cubes of the moved file, always at the same
-// position relative to them. So the nodes of a level are made from the distinct groups of these
-// cubes, level by level: every group is divided once, wherever it occurs. A group has one cube
-// along each axis in which the offset is a multiple of the cubes' edge.
+// A cube of the new file overlaps up to 2 x 2 x 2 cubes of the moved file that have the same edge.
+// They are called its group. On each level, the position of the cube relative to its group is the
+// same everywhere, so cubes with equal groups have equal contents. So the distinct groups are found
+// level by level, from the root down, and each is divided only once. On an axis on which the offset
+// is a multiple of the cubes' edge, a group has only one cube.
 #pragma once
 
 #include <array>
@@ -18,20 +19,23 @@
 
 namespace voxdag::query {
 
-// Finds the groups of cubes. The results of groups are like the results of pairs.
+// Finds the distinct groups of all levels. Returns them in the form of pairs (pair_levels.h), so
+// that LevelsWriter can write the moved file like a combined file.
 class MovedLevels {
  public:
-  // Voxel (0, 0, 0) of the input comes to `offset` in a grid of 2^levels voxels per edge. The input
-  // may have another resolution.
+  // The input's voxel (0, 0, 0) is placed at `offset` in a grid of 2^levels voxels per edge. The
+  // input may have another resolution.
   MovedLevels(DagInput& input, uint32_t levels, const std::array<int64_t, 3>& offset,
               uint32_t hash_bits, const SpillSpace& space)
       : input_(input), levels_(levels), offset_(offset), hash_bits_(hash_bits), space_(space) {}
 
-  // Returns all levels, from the root to the bricks, and adds the results of groups of bricks.
+  // Descends from the root to the bricks. Returns the places that use each group, by level; index 0
+  // is the root's level. Adds the new bricks to `bricks`.
   std::vector<std::unique_ptr<PairLevel>> descend(BrickResults& bricks);
 
  private:
-  // Word offsets of cubes; the first index is for the first axis.
+  // Word offsets of the cubes of a group; kNoNode for an empty cube. The index is 4x + 2y + z,
+  // where x, y and z are 0 or 1.
   using Cubes = std::array<uint64_t, 8>;
   struct Request {
     Cubes cubes;
@@ -53,7 +57,8 @@ class MovedLevels {
   };
 
   int64_t edge(uint32_t level) const { return int64_t{1} << (levels_ - level); }
-  // Returns the input's level with cubes of the same edge; negative for cubes larger than its grid.
+  // Returns the input's level whose cubes have the same edge as the cubes of `level`. The result is
+  // negative if they are larger than the input's grid.
   int64_t input_level(uint32_t level) const {
     return static_cast<int64_t>(input_.file().grid_levels()) - levels_ + level;
   }

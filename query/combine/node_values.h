@@ -75,7 +75,8 @@ class NodeValues {
   class WindowReader {
    public:
     explicit WindowReader(const NodeValues& values) : reader_(*values.list_) {}
-    // Fills the slots from `first_slot`. Windows must be read in their order.
+    // Fills the slots of a window that begins at slot `first_slot`. Windows must be read in
+    // increasing order.
     void read(uint64_t first_slot, PageBuffer<Slot>& window) {
       for (; !reader_.at_end() && reader_.front().offset / 2 - first_slot < window.size();
            reader_.pop())
@@ -99,12 +100,12 @@ class NodeValues {
   std::optional<SpillList<Entry>> list_;
 };
 
-// Looks up many values. `Values` is a class like NodeValues.
+// Looks up many values in the three passes described above. `Values` is a class like NodeValues.
 template <class Values>
 class NodeLookups {
  public:
   using Slot = typename Values::Slot;
-  // Windows, and the buffers of the buckets, take about `bytes` each.
+  // A window takes about `bytes`, and so do the buffers of all buckets together.
   NodeLookups(const Values& values, const SpillSpace& space, uint64_t bytes)
       : values_(values), space_(space), bytes_(bytes) {
     if (values.is_resident()) return;

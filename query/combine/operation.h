@@ -11,8 +11,8 @@ enum class Operation { kUnion, kMinus, kAnd, kXor };
 // An offset that stands for an empty cube, which has no node.
 inline constexpr uint64_t kNoNode = ~uint64_t{0};
 
-// The result of a pair of cubes: nothing, the cube of the first or of the second file, or unknown
-// until the children are combined.
+// The result of combining two cubes: nothing, the first file's cube, the second file's cube, or
+// unknown until their children are combined.
 enum class Outcome { kEmpty, kA, kB, kUnknown };
 
 // The word offsets of two cubes of the same level, one of each file.
@@ -44,8 +44,8 @@ constexpr Outcome outcome_of_empty(Operation operation, const NodePair& cubes) {
   return Outcome::kEmpty;
 }
 
-// Returns the result of two cubes. `full` has the offsets of the level's cubes in which all voxels
-// are set.
+// Returns the result of two cubes. `full` has the word offsets of the nodes of the same level in
+// which all voxels are set.
 constexpr Outcome outcome_of(Operation operation, const NodePair& cubes, const NodePair& full) {
   if (cubes.a == kNoNode || cubes.b == kNoNode) return outcome_of_empty(operation, cubes);
   const bool a_is_full = cubes.a == full.a, b_is_full = cubes.b == full.b;
@@ -62,10 +62,10 @@ constexpr Outcome outcome_of(Operation operation, const NodePair& cubes, const N
   return Outcome::kUnknown;
 }
 
-// Returns the reference file: the counts of the result are computed from the counts of this file,
-// by adding the changes at the places where the result differs. So if most of the result is in this
-// file, only few nodes must be counted. kEmpty: there is no reference file; all nodes of the result
-// are counted.
+// Returns the reference file. The counts of the result are the counts of this file, plus the
+// changes at the places where the result differs (count_levels.h). So if most of the result is in
+// this file, only few nodes must be counted. kEmpty means that there is no reference file, and all
+// nodes of the result are counted.
 constexpr Outcome reference_of(Operation operation, uint64_t nodes_of_a, uint64_t nodes_of_b) {
   if (operation == Operation::kAnd) return Outcome::kEmpty;
   if (operation == Operation::kMinus) return Outcome::kA;

@@ -2,11 +2,11 @@
 //
 //   - the distinct pairs of cubes whose result is neither empty nor a cube of one of the files;
 //   - the *kept* nodes of each file: nodes that are a result, and all nodes below them;
-//   - the *counted* nodes of each file, whose counts differ between the new file and the file from
-//     which its counts are derived (count_levels.h), and all nodes below them.
+//   - the *counted* nodes of each file: nodes whose counts must be added or subtracted to compute
+//     the counts of the new file (count_levels.h), and all nodes below them.
 //
-// The pairs of a level are sorted, so that equal pairs are found, also if they do not fit in
-// memory. Pairs of equal nodes end there, because Join has found the equal nodes.
+// The requested pairs of a level are sorted, so that equal pairs are found even if the pairs do not
+// fit in memory. A pair of equal nodes, which Join has found, is not divided further.
 #pragma once
 
 #include <array>
@@ -24,20 +24,22 @@
 
 namespace voxdag::query {
 
-// Marked nodes of one level of one file, and the places that use them: for their result or for a
-// change of their counts.
+// Marked (kept or counted) nodes of one level of one file. `uses` has the places that use these
+// nodes, as their result or for a change of their counts.
 template <class Use>
 struct MarkedNodes {
   explicit MarkedNodes(const SpillSpace& space) : uses(space), bits(space) {}
 
   SpillSorter<Use> uses;
-  // A bit for each word offset / 2, set if a marked node begins there. Empty without such nodes.
+  // Bit i is set if a marked node begins at word 2i or 2i + 1 of the level. Empty if no node is
+  // marked.
   SpillList<uint64_t> bits;
 };
 using KeptNodes = MarkedNodes<NodeUse>;
 using CountedNodes = MarkedNodes<CountUse>;
 
-// Walks through the bits of marked nodes, by increasing offsets.
+// Reads MarkedNodes::bits. has() returns true if a marked node begins at `offset`. The offsets of
+// successive calls must increase.
 class MarkReader {
  public:
   explicit MarkReader(const SpillList<uint64_t>& bits) : reader_(bits) {}
@@ -68,17 +70,17 @@ struct PairLevel {
   CountedNodes counted_b;
 };
 
-// The results of the pairs of bricks.
+// The results of all pairs of bricks: `rows` has the combined bricks that are not empty.
 struct BrickResults {
   explicit BrickResults(const SpillSpace& space) : rows(space), counts(space) {}
 
   SpillSorter<PairRow> rows;
-  // Changes of the voxels of the pairs relative to the bricks of the reference file, by increasing
-  // pairs.
+  // For each pair of bricks, sorted by number: the number of voxels in the result, minus the number
+  // in the reference file's brick.
   SpillList<KeyedCounts> counts;
 };
 
-// Collects the marked nodes of one level of one file.
+// Collects MarkedNodes::bits for one level of one file. Only the first mark allocates memory.
 class Marks {
  public:
   Marks(uint64_t level_words, MemoryBudget& budget) : words_(level_words), budget_(&budget) {}
@@ -103,10 +105,9 @@ class Marks {
 
 class PairLevels {
  public:
-  // `reference` is the file from which the counts of the result are derived, or kEmpty.
-  // `joined` has the facts about all levels, from the root to the bricks.
-  // With a shape, the operation is kMinus, the shape's cubes are the cubes of the second file, and
-  // `b` has no nodes.
+  // `reference` is the file from which the counts of the result are derived, or kEmpty. `joined`
+  // has the results of Join for all levels; index 0 is the root's level. With a shape, the
+  // operation is kMinus, the shape's cubes are the cubes of the second file, and `b` has no nodes.
   PairLevels(DagInput& a, DagInput& b, const Shape* shape, Operation operation, Outcome reference,
              const std::vector<std::unique_ptr<JoinedLevel>>& joined, const SpillSpace& space)
       : a_(a),
@@ -117,12 +118,13 @@ class PairLevels {
         joined_(joined),
         space_(space) {}
 
-  // Returns all levels, from the root to the bricks, and adds the results of pairs of bricks.
+  // Descends from the root to the bricks. Returns the pairs and the marked nodes of all levels;
+  // index 0 is the root's level. Adds the results of the pairs of bricks to `bricks`.
   std::vector<std::unique_ptr<PairLevel>> descend(BrickResults& bricks);
   uint64_t pair_count() const { return pair_count_; }
 
  private:
-  // A level to which nodes are added.
+  // A level while its pairs and marked nodes are collected.
   struct Open {
     Open(const PairLevels& all, uint32_t opened);
     uint32_t level;

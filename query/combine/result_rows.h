@@ -1,7 +1,9 @@
 // Records that pass between the levels while two DAGs are combined.
 //
-// The pairs of a level are numbered in the order of their offsets `a`, then `b` (NodePair). A
-// *place* is a child of a pair: 8 * number of the pair + index of the child.
+// A pair is two cubes of the same level and position, one of each file. The pairs of a level are
+// numbered in the order of their offsets `a`, then `b` (NodePair). A *place* is a child of a pair:
+// 8 * number of the pair + index of the child. The result of a place is the node of the new file at
+// this place, or empty.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +21,7 @@ struct Row {
   uint64_t hash = 0;          // truncated
   uint32_t mask = 0;          // child mask; 0 for a brick
   uint32_t count = 0;         // number of children; 1 for a brick
-  uint64_t children[8] = {};  // word offsets in one numbering; for a brick, the mask of its voxels
+  uint64_t children[8] = {};  // word offsets; for a brick, children[0] is its mask
 };
 
 // Returns a number < 0, 0 (equal) or > 0.
@@ -45,7 +47,7 @@ constexpr uint64_t place_of(uint64_t pair, int child) {
 constexpr uint64_t pair_of(uint64_t place) { return place / 8; }
 constexpr int child_of(uint64_t place) { return static_cast<int>(place % 8); }
 
-// A place whose result is the result of a pair that is not known yet.
+// A request to combine a pair of cubes, whose result is the result of `place`.
 struct PairRequest {
   NodePair cubes;
   uint64_t place = 0;
@@ -58,14 +60,15 @@ struct PairUse {
   uint64_t place = 0;
 };
 
-// A place whose result is a node of one of the files.
+// A place whose result is the node at `offset` of one of the files.
 struct NodeUse {
   uint64_t offset = 0;
   uint64_t place = 0;
   friend auto operator<=>(const NodeUse&, const NodeUse&) = default;
 };
 
-// A place whose counts change by `sign` times the counts of a node of one of the files.
+// A place whose counts change by `sign` times the counts of the node at `offset` of one of the
+// files.
 struct CountUse {
   uint64_t offset = 0;
   uint64_t place = 0;
@@ -73,7 +76,7 @@ struct CountUse {
   friend auto operator<=>(const CountUse&, const CountUse&) = default;
 };
 
-// A change of the counts of a place or of a pair, whose number is `key`, modulo 2^64.
+// A change, modulo 2^64, of the counts of the place or pair with the number `key`.
 struct KeyedCounts {
   uint64_t key = 0;
   OctreeCounts counts;
@@ -86,14 +89,14 @@ struct NewNode {
   uint64_t hash = 0;
 };
 
-// The result of a place or of a pair, whose number is `key`.
+// The result of the place or pair with the number `key`.
 struct KeyedNode {
   uint64_t key = 0;
   NewNode node;
   friend bool operator<(const KeyedNode& a, const KeyedNode& b) { return a.key < b.key; }
 };
 
-// A row that is made from a pair.
+// The row of the result of a pair.
 struct PairRow {
   Row row;
   uint64_t pair = 0;

@@ -20,13 +20,14 @@ constexpr double kMaxLength = 1 << 24;  // so that sums of squares have less tha
                   "whole numbers, in voxels of at most 16777216");
 }
 
-// Returns the number in half voxels.
+// Converts a number of voxels to half voxels. Refuses a number that is too large or not a multiple
+// of 1/2.
 int64_t halves_of(double number, const std::string& text) {
   if (!(std::abs(number) <= kMaxLength) || std::floor(2 * number) != 2 * number) refuse_shape(text);
   return static_cast<int64_t>(2 * number);
 }
 
-// Returns the voxel of a brick at a bit of its mask.
+// Returns the position, within its brick, of the voxel that a bit of the brick's mask stands for.
 constexpr std::array<int64_t, 3> voxel_of_bit(int bit) {
   const auto axis = [&](int shift) { return (bit >> (shift + 3) & 1) * 2 + (bit >> shift & 1); };
   return {axis(2), axis(1), axis(0)};
@@ -66,7 +67,7 @@ uint64_t Shape::box_cover(const Position& low, const Position& high) const {
   return is_full ? kFull : kMixed;
 }
 
-// The centers of the voxels are the odd numbers, in half voxels.
+// Computes in half voxels, so the center of voxel i is at 2i + 1.
 uint64_t Shape::sphere_cover(const Position& low, const Position& high) const {
   int64_t nearest = 0, farthest = 0;  // squared distances of centers
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -80,7 +81,8 @@ uint64_t Shape::sphere_cover(const Position& low, const Position& high) const {
   return farthest <= squared(radius_) ? kFull : kMixed;
 }
 
-// Returns the cube of an edge at a position counted in such cubes.
+// Returns kNoNode for an empty cube, kFull for a full cube, and for a mixed cube a code of its
+// position. `index` is the position of the cube, counted in cubes of this edge.
 uint64_t Shape::cube(const Position& index, int64_t edge) const {
   Position low, high;
   uint64_t code = 0;

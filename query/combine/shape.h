@@ -1,6 +1,6 @@
-// A sphere or a box as the second operand of a difference. A shape has no nodes: for each cube it
-// tells whether the cube is empty, full or mixed. The rule is exact: a voxel belongs to a shape if
-// its center does. All lengths are in voxels of the grid.
+// A sphere or a box as the second operand of a difference. A shape has no nodes. Instead, it
+// computes whether a cube is empty, full or mixed. The rule is exact: a voxel is in the shape if
+// its center is. All lengths are in voxels of the grid.
 #pragma once
 
 #include <array>
@@ -20,8 +20,10 @@ class Shape {
   // Stands for a full cube of any level, as the offset of a node stands for the node's cube.
   static constexpr uint64_t kFull = kNoNode - 1;
 
-  // These are like functions of a DAG's nodes, in a grid of 2^levels voxels per edge. `cube` is a
-  // result of root() or children(). Requires a mixed cube.
+  // These functions present the shape like the nodes of a DAG with 2^levels voxels per edge. root()
+  // and children() return a number for each cube: kNoNode if the cube is empty, kFull if it is
+  // full, and any other number if it is mixed. The argument `cube` is the number of a mixed cube;
+  // `level` is its level. brick() returns the mask of a brick.
   uint64_t root(uint32_t levels) const { return cube({0, 0, 0}, int64_t{1} << levels); }
   std::array<uint64_t, 8> children(uint32_t levels, uint32_t level, uint64_t cube) const;
   uint64_t brick(uint64_t cube) const;
@@ -30,13 +32,14 @@ class Shape {
   using Position = std::array<int64_t, 3>;
 
   uint64_t cube(const Position& index, int64_t edge) const;
-  // Return kNoNode, kFull or another value for the voxels from `low` to `high`.
+  // Return kNoNode if none of the voxels from `low` to `high` is in the shape, kFull if all of them
+  // are, and otherwise another value.
   uint64_t sphere_cover(const Position& low, const Position& high) const;
   uint64_t box_cover(const Position& low, const Position& high) const;
 
   bool is_box_ = false;
-  // A box has the voxels from low_ to high_. Numbers of a sphere are in half voxels, so that the
-  // centers of voxels are whole numbers.
+  // A box has the voxels from low_ to high_, both included. The center and the radius of a sphere
+  // are in half voxels, so that the centers of voxels are integers.
   Position low_ = {}, high_ = {};
   Position center_ = {};
   int64_t radius_ = 0;

@@ -32,7 +32,7 @@ struct SpillSpace {
   uint64_t buffer_bytes = 0;  // size of the buffers with which scratch files are read
 };
 
-// Items in a scratch file, at positions counted in items.
+// A scratch file of items. Positions and counts are in items, not bytes.
 template <class T>
 class ItemFile {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(uint32_t) == 0);
@@ -65,13 +65,13 @@ class ItemFile {
 };
 
 inline constexpr std::string_view kSpillBuffer = "a list of nodes";
-// Returns the number of items for which `bytes` are enough, at least two.
+// Returns the number of items that fit in `bytes`, but at least two.
 template <class T>
 uint64_t spill_items(uint64_t bytes) {
   return std::max<uint64_t>(bytes / sizeof(T), 2);
 }
 
-// A buffer that grows up to a limit.
+// A buffer of items that grows up to a maximum size.
 template <class T>
 class GrowingItems {
  public:
@@ -79,7 +79,8 @@ class GrowingItems {
   const T* data() const { return buffer_.data(); }
   T* data() { return buffer_.data(); }
   const T& operator[](uint64_t i) const { return buffer_[i]; }
-  // Adds the item. Returns false if the buffer has `max` items, which are then unchanged.
+  // Adds the item, and returns true. If the buffer already has `max` items, changes nothing and
+  // returns false.
   bool try_add(const T& item, uint64_t max, MemoryBudget& budget) {
     if (count_ == buffer_.size() && !grow(max, budget)) return false;
     buffer_[count_++] = item;

@@ -24,7 +24,8 @@
 
 namespace voxdag::query {
 
-// Throws Error{kCorrupt}: a parent points to a word of this file at which no node begins.
+// Throws Error{kCorrupt} because a parent points to a word of the file at which no node begins.
+// `level` and `offset` are the place of that word.
 [[noreturn]] void refuse_missing_node(const std::string& path, uint32_t level, uint64_t offset);
 
 class DagView {

@@ -24,8 +24,8 @@ constexpr uint32_t kOctoMapLevels = 16;
 enum BtChild : uint32_t { kUnknown = 0, kFree = 1, kOccupied = 2, kInner = 3 };
 
 // Walks the octree depth first. A full cube of at least 8 cells per edge is one occupied leaf.
-// Inside the region, cubes without voxels are written as free, even
-// inside closed objects: a surface does not show which of its sides is solid (docs/export.md).
+// Inside the region, cubes without voxels are written as free, even inside closed objects: a
+// surface does not show which of its sides is solid (docs/export.md).
 template <class Inner>
 class BtWalk {
  public:

@@ -38,7 +38,8 @@ struct GlbBrick {
   uint64_t mask = 0;
 };
 
-// A full cube of at least 8 cells per edge. Only the bricks at its sides are visited.
+// A cube of at least 8 cells per edge in which all cells are set. Only its bricks at one side are
+// visited when the faces of that side are found.
 struct GlbCube {
   uint64_t morton = 0;  // Morton code of the low corner, in bricks
   int64_t edge = 0;     // in cells

@@ -220,7 +220,7 @@ void add_positions(const ExportJob& job, uint64_t voxels, ExportStage& stage, Np
   });
 }
 
-// Returns the array's description for the report.
+// Writes the values of one attribute as an array. Returns the array's description for the report.
 std::string add_values(const ExportJob& job, uint64_t voxels, AttributeCursor& attribute,
                        ExportStage& stage, NpzWriter& writer) {
   const NumpyType type = numpy_type(attribute.encoding().number);

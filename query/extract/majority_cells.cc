@@ -13,22 +13,24 @@
 namespace voxdag::query {
 namespace {
 
-// Divisors of the memory: for the numbers of one level, of which there are two at any time, and for
-// the windows and buckets of lookups.
+// Divisors of the free memory. They give the memory for the voxel counts of one level, of which two
+// levels are in memory at any time, and for the windows of lookups (query/combine/node_values.h).
 constexpr uint64_t kCountShare = 4;
 constexpr uint64_t kCountWindowShare = 32;
 constexpr uint64_t kCountListShare = 1024;
 constexpr uint64_t kMaxCountListBytes = uint64_t{1} << 20;
 constexpr uint64_t kCountBufferBytes = uint64_t{16} << 10;
 
-// The number of voxels below each node of a level.
+// For each node of a level, the number of voxels below it.
 using VoxelNumbers = NodeValues<uint64_t>;
 using VoxelLookups = NodeLookups<VoxelNumbers>;
 
-// Visits the nodes of a level in the order of the file, with their numbers of voxels.
+// Visits the nodes of a level in the order of the file, and computes the number of voxels below
+// each.
 class VoxelCursor {
  public:
-  // `below` has the numbers of the next finer level; null for bricks.
+  // `below` has the numbers of voxels below the nodes of the next finer level; it is null for
+  // bricks.
   VoxelCursor(DagInput& input, uint32_t level, const VoxelNumbers* below, const SpillSpace& space,
               uint64_t window_bytes)
       : input_(input), level_(level), cursor_(input, level) {
@@ -39,7 +41,8 @@ class VoxelCursor {
 
   bool at_end() const { return cursor_.at_end(); }
   uint64_t offset() const { return cursor_.offset(); }
-  // Must be called once per node.
+  // Returns the number of voxels below the current node. Must be called exactly once per node,
+  // because the lookups are sequential.
   uint64_t voxels() {
     if (!lookups_) return static_cast<uint64_t>(popcount64(cursor_.brick()));
     lookups_->prefetch(cursor_.words_ahead());
@@ -90,7 +93,7 @@ MajorityCells::MajorityCells(const voxdag_reader::File& file, uint32_t grid_leve
   DagInput input(file, budget.limit(), cancel);
   std::unique_ptr<VoxelNumbers> below;
   progress.begin_stage("count", file.brick_level() + 2 - level_, "levels");
-  // The level above the cells is read to check its pointers to the cells.
+  // Also reads the level above the cells, only to check that its pointers lead to nodes.
   for (uint32_t level = file.brick_level() + 1; level-- > level_ - 1;) {
     auto numbers =
         std::make_unique<VoxelNumbers>(space, file.level(level), free_bytes / kCountShare);

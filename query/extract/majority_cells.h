@@ -1,11 +1,12 @@
-// The cells of a coarser grid in which at least half of the voxels are set.
+// Finds the cells of a coarser grid in which at least half of the voxels are set.
 //
-// The number of voxels below each node is computed once per unique node, from the bricks up to the
-// level of the cells. The nodes are read in the order of the file. The numbers of a level that do
-// not fit in memory are in a scratch file (query/combine/node_values.h). What remains is a bit for
-// each two words of the cells' level, because every node has at least two words.
+// The number of voxels below each node is computed once per node of the DAG, from the bricks up to
+// the level of the cells. The nodes are read in the order of the file. If the numbers of a level do
+// not fit in memory, they are in a scratch file (query/combine/node_values.h). This class finally
+// keeps only one bit for each two words of the cells' level, which is enough because every node has
+// at least two words.
 //
-// If the cells have two voxels per edge, they are octants of bricks and need no stored bits.
+// If the cells have two voxels per edge, they are octants of bricks, and this class needs no bits.
 // Immutable after construction; safe to use from several threads.
 #pragma once
 
@@ -28,9 +29,10 @@ class MajorityCells {
   MajorityCells(const voxdag_reader::File& file, uint32_t grid_levels, ScratchFolder& folder,
                 MemoryBudget& budget, Progress& progress, const CancelToken& cancel);
 
-  // Returns the octants of a brick with at least half of their voxels.
+  // Returns a mask of a brick's octants in which at least half of the voxels are set.
   static uint8_t octants(uint64_t mask);
-  // Returns the children of a node one level above the cells with at least half of their voxels.
+  // Returns a mask of a node's children in which at least half of the voxels are set. The node must
+  // be one level above the cells.
   uint8_t children(const voxdag_reader::Node& node) const;
 
  private:

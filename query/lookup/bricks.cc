@@ -8,8 +8,8 @@
 namespace voxdag::query {
 namespace {
 
-// Masks of a brick. A cell's coordinate on an axis, 0 to 3, has two bits. kUpper[axis][b] has the
-// cells for which bit b of the coordinate on `axis` is set.
+// Masks of cells in a brick. A cell's coordinate on an axis is 0 to 3, so it has two bits.
+// kUpper[axis][b] has the cells for which bit b of the coordinate on `axis` is set.
 constexpr uint64_t kUpper[3][2] = {{0xf0f0f0f0f0f0f0f0ull, 0xffffffff00000000ull},
                                    {0xccccccccccccccccull, 0xffff0000ffff0000ull},
                                    {0xaaaaaaaaaaaaaaaaull, 0xff00ff00ff00ff00ull}};

@@ -40,7 +40,8 @@ uint64_t mask_within(const Region& region, const Position& low);
 // Throws Error{kInvalidInput} unless 0 <= grid_levels <= the file's levels.
 void check_grid_levels(const DagView& dag, uint32_t grid_levels);
 
-// True if all cells of the grid are set in the cube of this depth and content (DagView).
+// True if all cells are set in the cube with this depth and content (DagView) in a grid of
+// 2^grid_levels cells per edge.
 bool is_full(const DagView& dag, uint32_t depth, uint64_t content, uint32_t grid_levels);
 
 // The implementation of for_each_brick() and for_each_brick_or_full_cube().
@@ -114,10 +115,11 @@ void for_each_brick(const DagView& dag, const Selection& selection, Visit&& visi
   BrickWalk<std::remove_reference_t<Visit>>(dag, selection, visit).run();
 }
 
-// Like for_each_brick(), but visits large cubes in which all cells are set, which solids have, in
-// one step: calls visit_cube(low, edge) for each largest octree cube of at least 8 cells per edge
-// that is completely in the region and full, and visit_brick(brick) for all other bricks. The order
-// is the Morton order. If the functions return a bool, false ends the iteration.
+// Like for_each_brick(), but visits a large full cube in one step. A full cube is an octree cube in
+// which all cells are set; solids have many. Calls visit_cube(low, edge) for each of the largest
+// full cubes that are completely in the region and have at least 8 cells per edge. Calls
+// visit_brick(brick) for all other bricks. Both functions are called in Morton order; if they
+// return a bool, false ends the iteration.
 template <class VisitBrick, class VisitCube>
 void for_each_brick_or_full_cube(const DagView& dag, const Selection& selection,
                                  const VisitBrick& visit_brick, const VisitCube& visit_cube) {

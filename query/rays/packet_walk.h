@@ -368,8 +368,8 @@ class PacketWalk {
     return true;
   }
 
-  // Casts the ray in a brick. Returns true if the ray ends there, with a hit or because it was
-  // given up.
+  // Casts the ray in a brick. Returns true if the ray ends in the brick, with a hit or because it
+  // was given up.
   VOXDAG_INLINE bool cast_in_brick(const RayDescent& cell, int ray) {
     const uint64_t mask = brick(cell.offset);
     const uint32_t occupied = mirrored_[octants(mask)];
@@ -386,9 +386,9 @@ class PacketWalk {
     return false;
   }
 
-  // Casts the ray in the children of a cell that all count as solid. `occupied` is the mask of the
-  // existing children, `half` their edge and `depth` their depth. Returns true if the ray ends
-  // there, with a hit or because it was given up.
+  // Casts the ray in a cell whose children all count as solid. `occupied` is the mask of the
+  // existing children, `half` their edge and `depth` their depth. Returns true if the ray ends in
+  // the cell, with a hit or because it was given up.
   VOXDAG_INLINE bool cast_in(Int4 low, int32_t half, int ray, uint32_t occupied, uint32_t depth) {
     const Crossed crossed = cross_one(low, ray, half);
     if (crossed.touching & occupied) return give_up(ray);

@@ -90,7 +90,7 @@ bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surfa
   const double cube = std::clamp((pixels - 5) / 8, 0.0, 1.0);
   const Vec face = face_normal(hit, ray.direction);
   s.normal = cube < 1 ? normalized(mix(plane_normal(dag, hit, ray.direction), face, cube)) : face;
-  // The start is moved from the surface by more than the steps between neighboring cells of a
+  // Moves the start away from the surface by more than the steps between neighboring cells of a
   // slope, so that these cells do not occlude it.
   s.start = ray.at(s.t) + s.normal * (s.size * 2.2 * (1 - cube)) + face * (s.size * 0.01);
   // In a narrow place the start may be in an occupied cell. It is then replaced by a point on the

@@ -50,7 +50,7 @@ void add(const FixedTriangle& t, SampledVoxel& voxel) {
   }
 }
 
-// Converts a snapped triangle. Returns false if a coordinate is too large.
+// Converts a snapped triangle to integer coordinates. Returns false if a coordinate is too large.
 bool convert(const SnappedTriangle& snapped, FixedTriangle& out) {
   for (int i = 0; i < 3; ++i)
     for (int a = 0; a < 3; ++a) {
@@ -82,7 +82,8 @@ bool is_closed(SolidRule rule, const SampledVoxel& voxel) {
                                     : " is set, but it is outside the scene's surface"));
 }
 
-// Adds the triangles of the scene to the voxels. Returns false if a triangle is too large.
+// Updates the sums of crossings and is_touched of all sampled voxels with the triangles of the
+// scene. Returns false if a triangle was left out because a coordinate was too large.
 bool add_scene(TriangleSource& scene, const Grid& grid, std::vector<SampledVoxel>& voxels,
                Progress& progress, const CancelToken& cancel) {
   bool is_complete = true;

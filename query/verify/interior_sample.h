@@ -1,11 +1,11 @@
 // Compares a random sample of a solid's voxels with the scene. A voxel's winding number is the sum
 // of the signs of the crossings before its center, on one of the three rows through the center. It
-// is computed for each voxel separately; only the crossing predicate is shared with the builder of
+// is computed for each voxel separately; only the test for a crossing is shared with the builder of
 // solids.
 //
-// On a closed surface the winding number is the same along all rows and decides every voxel that no
-// triangle touches. If a sampled row is open, the surface is not closed; then a solid depends on
-// majorities, and only voxels that triangles touch are compared.
+// On a closed surface, the winding number is the same along all rows, and decides every voxel that
+// no triangle touches. If the signs on a row do not add up to 0, the surface is not closed. A build
+// then decides voxels by majorities of rows, so only voxels that triangles touch are compared.
 //
 // The voxels of an enclosed solid are compared with their neighbors in the file instead. A set
 // voxel that no triangle touches has no empty neighbor and is not at the border of the grid.
@@ -36,7 +36,7 @@ InteriorReport compare_interior(const voxdag_reader::File& file, TriangleSource&
                                 const Grid& grid, SolidRule rule, uint64_t seed, Progress& progress,
                                 const CancelToken& cancel);
 
-// The same for an enclosed solid. The report's is_closed is true.
+// Like compare_interior(), for an enclosed solid. The report's is_closed is always true.
 InteriorReport compare_enclosed(const voxdag_reader::File& file, TriangleSource& scene,
                                 const Grid& grid, uint64_t seed, Progress& progress,
                                 const CancelToken& cancel);

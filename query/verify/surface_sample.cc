@@ -228,7 +228,8 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
   }
   std::sort(boxes.begin(), boxes.end(),
             [](const SampleBox& a, const SampleBox& b) { return a.low[0] < b.low[0]; });
-  // `surface` is null if the triangle cannot be cut out.
+  // `surface` is null if no part of the triangle can be invisible: its material is opaque, or
+  // cutouts are kept.
   const auto mark_boxes = [&](const FixedTriangle& triangle, const FixedSurface* surface) {
     const int64_t first = (triangle.low(0) >> kUnitBits) - kBoxEdge + 1;
     const int64_t last = triangle.high(0) >> kUnitBits;

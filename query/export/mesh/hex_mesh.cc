@@ -10,8 +10,9 @@ namespace {
 constexpr const char* kMeshMemory =
     "two layers of the mesh (a smaller --region or a coarser --level needs less)";
 
-// The bits of a brick's mask at which bit 0, or bit 1, of the coordinate on an axis is set. `step`
-// is the distance of two bits whose coordinates differ in this bit.
+// For one axis: `low` has the bits of a brick's mask at which bit 0 of the coordinate on the axis
+// is set, and `high` the same for bit 1. If two cells' coordinates differ only in bit 0, their bits
+// in the mask are `low_step` apart; for bit 1, `high_step`.
 struct AxisBits {
   uint64_t low, high;
   int low_step, high_step;
@@ -20,18 +21,20 @@ constexpr AxisBits kAxisBits[3] = {{0xf0f0f0f0f0f0f0f0ull, 0xffffffff00000000ull
                                    {0xccccccccccccccccull, 0xffff0000ffff0000ull, 2, 16},
                                    {0xaaaaaaaaaaaaaaaaull, 0xff00ff00ff00ff00ull, 1, 8}};
 
-// Returns the mask of the cells that follow the cells of `mask` on an axis, in the same brick.
+// Returns the mask of the cells that are next to the cells of `mask` in the positive direction of
+// the axis, if they are in the same brick.
 uint64_t next_within(uint64_t mask, const AxisBits& axis) {
   return (mask & ~axis.low) << axis.low_step | (mask & axis.low & ~axis.high)
                                                    << (axis.high_step - axis.low_step);
 }
-// Returns the mask of the cells that follow them in the next brick.
+// Returns the mask, in the next brick on the axis, of the cells there that are next to the cells of
+// `mask`.
 uint64_t next_beyond(uint64_t mask, const AxisBits& axis) {
   return (mask & axis.low & axis.high) >> (axis.low_step + axis.high_step);
 }
 
-// Returns the points of a brick's cells that belong to the PointBrick at the distance `beyond`
-// (4dx + 2dy + dz) from the brick.
+// Returns a mask of the corner points of a brick's cells `mask`: the points in the PointBrick at
+// the offset (dx, dy, dz) from the brick. `beyond` is 4dx + 2dy + dz, where each is 0 or 1.
 uint64_t points_of_brick(uint64_t mask, int beyond) {
   for (int axis = 0; axis < 3; ++axis)
     mask = beyond >> (2 - axis) & 1 ? next_beyond(mask, kAxisBits[axis])
@@ -77,8 +80,9 @@ HexSweep::Slab<HexSweep::HexBrick> HexSweep::read_slab(int64_t slab) const {
   return bricks;
 }
 
-// Calls visit(place, mask) for each PointBrick of the current slab, by place. Each brick has points
-// in up to eight PointBricks, so this merges eight sequences of bricks.
+// Calls visit(place, mask) for each PointBrick of the current slab, by increasing place. A
+// PointBrick can have corners of cells in up to eight bricks, so this merges eight sequences of
+// bricks.
 template <class Visit>
 void HexSweep::merge_points(const Visit& visit) const {
   struct Sequence {

@@ -2,11 +2,11 @@
 // common face, edge or corner have common points.
 //
 // The grid is divided into slabs, which are layers of bricks perpendicular to x. A sweep visits one
-// slab after the other and needs the bricks of two slabs and the points of two slabs, never the
-// complete mesh. Points are grouped like cells: a PointBrick has the points at the low corners of
-// the 4x4x4 cells of a brick, so points on its upper sides belong to its neighbors. The points of a
-// slab get consecutive numbers in the order (y, z) of their PointBricks. They depend on the bricks
-// of this slab and of the slab before.
+// slab after the other. It stores the bricks and the points of two slabs, never the complete mesh.
+// Points are grouped like cells: a PointBrick has the points at the low corners of the 4x4x4 cells
+// of a brick. So points on the upper sides of a brick belong to its neighbors' PointBricks. The
+// points of a slab get consecutive numbers in the order (y, z) of their PointBricks. They depend on
+// the bricks of this slab and of the slab before.
 #pragma once
 
 #include <array>
@@ -33,15 +33,17 @@ struct HexSlabs {
   std::vector<uint32_t> brick_counts;  // of the slabs from `first` on; the last one has bricks
 };
 
-// Visits the mesh: after each call of next() that returns true, for_each_point() visits the points
-// of a slab, and for_each_cell() the cells of the slab before. So a cell's points were visited
-// before the cell, or are visited with it. All sweeps visit points and cells in the same order.
+// Visits the mesh slab by slab. After each call of next() that returns true, for_each_point()
+// visits the points of a new slab, and for_each_cell() visits the cells of the slab before it. So
+// every point of a cell is visited before the cell or in the same step. All sweeps visit points and
+// cells in the same order.
 class HexSweep {
  public:
   // `job` and `slabs` must outlive this object.
   HexSweep(const ExportJob& job, const HexSlabs& slabs) : job_(job), slabs_(slabs) {}
 
-  // Throws Error{kOutOfMemory} if two slabs do not fit in the job's memory.
+  // Moves to the next slab. Returns false after the last one. Throws Error{kOutOfMemory} if two
+  // slabs do not fit in the job's memory.
   bool next();
   // The number of points visited so far, including the current slab's.
   uint64_t points() const { return next_point_; }
@@ -58,7 +60,8 @@ class HexSweep {
   void for_each_cell(const Visit& visit) const;
 
  private:
-  // A brick, or a PointBrick, by its y and z in bricks.
+  // A brick with its mask of cells. `place` is its position in the slab: place_of(y, z), counted in
+  // bricks. PointBrick is the same for points.
   struct HexBrick {
     uint64_t place = 0;
     uint64_t mask = 0;
@@ -86,8 +89,9 @@ class HexSweep {
   template <class Visit>
   void merge_points(const Visit& visit) const;
   void number_points();
-  // Returns the PointBricks around a brick of the slab before, at index 4dx + 2dy + dz; null if
-  // there is none.
+  // Returns the PointBricks that can have corners of the cells of a brick of the slab before. Their
+  // offset from the brick is (dx, dy, dz), and their index 4dx + 2dy + dz. An element is null if
+  // the PointBrick has no points.
   std::array<const PointBrick*, 8> point_bricks_around(uint64_t place) const;
   static Points points_of(const std::array<const PointBrick*, 8>& around, int bit);
 
@@ -126,8 +130,8 @@ struct HexMesh {
   uint64_t points = 0;
 };
 
-// Counts the cells and points of the mesh. Throws Error{kLimit} like require_voxels() if there are
-// more than `limit` of either.
+// Counts the cells and points of the mesh. If there are more than `limit` of either, throws
+// Error{kLimit} with `reason`, like require_voxels().
 HexMesh require_hex_mesh(const ExportJob& job, uint64_t limit, const std::string& reason);
 
 // Returns the sizes of the mesh as a note of the report.

@@ -15,7 +15,8 @@ namespace {
 constexpr uint64_t kMaxInpLabel = 999'999'999;  // of Abaqus
 constexpr int kInpDigits = 12;
 constexpr const char* kInpSet = "VOXELS";
-// Minimum size of the lines of a node and of an element: single digits, commas, and the line's end.
+// Minimum sizes in bytes of the lines of a node and of an element: numbers of one digit, a comma
+// after each, and a line end.
 constexpr uint64_t kMinNodeBytes = 8;
 constexpr uint64_t kMinElementBytes = 18;
 

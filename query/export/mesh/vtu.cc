@@ -31,7 +31,7 @@ const char* vtk_type(NumberType number) {
   return "Float32";
 }
 
-// An array in the appended data: its size in bytes, then its numbers.
+// An array in the appended data, where its size in bytes precedes its numbers.
 struct VtuArray {
   uint64_t offset = 0;  // from the beginning of the appended data
   uint64_t bytes = 0;   // of the numbers
@@ -88,12 +88,12 @@ class VtuFile {
     }
   }
 
-  // Moves the write position to the end of the array's written numbers.
+  // Moves the write position to the place of the array's next number.
   void seek(size_t array) {
     const VtuArray& to = layout_.arrays[array];
     file_.seek(layout_.xml.size() + to.offset + sizeof(uint64_t) + to.written);
   }
-  // Appends a number to the array, to which the last call of seek() has moved.
+  // Appends a number to the array. The last call of seek() must have been for this array.
   template <class Number>
   void put(size_t array, Number number) {
     file_.put(number);

@@ -76,7 +76,8 @@ class FileBuffer : public std::streambuf {
 
  protected:
   std::streamsize xsputn(const char* bytes, std::streamsize count) override {
-    // A single call may pass a complete grid.
+    // Writes in pieces, to check for cancellation and report progress: a single call may pass a
+    // complete grid.
     constexpr size_t kPieceBytes = 1 << 20;
     const bool done = attempt([&] {
       std::string_view rest(bytes, static_cast<size_t>(count));
@@ -132,8 +133,8 @@ struct VdbSize {
 // voxels of a cube have different colors.
 bool has_tiles(const ExportJob& job) { return !job.has_colors; }
 
-// Visits the bricks of a selection, and its full cubes if the job has tiles. Both functions return
-// a bool; false ends the iteration.
+// Calls visit_brick() for the bricks of a selection. If the job has tiles, calls visit_cube()
+// instead for the full cubes. Both functions return a bool; false ends the iteration.
 template <class VisitBrick, class VisitCube>
 void for_each_vdb_part(const ExportJob& job, const Selection& selection,
                        const VisitBrick& visit_brick, const VisitCube& visit_cube) {
