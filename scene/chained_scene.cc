@@ -16,8 +16,8 @@ struct Part {
   uint32_t first_material;
 };
 
-// Appends the materials `more` of another scene to `all`. Increases their image and name indices by
-// the numbers of images and names that `all` already has.
+// Appends the materials `more` of another scene to `all`. Material::image and Material::number of
+// these materials are increased by the numbers of images and names that `all` already has.
 void add_materials(SceneMaterials& all, SceneMaterials more) {
   for (Material& material : more.materials) {
     if (material.image != Material::kNoImage)
@@ -44,8 +44,8 @@ TriangleCursor::SurfaceVisitor with_material_offset(uint32_t first_material,
   };
 }
 
-// Reads the parts one after another. Only the current part's cursor is open, so that cursor can use
-// all memory of the ChainedCursor.
+// Reads the triangles of the parts (the joined scenes) one part after another. Only the current
+// part's cursor is open, so it can use all memory of the ChainedCursor.
 class ChainedCursor : public TriangleCursor {
  public:
   ChainedCursor(const std::vector<Part>& parts, unsigned cursors)

@@ -12,8 +12,8 @@ struct GlbArrays {
   nlohmann::json views = nlohmann::json::array(), accessors = nlohmann::json::array();
   uint64_t offset = 0;  // size of the BIN chunk so far
 
-  // Adds an array. `padded_bytes` is its size in the file, a multiple of 4. `target` is the target
-  // of its view, or 0.
+  // Adds an array. `padded_bytes` is its size in the file, a multiple of 4. `target` is the
+  // "target" of its bufferView, or 0 if the view has none.
   void add(uint64_t bytes, uint64_t padded_bytes, int target, nlohmann::json accessor) {
     accessor["bufferView"] = views.size();
     add_view(bytes, padded_bytes, target);

@@ -47,7 +47,7 @@ std::string ply_header(const Mesh& mesh, uint64_t vertices, uint64_t triangles) 
          "\nproperty list uchar uint vertex_indices\nend_header\n";
 }
 
-// A face: the number of corners, and their vertex indices.
+// Size of a face in the PLY file: one byte for the number of corners, and three vertex indices.
 constexpr size_t kFaceBytes = 1 + 3 * sizeof(uint32_t);
 
 // A file whose bytes come from several contiguous arrays.
@@ -76,7 +76,8 @@ class MemoryFile : public ReadableFile {
   }
 
  private:
-  // Reads at least one byte, at most to the end of the contiguous array at `offset`.
+  // Reads at least one byte, and at most all bytes from `offset` to the end of the contiguous array
+  // that contains it. Returns the number of bytes.
   virtual size_t read_some(uint64_t offset, std::span<std::byte> out) const = 0;
 
   const std::string path_;
@@ -150,7 +151,7 @@ class MeshFile : public MemoryFile {
   const PlyParts parts_;
 };
 
-// Throws Error{kInvalidInput} unless the arrays of the mesh have fitting lengths.
+// Throws Error{kInvalidInput} unless the lengths of the mesh's arrays fit each other.
 void check_lengths(const std::string& path, const Mesh& mesh) {
   const size_t numbers =
       std::visit([](auto positions) { return positions.size(); }, mesh.positions);
@@ -168,7 +169,8 @@ void check_lengths(const std::string& path, const Mesh& mesh) {
                           " texture coordinates: expected two for each of " + vertices);
 }
 
-// The path at which the PLY reader looks for the texture of a mesh without a folder.
+// Returns the path at which the PLY reader looks for a texture of the mesh at `mesh_path`, which
+// has no folder. Throws if `name` is not the name of a file.
 std::string texture_path(const std::string& mesh_path, const std::string& name) {
   if (name.empty() || name.find_first_of("/\\:\"\n\r") != name.npos)
     refuse_mesh(mesh_path, "the texture's name \"" + name +

@@ -29,7 +29,9 @@ constexpr const char* kImport = kConvert;
 constexpr const char* kUnpackOrImport = kConvert;
 #endif
 
-// A format that is no image and that voxdag does not read. Its files have `bytes` at `offset`.
+// A file format that voxdag does not read but recognizes, to name it in the error message. Its
+// files have `bytes` at `offset`. `remedy` is advice for the user. Image formats are not in this
+// table.
 struct KnownFormat {
   size_t offset;
   std::string_view bytes;
@@ -99,7 +101,8 @@ std::string contents_of_markup(std::string_view text) {
   return "an XML file";
 }
 
-// Returns the format and the remedy: "is compressed by gzip: unpack it first".
+// Returns the file's format and a remedy for the error message, such as "is compressed by gzip:
+// unpack it first". `begin` is the beginning of the file.
 std::string describe(std::string_view begin) {
   if (begin.empty()) return "is empty";
   const ImageFormat* const image = image_format_of(std::as_bytes(std::span(begin)));

@@ -64,7 +64,7 @@ class City {
     make_lots(center, centrality(column, row), random);
   }
 
-  // Returns 1 in the middle of the city, 0 at its edge.
+  // Returns how central a block is: 1 in the middle of the city, near 0 at its edge.
   double centrality(uint64_t column, uint64_t row) const {
     const auto off_middle = [](uint64_t i, uint64_t count) {
       const double middle = 0.5 * static_cast<double>(count - 1);
@@ -84,7 +84,7 @@ class City {
                                {c.x + kHalfBlock, kPavement, c.z + kHalfBlock}, false);
   }
 
-  // Adds trees on the pavement and cars next to it.
+  // Adds trees on the pavement of a block, and cars next to the pavement.
   void make_street(const Vec3& c, Random& random) {
     for (int side = 0; side < 4; ++side)
       for (int step = -2; step <= 2; ++step) {
@@ -119,7 +119,8 @@ class City {
       }
   }
 
-  // Adds one tower, four buildings or nine small ones.
+  // Fills a block with one tower, four buildings or nine small buildings. `central` is the block's
+  // centrality().
   void make_lots(const Vec3& c, double central, Random& random) {
     const int across = central > 0.7 && random.chance(40)   ? 1
                        : central > 0.3 || random.chance(25) ? 2

@@ -112,8 +112,8 @@ class GltfScene : public TriangleSource {
   SceneMaterials materials() const override {
     const DocumentMaterials& listed = *document_.materials;
     SceneMaterials out{listed.materials, {}, listed.warnings, {}};
-    // The file's materials come first, numbered from 0. The other entries repeat one of these
-    // numbers or have none.
+    // The file's materials come first, and have the numbers 0, 1, 2, ... The additional materials
+    // repeat one of these numbers or have none, so they add no name.
     for (const Material& material : listed.materials)
       if (material.number == out.names.size()) out.names.push_back(material.name);
     for (int image : listed.images)

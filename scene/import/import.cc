@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-// The work of the child process.
+// Converts the file. Runs in the child process.
 void convert(FileSystem& files, const std::string& input, const std::string& output,
              uint64_t memory_bytes, const SendMessage& send) {
   WarningList warnings;
@@ -40,7 +40,8 @@ void convert(FileSystem& files, const std::string& input, const std::string& out
           report.bytes}}});
 }
 
-// Receives the messages of the child process.
+// Receives the messages of the child process in the parent process, and forwards warnings and
+// progress.
 class Receiver {
  public:
   // `bytes` is the size of the scene file.

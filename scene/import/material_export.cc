@@ -51,7 +51,7 @@ int wrap_mode(int mode) {
   return mode == aiTextureMapMode_Clamp || mode == aiTextureMapMode_Decal ? 33071 : 10497;
 }
 
-// Encodes an embedded image that stores plain pixels as PNG.
+// Encodes an embedded image that assimp stores as plain pixels to PNG, without its alpha.
 std::string encode(const aiTexture& texture) {
   std::vector<uint8_t> rgb;
   const size_t pixels = size_t{texture.mWidth} * texture.mHeight;
@@ -60,8 +60,9 @@ std::string encode(const aiTexture& texture) {
   return encode_png(texture.mWidth, texture.mHeight, rgb);
 }
 
-// Returns the color of a material without an image. The diffuse color is sRGB, because most
-// programs display it without conversion.
+// Returns the color of a material without an image, in linear light. A base color is already
+// linear. A diffuse color is converted from sRGB, because most programs display it without
+// conversion.
 std::array<double, 3> color_of(const aiMaterial& material) {
   aiColor4D color(1, 1, 1, 1);
   if (material.Get(AI_MATKEY_BASE_COLOR, color) == AI_SUCCESS)
@@ -122,7 +123,8 @@ void MaterialExport::add(const aiMaterial& material) {
   materials_.push_back(std::move(out));
 }
 
-// Sets the alpha mode. An opacity of 0 is a fault of the program that wrote the file.
+// Sets the alpha mode. An opacity of 0 counts as a mistake of the program that wrote the file, so
+// it is ignored.
 void MaterialExport::set_alpha(const aiMaterial& material, const std::string& image,
                                const std::string& where, double opacity, json& out) {
   if (!(opacity > 0))

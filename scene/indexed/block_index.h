@@ -31,7 +31,8 @@ class BlockIndex {
     entries_.push_back(entry);
     if (entries_.size() > max_entries_) thin_out();
   }
-  // Returns the number of the first element of the block that contains this element.
+  // Returns the number of the first element of the block that contains this element. A block is the
+  // elements from one recorded position to the next.
   uint64_t block_begin(uint64_t element) const { return element & ~(stride_ - 1); }
   // Returns the entry of the block that contains this element.
   const Entry& at(uint64_t element) const {

@@ -25,7 +25,8 @@ void ObjMesh::read_surfaces(std::span<const uint32_t> numbers, const uint32_t* c
   }
 }
 
-// Sets the material and the texture coordinates. The v of OBJ runs upward.
+// Sets the material, and the texture coordinates if the triangle has them. In OBJ, v increases
+// upward in the image.
 void ObjMesh::read_material(size_t number, SurfaceTriangle& out) {
   const ObjMaterials::Use& use = materials_.uses[surfaces_.materials[number]];
   const uint32_t* const indices = &surfaces_.texcoords[3 * number];

@@ -35,7 +35,7 @@ class ObjMesh : public IndexedMesh {
   std::string name_index(uint64_t triangle, int corner, uint32_t) override {
     return "index " + std::to_string(faces_.index_in_file(triangle, static_cast<size_t>(corner)));
   }
-  // Like the indices in the file, the number counts from 1.
+  // Returns the vertex's name with its number in the file, which counts from 1.
   std::string name_vertex(uint32_t index) override {
     return "vertex " + std::to_string(uint64_t{index} + 1);
   }

@@ -49,7 +49,8 @@ uint64_t FaceReader::face_of(uint64_t triangle) {
 }
 
 // Reads the face that contains the triangle. Continues from the current face, unless the triangle
-// is in an earlier face or a later block. In these cases, starts at the triangle's block.
+// is in an earlier face or in a later block of PlyFile::face_blocks(). In these cases, starts at
+// the triangle's block.
 void FaceReader::seek(uint64_t triangle) {
   const auto& blocks = ply_.face_blocks();
   const bool is_ahead = is_loaded_ && triangle >= first_triangle_;
@@ -88,7 +89,7 @@ uint64_t FaceReader::face_end() const {
   return first_triangle_ + (corners < 3 ? 0 : corners - 2);
 }
 
-// Returns which corner of its face is corner `k` of a triangle.
+// Returns the position, in the current face, of corner `k` of a triangle.
 size_t FaceReader::corner_of(uint64_t triangle, size_t k) const {
   return polygon::position_of_corner(split_, static_cast<size_t>(triangle - first_triangle_), k);
 }

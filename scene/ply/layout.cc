@@ -29,7 +29,9 @@ size_t find_property(const Element& element, std::initializer_list<const char*> 
   return kNone;
 }
 
-// Returns the properties of the first family whose properties all exist.
+// `families` has alternative names for the same N numbers, such as red, green, blue and r, g, b.
+// Returns the properties of the first family whose N properties all exist. If no family is
+// complete, returns an empty list.
 template <size_t N>
 std::vector<size_t> find_family(const Element& element,
                                 std::initializer_list<std::array<const char*, N>> families) {
@@ -57,7 +59,7 @@ std::vector<size_t> find_colors(const Element& element) {
   return colors;
 }
 
-// Adds the names of color properties that are not in `read`.
+// Adds the names of the element's color properties that are not in `read` to `out`.
 void list_ignored_colors(const Element& element, const std::vector<size_t>& read,
                          std::vector<std::string>& out) {
   constexpr const char* kNames[] = {"red",          "green",          "blue",

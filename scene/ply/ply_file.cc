@@ -151,8 +151,8 @@ void PlyFile::check_end(uint64_t offset, MemoryBudget& budget) const {
     refuse("has " + printable(word) + " after its last row, expected the end of the file");
 }
 
-// Clears has_splits in blocks whose faces are all fans. Warns about faces whose edges cross each
-// other.
+// Finds the blocks whose faces are all fans, and clears their has_splits. Warns about faces whose
+// edges cross each other.
 void PlyFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
   if (std::ranges::none_of(face_blocks_, [](const FaceBlock& block) { return block.has_splits; }))
     return;

@@ -19,7 +19,7 @@ namespace {
 
 // Maximum number of records that are decoded in one loop.
 constexpr uint64_t kLasWindowRecords = 1024;
-// Records per block. LasFile stores the number of kept points before each block.
+// Records per block. LasFile stores the number of points that are not withheld before each block.
 constexpr uint64_t kLasBlockRecords = 1024;
 
 // Calls visit(record, bytes) for records [first, first + count).
@@ -61,8 +61,8 @@ class LasFile : public PointFile {
   bool has_withheld() const { return count_ != las_.records; }
   // Maximum value of a color: 255 if no color of the file is larger, otherwise 65535.
   uint16_t max_color() const { return max_color_; }
-  // Returns the first record of the block that contains the kept point `point`, and the number of
-  // kept points before this block.
+  // Returns the first record of the block that contains `point`, and the number of points before
+  // this block. Withheld records do not count as points.
   std::pair<uint64_t, uint64_t> block_of(uint64_t point) const {
     const auto after = std::ranges::upper_bound(kept_before_, point);
     const auto block = after - kept_before_.begin() - 1;
@@ -129,7 +129,7 @@ class LasReader : public PointReader {
   }
 
  private:
-  // Calls visit(record) for points [first, first + count). Withheld records are not counted.
+  // Calls visit(record) for points [first, first + count). Withheld records do not count as points.
   template <class Visit>
   void for_each_point(uint64_t first, size_t count, const Visit& visit) {
     if (!file_.has_withheld())

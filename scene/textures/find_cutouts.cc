@@ -25,7 +25,7 @@ bool needs_mask(const Material& m) {
   return m.alpha_mode != AlphaMode::kOpaque && m.image != Material::kNoImage;
 }
 
-// A mask to be decoded: its image and a material that uses it.
+// A mask to decode, from an image and the alpha properties of a material that uses the image.
 struct Task {
   const ImageSource* image;
   const Material* material;

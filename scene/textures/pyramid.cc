@@ -13,7 +13,7 @@ struct Taps {
 };
 
 // Returns the texels from which texel `i` of a level is computed along one axis, and their weights.
-// They are in the next finer level, which has `fine` texels along this axis.
+// These texels are in the next finer level, which has `fine` texels along this axis.
 Taps taps_of(uint32_t i, uint32_t fine) {
   if (fine == 1) return {0, 1, {1, 0, 0}};
   if (fine % 2 == 0) return {2 * i, 2, {1, 1, 0}};

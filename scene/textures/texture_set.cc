@@ -81,7 +81,7 @@ std::string user_of(const SceneMaterials& materials, uint32_t image) {
   return ", the base color of material " + numbered(index, found->name);
 }
 
-// The images that cannot be read because of the same problem.
+// The images that are unreadable for the same reason. They are reported in one warning.
 struct UnreadableImages {
   std::string problem;
   std::string first;  // the first of the images, and a material that uses it
@@ -96,8 +96,8 @@ struct UnreadableImages {
   }
 };
 
-// Runs `body` while other threads may also run one. If `body` runs out of memory, runs it again
-// while no other thread runs one.
+// Runs `body` under a shared lock, so that other threads can run theirs concurrently. If `body`
+// runs out of memory, runs it again under an exclusive lock, while no other thread runs one.
 template <class Body>
 void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const Body& body) {
   try {

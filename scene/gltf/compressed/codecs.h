@@ -20,7 +20,7 @@ struct BrokenData {
 // triangles than it has faces, because it counts the degenerate triangles that join its pieces.
 constexpr uint64_t kMaxStripTrianglesPerFace = 8;
 
-// Decodes `compressed` into `out`, whose size is view.decoded_bytes(). Throws BrokenData.
+// Decodes a meshopt view. `out` must have view.decoded_bytes() bytes. Throws BrokenData.
 void decode_meshopt(const MeshoptView& view, std::span<const std::byte> compressed,
                     std::span<std::byte> out);
 

@@ -45,7 +45,8 @@ constexpr const char* kTooMuchMemory =
     "machine "
     "with more memory";
 
-// Thrown once the number of vertices is known, if only this number is needed.
+// Thrown by BoundedDecoder to stop decoding as soon as the number of vertices is known, if only
+// this number is needed.
 struct VertexCount {
   uint64_t vertices;
 };
@@ -158,7 +159,8 @@ void decode_as(const DracoHeader& header, std::span<const std::byte> data, Memor
                           : " (" + printable(status.error_msg_string()) + ")")};
 }
 
-// Decodes into `mesh`. `compressed` contains the header.
+// Decodes Draco data into `mesh`. `compressed` includes the header. `max_vertices` is as in
+// BoundedDecoder.
 void decode_mesh(std::span<std::byte> compressed, const DracoHeader& header, MemoryCharge& charge,
                  uint64_t max_vertices, draco::Mesh& mesh) {
   charge_more(charge,
@@ -212,7 +214,8 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
   out.flush();
 }
 
-// Writes zeros for the declared vertices that the data do not have.
+// Writes zeros for the vertices that the part declares but the data do not have. `points` is the
+// number of vertices in the data.
 template <class T>
 void pad(const DracoPart& part, const DracoPart::Attribute& wanted, uint32_t points,
          Writer<T>& out) {

@@ -28,7 +28,8 @@ constexpr uint64_t kTypeBytes = 4;  // bytes per attribute: use, number type, co
   throw BrokenData{"its Draco data are damaged: expected valid connectivity and symbol tables"};
 }
 
-// Reads the data through a copy of Draco's buffer, so that Draco's position does not change.
+// Walks through the data in a copy of Draco's buffer, so that Draco's own position does not change.
+// Calls `admit` before it builds a table.
 class Walker {
  public:
   Walker(const draco::DecoderBuffer& at, const AdmitTable& admit) : buffer_(at), admit_(admit) {}

@@ -67,7 +67,8 @@ void read_group(Input& in, unsigned bits, uint8_t* deltas) {
     if (deltas[i] == sentinel) deltas[i] = in.next();
 }
 
-// Reads the deltas of one byte position for `count` elements. Fills the last group of 16 deltas.
+// Reads the deltas of one byte position for `count` elements. `deltas` needs space for a multiple
+// of 16 deltas: they are stored in groups of 16, and the last group may extend beyond `count`.
 void read_deltas(Input& in, unsigned control, size_t count, uint8_t* deltas) {
   if (control == kZeros) return void(std::fill_n(deltas, count, uint8_t{0}));
   if (control == kLiteral) return in.read(deltas, count);
@@ -84,7 +85,8 @@ T without_zigzag(T value) {
   return static_cast<T>(value & 1 ? ~(value >> 1) : value >> 1);
 }
 
-// Applies the deltas of one channel to `element`, the channel's bytes in the previous element.
+// Applies the deltas of one channel. `element` has the channel's bytes in the previous element, and
+// receives its bytes in the current element.
 void add_deltas(unsigned mode, const std::array<uint8_t, 4>& delta, uint8_t* element) {
   const auto pair = [](const uint8_t* bytes) {
     return static_cast<uint16_t>(bytes[0] | bytes[1] << 8);

@@ -17,7 +17,8 @@ namespace {
 // any count.
 constexpr uint64_t kMaxElements = uint64_t{1} << 32;
 
-// `count` elements of `bytes` bytes each. The first one begins at byte `offset` of a view.
+// The position of an array in a buffer view: `count` elements of `bytes` bytes each. The first
+// element begins at byte `offset` of the view.
 struct Extent {
   int view;
   uint64_t offset;

@@ -7,11 +7,13 @@
 
 namespace voxdag::gltf {
 
-// Marks the meshes that nodes of the scene draw. Checks these meshes and the nodes' skins and
-// instances. Calls place_draco_primitive() for compressed primitives. Throws Error{kInvalidInput}.
+// Marks the meshes that nodes of the scene draw. Checks these meshes, and the skins and instances
+// of the nodes. Calls place_draco_primitive() for compressed primitives. Throws
+// Error{kInvalidInput}.
 void check_drawn_meshes(Document& document);
 
-// Returns the buffer of decoded Draco data that a checked primitive's positions are in, or null.
+// Returns the buffer of decoded Draco data that has the primitive's positions. Returns null if the
+// positions are not compressed by Draco. The primitive must be checked.
 BufferSource* decoded_buffer(Document& document, const Primitive& primitive);
 
 // Checks that morph targets, joints and weights have as many elements as the positions.

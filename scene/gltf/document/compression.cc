@@ -64,7 +64,8 @@ void check_layout(const MeshoptView& view, const std::string& path) {
     violate("byteStride", view.stride, "8, as QUATERNION requires");
 }
 
-// Adds a buffer of decoded bytes to the document and returns its index.
+// Adds `buffer`, which will have decoded bytes, to the document, and returns its index. `heap` is
+// the heap memory that it owns, in bytes.
 int add_buffer(Document& d, BufferSource buffer, uint64_t heap) {
   d.charge.add(sizeof(buffer) + heap);
   d.buffers.push_back(std::move(buffer));
@@ -101,7 +102,8 @@ uint64_t move_accessor(Document& d, int& accessor, uint64_t count, int buffer, u
   return bytes;
 }
 
-// A compressed attribute and the primitive's accessor that it replaces.
+// An attribute in Draco data: its id there, and the accessor of the primitive whose data it
+// replaces.
 struct Replaced {
   int id;
   int* accessor;

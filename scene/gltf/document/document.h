@@ -183,7 +183,8 @@ struct Document {
 
   bool quantized = false;     // KHR_mesh_quantization is used
   bool has_restarts = false;  // KHR_mesh_primitive_restart is used
-  // Deques, because a growing vector would need its memory twice.
+  // Deques, because the old and the new array of a growing vector would exist together and need
+  // twice the memory.
   std::deque<BufferSource> buffers;
   std::deque<BufferView> views;
   std::deque<Accessor> accessors;

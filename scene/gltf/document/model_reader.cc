@@ -46,7 +46,7 @@ ModelReader::ModelReader(const std::string& scene_path, MemoryBudget& budget)
       parse_charge_(budget, "the description of the materials in " + scene_path) {}
 
 void ModelReader::add(std::string& section, const ElementText& element, uint64_t bytes) {
-  // A growing vector needs its memory twice.
+  // Charges `bytes` twice, because the old and the new array of a growing vector exist together.
   model_charge_.add(2 * bytes + model_bytes(element));
   parse_charge_.add(kTextCopies * element.text.size() + kTreeBytesPerValue * element.values);
   section.append(section.empty() ? "" : ",").append(element.text);

@@ -54,11 +54,11 @@ void place_bin_chunk(const Container& container, Document& d) {
   first.range = container.bin;
 }
 
-// Memory per node of check_document(), which follows the parents of all nodes.
+// Memory per node for the arrays in which check_document() follows the parents of all nodes.
 constexpr uint64_t kCheckBytesPerNode = 2 * sizeof(int);
 
-// Returns read(element). If the element breaks a rule, records the message and returns T(), because
-// this is an error only if the element is used.
+// Returns read(element). If the element breaks a rule, records the message and returns T(). This is
+// not an error yet, because a broken element is allowed if nothing uses it.
 template <class T, class Read>
 T read_or_note(Document& document, size_t index, const JsonElement& element, const Read& read) {
   try {
@@ -70,7 +70,8 @@ T read_or_note(Document& document, size_t index, const JsonElement& element, con
 }
 
 // Returns a function that converts an element by `read`, charges its memory and appends it to
-// `array`. store() fails for an element that breaks a rule, store_or_note() keeps the message.
+// `array`. For an element that breaks a rule, the function from store() throws Violation, and the
+// function from store_or_note() records the message and appends T().
 template <class T, class Read>
 auto store(Document& document, std::deque<T>& array, const Read& read) {
   return [&, read](const JsonElement& element) {
@@ -86,7 +87,8 @@ auto store_or_note(Document& document, std::deque<T>& array, T (*read)(const Jso
   });
 }
 
-// Reads all sections; returns the message of the first violation, or "".
+// Reads all sections of the JSON into `d` and `model`. Returns the message of the first violation,
+// or "" if no section has one.
 std::string read_structure(const ReadableFile& file, FileRange json, Document& d,
                            ModelReader& model, MemoryBudget& budget, const CancelToken& cancel) {
   bool has_asset = false;

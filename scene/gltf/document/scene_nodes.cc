@@ -172,7 +172,8 @@ std::vector<bool> drawn_nodes(Document& d) {
   return drawn;
 }
 
-// Checks the children of node `i`, and removes children that are not drawn below it.
+// Checks the children of node `i`. Removes children that are not drawn, and repetitions of a child.
+// `seen` marks the children found so far.
 void check_children(Document& d, int i, const std::vector<bool>& drawn, std::vector<bool>& seen) {
   const bool is_drawn = drawn[static_cast<size_t>(i)];
   std::erase_if(node_at(d, i).children, [&](int child) {

@@ -29,7 +29,7 @@ constexpr const char* kSound = "it describes sound";
 constexpr const char* kMotion = "it describes motion, and scenes are read at rest";
 constexpr const char* kBehavior = "it describes behavior";
 
-// Extensions, or groups of extensions with the same beginning.
+// Extensions that do not move vertices: all extensions whose names begin with `begin`.
 struct Harmless {
   std::string_view begin;
   const char* purpose;

@@ -23,7 +23,7 @@ constexpr size_t kMaxNesting = 32;
 constexpr uint64_t kBytesPerArrayElement = 3 * sizeof(Json);
 constexpr uint64_t kBytesPerObjectMember = 112;
 constexpr uint64_t kBytesPerContainer = 64;
-// A growing string needs its memory twice.
+// Copies of a string in memory while it grows: its old and its new characters exist together.
 constexpr uint64_t kGrowingCopies = 2;
 
 // Receives the parser's events. Builds each element of the requested sections: its JSON text if the

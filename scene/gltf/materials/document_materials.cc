@@ -101,7 +101,8 @@ class MaterialResolver {
     return document_.accessors[static_cast<size_t>(index)];
   }
 
-  // Returns the use of a color accessor, with three or four components. The accessor may not exist.
+  // Returns the types that the color accessor `index` may have. It may have three or four
+  // components. The accessor may not exist.
   AccessorUse color_use(int index) const {
     const bool exists = index >= 0 && static_cast<size_t>(index) < document_.accessors.size();
     return {where_ + ": COLOR_0",
@@ -109,7 +110,8 @@ class MaterialResolver {
             {kFloat, kUnsignedByte, kUnsignedShort},
             {kUnsignedByte, kUnsignedShort}};
   }
-  // KHR_mesh_quantization also allows signed numbers.
+  // Returns the types that an accessor of texture coordinates may have. Signed numbers are allowed
+  // by KHR_mesh_quantization.
   AccessorUse texture_coordinate_use(int set) const {
     return {where_ + ": TEXCOORD_" + std::to_string(set),
             2,

@@ -78,8 +78,8 @@ bool exists(const std::vector<T>& all, int index) {
 }
 
 // Returns the index of the texture's image. If the model has no such image, returns the index in
-// the first of four extensions for other file formats. The model may have no image with this index
-// either.
+// the first of four extensions for other file formats. The returned index may not exist in the
+// model either.
 int image_of(const tinygltf::Model& model, const tinygltf::Texture& texture) {
   int image = texture.source;
   for (const char* name :

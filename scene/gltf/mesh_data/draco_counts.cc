@@ -16,8 +16,8 @@ namespace {
 // Number of bytes that read_header() reads first. A header without metadata is not larger.
 constexpr uint64_t kCountedHeaderBytes = 64;
 
-// Faces per document whose connectivity is decoded although the header does not contradict the
-// accessors. More would take a noticeable time.
+// Maximum number of faces per document that are decoded only to check a number of vertices that the
+// Draco header does not contradict. More faces would take a noticeable time.
 constexpr uint64_t kMaxCheckedFaces = 4096;
 
 // Reads up to `size` bytes of the compressed data.
@@ -43,12 +43,12 @@ DracoHeader read_header(BufferReader& buffers, const CompressedBytes& from) {
   }
 }
 
-// True if the header has the number of vertices.
+// True if header.vertices is the exact number of vertices of the decoded mesh.
 bool has_exact_count(const DracoHeader& header) {
   return !header.is_edgebreaker || header.attribute_tables == 0;
 }
 
-// True if the data cannot have this number of vertices.
+// True if the header shows that the data cannot have this number of vertices.
 bool contradicts(const DracoHeader& header, uint64_t vertices) {
   if (has_exact_count(header)) return vertices != header.vertices;
   return vertices < header.vertices || vertices > 3 * header.faces;
@@ -61,9 +61,10 @@ bool fits_strip(const DracoPart& part, uint64_t faces) {
   return part.is_strip && faces <= triangles && triangles <= kMaxStripTrianglesPerFace * faces;
 }
 
-// Returns the part with the counts of its data. If the header neither gives nor contradicts the
-// number of vertices, decodes the faces to count them, but at most `checked_faces`, which it
-// reduces.
+// Returns the part with the numbers of corners and vertices in its Draco data. If the header
+// contradicts part.vertices, decodes the faces to count the vertices. If the header neither
+// confirms nor contradicts it, does so only if there are at most `checked_faces` faces, and then
+// subtracts them from `checked_faces`.
 DracoPart correct(const DracoPart& part, BufferReader& buffers, uint64_t& checked_faces) {
   DracoPart out = part;
   buffers.check_length(part.from.buffer);
@@ -92,8 +93,8 @@ std::optional<DracoPart> try_correct(const DracoPart& part, BufferReader& buffer
   }
 }
 
-// Sets the counts and places of the primitive's accessors: the indices, then the attributes, in the
-// order in which place_draco_primitive() added them.
+// Stores the corrected part, and sets the counts and offsets of the primitive's accessors: of the
+// indices, then of the attributes, in the order in which place_draco_primitive() added them.
 void replace_part(Document& d, const Primitive& primitive, BufferSource& buffer, DracoPart part) {
   const auto indices = static_cast<size_t>(primitive.indices);
   const auto place = [&](size_t accessor, uint64_t count, uint64_t offset) {

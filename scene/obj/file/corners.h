@@ -10,7 +10,7 @@
 
 namespace voxdag::obj {
 
-// Replaces an index that is out of range. No vertex has this index.
+// Stands for an index that is out of range. No vertex and no texture coordinate has this index.
 constexpr uint32_t kNoIndex = std::numeric_limits<uint32_t>::max();
 
 struct Corner {

@@ -36,7 +36,8 @@ int64_t FaceReader::index_in_file(uint64_t triangle, size_t corner) {
 }
 
 // Reads the face that contains the triangle. Continues from the current face, unless the triangle
-// is in an earlier face or a later block. In these cases, starts at the triangle's block.
+// is in an earlier face or in a later block of recorded faces (block_index.h). In these cases,
+// starts at the triangle's block.
 void FaceReader::seek(uint64_t triangle) {
   const bool is_ahead = is_loaded_ && triangle >= first_triangle_;
   if (is_ahead && triangle < face_end()) return;
@@ -66,7 +67,7 @@ uint64_t FaceReader::face_end() const {
   return first_triangle_ + (polygons_.size() < 3 ? 0 : polygons_.size() - 2);
 }
 
-// Returns which corner of its face is corner `k` of a triangle.
+// Returns the position, in the current face, of corner `k` of a triangle.
 size_t FaceReader::corner_of(uint64_t triangle, size_t k) const {
   return polygon::position_of_corner(split_, static_cast<size_t>(triangle - first_triangle_), k);
 }

@@ -10,7 +10,8 @@
 namespace voxdag::obj {
 namespace {
 
-// Converts an sRGB channel of a vertex.
+// Returns the linear light, 0 to 65535, of an sRGB channel of a vertex color. `full` is the value
+// of full intensity in the file; larger values are clamped to it.
 uint16_t light_of(double value, double full) {
   return value > 0 ? linear_light(std::min(value, full) / full) : 0;  // 0 for NaN
 }
@@ -24,8 +25,8 @@ StatementReader::StatementReader(const ObjFile& obj, Kind kind, MemoryBudget& bu
       lines_(obj.file(), budget, LineReader::Join::kBackslash),
       next_(count_) {}
 
-// Moves to the statement `first`, or to an earlier one in the same block. Continues from the
-// current statement, unless `first` is before it or in a later block.
+// Moves to the statement `first`, or to an earlier one in the same block (block_index.h). Continues
+// from the current statement, unless `first` is before it or in a later block.
 void StatementReader::seek(uint64_t first) {
   const auto& index = kind_ == Kind::kVertex ? obj_.vertex_index() : obj_.texcoord_index();
   const uint64_t block = index.block_begin(first);
@@ -34,7 +35,8 @@ void StatementReader::seek(uint64_t first) {
   next_ = block;
 }
 
-// Returns the arguments of the next statement of the kind.
+// Returns the arguments of the next statement of the kind `kind_`. Throws if the file has no
+// further one, because then it has changed.
 std::string_view StatementReader::next() {
   while (lines_.next()) {
     const Statement statement = statement_of(lines_.text());

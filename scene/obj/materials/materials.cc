@@ -19,7 +19,7 @@ uint16_t light_of_channel(double value) {
   return value > 0 ? linear_light(std::min(value, 1.0)) : 0;  // 0 for NaN
 }
 
-// Returns the material without its image.
+// Converts a material of a library, except for its image.
 Material to_material(const LibraryMaterial& in) {
   Material out;
   out.name = in.name;
@@ -51,7 +51,7 @@ class MaterialList {
   }
 
  private:
-  // Appends a material that is listed under its name.
+  // Appends a material, with its name in SceneMaterials::names, and returns its index.
   uint32_t list(Material material) {
     material.number = static_cast<uint32_t>(result_.scene.names.size());
     result_.scene.names.push_back(material.name);
@@ -74,7 +74,8 @@ class MaterialList {
     return {.material = list(std::move(white))};
   }
 
-  // The first materials are the materials of the libraries, in the same order.
+  // Returns the appearance of the faces that use material `number` of the libraries. This is also
+  // the material's index in the scene, because make() first appends all materials of the libraries.
   ObjMaterials::Use use_listed(const UsedMaterials::Use& use, uint32_t number) {
     const LibraryEntry& entry = listed_.materials[number];
     const LibraryMaterial& in = entry.material;
