@@ -57,7 +57,8 @@ class CountLevels {
   const SpillList<KeyedCounts>* pair_changes_;
   std::unique_ptr<SpillList<KeyedCounts>> sums_;
   std::optional<SpillReader<KeyedCounts>> next_pair_;
-  // Changes of the counts of the places whose results are pairs or nodes of the current level.
+  // Changes of the counts of the places (result_rows.h) whose results are pairs or nodes of the
+  // current level.
   std::unique_ptr<SpillSorter<KeyedCounts>> places_;
   // The counts of the counted nodes of the level that was added last, for each file.
   std::unique_ptr<Counts> below_a_, below_b_;

@@ -8,7 +8,7 @@
 namespace voxdag::query {
 namespace {
 
-// Returns the position, 0 or 1, on `axis` of cube `index` among 2 x 2 x 2 cubes.
+// Cube `index` is one of 2 x 2 x 2 cubes. Returns its position on `axis`, 0 or 1.
 constexpr int64_t axis_bit(size_t index, size_t axis) {
   return static_cast<int64_t>(index >> (2 - axis) & 1);
 }

@@ -120,7 +120,7 @@ class SpillList {
     flush();
     items_.try_add(item, max, space_->budget);
   }
-  // Must be called after the last item, before the list is read.
+  // Completes the list. Must be called after the last item was added, before the list is read.
   void finish() {
     if (!file_) return;
     flush();
@@ -180,8 +180,8 @@ class SpillReader {
   const T* end_ = nullptr;
 };
 
-// T has an operator <. Items that do not fit in memory are written as sorted runs, which are merged
-// when they are read.
+// Sorts items. T must have an operator <. Items that do not fit in memory are written as sorted
+// runs, which are merged when the items are read.
 template <class T>
 class SpillSorter {
  public:
@@ -195,15 +195,15 @@ class SpillSorter {
     store_run();
     items_.try_add(item, max, space_->budget);
   }
-  // Must be called after the last item. If `retain` is set, the items are read much later, so they
-  // are kept in memory only if they are few.
+  // Completes the sorter. Must be called after the last item was added. If `retain` is set, the
+  // items are read much later, so they are kept in memory only if they are few.
   void finish(bool retain = false) {
     sort();
     if (runs_.empty() && !(retain && items_.size() * sizeof(T) > space_->list_bytes)) return;
     store_run();
     items_.free();
   }
-  // Must be called once before the items are read.
+  // Moves to the first item in sorted order. Must be called once, after finish().
   void begin() {
     left_ = size_;
     const uint64_t count = std::max<uint64_t>(runs_.size(), 1);

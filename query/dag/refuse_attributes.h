@@ -1,4 +1,4 @@
-// The refusal of files with attributes, for commands that read only the voxels.
+// Refuses files with attributes, for commands that read only the voxels.
 #pragma once
 
 #include <string>

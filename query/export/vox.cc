@@ -235,7 +235,7 @@ class VoxWriter {
                      visit);
   }
 
-  // Returns the model of a node with this content.
+  // Returns the number of the model that has the voxels of the node with this content (DagView).
   uint32_t model_of(uint64_t content) {
     return depth_ + kBrickLevels == view_.grid_levels() ? 0 : models_[content];
   }

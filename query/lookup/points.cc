@@ -99,7 +99,7 @@ class Descents {
   // True if the cell at the end of a descent is set.
   bool ends_set(const Descent& d) const {
     if (grid_levels_ + 2 <= dag_.grid_levels()) return true;
-    // The number of levels below the brick, 1 or 2.
+    // Number of levels from the brick to the cells: 1 for octants, 2 for voxels.
     const uint32_t voxel_levels = grid_levels_ + 2 - dag_.grid_levels();
     const uint64_t mask = dag_.grid_levels() == 2 ? d.content : dag_.brick(d.content);
     const uint64_t octant = mask >> (8 * d.child_index(voxel_levels - 1)) & 255;

@@ -8,7 +8,8 @@
 namespace voxdag::query {
 namespace {
 
-// The linear intensities of sRGB bytes (IEC 61966-2-1).
+// Returns a table: element i is the linear intensity, from 0 to 1, of the sRGB byte i (IEC
+// 61966-2-1).
 const std::array<double, 256>& linear_of() {
   static const std::array<double, 256> table = [] {
     std::array<double, 256> linear{};

@@ -16,7 +16,8 @@ namespace {
 constexpr size_t kHeadBytes = 33;
 // The tEXt chunk that names voxdag as the software: its length, type, keyword and text, and CRC.
 constexpr std::string_view kSoftware{"\0\0\0\x0ftEXtSoftware\0voxdag\x59\x60\x14\x49", 27};
-// The comment of a JPEG file that names voxdag as the software, and its position.
+// The comment segment that names voxdag as the software of a JPEG file, and the segment's offset in
+// the file.
 constexpr std::string_view kComment = "voxdag";
 constexpr std::string_view kCommentMarker{"\xff\xfe\0\x08voxdag", 10};
 constexpr size_t kCommentAt = 20;

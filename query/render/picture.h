@@ -28,10 +28,10 @@ struct Picture {
 // Returns the picture as a PNG file, which names voxdag as its software. Throws Error{kOutOfMemory}
 // if libpng runs out of memory.
 std::string encode_png(const Picture& picture);
-// True if a file of this name is a JPEG file.
+// True if the name has an ending of JPEG files, such as .jpg.
 bool is_jpeg_name(std::string_view path);
-// Returns the picture as a JPEG file if the name of the file is that of one, otherwise as a PNG
-// file. Throws Error{kInvalidInput} for a JPEG file of a picture with alpha.
+// Returns the picture as a JPEG file if is_jpeg_name(path), otherwise as a PNG file. Throws
+// Error{kInvalidInput} for a JPEG file of a picture with alpha.
 std::string encode_picture(const Picture& picture, std::string_view path);
 // True if the file was written by encode_picture() or encode_png().
 bool is_rendered_picture(const ReadableFile& file);

@@ -108,19 +108,21 @@ GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighti
   return p;
 }
 
-// The light behind a row of the picture.
+// Returns the light of the background in one row of the picture. `height` is from 0 at the upper
+// edge of the picture to 1 at the lower edge.
 Vec background_of(Background background, double height) {
   if (background == Background::kSky) return mix(kTopColor, kBottomColor, height);
   return {{1, 1, 1}};
 }
 
-// The light of a pixel before it is rounded, and the share of it that hides what is behind.
+// A pixel before its channels are rounded to bytes.
 struct FinalPixel {
   Vec color;
   double alpha = 1;
 };
 
-// Converts the light of surfaces to the picture's colors.
+// Computes a pixel's color from the light of its surface: applies the exposure and the tone mapping
+// and, if the background is not transparent, adds haze and the background.
 struct ColorGrading {
   const Lighting& lighting;
   Background kind;

@@ -13,8 +13,8 @@
 
 namespace voxdag::query {
 
-// What pixels without a surface show: a gradient, white, or nothing. On the first two, the scene
-// throws a shadow.
+// The background, which pixels without a surface show: a gradient, white, or transparency. The
+// scene throws a shadow on a gradient or white background, but not on a transparent one.
 enum class Background { kSky, kWhite, kTransparent };
 // Returns "sky", "white" and "transparent".
 const std::vector<std::string>& background_names();
@@ -39,9 +39,9 @@ constexpr uint64_t render_bytes_per_pixel(Background background) {
   return sizeof(GBufferPixel) + static_cast<uint64_t>(channels_of(background));
 }
 
-// Renders a picture. It has alpha if the background is transparent. If the DAG is empty, the
-// picture shows only the background. Throws
-// Error{kCorrupt} for a damaged DAG, and Error{kCanceled}.
+// Renders a picture. The picture has alpha if the background is transparent. If the DAG is empty,
+// the picture shows only the background. Throws Error{kCorrupt} for a damaged DAG, and
+// Error{kCanceled}.
 Picture render_picture(const DagView& dag, const Placement& placement, const RenderOptions& options,
                        Progress& progress, const CancelToken& cancel);
 
