@@ -9,7 +9,7 @@ namespace voxdag {
 
 bool is_lfs_pointer(const ReadableFile& file);
 
-// Throws Error{kInvalidInput}, beginning with `where`, if the file is a pointer.
+// Throws Error{kInvalidInput} if the file is a Git LFS pointer. The message begins with `where`.
 void refuse_lfs_pointer(const ReadableFile& file, const std::string& where);
 
 }  // namespace voxdag

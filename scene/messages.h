@@ -13,8 +13,8 @@ namespace voxdag {
 // text may be of any encoding.
 std::string printable(std::string_view text, size_t max_bytes = 64);
 
-// Returns the message of an exception of the JSON library without its prefix "[json.exception...]
-// ". Other messages are returned unchanged.
+// Returns the message of an exception of the JSON library without its prefix in brackets, which
+// begins with "[json.exception". Other messages are returned unchanged.
 std::string without_prefix(std::string message);
 
 // Returns the index with the name in quotes: 16 "wheel". Returns only the index if the name is

@@ -20,7 +20,8 @@
 namespace voxdag::gltf {
 namespace {
 
-// Corrects the counts of Draco primitives before the scene's readers exist.
+// Corrects the numbers of vertices and faces of Draco primitives (draco_counts.h). Uses a temporary
+// reader, because the readers of the scene rely on the correct numbers.
 void correct_counts(FileSystem& files, const ReadableFile& file, Document& document,
                     MemoryBudget& budget) {
   if (std::ranges::none_of(document.buffers, [](const BufferSource& b) { return !!b.draco; }))

@@ -17,8 +17,8 @@ size_t find_element(const Header& header, const char* name) {
   return found == header.elements.size() ? kNone : found;
 }
 
-// Returns the first property of `names` that exists, and is a list if `is_list` is true and a
-// number if it is false. Returns kNone if there is no such property.
+// Returns the first of the properties `names` that exists and has the right form: a list if
+// `is_list` is true, otherwise a number. Returns kNone if no property does.
 size_t find_property(const Element& element, std::initializer_list<const char*> names,
                      bool is_list) {
   for (const char* name : names) {

@@ -1,5 +1,5 @@
-// The elements and properties of a PLY file that make its triangles and their surfaces, found by
-// their names. Upper and lower case are the same.
+// The elements and properties of a PLY file that make its triangles and their surfaces. They are
+// found by their names, in upper or lower case.
 #pragma once
 
 #include <array>

@@ -70,7 +70,8 @@ void PlyMesh::read_surfaces(std::span<const uint32_t> numbers, const uint32_t* c
   }
 }
 
-// Returns false if the triangle has no texture.
+// Sets the material and the texture coordinates of a triangle. If the triangle has no usable
+// texture, changes nothing and returns false.
 bool PlyMesh::read_texture(size_t number, const uint32_t* vertices, SurfaceTriangle& out) {
   const size_t texture = texture_of(number);
   std::array<double, 6> texcoords;

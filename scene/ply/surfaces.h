@@ -39,7 +39,7 @@ class Surfaces {
   uint32_t materials() const {
     return 1 + static_cast<uint32_t>(ply_.header().texture_files.size());
   }
-  // True if a texture file can be opened.
+  // True if `texture` is the position of a texture file that could be opened.
   static bool is_usable(const Values& values, size_t texture) {
     return texture < values.scene.images.size() && values.scene.images[texture].problem.empty();
   }

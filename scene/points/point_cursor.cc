@@ -130,7 +130,7 @@ uint64_t PointCursor::load_block(uint64_t point) {
   return end;
 }
 
-// Reads the colors of the points of block_.
+// Reads the colors of the points in block_, the current block, unless they are already read.
 void PointCursor::load_colors() {
   if (color_block_ == block_) return;
   color_block_ = kNoBlock;

@@ -70,7 +70,8 @@ class TextReader : public PointReader {
   }
 
  private:
-  // Reads a row. Returns false if the file has become shorter since it was opened.
+  // Moves to the row with this number and reads it. Returns false if the file has become shorter
+  // since it was opened.
   bool go_to(uint64_t row) {
     constexpr uint64_t kRows = RowIndex::kBlockRows;
     if (row < next_row_ || row / kRows != next_row_ / kRows || next_row_ % kRows == 0) {

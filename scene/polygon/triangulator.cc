@@ -55,7 +55,8 @@ void Triangulator::remove_collinear_corners() {
   for (; kept_.size() < left; corner = ring[corner].next) kept_.push_back(corner);
 }
 
-// Adds the triangles of the polygon of the corners in kept_.
+// Triangulates the polygon that the corners in kept_ form, and adds its triangles. Returns false if
+// the sweep fails or a triangle would be clockwise.
 bool Triangulator::triangulate_kept(Sweep::Move move) {
   kept_points_.clear();
   for (const uint32_t corner : kept_) kept_points_.push_back(points_[corner]);

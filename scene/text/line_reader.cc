@@ -98,7 +98,8 @@ bool LineReader::load_more() {
   return true;
 }
 
-// Drops the bytes of a long comment from the buffer, except for one byte, which becomes "#".
+// Drops the bytes of a long comment from the buffer, except for one byte. Replaces this byte by
+// "#", so that the line remains a comment.
 void LineReader::skip_comment() {
   if (!trimmed({buffer_.data(), size_}).starts_with('#'))
     throw Error(ErrorCode::kLimit, file_.path() + ": line " + std::to_string(number_) +

@@ -91,7 +91,8 @@ class TextureReader {
           height_(level.height) {}
 
     uint64_t place_of(uint32_t x, uint32_t y) const {
-      // Offsets of the tile and of the texel within it, along y and along x.
+      // The texel's offset along y and its offset along x: each has the offset of the tile and of
+      // the texel within the tile.
       const uint64_t row = (y >> kTileShift) * row_of_tiles_ + ((y % kTileEdge) << kTileShift);
       const uint64_t column = (uint64_t{x >> kTileShift} << 2 * kTileShift) + x % kTileEdge;
       return row + column;

@@ -159,8 +159,8 @@ void decode_as(const DracoHeader& header, std::span<const std::byte> data, Memor
                           : " (" + printable(status.error_msg_string()) + ")")};
 }
 
-// Decodes Draco data into `mesh`. `compressed` includes the header. `max_vertices` is as in
-// BoundedDecoder.
+// Decodes Draco data into `mesh`. `compressed` includes the header. `max_vertices` is the maximum
+// number of vertices, or kCountVertices to throw VertexCount.
 void decode_mesh(std::span<std::byte> compressed, const DracoHeader& header, MemoryCharge& charge,
                  uint64_t max_vertices, draco::Mesh& mesh) {
   charge_more(charge,

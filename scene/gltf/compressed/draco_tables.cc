@@ -133,7 +133,7 @@ uint64_t count_vertices(const CornerTable& table) {
   return count;
 }
 
-// A group of attributes that store their values in the same order.
+// A group of attributes whose values are stored in the same order of vertices or corners.
 struct Group {
   bool is_per_corner = false;
   std::vector<uint8_t> coders;  // draco::SequentialAttributeEncoderType of each attribute

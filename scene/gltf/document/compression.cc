@@ -64,8 +64,8 @@ void check_layout(const MeshoptView& view, const std::string& path) {
     violate("byteStride", view.stride, "8, as QUATERNION requires");
 }
 
-// Adds `buffer`, which will have decoded bytes, to the document, and returns its index. `heap` is
-// the heap memory that it owns, in bytes.
+// Adds `buffer`, a buffer for decoded bytes, to the document, and returns its index. `heap` is the
+// heap memory that `buffer` owns, in bytes.
 int add_buffer(Document& d, BufferSource buffer, uint64_t heap) {
   d.charge.add(sizeof(buffer) + heap);
   d.buffers.push_back(std::move(buffer));

@@ -79,7 +79,8 @@ struct DracoPart {
   uint64_t decoded_bytes() const;
 };
 
-// Returns the meshopt extension of a buffer or view, if `extensions` has one, and its name.
+// Returns the meshopt extension in the extensions of a buffer or buffer view, and the extension's
+// name. Returns nullopt if `extensions` has none.
 std::optional<std::pair<JsonElement, const char*>> find_meshopt(const JsonElement& extensions);
 
 // Throw Violation for a member that is missing or of a wrong type, or for a layout that the

@@ -28,7 +28,8 @@ class StatementReader {
       if (++next_ > first) body(arguments);
     }
   }
-  // Throws Error{kInvalidInput} about the statement passed to body().
+  // Throws Error{kInvalidInput} with a message about the last statement that for_each() passed to
+  // body().
   [[noreturn]] void refuse_statement(const std::string& what) const;
 
  private:

@@ -102,7 +102,7 @@ class HeaderParser {
     at_ += is_crlf ? 2 : 1;
   }
 
-  // Reads a line. Returns false if it ends the header.
+  // Interprets a line of the header. Returns false if the line ends the header.
   bool add_line(std::string_view line) {
     const auto words = words_of(line);
     const auto is = [&](std::string_view word) { return equals_in_any_case(words[0], word); };

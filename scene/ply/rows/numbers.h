@@ -14,7 +14,7 @@
 
 namespace voxdag::ply {
 
-// Replaces an index that is negative or needs more than 32 bits. No vertex has this index.
+// Stands for an index that is negative or needs more than 32 bits. No vertex has this index.
 constexpr uint32_t kNoVertex = std::numeric_limits<uint32_t>::max();
 
 // Calls body(T{}) with the C++ type for `type`.

@@ -52,7 +52,8 @@ bool StripReader::next(uint32_t* corners) {
   return false;
 }
 
-// Sets entry_ to the next entry. Returns false at the end of the element.
+// Sets entry_ to the next entry of the lists of vertex indices. Returns false at the end of the
+// element.
 bool StripReader::next_entry() {
   for (;;) {
     while (at_.left == 0) {
