@@ -47,8 +47,8 @@ struct OutputFile {
   // checks for path + ".partial", the temporary name of write_file_atomically(). Also throws Error
   // if the output's folder does not exist.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
-  // Makes the checks of check() above, except for the folder, for one name, such as path +
-  // ".partial".
+  // Checks one name, such as path + ".partial", in the same way as check() above, but does not
+  // check the folder.
   void check(FileSystem& files, const std::string& name, const std::string& input,
              const IsOwnFile& is_own) const;
 };

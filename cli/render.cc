@@ -22,7 +22,7 @@ namespace {
 
 constexpr int kMaxPictureEdge = 16384;
 // Name endings of picture formats that voxdag does not write. check_ending() refuses them for -o,
-// because the output would be a PNG file.
+// because the output would have another format.
 constexpr const char* kOtherPictures[] = {".webp", ".avif", ".gif", ".bmp", ".tif",
                                           ".tiff", ".ppm",  ".pgm", ".exr", ".hdr"};
 

@@ -55,8 +55,9 @@ class Download {
     return bytes <= size_ ? bytes : 0;
   }
 
-  // Requests the bytes from `offset` on and appends them to the partial file. Returns the number of
-  // seconds to wait before the next attempt: the time that a busy server requested, otherwise 0.
+  // Requests the bytes from `offset` on and writes them to the partial file at `offset`. Returns
+  // the number of seconds to wait before the next attempt: the time that a busy server requested,
+  // otherwise 0.
   double fetch_rest(uint64_t offset) {
     HeaderMap headers;
     if (offset > 0) {

@@ -1,4 +1,4 @@
-// The report of the commands that combine files.
+// The report of `voxdag combine` and `voxdag edit`, as text or as JSON.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

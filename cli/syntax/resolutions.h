@@ -1,4 +1,4 @@
-// `build -r 1k,2k,4k`: one build for each resolution.
+// Several resolutions in one command, such as `build -r 1k,2k,4k`: one build for each.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ std::vector<uint64_t> parse_resolutions(const std::string& text);
 // Returns the documentation of the option.
 std::string resolutions_help();
 
-// Returns the builds of a command, in the order of the resolutions. If there are several, the files
-// and the work folder of each have its resolution in their names: OUT.vdag becomes OUT-1024.vdag.
+// Returns one build for each resolution, in the same order. If there are several, the names of each
+// build's files and work folder have its resolution: OUT.vdag becomes OUT-1024.vdag.
 std::vector<BuildSpec> builds_of(const BuildSpec& spec, const std::vector<uint64_t>& resolutions);
 
 }  // namespace voxdag::cli

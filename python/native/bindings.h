@@ -1,4 +1,4 @@
-// Functions that add the members of the native module.
+// Functions that add classes and functions to the native module voxdag._native.
 #pragma once
 
 #include <nanobind/nanobind.h>
