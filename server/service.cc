@@ -25,7 +25,7 @@ constexpr size_t kMaxLoggedChars = 200;
 ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
   check_config(config);
   files.make_directories(config.data_folder);
-  // At least half of the file descriptors must remain for jobs, transfers and stores.
+  // At least half of the file descriptors must be left for jobs, transfers and databases.
   const uint64_t sockets = max_open_files() / 2;
   if (config.http.limits.max_connections > sockets) {
     log("connections are limited to " + std::to_string(sockets) + ", not " +

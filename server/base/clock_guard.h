@@ -10,7 +10,8 @@ inline constexpr double kSecondsPerDay = 86400;
 
 class ClockGuard {
  public:
-  // `last_seen_s`: Unix time at which the previous service is known to have run; 0 if unknown.
+  // `last_seen_s` is the latest Unix time at which a previous run of the service was certainly
+  // active; 0 if unknown.
   explicit ClockGuard(double last_seen_s) : last_clock_s_(last_seen_s) {}
 
   // Returns true if, since the last call, the clock has advanced over an hour more than `now_s`.
@@ -21,8 +22,8 @@ class ClockGuard {
   // True if the clock jumped within the last day.
   bool is_uncertain(double now_s) const { return now_s < uncertain_until_s_; }
   // Returns the Unix time before which data is older than `days`; 0 while the clock is uncertain.
-  // Calls has_jumped(). If the clock has jumped, logs that no old data is deleted for a day; `what`
-  // names the data in this log line.
+  // Calls has_jumped(). If the clock has jumped, logs that the service deletes no old data for a
+  // day; `what` names the data in this log line.
   double oldest_s(double days, const char* what, const Log& log);
 
  private:

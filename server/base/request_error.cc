@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-// Returns the text that answers to clients contain instead of the message of an Error.
+// Returns the text that clients get instead of the message of an Error with this code.
 const char* public_text(ErrorCode code) {
   static constexpr std::pair<ErrorCode, const char*> kTexts[] = {
       {ErrorCode::kInvalidInput, "the request is invalid"},

@@ -15,7 +15,7 @@ namespace voxdag::server {
 
 class RequestError : public std::exception {
  public:
-  // code() and server/api have tables in the order of these values.
+  // code() and server/api have tables whose entries are in the order of these values.
   enum class Kind {
     kInvalid,    // the request breaks a rule
     kNotFound,   // the job or scene does not exist

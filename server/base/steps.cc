@@ -35,7 +35,7 @@ void Steps::report(const std::string& name, const char* reason) noexcept {
     }
     log_(line);
   } catch (...) {
-    // The failure cannot be logged, so it is ignored.
+    // Writing the log line has failed, so the failure of the step cannot be reported.
   }
 }
 

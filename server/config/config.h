@@ -30,8 +30,8 @@ struct JobLimits {
 struct TransferLimits {
   uint64_t max_scene_bytes = uint64_t{64} << 30;
   uint64_t max_body_bytes = 64 << 10;  // JSON bodies
-  // Maximum numbers of concurrent transfers, in total and per client. Uploads, downloads, and
-  // requests for tiles are counted separately, each with these limits.
+  // Maximum numbers of concurrent transfers, in total and per client. The limits apply separately
+  // to uploads, to downloads, and to requests for tiles.
   size_t max_concurrent = 64;
   size_t max_per_client = 16;
   size_t max_event_streams = 256;
@@ -60,7 +60,7 @@ struct ServerConfig {
   ClusterOptions cluster;
   TransferLimits transfers;
   Retention retention;
-  bool adopt = false;          // creates new records for jobs and scenes without records
+  bool adopt = false;          // jobs and scenes without records get new records
   StepHook before_step;        // used by tests
   double drain_timeout_s = 5;  // time for requests in progress when the service stops
 };

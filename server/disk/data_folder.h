@@ -17,7 +17,7 @@ inline constexpr const char* kDeleted = ".deleted";
 // True if the folder exists and is not empty.
 bool has_entries(FileSystem& files, const std::string& path);
 
-// A file that must keep its name while it is open.
+// Detects that a file in use was removed or replaced under its name.
 class NamedFile {
  public:
   explicit NamedFile(const std::string& path);

@@ -17,8 +17,8 @@ namespace voxdag::server {
 
 class DiskSpace {
  public:
-  // Uploads leave `min_free_bytes` free, and at least a few megabytes for the databases. Removes an
-  // existing ballast, because the databases need space to open.
+  // Uploads leave `min_free_bytes` free, and at least a few megabytes for the databases. The
+  // constructor removes an existing ballast, because the databases need space to open.
   DiskSpace(FileSystem& files, const std::string& data_folder, uint64_t min_free_bytes);
 
   uint64_t free() const { return files_.free_space(folder_); }
@@ -28,7 +28,7 @@ class DiskSpace {
    public:
     // `announced`: the expected number of bytes, 0 if unknown. Throws Error{kNoSpace} unless this
     // number of bytes is free in addition to the space that is kept free or already reserved.
-    // Reserves only a part of it, so others may use the rest before the bytes arrive.
+    // Reserves only the first of these bytes, so other uploads may use the rest before it arrives.
     Reservation(DiskSpace& disk, uint64_t announced);
     ~Reservation();
     Reservation(const Reservation&) = delete;

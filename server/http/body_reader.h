@@ -13,8 +13,8 @@ class BodyReader {
  public:
   BodyReader(Connection& connection, const RequestHead& head);
 
-  // Like Request::read_body. A malformed chunk, or too many bytes outside the content, is
-  // BodyEnd::kBroken.
+  // Reads the body as Request::read_body does. Returns BodyEnd::kBroken for a malformed chunk, or
+  // for too many bytes outside the content.
   BodyEnd read(const Request::Sink& sink);
   // True if the body was read to its end, so that another request can follow.
   bool is_complete() const { return complete_; }

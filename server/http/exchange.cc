@@ -12,8 +12,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kReadBytes = 256 << 10;  // bytes of a file per write to the socket
-// The memory of larger answers is limited (ConnectionTable::kMaxAnswerBytes). The number of
-// connections limits the memory of smaller ones.
+// ConnectionTable::kMaxAnswerBytes limits the memory of larger answers. The number of connections
+// limits the memory of smaller answers.
 constexpr size_t kSmallAnswerBytes = 16 << 10;
 
 std::string http_date() {
@@ -77,7 +77,8 @@ Request& Exchange::read_request(size_t max_header_bytes) {
 
 std::string Exchange::read_head(size_t max_bytes) {
   std::string text;
-  size_t blank_bytes = 0;  // empty lines before a request are ignored, but count
+  size_t blank_bytes = 0;  // bytes of empty lines before the request, which count against
+                           // `max_bytes`
   for (size_t line_begin = 0;; line_begin = text.size()) {
     if (!connection_.read_line(text, max_bytes - blank_bytes)) {
       if (connection_.error_state() == Connection::ErrorState::kTooSlow)
@@ -136,7 +137,7 @@ std::string Exchange::answer_head(const Response& response, bool keep_alive) con
 bool Exchange::send(const Response& response, const std::string& head) {
   if (head_.method == "HEAD" || !has_content(response)) return connection_.write(head);
   const std::string_view body = response.body.empty() ? response.static_body : response.body;
-  // A small body is in the same packet as the head.
+  // Sends a small body in the same packet as the head.
   const bool in_one = body.size() <= kSmallAnswerBytes;
   if (!connection_.write(in_one ? head + std::string(body) : head)) return false;
   if (!in_one && !connection_.write(body)) return false;
@@ -145,8 +146,8 @@ bool Exchange::send(const Response& response, const std::string& head) {
 }
 
 bool Exchange::send_pieces(const Response& response) {
-  // A large buffer in the kernel per answer is safe if the API limits each client's concurrent
-  // answers of this kind.
+  // Allows a large buffer in the kernel for this answer. That is safe because a permit exists only
+  // if the API limits each client's concurrent answers of this kind.
   if (response.permit) connection_.allow_large_send_buffer();
   std::string buffer;
   for (const FilePiece& piece : response.pieces) {

@@ -20,7 +20,7 @@
 namespace voxdag::server {
 namespace {
 
-// Answers a connection that exceeds the limit, in one nonblocking write.
+// Answers a connection that exceeds the limit with status 503, in one nonblocking write.
 void send_busy(int socket) {
   const std::string body = problem_json(busy("too many connections"));
   const std::string text =
@@ -64,7 +64,8 @@ class HttpServer::Engine {
   }
 
  private:
-  // An exception (no memory for the connection, or no thread) closes only this connection.
+  // An exception (no memory for the connection, or no thread) closes only this connection, not the
+  // listener.
   void accept(int socket, const std::string& address) try {
     ConnectionTable::Place place;
     if (draining_ || !table_.admit(socket, address, place)) {

@@ -76,9 +76,9 @@ class Dispatcher {
     // True if the worker will still record the job's outcome.
     bool is_running() const { return !recorded && !done; }
   };
-  // Reserves the files of a job without a process for one thread, which removes files or stops
-  // cluster tasks. While this object exists, other removals of these files wait, and the job does
-  // not start even if a client retries it.
+  // Gives one thread exclusive access to the files of a job that has no process. The thread removes
+  // files or stops cluster tasks. While this object exists, other removals of these files wait, and
+  // the job does not start even if a client retries it.
   class FilesLock {
    public:
     FilesLock(Dispatcher& dispatcher, const std::string& id);
@@ -130,8 +130,8 @@ class Dispatcher {
   Steps steps_;
   ClockGuard clock_;  // used by the thread that starts jobs
 
-  // Guards the members below, up to live_mutex_. A thread also holds this mutex while it changes a
-  // job's state together with its process, but not while it removes files.
+  // Guards the members below, up to live_mutex_. A thread also holds this mutex while it changes
+  // both a job's state and its process, but not while it removes files.
   mutable std::mutex mutex_;
   JobFolders folders_;
   // Keyed by job id. The worker with the key "preview" renders the preview of a finished job.

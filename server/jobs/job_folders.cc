@@ -13,7 +13,8 @@ bool is_job_id(const std::string& name) {
   return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-// Returns the id of the job for a folder that a deletion has renamed; "" for other folders.
+// Returns the id of a job from the name of a folder that a deletion has renamed; "" for other
+// folders.
 std::string marked_job(const DirectoryEntry& entry) {
   const std::string id = entry.name.substr(0, entry.name.find('.'));
   return entry.is_directory && is_job_id(id) && entry.name == id + kDeleted ? id : "";

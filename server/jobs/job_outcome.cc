@@ -60,7 +60,8 @@ void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
   const bool stopped = asked && (error.code == "canceled" || !live.failure());
   if (!stopped) job.error = error;
   if (job.state == JobState::kCanceling) return finish(job, JobState::kCanceled, now_s);
-  // A client has suspended the job, and perhaps resumed it since. Its state is kept.
+  // If the job is not running, a client has suspended it, and perhaps resumed it since. Then its
+  // state is kept.
   if (job.state != JobState::kRunning) return;
   if (stopped || error.code == "canceled") {
     job.state = JobState::kQueued;

@@ -9,7 +9,8 @@ namespace {
 
 constexpr size_t kMaxWarnings = 100;
 constexpr size_t kMaxStages = 64;
-// Limits for texts of the job's process, so that a job has a bounded size in memory and in answers.
+// Limits for texts that the job's process sends, so that a job has a bounded size in memory and in
+// answers.
 constexpr size_t kMaxLabelBytes = 64;
 constexpr size_t kMaxPlaceBytes = 1024;
 constexpr size_t kMaxTextBytes = 4096;

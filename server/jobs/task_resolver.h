@@ -32,8 +32,9 @@ class TaskResolver {
   uint64_t memory_of(const JobRequest& request) const;
 
  private:
-  // Adds an uploaded scene to the task's uploads. Adds the scene, or the root that contains it, to
-  // the paths that the task may read.
+  // Adds the scene's files to the task. An upload becomes one of the task's uploads, and the task
+  // may read its file. For a path, the task may read the complete scene root that contains the
+  // path.
   void add_scene(const std::string& scene, JobTask& task);
 
   const ServerConfig& config_;

@@ -279,7 +279,7 @@ JobQueue::Added JobQueue::add(Job job, const IdempotencyKey& key, uint64_t max_o
 std::optional<Job> JobQueue::find(const std::string& id) {
   std::lock_guard lock(read_mutex_);
   std::optional<Job> job;
-  find_.reset();  // needed if the previous call has thrown
+  find_.reset();  // needed if the previous call of find() has thrown
   if (find_.bind(0, id).step()) job = read_job(find_);
   find_.reset();
   return job;

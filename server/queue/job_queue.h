@@ -72,9 +72,9 @@ class JobQueue {
   // Throws like check_removable().
   void remove(const std::string& id);
 
-  // Returns the first queued job that may start at `now_s` and is not in `except`. If a job would
-  // have to wait longer than `max_wait_s`, the clock was set back. Then the job may start
-  // immediately.
+  // Returns the first queued job that may start at `now_s` and is not in `except`. A job may start
+  // at its not_before_s, or immediately if it would have to wait longer than `max_wait_s`: such a
+  // wait means that the clock was set back.
   std::optional<Job> next(double now_s, double max_wait_s, const std::set<std::string>& except);
   // Returns a job that succeeded and has no preview yet.
   std::optional<Job> next_without_preview();
@@ -86,9 +86,9 @@ class JobQueue {
   // the jobs that have ended by this call.
   std::vector<Job> recover(const std::set<std::string>& running,
                            const std::function<double(unsigned attempt)>& pause_s);
-  // Returns the ids of the ended jobs that finished before `finished_before_s`. Also returns all
-  // but the `max_count` last-finished jobs of each Job::posted_by. So the jobs of one client never
-  // make other clients' jobs expire.
+  // Returns the ids of the ended jobs that finished before `finished_before_s`. For each
+  // Job::posted_by, also returns all ended jobs except the `max_count` jobs that finished last. So
+  // the jobs of one client never make other clients' jobs expire.
   std::vector<std::string> expired(double finished_before_s, uint64_t max_count);
 
   // Time of the last recorded change of a state; 0 for never.

@@ -16,7 +16,7 @@ namespace {
 constexpr size_t kMaxNameBytes = 128;
 
 // In the table `upload`, `total` is -1 while the size of the scene is unknown. `sha256` is "" until
-// publish() is called for the complete upload.
+// publish() has recorded the digest of the complete upload.
 constexpr const char* kSceneSchema = R"sql(
 CREATE TABLE scene (
   name TEXT PRIMARY KEY, size INTEGER NOT NULL, sha256 TEXT NOT NULL, modified_s REAL NOT NULL
@@ -277,7 +277,7 @@ void SceneStore::publish(const std::string& name, uint64_t size, const std::stri
         .run();
     transaction.commit();
   }
-  // A file marked as deleted remains from a failed deletion of an earlier scene with this name.
+  // The file marked as deleted is left from a failed deletion of an earlier scene with this name.
   if (files_.exists(marked_path(name))) files_.remove(marked_path(name));
   move_into_place(name, size, sha256);
 }

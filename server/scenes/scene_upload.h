@@ -29,7 +29,7 @@ class SceneUpload {
   uint64_t offset() const { return offset_; }
 
   // Ends the part. Its SHA-256 must be `part_digest` ("": not checked). Returns true if it was the
-  // last part of the scene. The complete scene must then have the SHA-256 `whole_digest` ("": not
+  // last part of the scene. Then the SHA-256 of the complete scene must be `whole_digest` ("": not
   // checked), and the caller must call publish(). If a digest differs, discards the part or the
   // complete scene, and throws RequestError{kInvalid}.
   //

@@ -14,8 +14,8 @@ namespace {
 constexpr size_t kHeaderBytes = 4096;
 constexpr size_t kDigestDigits = 32;
 
-// Returns a digest of the header page. It identifies the complete file, because this page contains
-// the checksum of the checksum table, which covers all other bytes.
+// Returns a digest of the header page. The digest identifies the complete file, because this page
+// contains the checksum of the checksum table, which covers all other bytes.
 std::string digest_of(const voxdag_reader::File& file) {
   std::string text(reinterpret_cast<const char*>(file.data()), kHeaderBytes);
   text += "tiles 1 " + std::to_string(kTileLevels);
@@ -67,7 +67,8 @@ std::unique_ptr<voxdag_reader::File> FileTileSource::read_header(const std::stri
   try {
     return open_global_bytes(path, bytes_);
   } catch (const Error&) {
-    // If pages were unreadable, reports that instead of an error in the format.
+    // If pages were unreadable, throws Error{kIo} instead, because the invalid format is only a
+    // consequence.
     expect_readable();
     throw;
   }

@@ -32,9 +32,9 @@ class FileTileSource : public TileSource {
   const FileIdentity& identity() const { return identity_; }
   // Returns a digest of the file's contents and of the version of the tile format.
   const std::string& digest() const override { return digest_; }
-  // The first call computes the cameras, which may take a second, or longer if the file is not in
-  // memory. Concurrent calls wait for the first call. If that call is canceled, the next call
-  // starts the computation again.
+  // Returns the manifest. The first call computes the cameras, which may take a second, or longer
+  // if the file is not in memory. Concurrent calls wait for the first call. If that call is
+  // canceled, the next call starts the computation again.
   const std::string& manifest(const CancelToken& cancel) const override;
   void expect_readable() const override;
   // True if expect_readable() throws. The file must then be opened again before it can be used.

@@ -19,8 +19,8 @@ class AccessControl {
   AccessControl(const ServerConfig& config, FileSystem& files);
 
   // Returns the caller who sends the request. Sets request.caller as soon as the caller is known.
-  // Throws Problem: 401 for a missing or unknown token, 403 for a role below `needed` or a wrong
-  // Host or Origin, and 429 above a rate limit.
+  // Throws Problem: 401 for a missing or unknown token, 403 for a caller whose role is below
+  // `needed` or for a wrong Host or Origin, and 429 above a rate limit.
   Caller admit(Request& request, Role needed);
 
  private:

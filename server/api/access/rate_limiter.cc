@@ -6,8 +6,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kDepthS = 2;  // capacity of a bucket, in seconds of requests
-// Above this number of buckets, full buckets are dropped. This changes no limit, because a client's
-// new bucket is also full.
+// If more buckets than this number exist, full buckets are dropped. This changes no limit, because
+// a client without a bucket gets a new one, which is also full.
 constexpr size_t kMaxBuckets = 10000;
 constexpr double kSweepIntervalS = 1;
 

@@ -14,7 +14,7 @@ constexpr int kLevel = 1;             // higher levels take twice the time to sa
 constexpr int kGzipWindow = 15 + 16;  // window of 32 KiB, with gzip's header
 constexpr int kMemory = 8;
 
-// True if the parameters of an entry of Accept-Encoding, such as "; q=0", exclude the entry.
+// True if the parameters of an entry of Accept-Encoding exclude the entry, as "; q=0" does.
 bool is_excluded(std::string_view parameters) {
   const size_t q = parameters.find("q=");
   if (q == std::string_view::npos) return false;
@@ -48,7 +48,7 @@ std::string gzip(std::string_view bytes) {
   stream.avail_in = static_cast<uInt>(bytes.size());
   stream.next_out = reinterpret_cast<Bytef*>(out.data());
   stream.avail_out = static_cast<uInt>(out.size());
-  // One call is enough, because the output has space for the worst case.
+  // One call compresses all bytes, because the output has space for the worst case.
   deflate(&stream, Z_FINISH);
   out.resize(stream.total_out);
   deflateEnd(&stream);

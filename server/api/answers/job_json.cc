@@ -9,7 +9,8 @@
 namespace voxdag::server {
 namespace {
 
-// Converts a text to a JSON string, or a list of warnings to an array. Makes texts printable.
+// Converts a text to a JSON string, or a list of warnings to a JSON array. All texts in the result
+// are printable.
 template <class T>
 std::string as_json(const T& value) {
   nlohmann::json json(value);
@@ -49,7 +50,7 @@ std::string request_members(const std::string& request) {
   return text.substr(1, text.size() - 2);
 }
 
-// Returns the JSON with printable texts, or "null" if it is empty.
+// Returns `json` with printable texts, or "null" if `json` is "".
 std::string or_null(const std::string& json) {
   return json.empty() ? "null" : printable_json_text(json);
 }

@@ -37,8 +37,8 @@ struct Context {
   ConcurrencyLimiter uploads{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter downloads{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter tiles{config.transfers.max_concurrent, config.transfers.max_per_client};
-  // Answers that are built in memory: a few at a time, so that their memory is bounded before the
-  // server knows their size.
+  // Limits the answers that are built in memory at the same time. So their memory is bounded even
+  // before the server knows their size and can limit it (ConnectionTable).
   ConcurrencyLimiter answers{4, 4};
   ConcurrencyLimiter plans{config.jobs.max_concurrent_plans, config.jobs.max_concurrent_plans};
   OpenTileSources open_sources{files, 16};
@@ -50,8 +50,8 @@ struct Context {
   // scene holds it while it checks that no job uses the scene and changes the store. So no scene
   // disappears between the check and the change of the queue.
   std::mutex scene_mutex = {};
-  // Scenes that dry runs are reading, guarded by scene_mutex. These scenes must not be removed.
-  // They may be replaced, because a reader keeps the old file open.
+  // Scenes that dry runs are reading, guarded by scene_mutex. A client must not remove these
+  // scenes. A client may replace them, because a reader keeps the old file open.
   std::multiset<std::string> planned_scenes = {};
 };
 

@@ -127,7 +127,7 @@ bool has_only_id_parameter(const Route& route) {
          std::none_of(route.answers.begin(), route.answers.end(), streams);
 }
 
-// Returns OpenAPI links for an answer that contains a new job. The links lead to the routes whose
+// Returns OpenAPI links for an answer that contains a new job. The links lead to all routes whose
 // only path parameter is the id of a job.
 Json job_links(const std::vector<Route>& routes) {
   Json links = Json::object();

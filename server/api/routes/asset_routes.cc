@@ -28,7 +28,8 @@ Response get_asset(Call& call, const Asset& asset) {
   return response;
 }
 
-// The OpenAPI document. The first request creates it, because all routes are known only then.
+// The OpenAPI document. The first request for it creates it, because all routes are known only
+// then.
 struct Document {
   std::once_flag is_created;
   Asset asset;

@@ -36,8 +36,8 @@ class EventFeed {
   EventFeed(Context& context, std::string id, std::optional<int64_t> last_seen)
       : context_(context), id_(std::move(id)), last_number_(last_seen.value_or(-1)) {}
 
-  // An EventSource: returns text to send, "" for nothing yet, nullopt at the end of the stream.
-  // Waits up to about a second.
+  // An EventSource (message.h): returns the text to send next, "" if there is nothing to send yet,
+  // or nullopt at the end of the stream. Waits up to about a second.
   std::optional<std::string> next();
 
  private:
@@ -75,8 +75,8 @@ std::optional<std::string> EventFeed::next() {
 }
 
 void EventFeed::wait() {
-  // Progress events have a minimum interval. If progress may have been held back, this wait ends as
-  // soon as the interval has passed.
+  // Two progress events have a minimum interval. If a progress event was delayed because of it,
+  // this wait ends as soon as the interval has passed.
   const double left_s = last_progress_s_ + kProgressIntervalS - wall_seconds();
   context_.queue.wait_for_change(seen_version_, left_s > 0 ? left_s : kMaxWaitS);
 }

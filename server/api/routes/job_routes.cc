@@ -20,7 +20,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxKeyChars = 255;
-constexpr size_t kMaxPageBytes = 512 << 10;  // a page of jobs ends with the job that exceeds it
+constexpr size_t kMaxPageBytes = 512 << 10;  // a page of jobs ends after the job with which it
+                                             // exceeds this size
 constexpr size_t kJobsPerRead = 16;
 // Maximum size of a stored request. The service keeps it as long as the job, and sends it with
 // every answer about the job.
@@ -67,7 +68,8 @@ IdempotencyKey key_of(const Request& request, const JobRequest& job) {
   return {key, sha256_hex(job.text + '\n' + std::to_string(job.priority) + '\n' + job.name)};
 }
 
-// Waits for a permit to build an answer, and returns an answer with the job that get() returns.
+// Waits for a permit to build an answer. Then calls get() and returns an answer with the job that
+// get() returns.
 template <class Get>
 Response job_response_of(Context& context, int status, const Get& get) {
   auto permit = context.answers.wait();
@@ -234,7 +236,7 @@ JobFilter filter_of(const Call& call) {
   return filter;
 }
 
-// Adds the jobs of a page to `body`: up to filter.limit jobs, and none after the page has
+// Adds the jobs of a page to `body`: up to filter.limit jobs, and no more jobs once the page has
 // kMaxPageBytes. Reads a few jobs at a time. Returns the JSON of next_cursor.
 std::string add_page(Context& context, JobFilter filter, std::string& body) {
   size_t missing = filter.limit;
@@ -317,8 +319,9 @@ Router::Handler act(Job (Dispatcher::*action)(const std::string& id)) {
   };
 }
 
-// Wraps a handler of requests that free disk space. If the queue cannot record the change because
-// the disk is full, the wrapped handler frees the ballast and tries again.
+// Returns a handler that calls `handler`, for requests that free disk space. If the queue cannot
+// record the change because the disk is full, frees the ballast (disk_space.h) and calls `handler`
+// again.
 Router::Handler freeing_space(Router::Handler handler) {
   return [handler = std::move(handler)](Context& context, Call& call) {
     return context.disk.with_ballast([&] { return handler(context, call); });

@@ -70,12 +70,12 @@ void check_unused(Context& context, const std::string& name) {
                    "job or wait for it");
 }
 
-// The part of a scene in the body of a request: the bytes from `first` to `end`, exclusive.
+// The part of a scene that a request's body contains: the bytes from `first` to `end`, exclusive.
 struct Part {
   uint64_t first = 0;
   std::optional<uint64_t> end;    // nullopt for a chunked body
   std::optional<uint64_t> total;  // size of the scene, if known
-  // True if a part that ends at `offset` completes the scene. A part without a total always does.
+  // True if a part that ends at `offset` completes the scene. True for every part without a total.
   bool is_last(uint64_t offset) const { return !total || offset == *total; }
 };
 
@@ -132,8 +132,8 @@ uint64_t announced_bytes(Context& context, const Part& part) {
   return size - std::min(size, part.first);
 }
 
-// Writes the request's body to `upload`. Stops at a body that is longer than the part; then returns
-// kStopped. Throws Problem (400) for a body that is shorter than the part, or empty.
+// Writes the request's body to `upload`. If the body is longer than the part, stops reading and
+// returns kStopped. Throws Problem (400) for a body that is shorter than the part, or empty.
 BodyEnd receive(Context& context, Call& call, const Part& part, DiskSpace::Reservation& space,
                 SceneUpload& upload) {
   const uint64_t end_offset = part.end.value_or(context.config.transfers.max_scene_bytes);
@@ -178,7 +178,7 @@ Response put_scene(Context& context, Call& call) {
   const std::string whole_digest = digest_of(call.request, "Repr-Digest");
   SceneUpload upload(context.scenes, name, part.first, part.total);
   // Declared after `upload`: if the upload starts over, the constructor of `upload` frees the space
-  // of its old bytes before this line reserves space.
+  // of the earlier bytes, and only then this line reserves space.
   DiskSpace::Reservation space(context.disk, announced);
   switch (receive(context, call, part, space, upload)) {
     case BodyEnd::kComplete:

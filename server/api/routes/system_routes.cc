@@ -18,8 +18,8 @@ namespace {
 // Tests whether the data folder is writable, at most once per second. Thread-safe.
 class WriteProbe {
  public:
-  // Creates and removes a file in the data folder, unless this succeeded within the last second.
-  // Throws Error if it fails.
+  // Creates and removes a file in the data folder, unless a call has succeeded within the last
+  // second. Throws Error if the folder is not writable.
   void check(Context& context) {
     const std::lock_guard lock(mutex_);
     if (wall_seconds() < valid_until_s_) return;

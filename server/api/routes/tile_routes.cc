@@ -17,7 +17,7 @@
 namespace voxdag::server {
 namespace {
 
-// Cache-Control of URLs with a digest: their contents never change.
+// Value of Cache-Control for URLs with a digest. The contents of such a URL never change.
 constexpr const char* kImmutable = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
 // Limits for the address of a node above the bricks (docs/format.md).
@@ -56,8 +56,8 @@ std::vector<uint32_t> make_tile(const TileSource& dag, const query::TileAddress&
     throw;
   } catch (const Error& error) {
     if (!error.is_corruption()) throw;
-    // Damage of the file is reported as DamagedBlock. So this error means that no node is at the
-    // offset.
+    // Damage of the file has a different type, DamagedBlock. So this error means that no node is at
+    // the offset.
     throw not_found(error.message());
   }
 }
@@ -119,8 +119,8 @@ void check_digest(const Call& call, const TileSource& dag) {
                   "the file or the format of its tiles has changed: get the manifest again");
 }
 
-// Returns a response that clients may cache. `make` returns its bytes, which depend only on the
-// digest and `name`. The entity tag is a hash of the digest and `name`.
+// Returns a response that clients may cache forever. make() returns the bytes of the response,
+// which depend only on the digest and `name`. The entity tag is a hash of the digest and `name`.
 template <class Make>
 Response immutable_response(const Call& call, const TileSource& dag, const std::string& name,
                             const Make& make) {
@@ -130,8 +130,8 @@ Response immutable_response(const Call& call, const TileSource& dag, const std::
   response.headers.emplace("ETag", "W/\"" + tag + '"');
   response.headers.emplace("Vary", "Accept-Encoding, Authorization");
   const std::string known = call.request.header("If-None-Match");
-  // The header value "*" means "if the tile exists". The service knows that only after it has made
-  // the tile.
+  // The value "*" matches any tile that exists. The service knows that a tile exists only after it
+  // has made the tile.
   if (trimmed(known) != "*" && has_tag(known, '"' + tag + '"')) {
     response.status = 304;
     return response;
@@ -157,9 +157,9 @@ void expect_unchanged(const TileSource& dag) {
     throw Problem(410, "gone", "the file was replaced while being read: get the manifest again");
 }
 
-// Calls `answer` and returns its response, or throws its error, only if the file was readable and
-// unchanged during the call. Otherwise the result is meaningless: unreadable pages read as zeros,
-// and a file that is being overwritten is a mixture of old and new parts.
+// Calls `answer` and returns its response, or throws its error, but only if the file was readable
+// and unchanged during the call. Otherwise throws another error, because the result is meaningless:
+// unreadable pages read as zeros, and a file that is being overwritten mixes old and new parts.
 template <class Answer>
 Response consistent_response(const Call& call, const TileSource& dag, const Answer& answer) {
   dag.expect_readable();  // a file known to be damaged is not read again
@@ -196,8 +196,8 @@ Response get_tile(const Call& call, const TileSource& dag) {
   });
 }
 
-// Calls `make` for each address and returns the resulting words, each result preceded by its length
-// in bytes. Disks may be slow, so the function throws as soon as the client has disconnected. A
+// Calls make(address) for each address, and returns all results, each preceded by its length in
+// bytes. Disks may be slow, so the function throws as soon as the client has disconnected. A
 // stopping service closes all connections, so it also ends this function.
 template <class Addresses, class Make>
 std::string batch_of(const Call& call, const Addresses& addresses, const Make& make) {

@@ -20,8 +20,8 @@ struct TileAccess {
 using OpenTiles = std::function<TileAccess(const Call&)>;
 
 // kGzip compresses tiles for clients that accept gzip. Compression halves the bytes of tiles and
-// runs at about 80 MB/s per core. So clients on a network get tiles faster, but clients on the
-// loopback get them more slowly.
+// runs at about 80 MB/s per core. So clients on a network get tiles faster with kGzip, but clients
+// on the loopback get them more slowly.
 enum class Packing { kNone, kGzip };
 
 enum class Colors { kNone, kServed };

@@ -74,7 +74,7 @@ struct Route {
 
 inline constexpr int kCommonProblems[] = {400, 401, 403, 429, 431, 500, 503};
 
-// "application/json" with a body of this schema.
+// Returns the content of a body of type "application/json" with this schema; "" for any JSON.
 inline Content json_content(std::string schema = "") {
   return {"application/json", std::move(schema)};
 }

@@ -39,7 +39,7 @@ void check_query(const Request& request, const Route& route) {
       throw unknown_parameter(route, name);
 }
 
-// Returns the method whose routes answer the request: GET for HEAD.
+// Returns the method under which the request's route is registered: GET for HEAD.
 std::string method_of(const Request& request) {
   return request.method == "HEAD" ? "GET" : request.method;
 }

@@ -50,7 +50,7 @@ Response no_content();
 // Reads the body of a request. Throws Problem: 413 if it is larger than `max_bytes`, 415 if its
 // content type is not JSON, 400 if the connection ends within it, 408 if it is sent too slowly.
 std::string read_json_body(Request& request, uint64_t max_bytes);
-// Throws Problem (400) if there is a body.
+// Throws Problem (400) if the request has a body.
 void expect_no_body(const Request& request);
 
 }  // namespace voxdag::server

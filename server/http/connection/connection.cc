@@ -13,8 +13,8 @@ namespace {
 
 constexpr size_t kBufferBytes = 16384;
 constexpr double kLingerS = 1;
-// More than the kernel and a proxy buffer. A proxy reads the answer only after it has sent the
-// bytes that it has.
+// Maximum bytes that linger() discards: more than the kernel and a proxy buffer. A proxy reads the
+// answer only after it has sent the bytes that it has.
 constexpr size_t kLingerBytes = 16 << 20;
 constexpr double kSteadyRates = 8;  // the steady rate as a multiple of the minimum rate
 
@@ -174,8 +174,8 @@ void Connection::allow_large_send_buffer() {
 #endif
 }
 
-// Uses poll() instead of a read. Unread bytes, such as the last bytes of a TLS session, may precede
-// the end of the stream, and a read would stop at them.
+// Uses poll() instead of a read: unread bytes, such as the last bytes of a TLS session, may precede
+// the end of the stream, and a read would return them instead of the end.
 bool Connection::peer_disconnected() const {
   pollfd peer{socket_, POLLRDHUP, 0};
   return poll(&peer, 1, 0) > 0;
@@ -185,7 +185,7 @@ void Connection::linger() {
   if (error_ == ErrorState::kBroken || !lingers_) return;
   tls_.shutdown();
   if (shutdown(socket_, SHUT_WR) != 0) return;
-  // Makes this connection the first one to be evicted.
+  // Makes this connection the first one that the table closes in favor of a new one.
   table_.set_waiting(place_, 0, ConnectionTable::Waiting::kForRequest);
   const double deadline = wall_seconds() + kLingerS;
   for (size_t bytes = 0; bytes < kLingerBytes;) {

@@ -39,7 +39,7 @@ class Connection {
   // Ends the header phase; the exchange phase begins.
   void begin_exchange();
   // Limits the time for the rest of this request to grace_s from now, however fast the client
-  // sends. For requests with a short body. Until the body is read, the table may close the
+  // sends. Use it for requests with a short body. Until the body is read, the table may close the
   // connection like a connection whose header is incomplete.
   void limit_request();
 
@@ -53,8 +53,9 @@ class Connection {
   void allow_large_send_buffer();
   // True if the client has closed the connection. Consumes no bytes.
   bool peer_disconnected() const;
-  // Closes the sending side, then discards the client's bytes for up to a second. Without this, a
-  // reset could destroy the last answer.
+  // Closes the sending side, then discards the client's bytes for up to a second. If the socket
+  // were closed with unread bytes, the kernel would send a reset, which could destroy the last
+  // answer.
   void linger();
   // Makes linger() do nothing, because the client may send without end.
   void close_without_linger() { lingers_ = false; }

@@ -13,7 +13,8 @@
 namespace voxdag::server {
 namespace {
 
-// During a body or an answer, a client that has been idle for less than this time counts as active.
+// A client that sends a body or receives an answer counts as active until it has been idle for this
+// time.
 constexpr double kMinExchangeWaitS = 0.25;
 constexpr std::chrono::seconds kMaxEvictionWait{1};
 // Interval at which an answer that waits for memory looks for connections to close.
@@ -110,8 +111,8 @@ size_t ConnectionTable::answer_bytes(const Counts& counts) const {
   return bytes;
 }
 
-// Returns true if the limits allow the answer now. Otherwise closes connections, unless the
-// connections that were closed before will release enough.
+// Returns true if the limits allow the answer now. Otherwise closes the connection whose answer has
+// waited longest, unless the connections that were closed before will release enough memory.
 bool ConnectionTable::make_room_for_answer(const Entry& entry, size_t bytes) {
   const auto fits = [&](size_t limit, const auto& counts) {
     const size_t used = answer_bytes(counts);

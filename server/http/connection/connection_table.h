@@ -17,15 +17,15 @@ namespace voxdag::server {
 
 class ConnectionTable {
  public:
-  // The action of its client for which a connection waits: none, sending the head of a request,
-  // sending a short body, or sending or receiving the rest of an exchange.
+  // The client's action for which a connection waits: none, sending the head of a request, sending
+  // a short body, or sending or receiving the rest of an exchange.
   enum class Waiting { kNot, kForRequest, kForShortBody, kInExchange };
 
  private:
   struct Entry {
     int socket;
     std::string client;
-    bool is_exempt;  // from the limits per client, as the loopback is
+    bool is_exempt;  // true if the limits per client do not apply, as for the loopback
     Waiting waiting;
     double waiting_since_s;
     bool evicted;
@@ -67,7 +67,8 @@ class ConnectionTable {
 
  private:
   bool evict_one();
-  // Closes the connection that has waited longest among those for which `is_candidate` is true.
+  // Closes the connection that has waited longest of all connections for which is_candidate(entry)
+  // is true.
   template <class IsCandidate>
   bool evict_longest(const IsCandidate& is_candidate);
   template <class Counts>

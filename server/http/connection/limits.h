@@ -8,7 +8,8 @@
 namespace voxdag::server {
 
 struct HttpLimits {
-  // At this number of connections, the connection that has waited longest is closed for a new one.
+  // If the table has this number of connections, a new connection replaces the connection that has
+  // waited longest.
   size_t max_connections = 512;
   size_t max_per_client = 256;      // the loopback (a proxy) is exempt
   size_t max_header_bytes = 32768;  // request line and header fields together

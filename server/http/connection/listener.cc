@@ -20,8 +20,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr int kBacklog = 512;
-// Kernel memory per connection for unread answers. The kernel doubles this value for its
-// bookkeeping.
+// Kernel memory per connection for bytes that the client has not received yet. The kernel doubles
+// this value for its bookkeeping.
 constexpr int kSendBufferBytes = 128 << 10;
 constexpr int kMaxSegmentBytes = 8960;  // Ethernet with jumbo frames
 

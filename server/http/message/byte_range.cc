@@ -11,8 +11,8 @@ namespace {
 
 constexpr size_t kMaxRanges = 16;
 
-// Accepts only digits. A number over 64 bits becomes the maximum, which is past the end of any
-// file.
+// Parses a number of digits only. A number over 64 bits becomes the maximum, which is past the end
+// of any file.
 std::optional<uint64_t> parse_number(std::string_view text) {
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return {};
   uint64_t value = 0;

@@ -5,7 +5,7 @@
 namespace voxdag::server {
 namespace {
 
-// ASCII only, independent of the locale.
+// Returns an ASCII letter in lower case, independent of the locale; any other character unchanged.
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c; }
 
 }  // namespace

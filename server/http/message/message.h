@@ -59,7 +59,7 @@ struct Response {
   HeaderMap headers;
   // At most one of body, static_body, file and next_event is set.
   std::string body;
-  std::string_view static_body;  // of a text that outlives the server
+  std::string_view static_body;  // like `body`, but part of a text that outlives the server
   std::shared_ptr<ReadableFile> file;
   std::vector<FilePiece> pieces;  // parts of `file` to send
   EventSource next_event;

@@ -75,7 +75,7 @@ constexpr const char* kSingleFields[] = {"Authorization", "Content-Encoding", "C
                                          "Content-Type",  "Idempotency-Key",  "If-Range",
                                          "Last-Event-ID", "Origin",           "Range"};
 
-// True if a header field that contains a list, such as Connection, has this element.
+// True if a header field with a list as its value, such as Connection, contains `element`.
 bool lists(const HeaderMap& headers, std::string_view name, std::string_view element) {
   const auto [begin, end] = headers.equal_range(name);
   return std::any_of(begin, end, [&](const auto& field) {

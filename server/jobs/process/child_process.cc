@@ -36,9 +36,9 @@ class BlockedSignals {
   sigset_t before_;
 };
 
-// Resets the signal handlers that the child inherits from the parent. Otherwise an inherited
-// handler could receive a stop request before exec, and the new program would not learn of the
-// request.
+// Resets all signal handlers that the child inherits from the parent to the defaults. Otherwise an
+// inherited handler could receive a stop request before exec, and the new program would not learn
+// of the request.
 void drop_signal_handlers() {
   for (int signal = 1; signal < NSIG; ++signal) {
     struct sigaction action {};
@@ -49,7 +49,7 @@ void drop_signal_handlers() {
   }
 }
 
-// Runs in the child between fork and exec, where only async-signal-safe calls are allowed.
+// Runs the program in the child. Between fork and exec, only async-signal-safe calls are allowed.
 [[noreturn]] void run_program(char* const* arguments, int output, const char* log_file, int nice,
                               pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);

@@ -12,8 +12,8 @@
 namespace voxdag::server {
 namespace {
 
-// Compares the opened file with the checked path, because a symbolic link in the path may have
-// changed between check and open.
+// True if `opened` is the file at the checked path `resolved`. They can differ, because a symbolic
+// link in the path may have changed between check and open.
 bool is_same_file(const std::string& resolved, const FileIdentity& opened) {
   struct stat found {};
   return lstat(resolved.c_str(), &found) == 0 && found.st_ino == opened.inode;

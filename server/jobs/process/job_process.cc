@@ -37,7 +37,8 @@ void enter(const std::string& folder) {
     throw Error(ErrorCode::kIo, "cannot enter the job's folder: " + errno_text(errno));
 }
 
-// Links the uploads of a task into the working directory under their public names.
+// Creates symbolic links to the task's uploads in the working directory. Their names are the public
+// names of the scenes.
 void link_uploads(const JobTask& task) {
   for (const auto& [name, path] : task.uploads) {
     std::error_code failure;
@@ -49,7 +50,7 @@ void link_uploads(const JobTask& task) {
   }
 }
 
-// Returns a file system that can read only the files of the scene and of the build.
+// Returns a file system that can read only the scene's files and the files of this build.
 ConfinedFiles confined(FileSystem& files, const JobTask& task, const JobFolder& folder) {
   const std::string here = resolved_path(".") + "/";
   std::vector<std::string> readable = task.readable;

@@ -41,14 +41,14 @@ class ProgressPipe : public Progress {
   void finish(const std::string& result_json);
 
  private:
-  // The caller of these functions, except tick(), must hold the mutex. `now`: send even if the
-  // previous message was sent less than the minimum interval ago.
+  // The caller of these functions, except tick(), must hold the mutex. If `now` is true, sends even
+  // if the previous message was sent less than the minimum interval ago.
   void send(const Message& message);
   void send_advance(bool now);
   void report_subvolumes(bool now);
-  // The loop of a thread that reports those changes of subvolumes that came too soon after the
-  // previous report. Without this thread, such a change would be reported only with the next
-  // change, perhaps minutes later.
+  // The loop of a thread that reports changes of subvolumes that came too soon after the previous
+  // report. Without this thread, such a change would be reported only with the next change, perhaps
+  // minutes later.
   void tick(const std::stop_token& end);
   void log(const std::string& text);
   // Replaces subvolumes.json atomically. Does not sync the file, because it can be created again.

@@ -17,7 +17,7 @@ class SubvolumeMap {
   void set(uint64_t resolution, std::span<const SubvolumeStatus> all);
   void set_grid(const std::array<double, 3>& origin, double edge);
   void begun(int64_t id);
-  // Marks all subvolumes as no longer in progress.
+  // Records that no subvolume is being built any more.
   void stop();
   void built(const SubvolumeStatus& subvolume);
   void split(int64_t id, std::span<const SubvolumeStatus> parts);

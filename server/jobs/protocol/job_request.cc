@@ -18,7 +18,7 @@ FieldJson read_body(std::string_view body, Options& options) {
   return json;
 }
 
-// Runs `parse` and converts its errors to invalid requests.
+// Runs `parse`, and throws its errors as RequestError{kInvalid}.
 auto as_request(const auto& parse) {
   try {
     return parse();

@@ -109,7 +109,7 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, dou
     cubes.insert(*known);
     return true;
   });
-  // Unreadable artifacts are retried in every call and may use up its time. So the list begins
+  // Every call retries unreadable artifacts, which may use up the call's time. So each call begins
   // where the last call stopped, and later calls reach the remaining artifacts.
   std::rotate(leaves.begin(),
               std::find_if(leaves.begin(), leaves.end(),

@@ -37,7 +37,7 @@ class PartialDag {
  private:
   using Parts = std::vector<const Part*>;
   uint64_t add_parts(const Cube& cube, const Parts& parts);
-  // Adds a node of level `level` with the cells of a coarse brick, all solid.
+  // Adds a node of level `level` that represents a coarse brick. All occupied cells are solid.
   uint64_t add_coarse(uint32_t level, uint64_t brick);
   uint64_t add_solid(uint32_t level);
   // Adds a node whose octants in `mask` are solid.

@@ -165,8 +165,8 @@ void PartialView::update_json(uint64_t resolution) {
 
 void PartialView::find_frame(const JobFolder& folder, uint64_t resolution) {
   if (!frame_.is_null()) return;
-  // Calls read_frame() once per reading of the work folder. Here an earlier call with this version
-  // failed, because the list of the subvolumes does not exist yet or is damaged.
+  // Calls read_frame() once per reading of the work folder. If an earlier call with this version
+  // failed, the list of the subvolumes does not exist yet or is damaged.
   if (std::exchange(frame_version_, version_) == version_)
     throw Error(ErrorCode::kNotFound,
                 folder.subvolumes() +

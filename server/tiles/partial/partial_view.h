@@ -1,9 +1,10 @@
 // A coarse view of the subvolumes that one job has built so far, as a list and as a DAG.
 //
-// 1. At most once per second, the thread of one request reads the job's folder. Other requests
-//    get the previous answer. Reading and converting take at most a twentieth of a core.
-// 2. One reading handles a limited number of subvolumes, so a large job appears in several steps.
-// 3. Nodes never move while a digest is in use: a new digest replaces all nodes in one step.
+//  1. At most once per second, the thread of one request reads the job's folder. Other requests
+//     get the previous answer. Reading and converting take at most a twentieth of a core.
+//  2. One reading handles a limited number of subvolumes, so a large job appears in several steps.
+//  3. Within one digest, the address of a node never changes. A new digest replaces all nodes in
+//     one step.
 //
 // Thread-safe.
 #pragma once
@@ -47,8 +48,9 @@ class ReadLimiter {
   double idle_until_s_ = 0;  // in wall_seconds(): end of the pause that limits the CPU share
 };
 
-// The DAG of the built subvolumes. It grows under one digest until it has too many words, because
-// nodes of earlier roots remain. Then a new DAG is built, with a new digest. Used by one thread.
+// The DAG of the built subvolumes. It grows under one digest. Nodes that only earlier roots use
+// remain, so it has too many words at some time. Then a new DAG is built, with a new digest. Used
+// by one thread.
 class GrowingDag {
  public:
   GrowingDag(std::string job, uint64_t max_words) : job_(std::move(job)), max_words_(max_words) {}
@@ -77,8 +79,8 @@ class PublishedAnswers {
  public:
   std::shared_ptr<const std::string> json() const;
   std::shared_ptr<const TileSource> tiles() const;
-  // Returns the tiles of the last set_tiles() if they have this digest, even after clear(); else
-  // null.
+  // Returns the tiles that set_tiles() stored last, even after clear(), if they have this digest;
+  // else null.
   std::shared_ptr<const TileSource> known(const std::string& digest) const;
 
   void set_json(std::string json);
@@ -132,7 +134,7 @@ class PartialView {
   bool has_failed_ = false;       // true if the last read failed
   nlohmann::ordered_json frame_;  // the manifest's constant members; null before the plan exists
   GrowingDag nodes_;
-  // Values of version_ at the last update of the list, of the tiles and of the frame.
+  // Values of version_ for which the list, the tiles and the frame were updated last.
   uint64_t json_version_ = 0, tiles_version_ = 0, frame_version_ = 0;
 };
 

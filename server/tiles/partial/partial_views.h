@@ -12,24 +12,24 @@ namespace voxdag::server {
 
 class PartialViews {
  public:
-  // `max_words`: a DAG with more words than this is built again, without its unreachable nodes.
+  // A DAG with more than `max_words` words is built again, without its unreachable nodes.
   PartialViews(FileSystem& files, size_t max_jobs, uint64_t max_words = uint64_t{1} << 21)
       : files_(files), max_jobs_(max_jobs), max_words_(max_words) {}
 
   // Returns the built subvolumes as JSON (docs/api.md). Throws Error{kNotFound} if the subvolumes
-  // are not planned yet or the folder is removed during the call. Throws RequestError{kBusy} if all
-  // remembered jobs were requested in the last ten seconds, and the errors of
-  // CoarseCubes::refresh().
+  // are not planned yet or the folder is removed during the call. Throws RequestError{kBusy} if the
+  // job has no view yet, and `max_jobs` other jobs have views that were requested in the last ten
+  // seconds. Also throws the errors of CoarseCubes::refresh().
   std::string json(const std::string& job, const JobFolder& folder, uint64_t resolution);
   // Returns the built subvolumes as the tiles of a DAG of the job's grid. Throws like json().
   std::shared_ptr<const TileSource> tiles(const std::string& job, const JobFolder& folder,
                                           uint64_t resolution);
-  // Returns the previous result of tiles() if it is remembered and has this digest; else null. Does
-  // not read the job's folder.
+  // Returns the previous result of tiles() if the job's view still has it and it has this digest;
+  // otherwise null. Does not read the job's folder.
   std::shared_ptr<const TileSource> known(const std::string& job, const std::string& digest);
-  // Forgets a job that was deleted or restarted. Requests in progress can finish.
+  // Drops the view of a job that was deleted or restarted. Requests in progress can finish.
   void close(const std::string& job);
-  // Forgets jobs that were not requested in the last `max_idle_s`.
+  // Drops the views that were not requested in the last `max_idle_s` seconds.
   void close_stale(double max_idle_s);
 
  private:

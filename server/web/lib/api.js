@@ -99,7 +99,7 @@ export function sleep(ms, signal, untilVisible = false) {
   });
 }
 
-// Calls `update` repeatedly until `signal` aborts. `update` must return the pause in ms until its
+// Calls `update` repeatedly until `signal` aborts. `update` must return the pause in ms before its
 // next call. While the page is hidden, the next call waits until the page is visible. If `update`
 // throws, calls onFailure(problem).
 export async function poll(update, onFailure, signal) {

@@ -1,6 +1,6 @@
 // Reads server-sent events with fetch(), because EventSource cannot send the Authorization header.
-// After a lost connection, reconnects with Last-Event-ID after growing pauses, until the event
-// `end` arrives.
+// If the connection is lost, reconnects with Last-Event-ID until the event `end` arrives. The
+// pauses between attempts grow.
 
 import {Problem, request, sleep} from "./api.js";
 

@@ -1,5 +1,5 @@
-// Uploads a scene in parts, each with its digest. The service stores each part when it is complete,
-// so a lost connection, a pause or a closed page loses at most one part.
+// Uploads a scene in parts, each with its digest. The service stores each complete part, so a lost
+// connection, a pause or a closed page loses at most one part.
 
 import {authorization, Problem, request, sleep} from "./api.js";
 

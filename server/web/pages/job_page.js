@@ -76,8 +76,8 @@ class JobPage {
     setText(this.link, "");
   }
 
-  // Waits before an ended job is fetched again: its preview may be ready then, or the job may be
-  // retried.
+  // Waits before an ended job is fetched again. By then its preview may be ready, or the job may
+  // have been retried.
   async waitWhileEnded() {
     const waking = new AbortController();
     this.wake = () => waking.abort();

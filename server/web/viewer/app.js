@@ -27,9 +27,9 @@ const kNoPicture = "There is no picture yet.";
 const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
-  // `renderer` need not be started yet. `places` are the elements {panel, tools, status}. With
-  // `bookmarks`, the fragment of the page's address is updated when the camera moves. The viewer
-  // ends when `signal` aborts.
+  // `renderer` need not be started yet. `places` are the elements {panel, tools, status}. If
+  // `bookmarks` is true, camera motions update the fragment of the page's address. The viewer ends
+  // when `signal` aborts.
   constructor({canvas, renderer, manifest, places, fileName, signal, bookmarks = true}) {
     Object.assign(this, {canvas, renderer, manifest, places, fileName, signal, bookmarks});
     this.space = new GridSpace(manifest);
@@ -94,8 +94,8 @@ export class Viewer {
     return camera ? this.fit(this.space.placement(camera)) : this.camera.get();
   }
 
-  // Returns `placement`, which shows the scene in a picture of 16:9. In a narrower picture, an eye
-  // outside the grid is moved away from its target until the scene fits.
+  // Returns `placement`, whose eye and target are right for a picture of 16:9. In a narrower
+  // picture, moves an eye outside the grid away from its target until the scene fits.
   fit(placement) {
     const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
     const outside = placement.eye.some((c) => c < 0 || c > this.manifest.resolution);

@@ -1,8 +1,9 @@
 // A pinhole camera in voxel units, computed in doubles. It gives the same picture as
 // query/render/camera.h.
 //
-// Invariants: the eye is not on the target. After a motion the view is at most kMaxPitch from the
-// horizontal, so the camera never turns over. Only set() can make it look straight up or down.
+// Invariants: the eye is not on the target. After a motion, the direction of view is at most
+// kMaxPitch above or below the horizontal, so the camera never turns over. Only set() can make it
+// look straight up or down.
 
 import {
   add,

@@ -73,7 +73,8 @@ function parseNumber(text, name) {
   return value;
 }
 
-// Joins members with "&" and keeps commas readable.
+// Returns the members as the text of a URL fragment, NAME=VALUE joined with "&". Keeps commas
+// unescaped, so that points remain readable.
 export function fragmentText(members) {
   return Object.entries(members)
       .filter(([, value]) => value !== null && value !== undefined)

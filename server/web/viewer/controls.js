@@ -163,8 +163,8 @@ export class Controls {
     else this.handlers.onClick(...at);
   }
 
-  // Zooms to the surface under the cursor. If the cursor is on the sky, zooms to the point at the
-  // target's distance.
+  // Zooms to the surface under the cursor. If the cursor is on the sky, zooms to the point under
+  // the cursor at the target's distance.
   handleWheel(event) {
     event.preventDefault();
     const at = this.position(event);

@@ -14,8 +14,8 @@ const kHeld = {
   KeyE: "rise",
   KeyQ: "sink",
 };
-// Keys identified by their character instead of their position, because their positions differ
-// between keyboards.
+// Keys that are identified by their character. Other keys are identified by their position, but
+// these keys have different positions on different keyboards.
 const kHeldCharacters = {
   "+": "zoomIn",
   "=": "zoomIn",
@@ -56,8 +56,8 @@ const kHelp = [
   ["H", "this help"],
 ];
 
-// Calls the actions by their names. `root` is the canvas or the window. With the window, the keys
-// also work while nothing has the focus.
+// Calls actions[name]() when the key of an action is pressed. `root` is the canvas or the window.
+// With the window, the keys also work while nothing has the focus.
 export function listenToKeys(root, canvas, motion, actions, onChange, signal) {
   const held = new Map();  // by event.code: a character may change while its key is down
   root.addEventListener("keydown", (event) => {

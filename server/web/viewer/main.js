@@ -86,7 +86,7 @@ async function finishedJob() {
   }
 }
 
-// Resolves to the job; to null if the service does not answer and `mayBe` is set.
+// Resolves to the job. Resolves to null if the service does not answer and `mayBe` is true.
 async function jobNow(mayBe) {
   try {
     return await getJson(`/api/v1/jobs/${jobId}`, lifetime.signal);

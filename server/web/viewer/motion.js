@@ -61,7 +61,7 @@ export class Motion {
     this.keys.clear();
   }
 
-  // Advances the motion to the time `nowMs`. Returns true if the camera still moves.
+  // Advances the motion to the time `nowMs`. Returns true if the camera is still moving.
   step(nowMs) {
     const elapsedS = this.lastMs === null ? 0 : Math.min(0.1, (nowMs - this.lastMs) / 1000);
     for (const key of this.keys) this.applyKey(key, elapsedS);

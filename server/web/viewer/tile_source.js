@@ -41,8 +41,8 @@ export class TileError extends Error {
   get isMissing() {
     return this.status === 404 || this.status === 409;
   }
-  // True if the requested items may have caused the error, although the service does not report
-  // this.
+  // True if one of the requested items may have caused the error, although the service does not
+  // report so.
   get isSuspicious() {
     return this.status === 200 || (this.status === 500 && this.isTransient);
   }
@@ -96,7 +96,8 @@ export class TileSource {
     return this.info.batch_max;
   }
 
-  // Call it after a tile was not found. Sets `ended` if the file was removed or replaced.
+  // Checks, after a tile was not found, whether the file still exists. Sets `ended` if the file was
+  // removed or replaced. Does nothing within kLookAgainMs after the last check.
   async lookAgain(signal) {
     if (this.ended || performance.now() < this.lookedMs + kLookAgainMs) return;
     this.looking ??= this.look(signal).finally(() => this.looking = null);

@@ -94,8 +94,8 @@ export class CubesView {
     this.canvas.hidden = this.turner.hidden = empty;
   }
 
-  // Shows why there are no cubes. `ended`: the job has ended, and gets cubes only if it is retried.
-  // `known`: the service has reported that the job has no cubes.
+  // Shows why there are no cubes. `ended`: the job has ended, so it gets cubes only if it is
+  // retried. `known`: the service has reported that the job has no cubes.
   sayWhyEmpty(ended, known) {
     if (this.resolution !== undefined) return;
     const end = known ? "There are no subvolumes." : "";

@@ -108,9 +108,10 @@ export class ColorStore {
     return fits(count, 1);
   }
 
-  // A search (probe) starts at the hash of the page and ends at the next free entry; some entries
-  // are always free. An entry has four words: x and the level; y; z; and the number of the page's
-  // first block plus 1. The last word is 0 in a free entry.
+  // Adds an entry to the hash table: the page at `place` has its first block at `number` minus 1. A
+  // search (probe) starts at the hash of the page and ends at the next free entry; some entries are
+  // always free. An entry has four words: x and the level; y; z; and `number`. The last word is 0
+  // in a free entry.
   insert(place, number) {
     let at = this.homeOf(place);
     while (this.words[4 * at + 3] !== 0) at = this.next(at);

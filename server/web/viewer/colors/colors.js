@@ -68,9 +68,9 @@ export class Colors {
     this.loader.demand(wanted, nowMs);
   }
 
-  // Adds a page to `wanted`. Its priority is the number of pixels that need it. So coarse pages,
-  // which more pixels need, come first. If memory is short, every part of the picture still has
-  // colors.
+  // Adds a page to `wanted`. Its priority is the number of pixels that need it. More pixels need a
+  // coarse page, so coarse pages come first. If memory is short, every part of the picture still
+  // has colors.
   want(wanted, level, position, pixels) {
     const key = pageKey(level, ...position), request = wanted.get(key);
     if (request) request.priority += pixels;

@@ -16,8 +16,8 @@ import {
   kTrace
 } from "./picture_shaders.js";
 
-// Light is divided by one of these two numbers before it is written to a target. Bytes hold values
-// of at most 1, so they represent light of up to kByteRange.
+// Light is divided by one of these numbers before it is written to a target. A target with bytes
+// holds values of at most 1, so it represents light of up to kByteRange.
 const kHalfRange = 1;      // for a target with half floats
 const kByteRange = 8;      // for a target with bytes
 const kFeedbackBlock = 4;  // edge in canvas pixels of a feedback texel

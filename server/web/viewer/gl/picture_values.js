@@ -3,7 +3,7 @@
 const kConeShare = 0.75;  // share of a pixel: cells up to this width are hit as one cell
 
 // Returns the uniforms for a picture of width x height pixels, drawn by `renderer` with its loaded
-// tiles. The picture shows cells as fine as a picture with lodHeight rows shows.
+// tiles. Its cells are as fine as in a picture with `lodHeight` rows.
 export function pictureValues(renderer, width, height, lodHeight) {
   const {info, options, view, light, stream: {store, colors, rootPointer}} = renderer,
                                                              levels = info.levels,

@@ -37,8 +37,8 @@ export class Light {
     return length(subtract(this.high, this.low));
   }
 
-  // After this call, the next readings set exposure, skyReach and hazeStart directly instead of
-  // approaching the new values in steps.
+  // After this call, the next readings set exposure, skyReach and hazeStart to their new values in
+  // one step instead of approaching these values.
   forgetReadings() {
     this.readings = 0;
   }

@@ -20,8 +20,8 @@ export class ViewProgress {
     return this.quietReadings >= kQuietReadings;
   }
 
-  // True if an arriving tile changes the picture so much that the picture must start again.
-  // Otherwise the tile is only visible in the remaining samples.
+  // True if an arriving tile changes the picture so much that the picture must start again. If
+  // false, only the remaining samples of the picture use the tile.
   get needsRestartOnArrival() {
     return !this.isComplete || this.coarsePixels > kMaxLateCellPixels;
   }

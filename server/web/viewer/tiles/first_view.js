@@ -27,7 +27,7 @@ export class FirstView {
     return this.wanted.size === 0 || this.known.size > kMaxTiles;
   }
 
-  // True if a request without an answer delays the search.
+  // True if no tile has arrived for so long that the search should end.
   stalls(nowMs) {
     return nowMs - this.takenMs > kStallMs;
   }
@@ -37,7 +37,7 @@ export class FirstView {
     this.take(store, tile, words);
   }
 
-  // Takes the words of a tile in the store.
+  // Takes the words of a tile that the store has loaded, and continues the search below the tile.
   take(store, tile, words) {
     this.takenMs = performance.now();
     if (this.known.has(tile.key)) return;

@@ -4,7 +4,7 @@
 
 import {TileError} from "../tile_source.js";
 
-// After this many readings, an item that no reading has marked is known to be unused.
+// Number of readings after which an item that none of them has marked is known to be unused.
 export const kRoundsToKnow = 4;
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
 const kMaxTries = 3;         // tries per item if the answers are unusable
@@ -80,7 +80,7 @@ export class Loader {
     return this.disposed || this.source.ended !== null || this.failure !== null;
   }
 
-  // True if no request is queued or in flight.
+  // True if no request waits in the queue or for its answer.
   get isIdle() {
     return this.requests === 0 && this.queue.length === 0;
   }
@@ -267,7 +267,7 @@ export class Loader {
     this.wakeAt(this.outage.retryMs, nowMs);
   }
 
-  // Pauses, because the service is busy. This is not an outage, so it is not shown to the user.
+  // Pauses, because the service is busy. This is not an outage, so the user sees no message.
   rest(retryAfterMs, nowMs) {
     this.endOutage();
     if (nowMs < this.busy.retryMs) return;

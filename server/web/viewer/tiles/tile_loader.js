@@ -83,7 +83,7 @@ export class TileLoader extends Loader {
     }
   }
 
-  // Links the already loaded tiles below a new root immediately, without waiting for a reading.
+  // Links a new root to the already loaded tiles below it, without waiting for a reading.
   linkRoot() {
     const {store} = this, {root} = store;
     for (let i = 0; i < (root.addresses?.length ?? 0); ++i) {

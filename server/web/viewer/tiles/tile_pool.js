@@ -44,8 +44,8 @@ export class TilePool {
     return this.free.length + this.blockCount - this.nextBlock;
   }
 
-  // Returns the numbers of `count` free blocks; null if too few blocks are free or the pool cannot
-  // grow.
+  // Returns the numbers of `count` free blocks; null if too few blocks are free, or if the pool
+  // cannot grow for them.
   allocate(count) {
     if (this.freeBlocks < count) return null;
     const end = this.nextBlock + Math.max(0, count - this.free.length);
