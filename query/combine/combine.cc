@@ -118,7 +118,8 @@ NewCounts write_levels(DagInput& a, DagInput& b, NewLevels& levels, const Worksp
 
 class Combination {
  public:
-  // With a shape, `b` has no nodes.
+  // If `shape` is not null, the shape is subtracted from `a`; `b` must then be a file without
+  // nodes.
   Combination(const voxdag_reader::File& a, const voxdag_reader::File& b, const Shape* shape,
               Workspace& work, Progress& progress, const CancelToken& cancel)
       : work_(work),

@@ -35,7 +35,8 @@ class CountLevels {
   // Call these functions in this order for each level, from the bricks up. Call add_pair() for each
   // place whose result is the result of a pair, by increasing numbers of the pairs.
   void begin_level();
-  // `has_node` is false if the result of the pair is empty.
+  // Adds the change of the counts of use.place, whose result is the result of use.pair. `has_node`
+  // is false if this result is empty.
   void add_pair(const PairUse& use, bool has_node);
   void add_nodes(uint32_t level, PairLevel& pairs);
 

@@ -223,8 +223,8 @@ void LevelsWriter::make_rows(SpillSorter<PairRow>& rows) {
   children_.reset();
 }
 
-// For each place whose result is the result of a pair: adds this result, and the change of the
-// counts.
+// Adds the result, and the change of the counts, of each place whose result is the result of a
+// pair. `results` has the results of the pairs of this level.
 void LevelsWriter::add_pair_results(const SpillList<PairUse>& uses,
                                     SpillSorter<KeyedNode>& results) {
   results.finish();

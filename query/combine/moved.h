@@ -1,10 +1,10 @@
 // Moves a file by a whole number of voxels into the grid of another file.
 //
 // A cube of the new file overlaps up to 2 x 2 x 2 cubes of the moved file that have the same edge.
-// They are called its group. On each level, the position of the cube relative to its group is the
-// same everywhere, so cubes with equal groups have equal contents. So the distinct groups are found
-// level by level, from the root down, and each is divided only once. On an axis on which the offset
-// is a multiple of the cubes' edge, a group has only one cube.
+// These cubes are the *group* of the new cube. On each level, the position of a cube relative to
+// its group is the same everywhere, so cubes with equal groups have equal contents. So the distinct
+// groups are found level by level, from the root down, and each group is divided only once. On an
+// axis on which the offset is a multiple of the cubes' edge, a group has only one cube.
 #pragma once
 
 #include <array>

@@ -37,7 +37,7 @@ class NodeValues {
   };
 
  public:
-  // The values are in memory if they take at most `resident_bytes`.
+  // Keeps the values in memory if they take at most `resident_bytes`, otherwise in a scratch file.
   NodeValues(const SpillSpace& space, const voxdag_reader::Level& level, uint64_t resident_bytes)
       : level_words_(level.word_count) {
     const uint64_t slots = level_words_ / 2 + 1, blocks = level_words_ / 64 + 1;
@@ -60,7 +60,8 @@ class NodeValues {
   void finish() {
     if (list_) list_->finish();
   }
-  // Require is_resident(). prefetch() loads the cache line of the value.
+  // at() returns the value at a word offset, and prefetch() loads its cache line. Both require
+  // is_resident().
   FoundValue<T> at(uint64_t offset) const {
     if (offset >= level_words_) return {};
     return {values_[offset / 2], begins_[offset / 64] >> offset % 64 & 1};

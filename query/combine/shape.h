@@ -17,7 +17,8 @@ class Shape {
   // Error{kInvalidInput}.
   explicit Shape(const std::string& text);
 
-  // Stands for a full cube of any level, as the offset of a node stands for the node's cube.
+  // The number of a full cube of any level. It is used where a node of a DAG would have its word
+  // offset.
   static constexpr uint64_t kFull = kNoNode - 1;
 
   // These functions present the shape like the nodes of a DAG with 2^levels voxels per edge. root()

@@ -27,8 +27,9 @@ class LockedOutputs {
   // an input or is not a regular file, or if it would replace a file that is not empty and
   // `replace` is false; kNotFound if an output's folder does not exist.
   LockedOutputs(FileSystem& files, const Outputs& outputs);
-  // The file system through which the command writes its outputs. Unless `replace` is true, it does
-  // not replace a file that appears at an output after the constructor.
+  // Returns the file system through which the command writes its outputs. Unless `replace` is true,
+  // this file system does not replace a file that another program creates at an output after the
+  // constructor.
   FileSystem& files() { return guarded_; }
 
  private:

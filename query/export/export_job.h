@@ -30,7 +30,7 @@ struct ExportJob {
   Progress& progress;
   const CancelToken& cancel;
 
-  // The edge of a cell of the selected grid in world space.
+  // Returns the edge of a cell of the selected grid in world space.
   double cell_edge() const {
     return file.edge() / static_cast<double>(int64_t{1} << selection.grid_levels);
   }

@@ -143,7 +143,7 @@ class VoxWriter {
     return std::max(min_bytes_, 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_);
   }
   size_t instance_count() const { return instances_; }
-  // Number of voxels of all models, each model counted once.
+  // Returns the number of voxels in all models. Each model counts once.
   uint64_t model_voxels() const {
     return std::accumulate(voxels_.begin(), voxels_.end(), uint64_t{0});
   }

@@ -73,8 +73,8 @@ class PartBuilder {
   };
 
   uint32_t brick_level() const { return selection_.grid_levels - kBrickLevels; }
-  // corner() returns the low corner of a cube on this level, and edge() the cube's edge, both in
-  // cells of the selected grid.
+  // Return the low corner (corner()) and the edge (edge()) of a cube on this level, in cells of the
+  // selected grid.
   std::array<int64_t, 3> corner(uint32_t level, const PartLevel::Position& position) const;
   PartLevel level_of_part(uint32_t level) {
     return PartLevel(memory_, file_.level(level).pointer_bits == 64);

@@ -75,7 +75,8 @@ Vec Lighting::reflected(const Vec& albedo, const Vec& normal, const Vec& sky, do
   return {{albedo[0] * light[0], albedo[1] * light[1], albedo[2] * light[2]}};
 }
 
-// The shadow on the floor fades with distance from the scene.
+// Returns the brightness of the floor where `ray` meets it. The shadow on the floor fades with
+// distance from the scene.
 double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
   constexpr int kSkyRays = 4;
   if (!has_floor_ || ray.direction[1] >= 0) return 1;
@@ -91,10 +92,10 @@ double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
   return 1 - fade * (0.75 - 0.35 * open - 0.40 * (sees(s, sun_) ? 1 : 0));
 }
 
-// Lighting has a floor if the camera is outside the scene. The sun is then placed behind the
-// camera's left shoulder. Without a floor, tries 48 positions: 16 directions around the vertical,
-// each at three heights. Chooses the position where the lit share of the samples in `seen` is
-// nearest to kLitTarget.
+// Sets the direction of the sun. If there is a floor, the camera is outside the scene, and the sun
+// is placed behind the camera's left shoulder. Otherwise, tries 48 positions: 16 directions around
+// the vertical, each at three heights. Chooses the position where the lit share of the samples in
+// `seen` is nearest to kLitTarget.
 void Lighting::place_sun(const std::vector<SurfaceHit>& seen, const Vec& back) {
   constexpr int kTurns = 16, kHeights = 3;
   constexpr double kLitTarget = 0.35;

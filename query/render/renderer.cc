@@ -61,7 +61,7 @@ double choose_exposure(const Lighting& lighting, const std::vector<SurfaceHit>& 
                   0.85 / luminance[luminance.size() * 9 / 10]);
 }
 
-// A filmic curve that compresses bright light: the ACES fit of Narkowicz 2015.
+// Applies a filmic curve that compresses bright light (the ACES fit of Narkowicz 2015).
 Vec tone_map(const Vec& light) {
   Vec out;
   for (int i = 0; i < 3; ++i) {

@@ -30,7 +30,7 @@ struct RenderOptions {
   const voxdag_reader::File* colors = nullptr;
 };
 
-// Number of channels of a picture, of one byte each.
+// Returns the number of channels of a picture. Each channel has one byte.
 constexpr int channels_of(Background background) {
   return background == Background::kTransparent ? 4 : 3;
 }

@@ -23,7 +23,7 @@ NodeIndex index_of(const voxdag_reader::File& file, uint32_t level, MemoryBudget
                    file.path() + ": level " + std::to_string(level));
 }
 
-// Adds a brick. Octant i of a brick is bits 8i to 8i + 7 of its mask.
+// Adds a brick to the statistics. Octant i of a brick is bits 8i to 8i + 7 of its mask.
 void add_brick(uint64_t mask, LevelStats& stats, OctantMasks& masks) {
   size_t octants = 0;
   for (int i = 0; i < 8; ++i) {

@@ -20,7 +20,7 @@ class OffsetTable {
     }
     return slot - 1;
   }
-  // All offsets in the order of their numbers.
+  // Returns all offsets, in the order of their numbers.
   const std::vector<uint64_t>& offsets() const { return offsets_; }
 
  private:

@@ -16,7 +16,7 @@
 
 namespace voxdag::query {
 
-// Maximum levels of nodes in a tile. With 5 levels, a tile has at most 700 KiB.
+// Maximum number of levels of nodes in a tile. With 5 levels, a tile has at most 700 KiB.
 inline constexpr uint32_t kMaxTileLevels = 5;
 // The first word of a tile: "VDT1".
 inline constexpr uint32_t kTileMagic = 0x31544456;

@@ -22,8 +22,8 @@ using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 
 struct SampledRegion {
-  // The region in the file for each attribute, at index_of(attribute). Attributes that the file
-  // does not have are unused.
+  // For each attribute, at index_of(attribute): the region as the file stores it. The elements of
+  // attributes that the file does not have are unused.
   std::array<ColorRegion, std::size(kAttributeTable)> stored;
   Cube cube;
   std::vector<FixedSurface> surfaces;  // surfaces that may touch the region
