@@ -55,7 +55,8 @@ struct ImageSource {
   std::string name;  // name in messages: the image and its scene file
   SourceFile file;
   uint64_t offset = 0, size = 0;
-  // The range holds characters that encode bytes. Some of them may be escaped by JSON.
+  // If is_base64 or is_data_uri is true, the range holds characters that encode bytes. JSON may
+  // have escaped some of these characters.
   bool is_base64 = false;
   bool is_data_uri = false;  // true: the characters follow the first comma of a data: URI
   uint64_t skip = 0;
@@ -94,16 +95,16 @@ class TriangleSource {
   virtual std::unique_ptr<TriangleCursor> open(unsigned cursors) = 0;
   // Calls `visit` with all triangles, in batches as in TriangleCursor::read().
   void for_each_batch(const Visitor& visit) { open(1)->read(0, declared_triangles(), visit); }
-  // Number of triangles that the scene declares. Each instance counts separately. Triangles that
-  // skip_invalid drops are included.
+  // Returns the number of triangles that the scene declares. Each instance counts separately.
+  // Triangles that skip_invalid drops are included.
   virtual uint64_t declared_triangles() const = 0;
-  // The materials that TriangleCursor::read_surfaces() refers to. Opens image files, but reads no
-  // image. An image that cannot be opened is not an error.
+  // Returns the materials that TriangleCursor::read_surfaces() refers to. Opens image files, but
+  // reads no image. An image that cannot be opened is not an error.
   virtual SceneMaterials materials() const { return {}; }
-  // Number of materials that materials() would return.
+  // Returns the number of materials that materials() would return.
   virtual uint32_t material_count() const { return 1; }
-  // All files that the triangles come from, with their identity when they were first opened.
-  // Reading throws an Error if a file has another identity when it is opened again.
+  // Returns all files that the triangles come from, with their identity when they were first
+  // opened. Reading throws an Error if a file has another identity when it is opened again.
   virtual std::vector<SourceFile> files() const { return {}; }
   // Warnings about the files (ignored optional extensions, points and lines that make no voxels).
   virtual std::vector<Warning> warnings() const { return {}; }

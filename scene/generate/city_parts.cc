@@ -41,7 +41,8 @@ MeshBuilder window_wall(const Vec3& u, const Vec3& w) {
   return mesh;
 }
 
-// A trunk and two crowns. Each crown consists of two pyramids that share their base.
+// Returns a tree: a trunk and two crowns. Each crown consists of two pyramids that share their
+// base.
 MeshBuilder tree_mesh() {
   MeshBuilder mesh;
   mesh.color = kTrunk;

@@ -1,9 +1,10 @@
-// Random numbers for generated scenes: splitmix64, which is the same everywhere (std::
-// distributions are not). Each object of a scene has its own generator, whose seed includes the
-// object's coordinates. So the numbers of an object do not depend on other objects.
+// Random numbers for generated scenes, by splitmix64. The distributions of the standard library are
+// not used, because they differ between its implementations. Each object of a scene has its own
+// generator, whose seed includes the object's coordinates. So the numbers of an object do not
+// depend on other objects.
 //
 // Never draw twice among the arguments of one call: the order of their evaluation is unspecified.
-// (Within braces the order is fixed.)
+// (Within braces, the order is fixed.)
 #pragma once
 
 #include <cstdint>

@@ -27,8 +27,8 @@ class BlockSink {
 
 class SceneBuilder {
  public:
-  // Without `instances`, parts are copied triangle by triangle to each place. With `colors`, each
-  // material has separate meshes.
+  // If `instances` is false, parts are copied triangle by triangle to each place. If `colors` is
+  // true, each material has separate meshes.
   SceneBuilder(BlockSink& sink, bool instances, bool colors);
   bool has_colors() const { return colors_; }
 

@@ -23,7 +23,7 @@ class GlbExport {
   // transform, or a scene without triangles. The arguments must outlive this object.
   GlbExport(const AssimpScene& scene, FileSystem& files, WarningList& warnings);
 
-  // The number of bytes is known after write().
+  // Returns the report. Its number of bytes is known only after write().
   const ImportReport& report() const { return report_; }
   // Writes "<path>.partial". Calls advance(triangles) after each mesh. Throws Error.
   void write(const std::string& path, MemoryBudget& budget,

@@ -15,9 +15,9 @@ class IndexedMesh {
  public:
   virtual ~IndexedMesh() = default;
 
-  // The path of the scene file, for messages.
+  // Returns the path of the scene file, for messages.
   virtual const std::string& path() const = 0;
-  // The vertices. There are fewer than 2^32 - 1.
+  // Returns the vertices, which are fewer than 2^32 - 1.
   virtual PositionSource& positions() = 0;
   // Writes the vertex indices of triangles [first, first + count) to `corners`, three per triangle.
   // The triangles must exist, but their vertex indices may be out of range. An index that is

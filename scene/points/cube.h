@@ -18,7 +18,8 @@ namespace voxdag::points {
 
 inline constexpr uint64_t kCubeTriangles = 12;
 
-// Corner numbers of the triangles. They run counterclockwise when seen from outside.
+// Returns the corner numbers of the cube's triangles. The corners of a triangle run
+// counterclockwise when seen from outside.
 constexpr std::array<std::array<uint8_t, 3>, kCubeTriangles> cube_triangles() {
   std::array<std::array<uint8_t, 3>, kCubeTriangles> all{};
   size_t n = 0;

@@ -96,7 +96,8 @@ class LasHeaderParser {
              std::to_string(stored));
   }
 
-  // LAS 1.4 has a 64-bit count. Some programs set only the older 32-bit count.
+  // Returns the number of point records. LAS 1.4 has a 64-bit count, but some programs set only the
+  // older 32-bit count.
   uint64_t read_count(uint8_t minor) const {
     const uint64_t old_count = at<uint32_t>(107);
     const uint64_t count = minor >= 4 ? at<uint64_t>(247) : old_count;

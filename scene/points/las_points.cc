@@ -59,7 +59,8 @@ class LasFile : public PointFile {
 
   const LasHeader& las() const { return las_; }
   bool has_withheld() const { return count_ != las_.records; }
-  // Maximum value of a color: 255 if no color of the file is larger, otherwise 65535.
+  // Returns the value of full intensity of a color: 255 if no color of the file is larger,
+  // otherwise 65535.
   uint16_t max_color() const { return max_color_; }
   // Returns the first record of the block that contains `point`, and the number of points before
   // this block. Withheld records do not count as points.

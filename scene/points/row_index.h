@@ -26,10 +26,10 @@ class RowIndex {
            const CancelToken& cancel);
 
   const Columns& columns() const { return columns_; }
-  // Value of a color's full intensity: 1 or 255.
+  // Returns the number that means full intensity of a color: 1 or 255.
   double full_color() const { return full_color_; }
   uint64_t rows() const { return rows_; }
-  // The positions of the rows 0, kBlockRows, 2 * kBlockRows, ...
+  // Returns the positions of the rows 0, kBlockRows, 2 * kBlockRows, ...
   const std::deque<RowReader::Place>& blocks() const { return blocks_; }
 
  private:

@@ -38,7 +38,7 @@ class RowReader {
     } while (is_comment(text_));
     return true;
   }
-  // The text of the row, without blanks around it. Valid until the next call of next().
+  // Returns the text of the row, without blanks around it. Valid until the next call of next().
   std::string_view text() const { return text_; }
   Place place() const { return {lines_.offset(), lines_.number()}; }
 

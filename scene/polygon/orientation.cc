@@ -16,7 +16,7 @@ class ExactSum {
     add(std::fma(a, b, -product));
     add(product);
   }
-  // The sign of the last nonzero component is the sign of the sum.
+  // Returns the sign of the sum, which is the sign of the last nonzero component.
   int sign() const {
     for (int i = size_ - 1; i >= 0; --i)
       if (components_[i] != 0) return sign_of(components_[i]);

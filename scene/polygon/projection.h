@@ -20,9 +20,9 @@ struct Projection {
   bool is_fan = false;
 };
 
-// A fast test that suffices for most polygons. If it returns true, the triangles are the fan:
-// choose_projection() would return a fan, or a coordinate is not finite. `xyz` holds three
-// coordinates per corner and need not be normalized.
+// A fast test that is enough for most polygons. If it returns true, the triangles of the polygon
+// are its fan, because choose_projection() would set is_fan, or because a coordinate is not finite.
+// `xyz` holds three coordinates per corner and need not be normalized.
 bool is_clear_fan(std::span<const double> xyz);
 
 // Multiplies the coordinates by a power of two, so that the largest magnitude is from 1/2 to 1.

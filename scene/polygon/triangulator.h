@@ -57,7 +57,7 @@ class Triangulator {
   // Error{kOutOfMemory} if the memory budget is too small for the corners.
   bool triangulate(std::span<double> xyz);
 
-  // The triangles, three numbers of corners each.
+  // Returns the triangles: the numbers of three corners for each.
   std::span<const uint32_t> triangles() const { return triangles_; }
   // True if the last polygon was doubtful: its edges cross, or a triangle would be clockwise.
   bool is_doubtful() const { return is_doubtful_; }

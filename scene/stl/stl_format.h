@@ -1,5 +1,5 @@
-// Tells binary from ASCII STL files. A binary file has 80 bytes of header, the number n of its
-// facets in 4 bytes, and 50 bytes per facet:
+// Distinguishes binary from ASCII STL files. A binary file has 80 bytes of header, the number n of
+// its facets in 4 bytes, and 50 bytes per facet:
 //
 //   byte  0          80      84                  84 + 50 n
 //         | header   | n     | facet | facet ... |

@@ -102,8 +102,8 @@ class BoundedDecoder : public Decoder {
       check_valence_tables(*this->buffer(), admit_table_);
   }
 
-  // Draco makes the objects of all attributes before it calls DecodeAllAttributes(), so their
-  // memory is charged before that.
+  // Charges the memory for the objects of all attributes. Draco makes these objects before it calls
+  // DecodeAllAttributes(), so they must be charged earlier.
   void charge_attributes() {
     const uint64_t attributes = count_attributes(attributes_, *this);
     charge_more(charge_, attributes * kBytesPerAttribute);

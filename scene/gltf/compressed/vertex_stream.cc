@@ -140,8 +140,8 @@ bool decode_vertex_stream_1(std::span<const std::byte> stream, size_t stride,
                             std::span<std::byte> out) {
   const size_t tail_bytes = std::max(stride + stride / 4, kMinTailBytes);
   if (!is_vertex_stream_1(stream) || stream.size() < 1 + tail_bytes) return false;
-  // The tail without its padding: the element to which the first deltas are added, and the channel
-  // modes.
+  // The end of the stream, after the padding: the element to which the first deltas are added, and
+  // the channel modes.
   Input tail(stream.last(stride + stride / 4));
   Element last;
   std::array<uint8_t, kMaxStride / 4> channel_modes;

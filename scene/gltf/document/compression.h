@@ -83,9 +83,10 @@ struct DracoPart {
 // name. Returns nullopt if `extensions` has none.
 std::optional<std::pair<JsonElement, const char*>> find_meshopt(const JsonElement& extensions);
 
-// Throw Violation for a member that is missing or of a wrong type, or for a layout that the
-// extension does not allow. `extensions` belong to a buffer view. read_meshopt() returns null if
-// it has no meshopt extension.
+// Read the extension of a buffer view, whose extensions are `extensions`, and the extension of a
+// primitive. read_meshopt() returns null if the view has no meshopt extension. Both throw Violation
+// for a member that is missing or of a wrong type, or for a layout that the extension does not
+// allow.
 std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extensions);
 std::shared_ptr<const DracoExtension> read_draco(const JsonElement& extension);
 

@@ -25,7 +25,7 @@ uint32_t read_u32(const ReadableFile& file, uint64_t offset) {
   return value;
 }
 
-// Some programs pad JSON with zeros.
+// True for blanks, line ends and zeros. Some programs pad JSON with zeros.
 bool is_filler(std::byte b) {
   return b == std::byte{0} || b == std::byte{' '} || b == std::byte{'\t'} || b == std::byte{'\n'} ||
          b == std::byte{'\r'};

@@ -20,9 +20,9 @@ struct ElementText {
 
 class ElementTextWriter {
  public:
-  // add_scalar() and start() add a value. `key` is its name if the value is a member of an object;
-  // otherwise it is ignored. start() takes an empty object or array. The values that follow are
-  // inside it until end().
+  // add_scalar() and start() add a value. `key` is the value's name if the value is a member of an
+  // object; otherwise `key` is ignored. start() takes an empty object or array. All values that are
+  // added before the matching call of end() are inside this object or array.
   void add_scalar(std::string_view key, const nlohmann::json& value);
   void start(std::string_view key, const nlohmann::json& value);
   void end();

@@ -18,7 +18,8 @@ constexpr uint64_t kMaxShownCharacters = 4096;
 constexpr uint64_t kCopies = 6;
 constexpr uint64_t kMaxWordCharacters = 1024;  // max length of a number or literal
 
-// ASCII that JSON does not escape within a string.
+// True for printable ASCII characters. Inside a string, only quotes and backslashes among them have
+// a special meaning.
 bool is_plain(char c) { return c >= ' ' && c <= '~'; }
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }

@@ -92,7 +92,8 @@ int image_of(const tinygltf::Model& model, const tinygltf::Texture& texture) {
   return image;
 }
 
-// `kind`: the purpose of the texture, for messages.
+// Sets the image and the texture coordinates of `out` from a texture. `kind` is the purpose of the
+// texture, for messages.
 void read_texture(const tinygltf::Model& model, const TextureUse& use, const char* kind,
                   MaterialSource& out) {
   if (use.texture < 0) return;

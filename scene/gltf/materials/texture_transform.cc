@@ -10,7 +10,7 @@ constexpr double kHalfPiHigh = 0x1.921fb544p+0;
 constexpr double kHalfPiLow = 0x1.0b4611a626331p-34;
 constexpr double kTwoPi = 0x1.921fb54442d18p+2;
 
-// Taylor series for |x| up to pi / 4. The first omitted term is below 2^-52.
+// Returns sin(x) by its Taylor series, for |x| up to pi / 4. The first omitted term is below 2^-52.
 double sine_near_zero(double x) {
   const double y = x * x;
   double sum = 0;

@@ -56,7 +56,7 @@ class BufferReader {
   // Checks one buffer like check_lengths().
   void check_length(int buffer);
 
-  // The budget to which readers of the scene charge their memory.
+  // Returns the budget to which the readers of the scene charge their memory.
   MemoryBudget& budget() { return budget_; }
 
  private:

@@ -33,7 +33,8 @@ bool NodeWalk::descend() {
 
 void NodeWalk::enter(int node, const Transform& global) {
   path_.push_back({node, 0, global});
-  // While a vector grows, its old memory also exists, which is half of the new memory.
+  // Charges 3/2 of the new memory: while a vector grows, its old memory, which is half of the new
+  // memory, also exists.
   charge_.grow_to(path_.capacity() * sizeof(Step) * 3 / 2);
 }
 

@@ -1,6 +1,6 @@
 // Visits the nodes of the scene that draw a mesh, with their global transforms: parents before
 // children, children in the order of the file. The memory of the walk grows with the depth of the
-// hierarchy. It never recurses.
+// hierarchy. The walk is not recursive, so that a deep hierarchy does not overflow the stack.
 #pragma once
 
 #include <vector>

@@ -54,7 +54,8 @@ class ObjFile {
   bool has_splits() const { return has_splits_; }
   // True if a vertex has a color.
   bool has_colors() const { return has_colors_; }
-  // The number that stands for full intensity of a color: 1, or 255 if a number is larger than 1.
+  // Returns the number that means full intensity of a vertex color: 255 if a color of the file has
+  // a number above 1, otherwise 1.
   double full_color() const { return full_color_; }
   const UsedMaterials& materials() const { return materials_; }
   const std::vector<Library>& libraries() const { return libraries_; }

@@ -12,7 +12,7 @@
 
 namespace voxdag::obj {
 
-// Visits the statements of one kind, starting at any of them.
+// Visits the statements of one kind (v or vt), starting at any statement.
 class StatementReader {
  public:
   // `kind` is kVertex or kTexture. The file must outlive the reader.
