@@ -49,8 +49,8 @@ class Option {
   // option.
   Option environment(const char* variable);
   Option show_default();
-  // For an option whose value is a list: takes one item after each occurrence of the option. By
-  // default, an occurrence takes all arguments up to the next option.
+  // For an option whose value is a list: makes each occurrence of the option take one item. Without
+  // this call, an occurrence takes all arguments up to the next option.
   Option one_value_each();
   Option positive();
   Option range(int low, int high);

@@ -41,7 +41,8 @@ class HttpClient {
 
   ClientResponse get(const std::string& path, const HeaderMap& headers = {});
   ClientResponse head(const std::string& path, const HeaderMap& headers = {});
-  // `method` is POST, PUT, PATCH or DELETE. A non-empty body is sent as application/json.
+  // Sends a request and returns the answer. `method` is POST, PUT, PATCH or DELETE. A body that is
+  // not empty is sent as application/json, unless `headers` has a Content-Type.
   ClientResponse send(const std::string& method, const std::string& path, const std::string& body,
                       const HeaderMap& headers = {});
 

@@ -24,7 +24,7 @@ struct StageView {
 // line has a bar and is redrawn. Not thread-safe.
 class ProgressLine {
  public:
-  // A quiet line shows only warnings and notes.
+  // If `quiet` is true, the line shows only warnings and notes.
   explicit ProgressLine(bool quiet = false);
   // Ends a line that is still being redrawn, so that later output starts on a new line.
   ~ProgressLine();

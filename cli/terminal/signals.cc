@@ -66,8 +66,9 @@ void catch_signals(CancelToken& cancel) {
   struct sigaction hangup {};
   sigaction(SIGHUP, nullptr, &hangup);
   if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
-  // Without these two lines, a write to a closed pipe or beyond the limit of file sizes would end
-  // the process. The write fails instead, so the error is reported.
+  // Ignores these two signals. By default, they end the process when it writes to a closed pipe or
+  // beyond the limit of file sizes. If they are ignored, the write fails, and the error is
+  // reported.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
 }

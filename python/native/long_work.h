@@ -52,8 +52,8 @@ class LatestProgress : public Progress {
 inline constexpr std::chrono::milliseconds kLookInterval{50};
 
 // Forwards warnings and new progress to Python. pass_on() calls callback(stage, done, total, unit)
-// if the progress has changed and `callback` is not None. It raises exceptions of the called Python
-// code, and KeyboardInterrupt after Ctrl-C.
+// if the progress has changed and `callback` is not None. pass_on() raises the exceptions of the
+// called Python code, and KeyboardInterrupt after Ctrl-C.
 class Messenger {
  public:
   explicit Messenger(nb::object callback) : callback_(std::move(callback)) {}
