@@ -39,7 +39,8 @@ inline constexpr int64_t kSmallestEdge = 64;
 // number of triangles.
 inline constexpr uint64_t kSmallestBudget = uint64_t{8} << 20;
 
-// The triangles that may touch a subvolume, in no particular order; can be read repeatedly.
+// Supplies the triangles that may touch a subvolume, in no particular order. After rewind(), they
+// can be read again.
 class TriangleStream {
  public:
   virtual ~TriangleStream() = default;
@@ -73,9 +74,9 @@ class Backend {
  public:
   virtual ~Backend() = default;
   virtual std::string_view name() const = 0;
-  // Builds one subvolume: passes its level arrays to `sink` and sets `summary`. Throws Error
-  // (kCanceled, kDevice, kOutOfMemory) and the errors of the stream and the sink. After an error
-  // the backend remains usable.
+  // Builds one subvolume: passes its level arrays to `sink` and sets `summary`. Throws
+  // Error{kCanceled}, Error{kDevice}, Error{kOutOfMemory}, and the errors of the stream and the
+  // sink. After an error the backend remains usable.
   virtual BuildOutcome build(const SubvolumeTask& task, TriangleStream& triangles,
                              MemoryBudget& budget, const CancelToken& cancel, SubDagSink& sink,
                              SubDagSummary& summary) = 0;

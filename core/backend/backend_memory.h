@@ -16,11 +16,11 @@
 namespace voxdag {
 
 struct BackendMemory : ConsingMemory {
-  // Maximum bytes of each table of the plane memo, a cache (plane_memo.h).
+  // Returns the maximum bytes of each table of the plane memo, which is a cache (plane_memo.h).
   static constexpr uint64_t plane_table_bytes(uint64_t budget_bytes, uint64_t free_bytes) {
     return std::min(budget_bytes / 16, free_bytes / 8);
   }
-  // Maximum bytes of the block memo, a cache (block_memo.h).
+  // Returns the maximum bytes of the block memo, which is a cache (block_memo.h).
   static constexpr uint64_t block_memo_bytes(uint64_t free_bytes) { return free_bytes / 16; }
 };
 

@@ -10,7 +10,7 @@ struct Row {
   int http_status;
 };
 
-// docs/errors.md shows this table to users. Exit status 130 is the one that a shell reports after
+// docs/errors.md shows this table to users. 130 is the exit status that a shell reports after
 // Ctrl-C.
 constexpr Row kTable[] = {
     {ErrorCode::kInvalidInput, "invalid_input", 2, 400},

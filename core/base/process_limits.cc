@@ -80,8 +80,8 @@ std::string own_membership() {
 
 constexpr const char* kCgroupMount = "/sys/fs/cgroup";
 
-// Returns the size, in bytes, in the line of /proc/self/status that begins with `name`; 0 if it is
-// absent.
+// Returns the size, in bytes, in the line of /proc/self/status that begins with `name`; 0 if there
+// is no such line.
 uint64_t status_bytes(const std::string& name) {
   std::ifstream status("/proc/self/status");
   std::string line;

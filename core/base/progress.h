@@ -44,7 +44,7 @@ class Progress {
   // unknown. `unit` is the plural name of a unit ("triangles", "subvolumes", "nodes").
   virtual void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) = 0;
   // Reports that an earlier run has done `done` units of the stage. They count toward the total,
-  // but not toward the displayed rate. Called after begin_stage(), if at all.
+  // but not toward the displayed rate. If it is called, it is called after begin_stage().
   virtual void resume_at(uint64_t done) = 0;
   // Reports that `count` more units are done.
   virtual void advance(uint64_t count) = 0;

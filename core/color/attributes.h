@@ -14,7 +14,7 @@ namespace voxdag {
 struct CellValues;
 struct ColorSum;
 
-// The number of an attribute is the kind of its section in the global file.
+// The value of an enumerator is the kind of the attribute's section in the global file.
 enum class Attribute : uint32_t { kColor = 1, kAlpha = 2, kNormal = 3, kMaterial = 4 };
 
 // How the global file stores the value of a cell.
@@ -76,9 +76,9 @@ struct AttributeTraits {
   Encoding encoding;
   bool uses_images = false;       // depends on the scene's textures
   const char* ply_properties[3];  // names of a value's components
-  // value_of_cell() returns the value of a baked cell. value_of_parent() returns the value of a
-  // coarser cell from its set children. Both are null for colors, which are encoded from the cells'
-  // sums.
+  // value_of_cell() returns the value of a cell of the finest level, from its baked sums.
+  // value_of_parent() returns the value of a coarser cell from its set children. Both are null for
+  // colors, which are encoded from the cells' sums.
   uint32_t (*value_of_cell)(const ColorSum& sum, const CellValues& values) = nullptr;
   uint32_t (*value_of_parent)(std::span<const uint32_t> children) = nullptr;
 
@@ -142,8 +142,8 @@ constexpr uint32_t value_bytes(Attribute attribute, uint64_t names) {
   return names <= 256 ? 1 : names <= 65536 ? 2 : 4;
 }
 
-// Returns null if a stored value is valid, otherwise the expectation that it violates, as a text
-// for a message.
+// Returns null if a stored value is valid. Otherwise returns the violated expectation, such as
+// "expected bytes up to 254", for an error message. `names` is the length of the list of names.
 constexpr const char* value_error(Encoding encoding, uint32_t value, uint64_t names) {
   if (encoding == Encoding::kOctahedral && ((value & 255) == 255 || value >> 8 == 255))
     return "expected bytes up to 254";

@@ -38,7 +38,7 @@ struct SubDagSummary {
   uint64_t dag_nodes = 0;  // unique nodes, including bricks
   uint64_t root_hash = 0;  // hash of the root, truncated to the hash bits; 0 when empty
   uint64_t interior = 0;   // voxels of a solid that are not in its shell
-  uint64_t disputed = 0;   // voxels of the interior whose directions disagree (solid_rule.h)
+  uint64_t disputed = 0;   // voxels of the interior whose unit is_disputed() (solid_rule.h)
   bool empty() const { return voxels == 0; }
 };
 

@@ -19,9 +19,9 @@ bool has_no_inodes(const std::string& path) {
   return statvfs(parent_directory(path).c_str(), &s) == 0 && s.f_files > 0 && s.f_favail == 0;
 }
 
-// Throws Error{kInvalidInput} if `path` exists and is not a regular file, for example a symbolic
-// link or a pipe, which voxdag did not create. SQLite itself does not follow links to its other
-// files.
+// Throws Error{kInvalidInput} if `path` exists and is not a regular file (but, for example, a
+// symbolic link or a pipe), because voxdag did not create it. SQLite itself does not follow links
+// to its other files.
 void refuse_foreign(const std::string& path) {
   struct stat found {};
   if (lstat(path.c_str(), &found) == 0 && !S_ISREG(found.st_mode))

@@ -59,7 +59,7 @@ class SqlDatabase {
   enum class Mode { kReadWrite, kReadOnly };
   // Opens a database; kReadWrite creates it if it does not exist. A statement waits up to `busy_ms`
   // milliseconds if another process has locked the database. Throws Error{kInvalidInput} if `path`
-  // is a symbolic link or another thing that is not a regular file.
+  // is a symbolic link or anything else that is not a regular file.
   SqlDatabase(const std::string& path, Mode mode, int busy_ms = 5000);
 
   void execute(const std::string& sql);

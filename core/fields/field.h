@@ -69,7 +69,8 @@ struct Field {
   bool is_positional = false;     // positional on the command line
   bool is_left_if_empty = false;  // JSON omits the member if it is empty
   // geometry_json(), which identifies a build's options, always contains a field if `in_key` is
-  // true, and never if it is false. If not set: only if the value differs from the default.
+  // true, and never if it is false. If it is not set, geometry_json() contains the field only if
+  // its value differs from the default.
   std::optional<bool> in_key;
 
   constexpr Field(const char* its_name, const char* its_help = "")
@@ -122,7 +123,7 @@ concept NamedEnum = std::is_enum_v<E> && requires(E e) {
 };
 
 // Makes a type usable as a set of names, such as AttributeSet. Members: `names(set)` returns the
-// names in the set; `add(set, name)` adds a name, or returns false if it is unknown; `all()`
+// names in the set; `add(set, name)` adds a name, or returns false if the name is unknown; `all()`
 // returns all known names.
 template <class T>
 struct NameSetTraits;

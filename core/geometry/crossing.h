@@ -72,7 +72,8 @@ class RowTest {
   VOXDAG_HD int sign() const { return sign_; }
 
   // The edges' values at a row. The triangle crosses the row iff all values are >= 0. edge_steps()
-  // returns their changes for a row `distance` units further along axis c (or b).
+  // returns the changes of these values for a row that is `distance` units further along axis c
+  // (or, if `is_along_c` is false, along axis b).
   struct EdgeValues {
     EdgeInt of[3];
   };

@@ -54,7 +54,7 @@ using Pair = double __attribute__((vector_size(16)));
 
 // Returns floor(x) for |x| <= 2^51, and otherwise a number near x, which may have a fraction.
 // Rounds to the nearest integer, and subtracts 1 if this has rounded up. There is no branch,
-// because the CPU would mispredict it for half of all numbers.
+// because the CPU would mispredict a branch for half of all numbers.
 Pair floor_of(Pair x) {
   constexpr Pair kNoFraction = {0x1.8p52, 0x1.8p52};
   const Pair nearest = (x + kNoFraction) - kNoFraction;

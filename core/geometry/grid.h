@@ -56,8 +56,8 @@ struct Grid {
   // center. Throws Error{kInvalidInput} if the scene does not fit in this grid, or if the size or
   // the levels are invalid, and Error{kLimit} if the grid is not finite.
   static Grid with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels);
-  // Returns the least levels of a grid with voxels of this edge in which the scene fits. Throws
-  // Error{kInvalidInput} if it fits in no grid, or if the size is invalid.
+  // Returns the smallest number of levels of a grid with voxels of this edge that contains the
+  // scene. Throws Error{kInvalidInput} if the scene fits in no grid, or if the size is invalid.
   static uint32_t levels_for_voxel_size(const WorldBounds& bounds, double voxel_size);
 };
 

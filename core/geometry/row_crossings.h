@@ -82,7 +82,7 @@ struct SampleRows {
   // Calls visit(i, j, block, sign) for every crossing of the triangle with a row along `axis`. (i,
   // j) are the row's indices along first_row_axis() and second_row_axis(). The crossing is between
   // the points `block` and `block + 1` of the row, which are 2^pitch_log2 units apart and are
-  // counted from the cube's low side; they can be outside the cube.
+  // counted from the cube's low side. These points can be outside the cube.
   template <class Visit>
   void for_each_crossing(const FixedTriangle& triangle, int axis, Visit visit) const {
     const int first = first_row_axis(axis), second = second_row_axis(axis);

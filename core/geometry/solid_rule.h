@@ -40,7 +40,7 @@ VOXDAG_HD constexpr int sample_pitch_log2(uint32_t grid_levels) {
   return kUnitBits + solid_block_log2(grid_levels);
 }
 
-// Returns the view along one axis from a corner.
+// Returns the view along one axis from a corner. `left` and `total` are the sums defined above.
 VOXDAG_HD constexpr int32_t view_of(SolidRule rule, int32_t left, int32_t total) {
   if (rule == SolidRule::kWinding) return 2 * left - total;
   return (left & 1) + ((total - left) & 1);
@@ -66,7 +66,7 @@ struct UnitViews {
     ++corners;
   }
   VOXDAG_HD bool is_inside() const { return (sum < 0 ? -sum : sum) > 3 * corners; }
-  // True if not all directions of all corners agree.
+  // True if the directions of the unit's corners do not all agree.
   VOXDAG_HD bool is_disputed() const { return sum % (6 * corners) != 0; }
 };
 

@@ -22,7 +22,7 @@ uint32_t little_endian(std::span<const uint8_t> bytes) {
   return value;
 }
 
-// Calls visit(name, contents) for each chunk.
+// Calls visit(name, contents) for each chunk of the file.
 template <class Visit>
 void visit_chunks(std::span<const uint8_t> file, const Visit& visit) {
   constexpr size_t kRiffHeader = 12, kChunkHeader = 8;

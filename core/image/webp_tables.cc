@@ -121,8 +121,9 @@ uint32_t read_cache_bits(BitReader& bits) {
 }
 uint32_t cache_size(uint32_t cache_bits) { return cache_bits > 0 ? 1u << cache_bits : 0; }
 
-// Reads the rest of a length or a distance. Throws BrokenStream for symbols that do not exist; a
-// code of one or two symbols can contain them.
+// Reads the extra bits of a length or a distance whose prefix symbol is `symbol`, and returns the
+// value. Throws BrokenStream for symbols that do not exist; a code of one or two symbols can
+// contain them.
 uint32_t read_copy_value(BitReader& bits, uint32_t symbol) {
   if (symbol >= kDistanceCodes) throw BrokenStream{};
   if (symbol < 4) return symbol + 1;
@@ -130,8 +131,9 @@ uint32_t read_copy_value(BitReader& bits, uint32_t symbol) {
   return ((2 + (symbol & 1)) << extra) + bits.read(extra) + 1;
 }
 
-// Reads an image that is encoded with one set of codes. Returns the largest number in the red and
-// green channels. Copies and the color cache only repeat earlier pixels, so literals suffice.
+// Reads an image that is encoded with one set of codes. Returns the largest number that red (high
+// byte) and green (low byte) of a pixel form. Copies and the color cache only repeat earlier
+// pixels, so literals suffice.
 uint32_t read_small_image(BitReader& bits, uint64_t pixels) {
   const uint32_t cache = cache_size(read_cache_bits(bits));
   const PrefixCode green = read_code(bits, kLiterals + kLengthCodes + cache),

@@ -36,8 +36,8 @@ class SubvolumeBuild {
   // cube are entries_[first, first + count).
   NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   // The node of a cube of a solid. A cube without voxels of the shell (is_empty) has no node yet.
-  // Its parent chooses the node from the cube's views, or, if the parent is also empty, has no node
-  // itself.
+  // If the cube's parent is also empty, the parent has no node either. Otherwise the parent chooses
+  // the cube's node from the cube's views.
   struct SolidNode {
     NodeRef node;
     bool is_empty = false;
@@ -74,9 +74,10 @@ class SubvolumeBuild {
   PooledMemory& memory_;
   const CancelToken& cancel_;
   TriangleSet triangles_;
-  // A stack: for each cube from the root to the current cube, the triangles that may touch it. For
-  // each of the current cube's entries, octants_ has two masks: bits 0-7 are the children that the
-  // triangle may touch, bits 8-15 are the children that it covers (see Entry in triangle_set.h).
+  // entries_ is a stack. For each cube from the root to the current cube, it has the triangles that
+  // may touch the cube. For each of the current cube's entries, octants_ has two masks: bits 0-7
+  // are the children that the triangle may touch, bits 8-15 are the children that it covers (see
+  // Entry in triangle_set.h).
   PooledArray<Entry> entries_;
   PooledArray<uint16_t> octants_;
   size_t entries_used_ = 0;

@@ -12,9 +12,9 @@
 
 namespace voxdag::cuda {
 
-// Checks a call of the runtime. Running out of device memory becomes OutOfBudget, so that the
-// subvolume is split. Any other failure becomes Error{kDevice} with the call and the place. `call`:
-// the function of the runtime or of CUB; `where`: device and subvolume.
+// Checks a call of the runtime. If device memory is exhausted, throws OutOfBudget, so that the
+// subvolume is split. For any other failure, throws Error{kDevice} whose message names the call and
+// the place. `call`: the function of the runtime or of CUB; `where`: device and subvolume.
 inline void check_call(cudaError_t status, const char* call, const std::string& where) {
   if (status == cudaSuccess) return;
   cudaGetLastError();  // clears the error, which is reported here

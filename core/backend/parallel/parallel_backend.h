@@ -32,8 +32,8 @@ BrickList<Space> voxelize(Space& space, Method method, const SubvolumeTask& task
       voxelize_by_tiles(space, task, triangles, bricks);
       return bricks;
     } catch (const OutOfBudget&) {
-      // Throws to the caller, which splits the cube, if the cube is larger than the smallest cube.
-      // The smallest cube must fit for any number of triangles, so it is voxelized by list below.
+      // If the cube is larger than the smallest cube, the caller splits it. The smallest cube must
+      // fit for any number of triangles, so voxelize_by_list() voxelizes it below.
       if (cube_levels > kTileLevels) throw;
     }
   }

@@ -162,8 +162,9 @@ class BlockEncoder {
     project(colors, count, axis, out);
   }
 
-  // Fits the ends by least squares, for weights from 0 to `top` that are nearest to the colors'
-  // positions on the axis. The weights 0 and `top` occur, so the determinant is not 0.
+  // Sets `ends` by least squares. For this, each color has the weight, from 0 to `top`, that is
+  // nearest to its position on the axis. The weights 0 and `top` occur, so the determinant is not
+  // 0.
   VOXDAG_INLINE static void fit_ends(const Colors& colors, size_t count,
                                      const Projection& projection, int32_t top,
                                      int32_t (&ends)[2][3]) {

@@ -19,9 +19,10 @@
 
 namespace voxdag {
 
-// Distance in levels between the cells of a table in EncodedRegion::prefix and the cubes for which
-// the table has entries. A reader adds the entry of a cell's cube to the cell's rank within this
-// cube. The sum is the cell's rank among all cells of its level in the region.
+// A table in EncodedRegion::prefix is for the cells of one level. It has an entry for each cube
+// kPrefixLevels above this level: the number of cells of the level that come before the cube. A
+// reader adds this number to the rank of a cell within the cube. The sum is the rank of the cell
+// among all cells of its level in the region.
 inline constexpr uint32_t kPrefixLevels = 4;
 
 struct EncodedRegion {

@@ -7,7 +7,7 @@ void append_value(uint32_t value, uint32_t bytes, std::vector<std::byte>& out) {
   for (uint32_t b = 0; b < bytes; ++b) out.push_back(static_cast<std::byte>(value >> 8 * b));
 }
 
-// Appends the parents of cells, in order.
+// Appends the parents of `cells`, with their values, to `parents` in Morton order.
 void make_parents(Attribute attribute, std::span<const ValuedCell> cells,
                   std::vector<ValuedCell>& parents) {
   const auto value_of_parent = traits_of(attribute).value_of_parent;

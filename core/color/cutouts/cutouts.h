@@ -14,7 +14,7 @@ struct Cutouts {
 
   std::vector<Material> materials;  // the scene's materials
   std::vector<AlphaMask> masks;
-  // For each material, the index of its mask; kNoMask if it cuts out no texel.
+  // For each material, the index of its mask; kNoMask if the material cuts out no texel.
   std::vector<uint32_t> mask_of;
 
   const AlphaMask* mask(uint32_t material) const {

@@ -20,7 +20,7 @@ constexpr double kVoxelMargin = 0x1p-6;
 // A polygon that spans more than this many repetitions of the image is treated as covering all
 // texels.
 constexpr double kMaxPeriods = 16;
-// Texels at the border of a clamped image extend without end; here, to this coordinate.
+// Texels at the border of a clamped image extend without end. This coordinate stands for the end.
 constexpr double kEndless = 0x1p45;
 
 std::array<int64_t, 3> low_corner(const Cube& cube, uint32_t grid_levels) {
@@ -30,8 +30,8 @@ std::array<int64_t, 3> low_corner(const Cube& cube, uint32_t grid_levels) {
   return low;
 }
 
-// Maps a coordinate in texels to the image. A period is one repetition of the image; period 0
-// begins at coordinate 0.
+// Maps `texel`, a coordinate (in texels) within a period, to the coordinate in the image. A period
+// is one repetition of the image; period 0 begins at coordinate 0.
 double in_image(double texel, double period, double size, Wrap wrap) {
   const double at = texel - period * size;
   const bool is_mirrored = wrap == Wrap::kMirroredRepeat && std::fmod(period, 2) != 0;
@@ -70,8 +70,8 @@ VisiblePart::VisiblePart(const FixedSurface& surface, const Cutouts& cutouts, ui
       texels_[i][a] = static_cast<double>(surface.corners[i].texture[a]) * (size[a] * 0x1p-24);
 }
 
-// Adds the part of `from` on the inner side of a plane to `inside`: the corners whose distance
-// along `axis` from the plane `bound`, in the direction `sign`, is >= 0.
+// Sets `inside` to the part of `from` on the inner side of a plane, on which the coordinate along
+// `axis` is `bound`. A point is on the inner side if sign * (coordinate - bound) >= 0.
 void VisiblePart::clip(const Polygon& from, int axis, double sign, double bound, Polygon& inside) {
   inside.count = 0;
   for (int i = 0; i < from.count && inside.count + 2 <= Polygon::kMaxPoints; ++i) {
@@ -232,8 +232,8 @@ VisiblePart::Outline VisiblePart::outline_of(const Polygon& polygon,
 }
 
 // Returns the smallest block that contains the polygon and a margin around it, or the block of the
-// last level. covers() gives the same answer for any larger block that contains this one: it finds
-// no gap between the polygon and a block that contains the polygon, whatever the depth.
+// last level. covers() returns the same for any larger block that contains this one, because
+// covers() never finds a gap between the polygon and a block that contains the polygon.
 VisiblePart::Block VisiblePart::block_around(const Outline& outline) const {
   const uint32_t size[2] = {mask_->width(), mask_->height()};
   uint32_t first[2], last[2];

@@ -29,8 +29,8 @@ class VisiblePart {
   VisiblePart(const FixedSurface& surface, const Cutouts& cutouts, uint32_t grid_levels);
 
   enum class Sight { kHidden, kVisible, kMixed };
-  // Returns kHidden or kVisible if the triangle is hidden or visible in all voxels of the cube that
-  // it touches. kMixed means that this is not known.
+  // Returns kHidden if the triangle is hidden in all voxels of the cube that it touches, and
+  // kVisible if it is visible in all these voxels. Returns kMixed if neither is certain.
   Sight sight(const Cube& cube) const;
   // True if the triangle is visible in a voxel. The triangle must touch the voxel.
   bool is_visible(const std::array<int64_t, 3>& voxel) const;
@@ -56,7 +56,7 @@ class VisiblePart {
     double low[2], high[2];
   };
 
-  // A polygon's corners in the image, with their box and their edges.
+  // The outline of a polygon in the image: its box and its edges.
   struct Outline {
     // The edge's function nu * (u - from[0]) + nv * (v - from[1]) is 0 on the edge, and from
     // `least` to `most` on the polygon.
@@ -89,7 +89,7 @@ class VisiblePart {
   std::array<Wrap, 2> wrap_;
   const uint32_t grid_levels_;
   bool is_hidden_;       // the material cuts out the complete triangle
-  double texels_[3][2];  // positions of the corners in the image
+  double texels_[3][2];  // positions of the corners in the image, in texels
 };
 
 }  // namespace voxdag

@@ -25,7 +25,7 @@ class VisiblePatches {
 
   explicit VisiblePatches(uint32_t grid_levels);
   // Visits the patches in an order that depends only on the triangle. Returns false if `visit`
-  // did.
+  // returned false.
   bool for_each(const VisiblePart& part, const Visit& visit);
 
  private:

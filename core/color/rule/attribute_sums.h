@@ -35,7 +35,8 @@ class AttributeSums {
   }
 
   bool is_needed() const { return is_needed_; }
-  // Adds a triangle to a cell. `columns` and `weight` are 1 if it covers no column of the cell.
+  // Adds a triangle to a cell. `columns` and `weight` are 1 if the triangle covers no column of the
+  // cell.
   void add(uint32_t cell, const SurfaceFacing& facing, uint32_t columns, uint32_t weight) {
     for_each([&](auto& sums) { sums.add(cell, facing, columns, weight); });
   }

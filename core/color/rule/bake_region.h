@@ -135,9 +135,9 @@ class RegionBaker {
     }
   }
 
-  // Returns false if the triangle cannot cover a column, as for most tiny triangles. A column is a
-  // line with fixed coordinates along two axes. So the triangle's box must contain a coordinate of
-  // columns along at least two axes.
+  // Returns false if the triangle cannot cover a column, which is the case for most tiny triangles.
+  // A column is a line with fixed coordinates along two axes. So along at least two axes, the
+  // triangle's box must contain a coordinate of a column.
   bool may_cover(const FixedTriangle& triangle) const {
     const int bits = grid_.cell_bits() - 2;
     const int64_t half = int64_t{1} << (bits - 1);

@@ -26,9 +26,9 @@ struct NormalSum {
   }
 };
 
-// Returns the normal of sum.area. If the largest component of sum.area is less than 1/64 of the
-// largest component of sum.turned, returns the normal of sum.turned. If both sums are 0, returns
-// kNoNormal.
+// Returns the normal of sum.turned if the largest component of sum.area is less than 1/64 of the
+// largest component of sum.turned, and otherwise the normal of sum.area. Returns kNoNormal if both
+// sums are 0.
 VOXDAG_HD inline NormalCode normal_of_sum(const NormalSum& sum) {
   const auto largest = [](const int64_t(&v)[3]) {
     int64_t most = 0;

@@ -72,7 +72,7 @@ VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& t
   }
   const double cell = static_cast<double>(int64_t{1} << cell_bits);
   const double available = texels * (cell * cell);
-  double needed = area * 0x1p50;  // for level 1: 4 * area * 2^(2 kTextureBits)
+  double needed = area * 0x1p50;  // least `available` for level 1: 4 * area * 2^(2 kTextureBits)
   const uint32_t levels = textures.levels(image);
   uint32_t level = 0;
   for (; level + 1 < levels && needed <= available; ++level) needed *= 4;
@@ -85,7 +85,8 @@ VOXDAG_HD inline Texel tinted(Texel texel, const uint32_t (&tint)[4]) {
   return out;
 }
 
-// Adds a texel to a sum with a weight. `seen`: the weight times alpha. Both are below 2^32.
+// Adds `texel` to a sum with the weight `weight`. `seen` is `weight` times alpha. Both are below
+// 2^32.
 VOXDAG_HD inline void add_weighted_one_by_one(Texel texel, uint64_t weight, uint64_t seen,
                                               ColorSum& sum) {
   for (int c = 0; c < 3; ++c) {

@@ -45,8 +45,9 @@ VOXDAG_HD inline TexelPair texels_at(int64_t coordinate, Wrap wrap, uint32_t siz
   return pair;
 }
 
-// Returns the mean of four texels, weighted by the fractions. Each word has two channels in 32-bit
-// lanes. The sums in a lane do not overflow, because 65535 * 65536 + 32768 < 2^32.
+// Returns the mean of four texels, weighted by the fractions. `even` and `odd` have two channels
+// each, in lanes of 32 bits. The sums in a lane do not overflow, because 65535 * 65536 + 32768 <
+// 2^32.
 VOXDAG_HD inline Texel blended(const Texel (&texels)[4], uint32_t x_fraction, uint32_t y_fraction) {
   constexpr uint64_t kLanes = 0x0000ffff0000ffffull, kHalf = 0x0000800000008000ull;
   const uint64_t x1 = x_fraction, x0 = 256 - x1, y1 = y_fraction, y0 = 256 - y1;

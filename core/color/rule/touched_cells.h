@@ -66,8 +66,8 @@ class TouchedCells {
     }
   }
 
-  // Sets first_ and last_ to the range of cells that the plane touches in column of cells (p, q),
-  // and highest_ and lowest_ as correct() does.
+  // Sets first_ and last_ to the range of cells that the plane touches in the column of cells (p,
+  // q), and highest_ and lowest_ as correct() does.
   VOXDAG_HD void find_plane(int64_t p, int64_t q) {
     if (t_.degenerate) {
       first_ = range_.first[2];
@@ -122,7 +122,8 @@ class TouchedCells {
     const bool inside =
         !t_.degenerate && ((at[0] - margin_[0]) | (at[1] - margin_[1]) | (at[2] - margin_[2])) >= 0;
     const uint32_t columns = t_.degenerate ? 0 : inside ? kAllColumns : columns_in_shadow(p, q);
-    // If the plane touches several of these cells, the covered columns are divided among the cells.
+    // If the plane touches several cells of this column of cells, the covered columns are divided
+    // among them.
     const bool split = first_ != last_ && columns != 0;
     const bool exact = t_.column_floor == t_.column_ceil;
     Int at_bottom = 0;

@@ -13,7 +13,7 @@ namespace {
 constexpr char kWhat[] = "a subvolume";
 constexpr size_t kPage = size_t{4} << 10;
 constexpr size_t kLargestPower = size_t{4} << 20;
-// Maximum number of cached ranges. The build of a subvolume uses up to some hundred arrays. With a
+// Maximum number of cached ranges. The build of a subvolume uses up to a few hundred arrays. With a
 // lower limit, the small ranges, which are freed last, would evict the large ranges.
 constexpr size_t kMaxRanges = 1024;
 

@@ -20,9 +20,9 @@ inline uint64_t slots_for(uint64_t entries) {
   return slots;
 }
 
-// Moves the used slots to the front without changing their order, and returns them. Linear probing
-// can have put entries with the highest hashes into the first slots; these entries go behind all
-// others. `tag(slot)` is the upper half of the hash.
+// Moves the used slots to the front and returns them. Their order does not change, with one
+// exception: entries with the highest hashes that linear probing has put into the first slots are
+// moved behind all others. `tag(slot)` is the upper half of the hash.
 template <class Slot, class InUse, class Tag>
 std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   std::vector<Slot> wrapped;
@@ -44,9 +44,9 @@ std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   return slots.first(count + wrapped.size());
 }
 
-// Sorts slots by tag and, for equal tags, by less(a, b). Fast if no slot is far from its final
-// position; with linear probing, the distance is at most the length of the longest run of used
-// slots. `tag(slot)` is the upper half of the hash.
+// Sorts slots by tag and, for equal tags, by less(a, b). This is fast if no slot is far from its
+// final position. With linear probing, the distance is at most the length of the longest run of
+// consecutive used slots. `tag(slot)` is the upper half of the hash.
 template <class Slot, class Tag, class Less>
 void sort_nearly_sorted(std::span<Slot> slots, Tag tag, Less less) {
   if (slots.empty()) return;

@@ -47,7 +47,7 @@ constexpr uint64_t brick_neighbors(uint64_t mask) {
   uint64_t out = 0;
   for (int a = 0; a < 3; ++a) {
     const uint64_t(&layer)[kBrickEdge] = kBrickLayers.of[a];
-    const int near = 4 >> a, far = 28 >> a;  // differences of the bits of neighbors
+    const int near = 4 >> a, far = 28 >> a;  // differences between the bit numbers of neighbors
     out |= (mask & (layer[0] | layer[2])) << near | (mask & layer[1]) << far;
     out |= (mask & (layer[1] | layer[3])) >> near | (mask & layer[2]) >> far;
   }

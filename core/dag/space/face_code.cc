@@ -49,7 +49,8 @@ class FaceEncoder {
     }
   }
 
-  // Returns the number of the first component at the face; kNoLabel if all voxels there are set.
+  // Returns the label of the first component at the face; kNoLabel if all voxels at the face are
+  // set.
   uint32_t label_at_face(int depth, const LabeledCube& cube) const {
     if (!cube.exists) return numbers_[cube.first];
     const uint8_t* const touch = labels_.touch(depth, cube.row);

@@ -23,7 +23,7 @@ namespace voxdag {
 // Returns the quadtree of face `face` of the root. Throws OutOfBudget if it exceeds `max_bytes`.
 std::vector<std::byte> encode_face(const SpaceLabels& labels, int face, uint64_t max_bytes);
 
-// Returns the quadtree of a face of an empty cube. Its label is 0.
+// Returns the quadtree of a face of an empty cube. The label of the cube's only component is 0.
 std::vector<std::byte> empty_face();
 
 // Reads a quadtree. Throws Error{kCorrupt} if the bytes are not a quadtree.

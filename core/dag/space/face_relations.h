@@ -18,7 +18,8 @@ class FaceRelations {
  public:
   static constexpr uint32_t kMaxComponents = 8;
 
-  // Bit 8 i + j: component i of the low node meets component j of the high node.
+  // Bit 8 i + j of `pairs` is set if component i of the low node meets component j of the high
+  // node.
   struct Meeting {
     uint64_t pairs = 0;
   };
@@ -41,7 +42,7 @@ class FaceRelations {
     uint32_t tag = 0;  // depth and axis; 0: free
   };
 
-  // Returns the components of a node at a face, as bits.
+  // Returns the set of a node's components that have a voxel at a face, as bits.
   uint32_t at_face(int depth, uint32_t row, int face) const;
   Meeting meet_bricks(uint32_t low, uint32_t high, int axis) const;
   std::optional<Meeting> meet_octants(int depth, uint32_t low, uint32_t high, int axis);

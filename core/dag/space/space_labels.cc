@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kOctants = 8;
 constexpr uint32_t kNone = UINT32_MAX;
-// Maximum number of components of all octants of a node.
+// Maximum total number of components of a node's octants.
 constexpr size_t kMaxComponents = 0xfff0 - kOctants;
 
 // Appends a value to an array of which `size` elements are used.
@@ -105,7 +105,8 @@ class SpaceLabeler {
     end_row(out, row, touch_used_, open_faces(depth + 1, octants));
   }
 
-  // Joins the components of a node's octants. Returns the number of these components.
+  // Sets `octants` to a node's octants, and joins those components of the octants that meet.
+  // Returns the number of components of all octants.
   size_t join_octants(int depth, uint32_t row, LabeledCube (&octants)[kOctants]) {
     elements_.clear();
     for (int o = 0; o < kOctants; ++o) {
@@ -125,7 +126,8 @@ class SpaceLabeler {
     return components;
   }
 
-  // Sets touch_ of the root of each set to the faces of the node at which the set has a voxel.
+  // For each set of joined components, sets touch_ of the set's root to the faces of the node at
+  // which the set has a voxel.
   void number(int below, const LabeledCube (&octants)[kOctants], size_t components) {
     touch_.assign(components, 0);
     for (int o = 0; o < kOctants; ++o) {
@@ -240,7 +242,7 @@ class SpaceLabeler {
     while (parents_[element] != element) element = parents_[element] = parents_[parents_[element]];
     return element;
   }
-  // The lower number becomes the root.
+  // Joins two sets. The root with the lower number becomes the root of the joined set.
   void unite(uint32_t a, uint32_t b) {
     a = find(a);
     b = find(b);

@@ -33,8 +33,8 @@ struct CacheEntry {
 };
 
 // Opens the cache entry of `key` and reads its artifact's index. Throws Error{kNotFound} if the
-// file does not exist; Error{kCorrupt} or Error{kUnsupportedVersion} if it is invalid, or if it is
-// the entry of another key.
+// file does not exist. Throws Error{kCorrupt} or Error{kUnsupportedVersion} if the file is invalid,
+// or if it is the entry of another key.
 CacheEntry read_cache_entry(FileSystem& files, const std::string& path, const std::string& key);
 
 }  // namespace voxdag

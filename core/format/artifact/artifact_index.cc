@@ -187,7 +187,7 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
   if (levels > index.shape.brick_level() + 1)
     corrupt(where, std::to_string(levels) + " levels, expected at most " +
                        std::to_string(index.shape.brick_level() + 1));
-  // After this check, everything allocated below is limited by the size of `bytes`.
+  // After this check, the size of `bytes` limits all allocations below.
   const uint64_t expected =
       kFixedBytes + roots * kRootBytes + levels * kLevelBytes + frames * kFrameBytes;
   if (bytes.size() != expected)

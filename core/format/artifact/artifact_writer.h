@@ -21,7 +21,7 @@ class ArtifactWriter : public SubDagSink {
   ~ArtifactWriter() override;
 
   void begin_level(uint32_t level);
-  // Append any number of rows to the level.
+  // Append any number of rows to the open level.
   void append_bricks(std::span<const uint64_t> masks);
   void append_nodes(const NodeLevelView& rows);
   void end_level();

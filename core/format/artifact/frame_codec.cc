@@ -42,7 +42,8 @@ uint32_t plane_count(std::span<const uint32_t> children) {
   return all > 0xffffff ? 4 : all > 0xffff ? 3 : all > 0xff ? 2 : 1;
 }
 
-// One decompression context per thread, because several threads read frames concurrently.
+// Returns this thread's decompression context. Each thread has one, because several threads read
+// frames concurrently.
 ZSTD_DCtx* decompression_context() {
   struct Deleter {
     void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }

@@ -132,7 +132,8 @@ class AttributeSectionWriter::TiersOf : public Tiers {
     uint32_t code = 0;  // Morton code within the region
     typename Rule::Sum sum;
   };
-  // The region of a coarser tier whose cells are being collected. Tier 0 has none.
+  // The region of a coarser tier whose cells are being collected. Tier 0 has no such region,
+  // because its regions are added complete.
   struct Open {
     explicit Open(MemoryBudget& budget) : cells(budget, "cells of coarse levels") {}
     GrowingBuffer<Cell> cells;

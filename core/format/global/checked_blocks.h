@@ -26,7 +26,8 @@ class DamagedBlock : public Error {
 class CheckedBlocks {
  public:
   static constexpr uint64_t kBlockBytes = 65536;
-  // Returns the bytes of memory for a file whose checksum table begins at byte `table_offset`.
+  // Returns the memory, in bytes, of a CheckedBlocks for a file whose checksum table begins at byte
+  // `table_offset`.
   static constexpr uint64_t memory_bytes(uint64_t table_offset) {
     return sizeof(uint64_t) * (table_offset / kBlockBytes / 64 + 1);
   }

@@ -62,7 +62,8 @@ class PairTable {
     NodePair pair() const { return {a1 - 1, b1 - 1}; }
   };
 
-  // Returns the index of the pair's entry, or of the free entry for it.
+  // Returns the index of the pair's entry or, if the table does not contain the pair, of the free
+  // entry for it.
   size_t find_entry(const NodePair& pair, uint64_t hash) const {
     size_t at = hash & (entries_.size() - 1);
     while (entries_[at].taken() && entries_[at].pair() != pair)

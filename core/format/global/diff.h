@@ -20,7 +20,7 @@ struct DiffReport {
 };
 
 // Throws Error{kInvalidInput} if the resolutions or the bounds of two files differ. The message
-// begins with "only files of the same grid can be" and `what`, a participle.
+// begins with "only files of the same grid can be" and `what`, such as "compared".
 void expect_same_grid(const voxdag_reader::File& a, const voxdag_reader::File& b,
                       const std::string& what);
 

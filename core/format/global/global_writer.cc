@@ -116,7 +116,8 @@ struct GlobalFileWriter::State {
   uint64_t section_bytes = 0;  // bytes of the open section
   bool section_open = false;
   bool retained = false;                         // the partial file outlives the writer
-  std::optional<TemporaryPath> registered = {};  // the partial file, until it is retained
+  std::optional<TemporaryPath> registered = {};  // registers the partial file for removal, until it
+                                                 // is retained
   uint64_t end = kPageBytes;  // start of the open (or the next) level or section, or of the table
 
   uint32_t brick_level() const { return grid.levels - kBrickLevels; }

@@ -105,7 +105,7 @@ class Verifier {
   const uint64_t narrow_words_;
   std::vector<NodeIndex> indexes_;  // indexes of the levels checked so far
   PageBuffer<uint64_t> hashes_;     // truncated hashes of the nodes of the level checked last
-  PageBuffer<uint8_t> used_;        // for that level: 1 if a node above refers to the node
+  PageBuffer<uint8_t> used_;        // for each node of that level: 1 if a node above refers to it
 };
 
 void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what) const {

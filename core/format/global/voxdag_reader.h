@@ -236,8 +236,8 @@ class File {
   static uint64_t child(const Node& node, int index) {
     return node.child(count_set_bits(node.child_mask & ((1u << index) - 1)));
   }
-  // Returns the number of a voxel's bit in the mask of its brick. Only the two low bits of each
-  // coordinate count.
+  // Returns the number of a voxel's bit in the mask of its brick. Uses only the two low bits of
+  // each coordinate.
   static int brick_bit(int64_t x, int64_t y, int64_t z) {
     return static_cast<int>((x & 2) << 4 | (y & 2) << 3 | (z & 2) << 2 | (x & 1) << 2 |
                             (y & 1) << 1 | (z & 1));

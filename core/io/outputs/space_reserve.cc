@@ -9,8 +9,8 @@
 namespace voxdag {
 namespace {
 
-// use() reads the free space again after this many written bytes, and near the reserve at every
-// write.
+// use() reads the free space again after this many bytes were written. If little more than the
+// reserve is free, use() reads the free space at every write.
 constexpr uint64_t kCheckBytes = uint64_t{1} << 20;
 
 }  // namespace
@@ -55,7 +55,7 @@ void SpaceReserve::use(const std::string& path, uint64_t bytes) {
     throw Error(ErrorCode::kNoSpace, "write " + path + ": the disk has " + size_text(free_bytes) +
                                          " free besides the " + size_text(reserve_bytes_) +
                                          " that stay reserved");
-  // Near the reserve, every write reads the free space again.
+  // If little more than the reserve is free, every write reads the free space again.
   unchecked_bytes_ = free_bytes < 2 * kCheckBytes ? kCheckBytes : 0;
 }
 

@@ -36,10 +36,10 @@ void Plane::set_rule(VoxelRule rule) {
     width = std::abs(n[dominant]) - 1;
     return;
   }
-  // Over the corners x of voxel k, the maximum of n.x + f is n.k + f + rising, and the minimum is
-  // `size` less. The plane touches the voxel if the maximum is >= 0 and the minimum <= 0. If
-  // `fractional`, the exact value at each corner is greater than n.x + f by less than 1, so the
-  // minimum must be <= -1.
+  // Let x be the corners of the voxel with the low corner k. The maximum of n.x + f is n.k + f +
+  // rising(), and the minimum is the maximum minus `size`. The plane touches the voxel if the
+  // maximum is >= 0 and the minimum <= 0. If `fractional`, the exact value at each corner is
+  // greater than n.x + f by less than 1, so the minimum must be <= -1.
   fractional = (c & (kUnitsPerVoxel - 1)) != 0;
   up = rising();
   width = size - (fractional ? 1 : 0);

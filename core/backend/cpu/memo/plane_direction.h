@@ -16,14 +16,15 @@
 
 namespace voxdag::cpu {
 
-// Trivially copyable, at most 24 KiB. Only for planes with Plane::fractional. Not thread-safe.
+// The nodes of one direction of planes. The planes must have Plane::fractional. Trivially copyable,
+// at most 24 KiB. Not thread-safe.
 class PlaneDirection {
  public:
   static constexpr int kSizeLog2 = 3;  // log2 of the edge of the nodes' cubes, in voxels
   static constexpr int kCorners = 9 * 9 * 9;
 
-  // A node of 8^3 voxels, and the numbers of voxels, filled voxels (of inner sides) and octree
-  // nodes in it.
+  // A node of 8^3 voxels, the number of its voxels, the number of voxels that only an inner side
+  // sets (`filled`), and the number of its octree nodes.
   struct Known {
     uint64_t hash;
     uint32_t id;
@@ -75,7 +76,8 @@ class PlaneDirection {
   double buckets_per_unit_;
   int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer
   int64_t offsets_[512];
-  uint16_t bucket_[kBuckets + 1];  // index of the last of values_ that is <= every f of the bucket
+  uint16_t bucket_[kBuckets + 1];  // index of the last element of values_ that is <= every f in the
+                                   // bucket
   Known known_[kCorners];
 };
 static_assert(sizeof(PlaneDirection) <= 24 << 10);

@@ -14,9 +14,9 @@ constexpr uint64_t kMinPlaneSlots = 1024;  // a power of two
 constexpr uint64_t kSpareSlots = 64;
 constexpr uint32_t kMaxPlanes = 1 << 20;
 
-// Packs all inputs of small_node() into a key. Its lowest 60 bits are 2 bits for the inner sides,
-// 24 for the normal, 1 for `fractional`, 5 for the size and 28 for f. The next bit is always 1, so
-// that no key is 0.
+// Packs all inputs of small_node() into a key. The lowest 60 bits of the key are 2 bits for the
+// inner sides, 24 for the normal, 1 for `fractional`, 5 for the size and 28 for f. The next bit is
+// always 1, so that no key is 0.
 uint64_t small_key(const Plane& plane, InnerSides inner, int64_t f, int size_log2) {
   uint64_t key = 4 | inner.bits();
   for (const int64_t x : plane.n) key = key << 8 | static_cast<uint64_t>(x + kSmallNormal);

@@ -38,7 +38,8 @@ class PlaneMemo {
         kernels_(kernels),
         rule_(rule) {}
 
-  // The plane of a triangle. `known` is the number of the plane in the memo, if it has one.
+  // The plane of a triangle. `known` is the index of the plane in planes_, or nullopt if planes_
+  // does not contain the plane.
   struct Found {
     Plane plane;
     std::optional<uint32_t> known;
@@ -113,7 +114,7 @@ class PlaneMemo {
   TileReducer& reducer_;
   const Kernels& kernels_;
   const VoxelRule rule_;
-  PooledArray<uint32_t> known_;  // by number of the narrow triangle
+  PooledArray<uint32_t> known_;  // by number of the narrow triangle; see kWorthwhile
   PooledArray<KnownPlane> planes_;
   uint32_t plane_count_ = 0;
   std::vector<PooledArray<PlaneDirection>> directions_;

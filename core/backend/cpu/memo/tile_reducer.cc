@@ -112,8 +112,8 @@ NodeRef TileReducer::reduce(int words, int count, int from_log2, int size_log2) 
         rest &= ~(uint64_t{0xff} << 8 * byte);
         above |= uint64_t{1} << byte;
       }
-      // Overwrites word w / 8 with bits of the next level. Its old bits have already been
-      // processed, because w / 8 <= w.
+      // Overwrites word w / 8 with bits of the next coarser level. The old bits of this word have
+      // already been processed, because w / 8 <= w.
       existing_.words[w / 8] = w % 8 == 0 ? above : existing_.words[w / 8] | above << 8 * (w % 8);
     }
     look_up(parents_, tables_.nodes(s), hashes_, ids_);
@@ -127,8 +127,8 @@ void TileReducer::look_up(const Parents& parents, NodeTable& table, uint64_t* ha
                           uint32_t* ids) {
   const int count = parents.count;
   table.reserve(static_cast<uint64_t>(count));
-  // The children of a node are at or after the node's position, so they are read before being
-  // overwritten.
+  // In `hashes` and `ids`, the values of a node's children are at or after the node's position, so
+  // they are read before they are overwritten.
   for (int i = 0; i < count; ++i) {
     hashes[i] =
         hash_node(parents.masks[i], popcount8(parents.masks[i]), &hashes[parents.first_child[i]]);

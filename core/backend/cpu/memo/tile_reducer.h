@@ -65,7 +65,7 @@ class TileReducer {
     }
   };
 
-  // Number of words in the bit set of all cubes `levels` levels below a cube.
+  // Returns the number of words in a bit set of all cubes that are `levels` levels below a cube.
   static int words_of(int levels) { return levels > 2 ? 1 << (3 * levels - 6) : 1; }
   // Sets the first `count` elements of ids_ and hashes_ to the nodes of the voxel blocks in
   // blocks_, and clears these blocks in the tile.

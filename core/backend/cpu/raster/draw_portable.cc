@@ -132,7 +132,8 @@ bool may_touch(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
   return true;
 }
 
-// Calls visit(brick, index) for the bricks of the triangle's box.
+// Calls visit(brick, index) for each brick of the triangle's box. `brick` has the brick's
+// coordinates in the tile, in bricks, and `index` is its Morton index.
 template <class Coordinate, class Visit>
 void for_each_brick(const TileTriangle<Coordinate>& t, Visit visit) {
   int first[3], last[3];

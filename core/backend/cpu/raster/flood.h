@@ -114,7 +114,7 @@ VOXDAG_SLICES_INLINE uint32_t corners_in(const Words& voxels) {
     corners |= (voxels[(c >> 2) * kLast] >> kLast * (8 * (c >> 1 & 1) + (c & 1)) & 1) << c;
   return static_cast<uint32_t>(corners);
 }
-// Sets `voxels` to the given corner voxels, numbered as corners_in() returns them.
+// Sets `voxels` to the corner voxels in `corners`, which is a bit set as corners_in() returns it.
 template <int kLast>
 VOXDAG_SLICES_INLINE void set_corners(uint64_t corners, Words& voxels) {
   uint64_t words[2] = {0, 0};

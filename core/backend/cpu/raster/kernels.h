@@ -20,7 +20,7 @@
 
 namespace voxdag::cpu {
 
-// Bit masks of the children of a cube.
+// Sets of children of a cube, as bit masks.
 struct Octants {
   uint32_t touched;  // every child that the triangle touches, and possibly some others
   uint32_t inside;   // touched children that the triangle covers (see Entry in triangle_set.h)
@@ -46,9 +46,9 @@ struct Kernels {
                         uint64_t* bits);
   // Finds the non-empty blocks among the first 8 * groups voxel blocks of the tile, and returns the
   // number of these blocks. Writes their indexes in TileBricks::blocks to `numbers` and their keys
-  // (block_key()) to `keys`, in Morton order. Sets their bits in the 8 * groups bits of `existing`.
-  // Clears TileBricks::touched of all 8 * groups blocks. `numbers` and `keys` need space for one
-  // element more than the number that is returned.
+  // (block_key()) to `keys`, in Morton order. Sets bit i of `existing`, which has 8 * groups bits,
+  // to 1 if block i is not empty, otherwise to 0. Clears TileBricks::touched of all 8 * groups
+  // blocks. `numbers` and `keys` need space for one element more than the number that is returned.
   int (*list_blocks)(TileBricks& tile, int groups, uint8_t* existing, uint16_t* numbers,
                      uint64_t* keys);
   // Copies the non-empty bricks of a voxel block to the front of `bricks`, which has space for

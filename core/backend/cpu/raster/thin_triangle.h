@@ -29,7 +29,7 @@ struct ThinTriangle : TileTriangle<Coordinate> {
   Int lowest_along[3];
   Int width_along[3];  // -1 if the triangle is parallel to the axis
 
-  // Prepares a triangle. Returns false if it certainly sets no voxel of the tile. This is so for
+  // Prepares a triangle. Returns false if it certainly sets no voxel of the tile. Returns false for
   // all degenerate triangles.
   bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const LatticeCube& tile);
 

@@ -56,14 +56,15 @@ struct TileTriangle {
 
  protected:
   static Int positive_part(Int x) { return x > 0 ? x : 0; }
-  // Sets v[axis][vertex] to the vertices relative to the tile, and the range of voxels. Returns
-  // false if the triangle's box misses the tile.
+  // Sets v[axis][vertex] to the vertices relative to the tile's low corner, and first_voxel and
+  // last_voxel to the voxels of the tile in the triangle's box. Returns false if the triangle's box
+  // misses the tile.
   bool set_box(const Triangle<Coordinate>& triangle, const LatticeCube& tile, int64_t (&v)[3][3]);
-  // Sets `half` to the half-edges (the edge vectors, divided by 2), [axis][edge]. Edge i leads from
-  // vertex i.
+  // Sets half[axis][i] to the half-edges: the edge vectors from vertex i to vertex i + 1 (modulo
+  // 3), divided by 2.
   static void set_halves(const int64_t (&v)[3][3], int64_t (&half)[3][3]);
-  // Sets `normal` and `dominant`, and `size` to the magnitudes of the normal's components. If this
-  // negates the normal, also negates the half-edges.
+  // Sets `normal` and `dominant`, and `size` to the magnitudes of the normal's components. If the
+  // dominant component is negative, negates the normal and the half-edges.
   void set_normal(int64_t (&half)[3][3], Int (&size)[3]);
 
  private:

@@ -31,7 +31,7 @@ class SolidFill {
                                               const LatticeCube& tile);
   void pass_plane(const PlaneViews::Sides& sides, uint64_t filled);
 
-  // For each other tile in octree order: begin_tile(), then add() for each triangle, then
+  // For each other tile, in octree order, call begin_tile(), then add() for each triangle, and then
   // fill_tile().
   void begin_tile(const LatticeCube& tile);
   void add(const FixedTriangle& triangle) { views_.add(triangle); }
@@ -40,7 +40,7 @@ class SolidFill {
   // tile has no voxel of the shell.
   bool fill_tile(TileBricks& bricks, int size_log2,
                  const TileFiller::ForEachTriangle& for_each_triangle);
-  // Bit set of the tile's full voxel blocks, for TileReducer.
+  // Returns a bit set of the tile's full voxel blocks, for TileReducer::reduce_bricks().
   const uint64_t* full_blocks() const { return filler_.full_blocks(); }
 
   // Returns the views of a cube without voxels of the shell. The cube is at least as large as a

@@ -16,7 +16,8 @@ namespace {
 // computes the walks to all of them.
 constexpr size_t kMaxBlind = 256;
 
-// Returns a coordinate of a cube with the number `index` in Morton order, below 512.
+// Returns the coordinate, along `axis`, of the cube with the number `index` (below 512) in Morton
+// order.
 int cube_coordinate(int index, int axis) {
   const int bits = index >> (2 - axis);
   return (bits & 1) | (bits >> 2 & 2) | (bits >> 4 & 4);

@@ -61,14 +61,16 @@ class TileFiller {
   void fill_block(int index);
   // Returns the sum of the views from a corner of the block at the position `block` (in blocks).
   int32_t view_at(const int (&block)[3], int corner) const;
-  // Adds the components of `rest` to blind_.
+  // Adds to blind_ the components of `rest`, a set of empty voxels of the block with the number
+  // `index` and the position `low` (in blocks). Then `rest` is empty.
   void add_blind(int index, const int (&low)[3], Slices& rest);
   void fill_blind();
 
   const Kernels& kernels_;
   const SolidRule rule_;
   const int block_log2_;
-  // Bit sets of the cubes with voxels, in Morton order, by the log2 of their edges in blocks.
+  // occupied_[level] is a bit set, in Morton order, of the cubes with voxels. `level` is log2 of
+  // the cubes' edge in blocks.
   uint64_t occupied_[4][kTileBlocks / 64];
   uint64_t full_[kTileBlocks / 64];
   std::vector<BlindComponent> blind_;

@@ -10,7 +10,7 @@ namespace voxdag::cpu {
 
 class TileViews {
  public:
-  static constexpr int kCorners = RunningRows::kRows;  // corners along an edge, at most
+  static constexpr int kCorners = RunningRows::kRows;  // maximum number of corners along an edge
 
   // Starts a tile.
   void begin(const SampleRows& rows);
@@ -23,9 +23,9 @@ class TileViews {
 
   // Returns the sum of the three views from a corner; coordinates are in blocks.
   int32_t at(int x, int y, int z) const { return views_[x][y][z]; }
-  // Sets the classes of the eight corners of a block, in the order of child indices. Views with the
-  // same decision have the same class: 0 if they are outside, 4 or -4 if they are inside and
-  // disputed. Otherwise the class is the sum of the views.
+  // Sets the classes of the eight corners of a block, in the order of child indices. The class of a
+  // corner depends on the sum of its three views: 0 if the sum means outside, 4 or -4 if it means
+  // inside and disputed, and otherwise the sum itself.
   void classes_at(const int (&low)[3], int32_t (&classes)[8]) const {
     for (int c = 0; c < 8; ++c)
       classes[c] = classes_[low[0] + (c >> 2)][low[1] + (c >> 1 & 1)][low[2] + (c & 1)];
@@ -39,7 +39,8 @@ class TileViews {
 
   SampleRows rows_;
   bool has_crossings_[3] = {};
-  // Sums of the signs of the crossings between corners k and k + 1 of a row: [axis][k][row].
+  // crossings_[axis][k][row] is the sum of the signs of the row's crossings between its corners k
+  // and k + 1.
   int32_t crossings_[3][8][RunningRows::kSquare] = {};
   int32_t views_[kCorners][kCorners][kCorners];
   int32_t classes_[kCorners][kCorners][kCorners];

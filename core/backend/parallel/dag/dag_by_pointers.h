@@ -27,18 +27,18 @@ struct Reduced {
   uint32_t count = 0;
   SpaceArray<Space, uint32_t> survivors;  // octree nodes, in the total order
   SpaceArray<Space, uint64_t> hashes;     // hashes of the survivors
-  SpaceArray<Space, uint32_t> index_of;   // by octree node: position of its survivor
+  SpaceArray<Space, uint32_t> index_of;   // by octree node: position of the node's survivor
 };
 
 // The nodes of a level, as lists of their children in the level below, which is already reduced.
 struct LinkedNodes {
   OctreeNodes nodes;
-  const uint32_t* index_of;  // by octree node of the level below: position of its survivor
+  const uint32_t* index_of;  // by octree node of the level below: position of the node's survivor
 
   VOXDAG_HD uint32_t child(uint32_t node, uint32_t rank) const {
     return index_of[nodes.first_child[node] + rank];
   }
-  // Returns 0 if there is no child, otherwise the child's position + 1.
+  // Returns 0 if the node has no child in `slot`, otherwise the child's position + 1.
   VOXDAG_HD uint64_t pointer(uint32_t node, uint32_t slot) const {
     const uint32_t mask = nodes.masks[node];
     if (!(mask >> slot & 1)) return 0;

@@ -35,7 +35,8 @@ inline constexpr int64_t kNarrowUnits = int64_t{1} << 28;
 // order (N = 2: child index, N = 4: brick bit), is the sum of the three parts.
 VOXDAG_HD constexpr int cell_bit(int axis, int k) { return ((k & 1) | (k & 2) << 2) << (2 - axis); }
 
-// Copies cells with coordinate 0 along `axis` to all other coordinates of this axis.
+// Returns `cells`, which have the coordinate 0 along `axis`, together with their copies at all
+// other coordinates along `axis`.
 template <int N>
 VOXDAG_HD inline uint64_t repeat_along(int axis, uint64_t cells) {
   cells |= cells << cell_bit(axis, 1);
@@ -59,7 +60,7 @@ struct TriangleOnLattice {
   int32_t first[3], last[3];  // cells of the bounding box
   int64_t n[3];               // quarter normal
   int128 plane;               // n . (low - v) / 2^shift, floored; v is vertex 0
-  int32_t remainder;          // 1 if the division left a remainder
+  int32_t remainder;          // 1 if the division for `plane` left a remainder
   bool short_normal;          // the plane test needs only 32 bits
   Edge edges[3][3];           // [projection][edge]
 

@@ -8,8 +8,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// A brick's 64 voxels as bytes of two vectors. Bit 5 of a voxel's number selects the vector, and
-// bit 4 selects the half of the vector.
+// Tables in the order in which a brick's 64 voxels are bytes of two vectors. Bit 5 of a voxel's
+// number selects the vector, and bit 4 selects the half of the vector.
 template <int D>
 struct ByteOrder {
   alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel column's number
@@ -30,8 +30,8 @@ struct ByteOrder {
 template <int D>
 inline constexpr ByteOrder<D> kByteOrder;
 
-// The HeightBounds (sides.h) of a column of bricks, copied to a byte for each of a brick's 64
-// voxels.
+// Copies the HeightBounds (sides.h) of a column of bricks to the 64 voxels of a brick. For each
+// voxel, a byte of below_ and a byte of over_ have the bounds of its voxel column.
 template <int D>
 class Spread {
  public:

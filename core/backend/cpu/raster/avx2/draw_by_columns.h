@@ -90,8 +90,9 @@ class ColumnWalk {
   Sides<D> sides;
 };
 
-// Converts a set of voxel columns, in which column (p, q) has bit p + 4 q, to the set of a brick
-// layer's voxels in Morton order.
+// Converts a set of the 16 voxel columns of a column of bricks, in which column (p, q) has bit p +
+// 4 q. Returns the voxels that these columns have in one layer of a brick, as 16 bits in Morton
+// order.
 template <int D>
 VOXDAG_INLINE uint32_t in_layer(uint32_t columns) {
   const uint32_t middle = (columns >> 2 ^ columns) & 0x0c0c;

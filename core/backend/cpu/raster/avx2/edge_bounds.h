@@ -90,9 +90,9 @@ constexpr BoundOrder kBoundOrder;
 
 class EdgeBounds {
  public:
-  // If `bound_first`, the bounded coordinate has the edges' factor a and the row has the factor b;
-  // otherwise the reverse. Adds `below_more` to all bounds from below and `over_more` to all bounds
-  // from above.
+  // If `bound_first` is true, x (the bounded coordinate) has the edges' factor a, and k (the row)
+  // has the factor b. Otherwise x has the factor b, and k has the factor a. Adds `below_more` to
+  // all bounds from below and `over_more` to all bounds from above.
   VOXDAG_INLINE EdgeBounds(const Edge (&edges)[3], bool bound_first, double below_more,
                            double over_more) {
     const EdgeLanes lanes(edges);

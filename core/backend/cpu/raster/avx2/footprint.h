@@ -19,8 +19,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// The rules kShell and kThin differ in the edges (tile_triangle.h, thin_triangle.h) and in the
-// columns of bricks that they list: kShell lists kInside, kThin lists kTouched.
+// Determines which columns of bricks a Footprint lists: kInside for the rule kShell, kTouched for
+// the rule kThin. (The rules also have different edges: see tile_triangle.h and thin_triangle.h.)
 enum class FootprintColumns {
   kInside,   // columns of bricks that have a voxel column inside
   kTouched,  // columns of bricks that the triangle touches, even if no voxel column is inside

@@ -69,7 +69,7 @@ class Heights {
     set_lanes(np > 0, sp, nq > 0, sq, width_units);
   }
 
-  // The heights at which the plane passes a column of bricks.
+  // The place where the plane crosses the column of bricks (p, q).
   struct Column {
     int p, q;
     int64_t from, to;  // range of bricks that the plane may touch; empty if from > to

@@ -37,7 +37,8 @@ VOXDAG_INLINE int list_blocks_with(TileBricks& tile, int groups, uint8_t* existi
     for (; touched != 0; touched &= touched - 1) {
       const int i = __builtin_ctzll(touched) / 8;
       const BlockSummary block = summarize(tile.blocks[8 * group + i]);
-      // Written without a branch. If the block is empty, the next block overwrites this element.
+      // Always writes the block's number and key, because a branch would often be mispredicted. If
+      // the block is empty, the next block overwrites them.
       numbers[count] = static_cast<uint16_t>(8 * group + i);
       keys[count] = block.key;
       count += block.has_voxels;

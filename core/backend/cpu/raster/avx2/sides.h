@@ -70,7 +70,7 @@ class Sides {
   VOXDAG_INLINE HeightBounds bounds(int p, int q, int brick) const {
     return from_floor(_mm256_max_epu8(by_q_[q], by_p_[p]), brick);
   }
-  // The bounds from one projection only.
+  // Return the bounds from one projection only.
   VOXDAG_INLINE HeightBounds bounds_of_q(int q, int brick) const {
     return from_floor(by_q_[q], brick);
   }

@@ -27,7 +27,8 @@ class SideCrossings {
       : heights(t.normal, t.lowest_along[axis], t.width_along[axis]) {}
 
   // Returns a mask of the voxel columns of `at` that have a voxel within the bounds of the plane
-  // and within `sides`. For such a column, both its bytes in HeightBounds (sides.h) have all ones.
+  // and within `sides`. The mask has the layout of HeightBounds (sides.h); both bytes of such a
+  // column are all ones.
   VOXDAG_INLINE __m256i hits(const typename Heights<D>::Column& at, HeightBounds sides) const {
     const HeightBounds bounds =
         _mm256_max_epu8(heights.bounds(heights.in_bricks_of(at), _mm256_setzero_si256()), sides);
@@ -79,7 +80,8 @@ class ThinColumnWalk {
  private:
   static constexpr int8_t kNothing = 120;  // as a bound, excludes all voxels
 
-  // Returns all ones in the bytes of the voxel columns in a set of Footprint::inside.
+  // Returns a vector with the layout of HeightBounds. The bytes of the voxel columns in `inside` (a
+  // set as in Footprint::inside) are all ones, and all other bytes are 0.
   static VOXDAG_INLINE __m256i columns_of(uint16_t inside) {
     const __m256i bits = load(kInsideBits.bit);
     const __m256i lanes = _mm256_cmpeq_epi16(

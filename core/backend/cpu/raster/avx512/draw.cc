@@ -37,8 +37,8 @@ inline constexpr VoxelBytes<D> kVoxelBytes;
 
 VOXDAG_INLINE __m512i load512(const void* at) { return _mm512_load_si512(at); }
 
-// The HeightBounds (sides.h) of a column of bricks, copied to a byte for each of a brick's 64
-// voxels.
+// Copies the HeightBounds (sides.h) of a column of bricks to the 64 voxels of a brick. For each
+// voxel, a byte of below_ and a byte of over_ have the bounds of its voxel column.
 template <int D>
 class Spread512 {
  public:
