@@ -23,7 +23,8 @@ namespace {
 constexpr size_t kPoints = 2'000'000;
 constexpr size_t kNearestPoints = 2000;
 constexpr size_t kReaderBoxes = 20;
-// OctoMap takes some 5 GB for Sponza on a grid of 2048^3.
+// The other libraries get grids of at most 2^11 cells per edge, because OctoMap needs about 5 GB of
+// memory for Sponza on a grid of this size.
 constexpr uint32_t kMaxOtherLevels = 11;
 
 // Prints a timing, and whether its `found` differs from expected->found. `expected` is the timing

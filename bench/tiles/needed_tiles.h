@@ -65,7 +65,8 @@ class NeededTiles {
     if (level < 2) return;  // the first tile has these children
     const uint32_t bricks = dag_.grid_levels() - 2;
     for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) {
-      // The tile above contains the cells down to two levels below the root of a tile.
+      // The tile above a tile contains the cells down to two levels below the lower tile's root. So
+      // the root of the tile with the children is at least two levels above the cell.
       uint32_t root = std::min(level - 2, bricks);
       while (root > 0 && (bricks - root) % depth != 0) --root;
       if (root == 0 || root == bricks) continue;
