@@ -93,8 +93,8 @@ struct BuildOptions {
   std::string cache_folder;  // folder for subvolumes shared between builds; "": no cache
   uint64_t cache_bytes = uint64_t{16} << 30;  // maximum size of the cache folder
 
-  // Resources. Resident memory, without `mesh`, exceeds memory_bytes by at most 64 MiB if the
-  // allocator returns freed memory to the system (docs/library.md).
+  // Resources. If the allocator returns freed memory to the system (docs/library.md), the process
+  // has at most memory_bytes + 64 MiB of resident memory, plus the memory of `mesh`.
   uint64_t memory_bytes = 0;    // at least 64 MiB; 0: half of the RAM or cgroup limit
   unsigned threads = 0;         // 0: all CPUs that the process may use
   uint64_t subvolume_edge = 0;  // in voxels, a power of two; 0: chosen by the plan
@@ -122,7 +122,7 @@ struct BuildHooks {
 // A fault of the scene that did not stop the build.
 struct SceneWarning {
   std::string code;     // the kind, such as "ignored-extension" (docs/scenes.md)
-  std::string place;    // the first place: the scene file, and the element of the file
+  std::string place;    // the first place of the fault: the scene file and its element
   std::string message;  // one sentence about this place
   uint64_t count = 1;   // number of places
 };

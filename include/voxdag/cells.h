@@ -19,8 +19,8 @@ struct Region {
   Position high{};
 
   bool empty() const { return low[0] >= high[0] || low[1] >= high[1] || low[2] >= high[2]; }
-  // intersects() is true if the region contains at least one cell of the cube with this low corner
-  // and edge. contains() is true if the region contains all cells of the cube.
+  // intersects() returns true if the region contains at least one cell of the cube with this low
+  // corner and edge. contains() returns true if the region contains all cells of the cube.
   bool intersects(const Position& corner, int64_t edge) const {
     for (size_t axis = 0; axis < 3; ++axis)
       if (corner[axis] >= high[axis] || corner[axis] + edge <= low[axis]) return false;
