@@ -9,7 +9,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kNoNode = ~uint64_t{0};
+constexpr uint64_t kNoOffset = ~uint64_t{0};
 constexpr const char* kDagMemory =
     "the DAG of the selection (a smaller --region or a coarser --level needs less)";
 
@@ -60,16 +60,16 @@ class SlotTable {
 
 struct NodeSlot {
   uint64_t hash = 0;
-  uint64_t offset = kNoNode;
-  bool free() const { return offset == kNoNode; }
+  uint64_t offset = kNoOffset;
+  bool free() const { return offset == kNoOffset; }
 };
 
 struct MemoSlot {
-  uint64_t hash = 0;          // bijective hash of `source`
-  uint64_t source = 0;        // word offset of the file's node in its level
-  uint64_t offset = kNoNode;  // word offset of the new node in its level
-  uint64_t voxels = 0;        // voxels below the new node
-  bool free() const { return offset == kNoNode; }
+  uint64_t hash = 0;            // bijective hash of `source`
+  uint64_t source = 0;          // word offset of the file's node in its level
+  uint64_t offset = kNoOffset;  // word offset of the new node in its level
+  uint64_t voxels = 0;          // voxels below the new node
+  bool free() const { return offset == kNoOffset; }
 };
 
 // One level of the new DAG.
@@ -117,7 +117,7 @@ class BuiltLevel {
 };
 
 struct BuiltNode {
-  uint64_t offset = kNoNode;
+  uint64_t offset = kNoOffset;
   uint64_t voxels = 0;
 };
 
@@ -172,7 +172,7 @@ class DagBuilder {
       if (!children.has(i)) continue;
       const BuiltNode child =
           build(depth + 1, job_.dag.content(depth, children, i), child_corner(corner, i, edge / 2));
-      if (child.offset == kNoNode) continue;
+      if (child.offset == kNoOffset) continue;
       words[0] |= 1u << i;
       words[count++] = static_cast<uint32_t>(child.offset);
       node.voxels += child.voxels;
