@@ -324,7 +324,8 @@ void remove_finished_work(BuildJob& job) {
   if (!job.spec.run.keep_work) remove_work(job);
 }
 
-// Runs all stages of a build.
+// Runs all stages of a build, writes its report, and removes finished work
+// (remove_finished_work()).
 void run_stages(BuildJob& job, SubvolumeBuilder& builder, double start_s) {
   prepare_work_folder(job);
   build_artifacts(job, builder);

@@ -28,7 +28,7 @@ class Service {
   // Serves until stop(). Then stops builds at a checkpoint, waits for requests in progress up to
   // ServerConfig::drain_timeout_s, and returns.
   void run();
-  // May be called from any thread.
+  // Makes run() return. May be called from any thread.
   void stop();
 
  private:

@@ -12,7 +12,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kDrainS = 1;
-// Enough for the old and the new file while the file is being replaced.
+// Maximum number of open files: enough for the old and the new file while the file is being
+// replaced.
 constexpr size_t kMaxOpen = 2;
 constexpr size_t kMaxConcurrentTiles = 64;
 

@@ -24,7 +24,7 @@ class ViewService {
   std::string url() const;
   // Serves until stop().
   void run();
-  // May be called from any thread.
+  // Makes run() return. May be called from any thread.
   void stop() {
     stopping_.cancel();
     http_.stop();

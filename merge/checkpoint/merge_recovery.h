@@ -57,8 +57,9 @@ class MergeRecovery {
   // Returns the intermediates (outputs of earlier passes) among the pending artifacts from index
   // `begin` on.
   std::vector<ArtifactRef> intermediates_from(size_t begin) const;
-  // Returns the ranges of the input segments with the frames of the levels from the bricks up to
-  // `level`. Omits ranges that earlier calls returned, and ranges that are still short.
+  // For each input, returns the range of its segment that contains the frames of the levels from
+  // the bricks up to `level`. Omits the part that earlier calls returned, and ranges that are still
+  // shorter than kMinReleasedBytes.
   std::vector<SegmentRange> newly_merged(std::span<const ArtifactReader> readers, uint32_t level);
 
   const MergeContext& context_;

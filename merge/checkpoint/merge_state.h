@@ -43,7 +43,7 @@ struct MergeState {
 };
 
 std::vector<std::byte> encode_state(MergeState state);
-// Throws Error{kCorrupt} if the bytes are not a state of this version.
+// Decodes a state. Throws Error{kCorrupt} if the bytes are not a state of this version.
 MergeState decode_state(std::span<const std::byte> bytes);
 
 }  // namespace voxdag

@@ -7,7 +7,8 @@
 namespace voxdag {
 namespace {
 
-// Returns the number of rows of all runs before each run, followed by the number of all rows.
+// Returns, for each run, the number of rows in all runs before it. The last item is the number of
+// all rows.
 std::vector<uint64_t> begins_of(std::span<const uint64_t> rows) {
   std::vector<uint64_t> begins{0};
   for (const uint64_t count : rows) begins.push_back(begins.back() + count);

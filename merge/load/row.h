@@ -30,7 +30,8 @@ inline constexpr uint8_t kBrickRowMask = 3;
 inline constexpr uint32_t kBrickWords = 2;
 inline constexpr uint32_t kMaxRowWords = 16;
 
-// The representation of a level's rows.
+// How the rows of a level are represented: as bricks or as nodes, and with children of one word or
+// of two words.
 struct RowFormat {
   bool bricks = false;
   bool wide = false;  // children take two words

@@ -83,7 +83,7 @@ class ScratchFile {
   ScratchFile(ScratchFolder& folder, ScratchFileState state);
 
   void write(uint64_t first_word, std::span<const uint32_t> words);
-  // Throws Error{kCorrupt} if the words from the disk differ from the written ones.
+  // Reads words. Throws Error{kCorrupt} if the words on the disk differ from the written ones.
   void read(uint64_t first_word, std::span<uint32_t> words) const;
   void sync() { out_->sync(); }
 

@@ -23,7 +23,7 @@ struct ClusterContext {
 };
 
 // Returns the command runner in the spec's cluster options, else system_commands(). Only tests set
-// one in the options.
+// a command runner in the options.
 CommandRunner& commands_of(const BuildSpec& spec);
 // Returns `path` in the form that tasks on other machines need: absolute and normalized.
 std::string absolute_path(const std::string& path);

@@ -223,7 +223,7 @@ void SlurmMergeJob::show_progress() {
   try {
     state = read_cluster_state(context_.files, folder_.work_folder());
   } catch (const Error&) {
-    // The merge job reports a permanent error.
+    // Ignores the error. If it is permanent, the merge job reports it.
   }
   if (!state) return;
   set_names(*state);

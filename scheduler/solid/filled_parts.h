@@ -31,7 +31,7 @@ struct FilledPart {
 
 class FilledParts {
  public:
-  // `identity` names the job; parts of other jobs are not used.
+  // `identity` identifies the job: load() ignores parts that were saved with another identity.
   FilledParts(FileSystem& files, std::string path, std::string identity);
 
   // Loads the parts that an earlier run saved, if any.

@@ -1,4 +1,4 @@
-// The seed of an enclosed solid: a point whose space is filled.
+// The seed of an enclosed solid: a point. Only the enclosed space around the seed is filled.
 #pragma once
 
 #include <array>

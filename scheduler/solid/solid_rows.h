@@ -29,8 +29,9 @@ namespace voxdag {
 // filled or left empty as one piece (core/geometry/solid_rule.h).
 enum class SolidUnit : uint32_t {
   kShell,      // it has voxels of the shell
-  kEmptyUnit,  // it has none, but the cube around it does: it is one unit
-  kEmpty,      // the cube around it has none either, so it is a part of a larger unit
+  kEmptyUnit,  // it has none: a part of a split subvolume that is one unit
+  kEmpty,      // it has none: a planned subvolume, whose unit is in SolidRows::full_cubes if it is
+               // inside the solid
 };
 
 struct SubvolumeRows {
@@ -38,7 +39,8 @@ struct SubvolumeRows {
   RowExtent views[3];
 };
 
-// A unit that is larger than any subvolume in it, and inside the solid.
+// A unit (see SolidUnit) that is inside the solid and outside all subvolumes with voxels of the
+// shell.
 struct FullCube {
   Cube cube;
   bool is_disputed = false;
@@ -72,7 +74,8 @@ class SolidRows {
   RowFile& file() { return *file_; }
   void add(const Cube& cube, const SubvolumeRows& rows);
   SubvolumeRows find(const Cube& cube) const;
-  // Reads the views from a subvolume's low faces. The caller charges their row_bytes().
+  // Reads the views from a subvolume's low faces. The caller charges row_bytes() for them to its
+  // budget.
   SolidEntry read_entry(const Cube& cube) const;
 
   std::vector<FullCube> full_cubes;

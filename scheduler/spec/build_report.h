@@ -77,8 +77,8 @@ std::vector<std::string> reported_scenes(const BuildSpec& spec);
 
 // Returns one JSON object; docs/cli.md lists its members.
 std::string report_json(const BuildReport& report);
-// Throws Error{kCorrupt} for a text not created by report_json(). Fields missing from the text have
-// their defaults.
+// Decodes a report. Throws Error{kCorrupt} for a text not created by report_json(). Fields missing
+// from the text have their defaults.
 BuildReport decode_report(const std::string& text);
 
 }  // namespace voxdag

@@ -139,7 +139,7 @@ struct ColorMemory {
 struct WorkerMemory {
   // Maximum number of workers. It is limited because every worker has a segment file open.
   static constexpr uint64_t kMaxWorkers = 256;
-  // Memory one worker needs outside its share.
+  // Memory that one worker needs in addition to share_bytes.
   static constexpr uint64_t kOutsideShareBytes = kSegmentWriterBytes + BackendMemory::kMinPageBytes;
 
   unsigned workers = 1;

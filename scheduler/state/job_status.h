@@ -26,7 +26,8 @@ struct JobStatus {
   double eta_s() const;
 };
 
-// Throws Error{kNotFound} if the folder has no job store.
+// Reads the state of the build in a work folder. Throws Error{kNotFound} if the folder has no job
+// store.
 JobStatus read_job_status(FileSystem& files, const std::string& work_folder);
 
 // Returns one JSON object with the names in docs/cli.md. `cluster` is the JSON status of a cluster

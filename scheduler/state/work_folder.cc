@@ -41,7 +41,7 @@ bool is_scratch(const DirectoryEntry& entry) {
 // NFS gives such a name to a removed file that a process still has open.
 bool is_left_by_nfs(std::string_view name) { return name.starts_with(".nfs"); }
 
-// Files and folders of a cluster build; slurm/files/cluster_folder.h lists them. Any entry, even a
+// True for a file or folder of a cluster build (slurm/files/cluster_folder.h). Any entry, even a
 // folder or a pipe, may have the name of a record; the build warns about it.
 bool is_of_cluster(const DirectoryEntry& entry) {
   const std::string_view name = entry.name;

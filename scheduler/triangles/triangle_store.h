@@ -77,7 +77,7 @@ class BinWriter {
   // Chooses the chunk size so that the incomplete chunks of all bins together take at most about
   // `buffer_bytes`.
   BinWriter(TriangleStore& store, std::vector<BinId> targets, size_t buffer_bytes);
-  // Add triangles or records to a bin. `target` is an index into the constructor's `targets`.
+  // Adds triangles or records to a bin. `target` is an index into the constructor's `targets`.
   void append(size_t target, const FixedTriangle& triangle);
   void append(size_t target, std::span<const std::byte> records);
   // Adds the buffered records to the bins.

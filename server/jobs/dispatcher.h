@@ -104,7 +104,8 @@ class Dispatcher {
   // The loop of the thread that starts jobs.
   void dispatch();
   void start_ready_jobs();
-  // Returns false if no job is ready, or if the limits leave no slot, memory or disk space for it.
+  // Starts the next ready job. Returns false if no job is ready, or if the limits leave no slot,
+  // memory or disk space for it.
   bool start_next_job();
   void start_preview();
   void start_worker(const std::string& key, std::shared_ptr<LiveJob> live,

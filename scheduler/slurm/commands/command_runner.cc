@@ -60,7 +60,7 @@ class FileActions {
 
 class Attributes {
  public:
-  // Restores the default actions, in the started program, of signals that this process may ignore.
+  // Gives signals that this process may ignore their default actions in the started program.
   Attributes() {
     posix_spawnattr_init(&attributes_);
     sigset_t defaults;
@@ -68,7 +68,7 @@ class Attributes {
     for (const int signal : {SIGPIPE, SIGXFSZ, SIGINT}) sigaddset(&defaults, signal);
     posix_spawnattr_setsigdefault(&attributes_, &defaults);
     posix_spawnattr_setpgroup(&attributes_, 0);
-    // A separate process group, so that Ctrl-C does not kill the command.
+    // Starts the command in a separate process group, so that Ctrl-C does not kill it.
     posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
   }
   ~Attributes() { posix_spawnattr_destroy(&attributes_); }

@@ -68,8 +68,8 @@ std::string script_line(const std::vector<std::string>& command) {
   return line;
 }
 
-// Escapes % in the path of the log folder, because sbatch replaces patterns such as %A. Only `name`
-// may contain such patterns.
+// Returns sbatch's option for the log file `name` in the log folder. Escapes % in the path of the
+// folder, because sbatch replaces patterns such as %A. Only `name` may contain such patterns.
 std::string output_option(const std::string& log_folder, const std::string& name) {
   std::string option = "--output=";
   for (const char c : log_folder) option += c == '%' ? "%%" : std::string(1, c);

@@ -69,7 +69,7 @@ struct ClusterState {
 };
 
 std::string encode_state(const ClusterState& state);
-// Throws Error{kCorrupt} for a text not created by encode_state().
+// Decodes a state. Throws Error{kCorrupt} for a text not created by encode_state().
 ClusterState decode_state(const std::string& text);
 // Reads the state in a work folder; nullopt if the folder has no cluster build. Throws Error with
 // the name of cluster.json if this file cannot be read or is damaged.

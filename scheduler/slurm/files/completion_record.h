@@ -45,7 +45,7 @@ struct CompletionRecord {
 };
 
 std::string encode_record(const CompletionRecord& record);
-// Throws Error{kCorrupt} for a text not created by encode_record().
+// Decodes a record. Throws Error{kCorrupt} for a text not created by encode_record().
 CompletionRecord decode_record(const std::string& text);
 
 // The reason why an attempt ended without a record, as reported by the task.

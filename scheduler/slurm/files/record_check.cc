@@ -19,7 +19,7 @@ std::string describe(const Cube& cube) {
 }
 
 // True if every triangle in a cube sets a voxel of the cube. With the rule kThin, a triangle sets
-// no voxel if it crosses no row through voxel centers.
+// no voxel if it crosses no axis-parallel line through voxel centers.
 bool always_sets_voxels(VoxelRule rule) { return rule == VoxelRule::kShell; }
 
 // Checks that the record has voxels only in subvolumes that have triangles. Unless the rule allows

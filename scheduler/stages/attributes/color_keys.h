@@ -43,7 +43,8 @@ std::vector<Checksum128> look_digests(std::span<const Material> materials,
                                       const AttributeSet& attributes,
                                       const Cutouts* cutouts = nullptr);
 
-// Returns a digest of a surface's record (surface_record.h) and its material's look.
+// Returns a digest of a surface's record (surface_record.h) and its material's look
+// (look_digests()).
 Checksum128 surface_digest(std::span<const std::byte> record, const Checksum128& look);
 
 // Returns the key of one attribute of a cube whose surfaces have the summary `content`.

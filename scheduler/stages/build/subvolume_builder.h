@@ -18,8 +18,8 @@ class SubvolumeBuilder {
   // Records subvolumes that an earlier run built outside this process for the scene with this
   // digest. Called after the plan is in the job store and before build().
   virtual void resume(const std::string& scene_digest) = 0;
-  // The partition and build stages: fills bins from the scene's triangles and builds `planned`.
-  // Frees the triangles.
+  // Runs the partition and build stages: fills bins from the scene's triangles, builds `planned`,
+  // and frees the triangles.
   virtual void build(PreparedScene& scene, std::span<const StoredSubvolume> planned) = 0;
   // Adds the builder's totals. Also called if there was nothing to build.
   virtual void add_to(BuildReport& report) const = 0;

@@ -37,7 +37,7 @@ struct PartTooLarge {
 
 // A part of the grid in memory: its nodes and the labels of its empty space.
 struct LabeledSpace {
-  // The pages come from `pool`, or from a pool of this object if it is null.
+  // The pages come from `pool`, or from a pool of this object if `pool` is null.
   LabeledSpace(uint64_t limit_bytes, MemoryBudget& parent, PagePool* pool)
       : budget(limit_bytes, &parent), memory{budget, pool ? *pool : own_pool} {}
 

@@ -95,7 +95,8 @@ class SnappedPiece {
     counts_.expected_voxels = 0;
   }
 
-  // Returns true if the triangle is in the grid. Otherwise counts it, or sets too_far_.
+  // Returns true if the triangle is in the grid. Otherwise counts the triangle as dropped, or sets
+  // too_far_.
   bool is_inside(SnapResult result) {
     if (result == SnapResult::kOutside) ++counts_.dropped_outside;
     if (result == SnapResult::kTooFar && !too_far_)
@@ -117,8 +118,9 @@ class SnappedPiece {
     ++stored_;
   }
 
-  // The checksum covers the triangles with their corners, not the patches, so that later stages
-  // can compare it with the scene.
+  // Reads `count` triangles with their materials, from index `first` on. The checksum covers the
+  // triangles with their corners, not the patches, so that later stages can compare it with the
+  // scene.
   void read_surfaces(TriangleCursor& cursor, uint64_t first, uint64_t count) {
     late_.clear();
     identity_.clear();

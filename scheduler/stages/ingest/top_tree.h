@@ -48,7 +48,7 @@ class TopTree {
    public:
     explicit Tally(const TopTree& top) : grid_levels_(top.grid_levels_), depth_(top.depth_) {}
     void clear();
-    // `weight`: the number of bricks that the triangle is expected to touch.
+    // Adds a triangle. `weight` is the number of bricks that the triangle is expected to touch.
     void add(const FixedTriangle& triangle, double weight);
 
    private:

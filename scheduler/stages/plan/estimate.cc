@@ -36,7 +36,8 @@ constexpr double kArtifactBytesPerNode = 16;
 // Upper bound of the bytes of a node, in an artifact or in the global file. An uncompressed node
 // takes fewer.
 constexpr double kMaxDiskBytesPerNode = 40;
-// CPU time per DAG node of a build, relative to its pilot. Measured on real scenes.
+// CPU time per DAG node of a build, divided by the CPU time per DAG node of its pilot. Measured on
+// real scenes.
 constexpr double kBuildOverPilotTime = 1.5;
 // Upper bound of the cells per brick. A surface that crosses a brick sets about 16 of its voxels.
 constexpr double kMaxCellsPerBrick = 32;

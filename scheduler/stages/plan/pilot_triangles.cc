@@ -44,7 +44,7 @@ class RecentTriangles {
   static constexpr size_t kBytes = (size_t{1} << 14) * sizeof(FixedTriangle);
 
   RecentTriangles() : slots_(kBytes / sizeof(FixedTriangle)) {}
-  // Returns false if an equal triangle is remembered.
+  // Remembers the triangle. Returns false if an equal triangle was already remembered.
   bool add(const FixedTriangle& triangle) {
     uint64_t hash = 0;
     for (const auto& vertex : triangle.v)

@@ -62,7 +62,8 @@ class PilotBuilder {
   }
 
  private:
-  // Returns nullopt if the pilot does not fit the budget.
+  // Builds a pilot on a grid with `levels` levels. Returns nullopt if the pilot does not fit the
+  // budget.
   std::optional<PilotCounts> try_build(uint32_t levels) try {
     const double start = thread_cpu_seconds();
     PilotCounts counts;

@@ -54,9 +54,10 @@ class RowColumn {
   // Call the functions in this order: add_total() for all subvolumes of the column, and
   // add_outside(); then begin(); then entry() and advance() for each subvolume in Morton order.
   void add_total(const Cube& cube, const std::vector<int32_t>& numbers);
-  // Adds the column's rows to the counts; each row of the grid counts once. Call it before begin().
+  // Adds the column's rows to `counts`; each row of the grid counts once. Call it before begin().
   void count(RowCounts& counts) const;
-  // Adds the rows of one tile; `number` returns a row's number (row_sums.h).
+  // Adds the rows of one tile to `counts`. number(i) returns the number (row_sums.h) of row i of
+  // the tile.
   template <class Number>
   static void count_tile(const TileGrid& grid, int first, int second, Number number,
                          RowCounts& counts);

@@ -52,8 +52,8 @@ struct IngestRecord {
 };
 
 std::vector<std::byte> encode(const IngestRecord& record);
-// Throws Error{kCorrupt} for bytes that encode() did not write, Error{kUnsupportedVersion} for
-// bytes of another version.
+// Decodes a record. Throws Error{kCorrupt} for bytes that encode() did not write,
+// Error{kUnsupportedVersion} for bytes of another version.
 IngestRecord decode_ingest_record(std::span<const std::byte> bytes);
 
 }  // namespace voxdag

@@ -53,7 +53,7 @@ struct NewToken {
   std::string token;
   std::string line;
 };
-// Throws Error{kInvalidInput} for an invalid role or name.
+// Creates a token. Throws Error{kInvalidInput} for an invalid role or name.
 NewToken make_token(const std::string& role, const std::string& name);
 
 }  // namespace voxdag::server

@@ -55,7 +55,7 @@ struct Context {
   std::multiset<std::string> planned_scenes = {};
 };
 
-// Throws Problem (404) for an unknown job.
+// Returns the job with this id. Throws Problem (404) for an unknown job.
 Job find_job(JobQueue& queue, const std::string& id);
 
 }  // namespace voxdag::server

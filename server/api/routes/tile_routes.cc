@@ -257,7 +257,8 @@ TileAccess open_result(Context& context, const Call& call) {
   return {context.open_sources.open(context.dispatcher.folder(job.id).result()), std::move(permit)};
 }
 
-// Calls `make` with the id, folder and resolution of a job that has not succeeded.
+// Returns make(id, folder, resolution) for the job of the call. Throws Problem (404) if the job has
+// succeeded, or if its subvolumes are not known yet.
 template <class Make>
 auto with_unfinished_job(Context& context, const Call& call, const Make& make) {
   const Job job = find_job(context.queue, call.names[0]);

@@ -50,7 +50,7 @@ class ConnectionTable {
   // Records that the connection has waited for its client since `since_s` (wall_seconds()).
   void set_waiting(Place place, double since_s, Waiting waiting);
   void set_working(Place place);
-  // Call it before closing the socket.
+  // Removes the connection. Call it before closing the socket.
   void remove(Place place);
 
   // Reserves memory for an answer of the connection. If too little is free, closes connections

@@ -19,7 +19,8 @@ class Listener {
   // Calls on_connection(socket, client address) for every connection; the socket is non-blocking
   // and belongs to the callee. Returns after stop().
   void accept_all(const std::function<void(int socket, const std::string& address)>& on_connection);
-  // May be called from any thread and repeatedly. Connections not yet accepted are refused.
+  // Ends accept_all(). May be called from any thread and repeatedly. Connections not yet accepted
+  // are refused.
   void stop();
 
  private:

@@ -14,9 +14,9 @@ struct Target {
   std::map<std::string, std::string> query;  // percent-decoded
 };
 
-// Throws Problem (400) for malformed escapes, control characters, a repeated query parameter, or a
-// target that is not a path. Does not resolve "." and "..": they are ordinary names that no route
-// has.
+// Parses a target. Throws Problem (400) for malformed escapes, control characters, a repeated query
+// parameter, or a target that is not a path. Does not resolve "." and "..": they are ordinary names
+// that no route has.
 Target parse_target(std::string_view text);
 
 }  // namespace voxdag::server

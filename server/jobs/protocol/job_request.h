@@ -29,7 +29,8 @@ void fields(Visitor& visit, JobRequest& request) {
   visit.object("options", [&](auto& options) { visit_job_options(options, request.spec); });
 }
 
-// Throws RequestError{kInvalid} with the member that is unknown, missing or has a wrong value.
+// Parses the body of POST /jobs. Throws RequestError{kInvalid} with the member that is unknown,
+// missing or has a wrong value.
 JobRequest parse_job_request(std::string_view body);
 
 // The body of PATCH /jobs/{id}.

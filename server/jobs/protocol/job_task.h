@@ -23,7 +23,7 @@ struct JobTask {
   ClusterOptions cluster;             // as in ServerConfig
 };
 void write_task(FileSystem& files, const std::string& path, const JobTask& task);
-// Throws Error{kCorrupt} for a file that is not a task.
+// Reads a task. Throws Error{kCorrupt} for a file that is not a task.
 JobTask read_task(FileSystem& files, const std::string& path);
 
 }  // namespace voxdag::server

@@ -2,7 +2,7 @@
 
 const kThinSpace = "\u2009";
 
-// 2567687158 -> "2 567 687 158"
+// Returns a count with a thin space between groups of digits: 2567687158 -> "2 567 687 158".
 export function countText(count) {
   return String(Math.round(count)).replace(/\B(?=(\d{3})+$)/g, kThinSpace);
 }
@@ -28,7 +28,8 @@ export function unitText(text, unit) {
   return `${text} ${text === "1" ? unit.replace(/s$/, "") : unit}`;
 }
 
-// "1.40 MiB", "3.20 MiB" -> "1.40 – 3.20 MiB"
+// Joins two texts with the same unit, or with different units: "1.40 MiB", "3.20 MiB" -> "1.40 –
+// 3.20 MiB".
 export function rangeText(low, high) {
   const unit = / [A-Za-z]+$/.exec(high)?.[0];
   return `${unit && low.endsWith(unit) ? low.slice(0, -unit.length) : low} – ${high}`;
@@ -42,7 +43,7 @@ export function sizeText(bytes) {
   return unit === 0 ? `${Math.round(bytes)} B` : `${threeDigits(bytes)} ${units[unit]}`;
 }
 
-// 64 -> "1 m 04 s", 0.046 -> "46 ms"
+// Returns the text of a duration: 64 -> "1 m 04 s", 0.046 -> "46 ms".
 export function durationText(seconds) {
   if (seconds > 0 && seconds < 0.9995) return `${Math.max(1, Math.round(1000 * seconds))} ms`;
   const whole = Math.round(seconds);
@@ -54,7 +55,7 @@ export function durationText(seconds) {
   return `${seconds.toFixed(1)} s`;
 }
 
-// "just now", "5 min ago", "in 3 min"
+// Returns the distance of a time from now: "just now", "5 min ago", "in 3 min".
 export function agoText(time) {
   const seconds = (Date.now() - Date.parse(time)) / 1000;
   const away = Math.abs(seconds);
@@ -66,7 +67,7 @@ export function agoText(time) {
   return seconds >= 0 ? `${text} ago` : `in ${text}`;
 }
 
-// "2026-11-21 07:00:00", in the local time zone
+// Returns the text of a time in the local time zone: "2026-11-21 07:00:00".
 export function timeText(time) {
   const date = new Date(time);
   const two = (n) => String(n).padStart(2, "0");

@@ -49,7 +49,7 @@ class NewJob {
     });
   }
 
-  // `like`: id of a job from which the scene and the options are copied.
+  // Fills in the form. `like` is the id of a job from which the scene and the options are copied.
   async begin(like) {
     try {
       const model =

@@ -31,7 +31,8 @@ export class Camera {
     });
   }
 
-  // Throws an Error if no picture can be taken from this position. The message is for users.
+  // Sets the camera. Throws an Error, with a message for users, if no picture can be taken from
+  // this position.
   set({eye, target, fovDegrees}) {
     if (![...eye, ...target].every(Number.isFinite))
       throw new Error("The coordinates of the camera and its target must be finite numbers.");

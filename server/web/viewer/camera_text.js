@@ -27,7 +27,7 @@ export class GridSpace {
   }
 }
 
-// "--camera 1,2,3 --target 4,5,6 --fov 35"
+// Returns the options of `voxdag render` for a camera: "--camera 1,2,3 --target 4,5,6 --fov 35".
 export function cameraText(space, {eye, target, fovDegrees}) {
   return `--camera ${space.text(eye)} --target ${space.text(target)} ` +
       `--fov ${numberText(fovDegrees)}`;

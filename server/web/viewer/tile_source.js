@@ -97,7 +97,7 @@ export class TileSource {
   }
 
   // Checks, after a tile was not found, whether the file still exists. Sets `ended` if the file was
-  // removed or replaced. Does nothing within kLookAgainMs after the last check.
+  // removed or replaced. Does nothing within kLookAgainMs after the last successful check.
   async lookAgain(signal) {
     if (this.ended || performance.now() < this.lookedMs + kLookAgainMs) return;
     this.looking ??= this.look(signal).finally(() => this.looking = null);

@@ -30,7 +30,7 @@ export class EstimateView {
     this.update(null);
   }
 
-  // `body`: the request body of the job; null while the form is incomplete.
+  // Shows the estimate for `body`, the request body of the job; null while the form is incomplete.
   async update(body) {
     const question = JSON.stringify(body);
     if (question === this.question) return;

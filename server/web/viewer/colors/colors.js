@@ -9,8 +9,8 @@ const kBudgetShare = 1 / 4;   // share of colors in the budget of tiles and colo
 const kMinBytes = 96 * 1024;  // minimum for a pool and a hash table together
 const kBytesPerVoxel = 1024;  // in the worst case: a page per voxel, and as many on coarser levels
 const kBaseBelow = 2;  // levels from a wanted page to the coarser page that is requested first
-// Minimum value of the last word of a feedback texel whose page is missing: 1 + the number of
-// pixels that lack the page (gl/color_shader.js).
+// The last word of a feedback texel is 1 + the number of pixels that lack the texel's page
+// (gl/color_shader.js). So at least this value means that the page is missing.
 const kWanted = 2;
 
 // Returns the part of the budget for the colors of a file.

@@ -59,7 +59,7 @@ export class FrameAccumulator {
     return this.drawPart(nowMs);
   }
 
-  // Returns true if this was the last part.
+  // Draws the next part of the sample. Returns true if this was the last part.
   drawPart(nowMs) {
     const {drawing, context: {gl}} = this, {value: pass, done} = drawing.parts.next();
     drawing.partMs = nowMs;

@@ -35,7 +35,7 @@ export class Pace {
     this.lacksFew ||= tiles < kFewTiles && coarsePixels < kCoarsePixels;
   }
 
-  // Call it when the browser requests a frame.
+  // Measures the interval between frames. Call it when the browser requests a frame.
   tick(nowMs) {
     const interval = nowMs - this.callMs;
     this.callMs = nowMs;
