@@ -38,7 +38,7 @@ class DagInput {
 
  private:
   friend class LevelCursor;
-  // Bytes that the system may load for one access.
+  // The number of bytes that the system may load into memory for one access to the mapping.
   static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
   static constexpr uint64_t kBytesBetweenChecks = uint64_t{8} << 20;
 
@@ -86,9 +86,9 @@ class LevelCursor {
 
   bool at_end() const { return offset_ >= words_.word_count; }
   uint64_t offset() const { return offset_; }
-  // Requires that the level has nodes.
+  // Returns the current node. Requires that the level has nodes.
   const voxdag_reader::Node& node() const { return node_; }
-  // Requires that the level has bricks.
+  // Returns the current brick. Requires that the level has bricks.
   uint64_t brick() const {
     return words_.words[offset_] | static_cast<uint64_t>(words_.words[offset_ + 1]) << 32;
   }

@@ -140,7 +140,8 @@ class NodeLookups {
     if (offset >= values_.level_words()) return Values::nothing();
     return Values::found(offset, answers_->next(offset / 2 / window_slots_));
   }
-  // Prepares the lookups of words that are probably pointers of nodes visited soon.
+  // Prefetches the values at these words, which are probably pointers in nodes that are visited
+  // soon.
   void prefetch(std::span<const uint32_t> words) const {
     if (!values_.is_resident()) return;
     for (const uint32_t word : words) values_.prefetch(word);

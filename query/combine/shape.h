@@ -14,7 +14,7 @@ namespace voxdag::query {
 class Shape {
  public:
   // Parses "sphere:X,Y,Z,R" (multiples of 1/2) or "box:X0,Y0,Z0,X1,Y1,Z1" (whole numbers). Throws
-  // Error{kInvalidInput}.
+  // Error{kInvalidInput} for any other text.
   explicit Shape(const std::string& text);
 
   // The number of a full cube of any level. It is used where a node of a DAG would have its word

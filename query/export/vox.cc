@@ -240,7 +240,8 @@ class VoxWriter {
     return depth_ + kBrickLevels == view_.grid_levels() ? 0 : models_[content];
   }
 
-  // Calls visit(corner, content) for each place of a model.
+  // Calls visit(corner, content) for each instance of a model: `corner` is the instance's low
+  // corner, and `content` is the content (DagView) of the model's node.
   template <class Visit>
   void visit_instances(uint32_t depth, uint64_t content, const Position& corner,
                        const Visit& visit) {

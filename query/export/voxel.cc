@@ -87,7 +87,7 @@ class VoxelWriter {
   }
 
  private:
-  // Adds the words of the children. Returns the node's word.
+  // Returns the word of a node, and writes the words of its children, unless all eight are solid.
   uint32_t add_node(uint32_t mask, std::span<const uint32_t> children,
                     NodeNumbers<uint32_t>& below) {
     std::array<uint32_t, 8> of_child{};

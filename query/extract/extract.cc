@@ -129,7 +129,7 @@ class Extraction {
     return grid;
   }
 
-  // Returns the position of a cube in the new grid.
+  // Converts a cube of the whole grid to the coordinates of the new grid.
   Cube in_new_grid(Cube cube) const {
     cube.level -= crop_.level;
     for (int axis = 0; axis < 3; ++axis) cube.position[axis] -= crop_.position[axis] << cube.level;

@@ -34,7 +34,7 @@ constexpr size_t kBatch = 4096;
 [[noreturn]] void refuse(const std::string& what) {
   throw Error(ErrorCode::kInvalidInput, "query: " + what);
 }
-// Throws unless the array `name` has as many entries as there are `items`.
+// Throws unless the array `name` has `expected` entries, one for each of the `items`.
 void require_length(const char* name, size_t length, size_t expected, const char* items) {
   if (length != expected)
     refuse("the array of " + std::string(name) + " has " + std::to_string(length) +

@@ -24,7 +24,7 @@ class OffsetTable {
   const std::vector<uint64_t>& offsets() const { return offsets_; }
 
  private:
-  // Returns the slot of the offset, or the free slot for it.
+  // Returns the slot of the offset. If the offset is new, returns the free slot that it will use.
   uint32_t& find(uint64_t offset) {
     size_t at = static_cast<size_t>(offset * 0x9e3779b97f4a7c15ull >> 32) & (slots_.size() - 1);
     while (slots_[at] != 0 && offsets_[slots_[at] - 1] != offset)
