@@ -253,7 +253,8 @@ void TriangleReader::flush() {
   batch_size_ = 0;
 }
 
-// Returns false for a corner out of range or a vertex that is not finite in world space.
+// Sets `out` to the triangle with these vertex indices. Returns false if an index is out of range
+// or a vertex is not finite in world space.
 bool TriangleReader::place(const uint32_t* corners, RealTriangle& out) {
   if (std::max({corners[0], corners[1], corners[2]}) >= vertex_count_) return false;
   for (int k = 0; k < 3; ++k) std::copy_n(cache_.at(corners[k]), 3, out.v[k]);

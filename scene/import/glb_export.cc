@@ -109,7 +109,8 @@ json GlbExport::node_of(const aiNode& node) {
   return out;
 }
 
-// Returns the number of the mesh of a node; nullopt if the node has no triangles.
+// Returns the number of a node's mesh in the .glb file, and adds the mesh if it is new. Returns
+// nullopt if the node has no triangles.
 std::optional<size_t> GlbExport::mesh_of(const aiNode& node) {
   std::vector<unsigned> parts;
   for (unsigned i = 0; i < node.mNumMeshes; ++i) {

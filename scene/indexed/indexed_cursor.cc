@@ -96,7 +96,8 @@ void IndexedCursor::complete(std::span<SurfaceTriangle> batch) {
   mesh_->read_surfaces({placed_.data(), batch.size()}, corners_.data(), batch.data());
 }
 
-// Returns false for a corner out of range or a vertex that is not finite.
+// Sets `out` to the triangle with these vertex indices. Returns false if an index is out of range
+// or a vertex is not finite.
 bool IndexedCursor::place(const uint32_t* corners, RealTriangle& out) {
   if (std::max({corners[0], corners[1], corners[2]}) >= vertex_count_) return false;
   for (int k = 0; k < 3; ++k) std::copy_n(cache_.at(corners[k]), 3, out.v[k]);

@@ -25,7 +25,8 @@ class ColorScale {
 
   // True if add() must be called with all colors of the element before set_full_intensities().
   bool needs_numbers() const;
-  // Updates the largest numbers with a color, one number per channel. Ignores non-finite numbers.
+  // Updates the largest number of each channel with a color, one number per channel. Ignores
+  // non-finite numbers.
   void add(const double* numbers);
   void set_full_intensities();
 

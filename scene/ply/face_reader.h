@@ -17,7 +17,7 @@ namespace voxdag::ply {
 
 class FaceReader {
  public:
-  // The values of the faces that contain the triangles of a read().
+  // The values that a read() returns for its triangles. They come from the triangles' faces.
   struct Surfaces {
     std::vector<double> numbers;                   // the requested numbers, for each triangle
     std::vector<std::array<double, 6>> texcoords;  // three pairs; NaN if the face does not have

@@ -70,7 +70,7 @@ bool normalize(std::span<double> xyz) {
   if (sum != 0) return false;
   int exponent;
   std::frexp(largest, &exponent);
-  // In two steps, because 2^-exponent may be too large for a double.
+  // Multiplies in two steps, because 2^-exponent may be too large for a double.
   const double factor = std::ldexp(1.0, -exponent / 2);
   const double rest = std::ldexp(1.0, -exponent - -exponent / 2);
   if (exponent != 0)

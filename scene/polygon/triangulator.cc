@@ -29,7 +29,8 @@ bool Triangulator::triangulate_projected() {
   return false;
 }
 
-// Sets kept_, and adds the degenerate triangles of the other corners. Stops at two corners.
+// Removes collinear corners until none or only two corners are left, and adds a degenerate triangle
+// for each. Sets kept_ to the corners that are left.
 void Triangulator::remove_collinear_corners() {
   Rings& ring = sweep_.rings();
   ring.reset(static_cast<uint32_t>(points_.size()));

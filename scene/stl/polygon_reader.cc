@@ -88,7 +88,7 @@ void PolygonReader::skip(std::string_view word) {
   }
 }
 
-// Skips up to three words, which are usually numbers.
+// Skips the words of the normal: up to three, which are usually numbers. Stops at a keyword.
 void PolygonReader::skip_normal() {
   for (int i = 0; i < 3; ++i) {
     std::string_view after = rest_;

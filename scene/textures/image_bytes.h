@@ -17,7 +17,8 @@ class ImageBytes : public EncodedBytes {
  public:
   // Throws Error{kInvalidInput} if the file has changed since the scene was opened.
   ImageBytes(FileSystem& files, const ImageSource& source);
-  // Throws BrokenImage for a text that should be base64 but is not.
+  // Reads the next bytes of the image. Throws BrokenImage for a text that should be base64 but is
+  // not.
   size_t read(std::span<std::byte> out) override;
 
  private:

@@ -245,7 +245,8 @@ class TextureSet::Builder {
       }
   }
 
-  // Reserves memory for the pages, or creates the scratch file.
+  // Reserves memory for the pages. If they need more than half of the available memory, creates the
+  // scratch file instead.
   void reserve(const std::string& path) {
     const auto pages = static_cast<size_t>(set_->pages_);
     if (set_->bytes() <= budget_.available() / 2) {

@@ -39,7 +39,8 @@ class VertexCache {
 
   // True if all vertices returned since place() are finite.
   bool all_finite() const { return all_finite_; }
-  // Returns three doubles, valid until the next call. `vertex` must be below the source's count.
+  // Returns the position of a vertex: three doubles, valid until the next call. `vertex` must be
+  // below the source's count.
   const double* at(uint64_t vertex) {
     const uint64_t block = vertex / kBlockVertices;
     const size_t slot = static_cast<size_t>(block) & slot_mask_;

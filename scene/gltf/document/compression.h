@@ -28,7 +28,7 @@ struct CompressedBytes {
   uint64_t byte_length = 0;
 };
 
-// EXT_meshopt_compression or KHR_meshopt_compression of a buffer view.
+// The extension EXT_meshopt_compression or KHR_meshopt_compression of a buffer view.
 struct MeshoptView {
   enum class Mode { kAttributes, kTriangles, kIndices };
   enum class Filter { kNone, kOctahedral, kQuaternion, kExponential, kColor };
@@ -43,8 +43,8 @@ struct MeshoptView {
   uint64_t decoded_bytes() const { return count * stride; }
 };
 
-// KHR_draco_mesh_compression of a primitive: the Draco ids of the attributes that voxdag reads, -1
-// for an attribute that is not compressed.
+// The extension KHR_draco_mesh_compression of a primitive: the Draco ids of the attributes that
+// voxdag reads, -1 for an attribute that is not compressed.
 struct DracoExtension {
   struct JointSet {
     int joints = -1;
@@ -102,8 +102,8 @@ void place_draco_primitive(Document& document, Primitive& primitive, const std::
 // positions. `set` is the n of the surface's TEXCOORD_n, if it has one.
 void place_draco_surface(Document& document, Primitive& primitive, int set);
 // Checks a view of a buffer that one of the functions above added. `where` names the view. Throws
-// Error{kInvalidInput} if its compressed bytes do not exist or decode to another layout. Also
-// throws it if voxdag was built without the library that decodes them.
+// Error{kInvalidInput} if its compressed bytes do not exist or decode to another layout, or if
+// voxdag was built without the library that decodes them.
 void check_compressed(const Document& document, const BufferView& view, const std::string& where);
 
 }  // namespace voxdag::gltf

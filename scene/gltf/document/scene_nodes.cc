@@ -111,7 +111,7 @@ void choose_roots(Document& d) {
   });
 }
 
-// Global transforms of nodes, each computed once.
+// Computes the global transforms of nodes, and stores them, so that each is computed only once.
 class AncestorTransforms {
  public:
   explicit AncestorTransforms(Document& document) : document_(document) {}

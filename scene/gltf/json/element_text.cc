@@ -44,7 +44,8 @@ ElementText ElementTextWriter::take() {
   return std::exchange(written_, {});
 }
 
-// Counts a value, and writes the comma and the key before it.
+// Called before a value is written. Counts the value, and writes the comma and the key that precede
+// it.
 void ElementTextWriter::begin_value(std::string_view key) {
   ++written_.values;
   if (open_.empty()) return;

@@ -25,8 +25,8 @@ class SurfaceReader {
   SurfaceReader(const Document& document, BufferReader& buffers, uint64_t vertices,
                 unsigned readers);
 
-  // Changes to another primitive of the document. Throws Error{kInvalidInput} if a buffer of its
-  // surface is shorter than declared.
+  // Makes read() use another primitive of the document. Throws Error{kInvalidInput} if a buffer of
+  // its surface is shorter than declared.
   void bind(const Primitive& primitive);
   // Sets the material and corners of `out`, a triangle of this primitive. `vertices` are its three
   // vertex indices, which must exist.
