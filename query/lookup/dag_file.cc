@@ -64,9 +64,9 @@ void for_each_batch(unsigned threads, size_t items, const Body& body) {
 }
 
 // Fills `rays`, with directions scaled to length 1. Throws Error{kInvalidInput} for numbers that
-// are not finite and for directions of 0; `number` is the number of the first ray in the message.
-// Processes two rays per operation, because otherwise the divisions would take longer than the walk
-// of the rays through large cells.
+// are not finite and for directions of 0. `number` is the index of the first of these rays in the
+// caller's array, for the message. Processes two rays per operation, because otherwise the
+// divisions would take longer than the walk of the rays through large cells.
 void make_rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
                size_t number, Ray* rays) {
   const DoublePair zero = DoublePair::of(0), one = DoublePair::of(1);
