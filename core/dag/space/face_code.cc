@@ -137,8 +137,12 @@ FaceReader::Square FaceReader::next() {
 }
 
 void FaceReader::skip(const Square& square) {
-  if (square.kind != Kind::kSplit) return;
-  for (int i = 0; i < 4; ++i) skip(next());
+  for (uint64_t left = square.kind == Kind::kSplit ? 4 : 0; left > 0; --left)
+    if (next().kind == Kind::kSplit) left += 4;
+}
+
+void FaceReader::check_depth(int depth) {
+  if (depth > kMaxFaceDepth) refuse_face();
 }
 
 FaceReader::Square FaceReader::descend(std::span<const uint8_t> path) {

@@ -49,6 +49,8 @@ class FaceReader {
   // Reads the square at a path of quadrants. If a larger square contains it, and is not split,
   // returns the larger square.
   Square descend(std::span<const uint8_t> path);
+  // Throws Error{kCorrupt} if no face of a grid has a quadtree of this depth.
+  static void check_depth(int depth);
 
  private:
   uint8_t byte();
@@ -60,11 +62,13 @@ class FaceReader {
 
 // Calls unite(label_a, label_b) for each component of one square that touches a component of the
 // other square. `in_a` and `in_b` are the squares that `a` and `b` have just read. Reads and skips
-// the quadrants of these squares.
+// the quadrants of these squares. `depth` is the number of squares above `in_a` and `in_b` that the
+// current call has visited.
 template <class Unite>
 void join_squares(FaceReader& a, const FaceReader::Square& in_a, FaceReader& b,
-                  const FaceReader::Square& in_b, const Unite& unite) {
+                  const FaceReader::Square& in_b, const Unite& unite, int depth = 0) {
   using Kind = FaceReader::Kind;
+  FaceReader::check_depth(depth);
   if (in_a.kind == Kind::kSet || in_b.kind == Kind::kSet) {
     a.skip(in_a);
     b.skip(in_b);
@@ -76,7 +80,7 @@ void join_squares(FaceReader& a, const FaceReader::Square& in_a, FaceReader& b,
     for (int i = 0; i < 4; ++i) {
       const auto next_a = in_a.kind == Kind::kSplit ? a.next() : in_a;
       const auto next_b = in_b.kind == Kind::kSplit ? b.next() : in_b;
-      join_squares(a, next_a, b, next_b, unite);
+      join_squares(a, next_a, b, next_b, unite, depth + 1);
     }
   }
 }

@@ -418,6 +418,28 @@ TEST(Space, FacesDescend) {
   EXPECT_EQ(empty_face().size(), 2u);
 }
 
+// Damaged bytes in which every square is split are an error. They must not exhaust the stack.
+TEST(Space, FacesOfAnyDepthAreRefused) {
+  const std::vector<std::byte> split(1 << 20, static_cast<std::byte>(FaceReader::Kind::kSplit));
+  const auto code_of = [](const auto& read) {
+    try {
+      read();
+    } catch (const Error& e) {
+      return e.code();
+    }
+    return ErrorCode::kInternal;
+  };
+  EXPECT_EQ(ErrorCode::kCorrupt, code_of([&] {
+              FaceReader reader(split);
+              reader.skip(reader.next());
+            }));
+  EXPECT_EQ(ErrorCode::kCorrupt, code_of([&] {
+              FaceReader a(split), b(split);
+              const auto square_a = a.next(), square_b = b.next();
+              join_squares(a, square_a, b, square_b, [](uint32_t, uint32_t) {});
+            }));
+}
+
 TEST(Space, MemoryIsLimited) {
   SpaceGrid grid(32);
   grid.for_each(
