@@ -30,7 +30,8 @@ function add_values(line,   list) {
   sub(/ .*/, "", names)
   rest = substr(line, length(names) + 1)
   # The description begins in column 31, or in the next line if the name of the value is long.
-  is_long = rest ~ /(Needs|Excludes):( -[^ ]+)+$/ || length($0) < 31
+  is_long = rest ~ /(Needs|Excludes):( -[^ ]+)+$/ || length($0) < 31 || substr($0, 30, 1) != " " \
+            || rest ~ /^ [^ ]*\{[^}]*\}( \[[^]]*\])?( REQUIRED)?$/
   text = is_long ? "" : substr($0, 31)
   type = is_long ? rest : substr($0, 3 + length(names), 28 - length(names))
   gsub(/^ +| +$/, "", type)

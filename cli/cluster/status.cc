@@ -15,7 +15,7 @@ std::optional<ClusterState> read_state(FileSystem& files, const std::string& wor
   try {
     return read_cluster_state(files, work_folder);
   } catch (const Error& error) {
-    std::fprintf(stderr, "voxdag: %s\n", printable_line(error.what()).c_str());
+    std::fprintf(stderr, "voxdag: warning: %s\n", printable_line(error.what()).c_str());
     return std::nullopt;
   }
 }

@@ -51,13 +51,12 @@ int wrap_mode(int mode) {
   return mode == aiTextureMapMode_Clamp || mode == aiTextureMapMode_Decal ? 33071 : 10497;
 }
 
-// Encodes an embedded image that assimp stores as plain pixels to PNG, without its alpha.
+// Encodes an embedded image that assimp stores as plain pixels to PNG.
 std::string encode(const aiTexture& texture) {
-  std::vector<uint8_t> rgb;
-  const size_t pixels = size_t{texture.mWidth} * texture.mHeight;
-  for (size_t i = 0; i < pixels; ++i)
-    rgb.insert(rgb.end(), {texture.pcData[i].r, texture.pcData[i].g, texture.pcData[i].b});
-  return encode_png(texture.mWidth, texture.mHeight, rgb);
+  std::vector<uint8_t> rgba;
+  for (const aiTexel& pixel : std::span(texture.pcData, size_t{texture.mWidth} * texture.mHeight))
+    rgba.insert(rgba.end(), {pixel.r, pixel.g, pixel.b, pixel.a});
+  return encode_png(texture.mWidth, texture.mHeight, rgba);
 }
 
 // Returns the color of a material without an image, in linear light. A base color is already
