@@ -29,7 +29,7 @@ constexpr Row kPromised[] = {
     {ErrorCode::kCanceled, "canceled", 130, 409},
 };
 
-// Names and statuses are an interface, so the test fails if one of them changes.
+// Names and statuses are a public interface, so this test fails if one of them changes.
 TEST(ErrorTable, IsAsPromised) {
   for (const Row& row : kPromised) {
     SCOPED_TRACE(row.name);
@@ -51,7 +51,7 @@ TEST(ErrorTable, ExitStatusesAreDistinctAndNotTheShells) {
   }
 }
 
-// The caught error equals the thrown one, as Error and as std::exception.
+// An Error that is caught as std::exception keeps its message and, after a cast to Error, its code.
 TEST(Error, KeepsCodeAndMessage) {
   try {
     throw Error(ErrorCode::kNoSpace, "disk full: spill.bin");

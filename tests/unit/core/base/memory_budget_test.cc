@@ -77,7 +77,7 @@ TEST(MemoryBudget, SharesChargeTheirParents) {
   EXPECT_EQ(whole.used(), 65u);
 }
 
-// A charge can be moved, resized and overwritten. It is released exactly once.
+// A MemoryCharge can be moved, resized and overwritten. Its bytes are released exactly once.
 TEST(MemoryCharge, IsReleasedOnce) {
   MemoryBudget budget(100);
   {

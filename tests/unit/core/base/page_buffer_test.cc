@@ -72,8 +72,8 @@ TEST(PageBuffer, MayBeEmpty) {
   EXPECT_EQ(buffer.begin(), buffer.end());
 }
 
-// An allocation is refused by the budget, by the system, or because its size in bytes exceeds 64
-// bits. The error is kOutOfMemory and names the buffer, and nothing remains charged.
+// An allocation fails if it exceeds the budget, if the system refuses it, or if its size in bytes
+// exceeds 64 bits. The error is kOutOfMemory and names the buffer, and nothing remains charged.
 TEST(PageBuffer, NamesWhatDidNotFit) {
   MemoryBudget small(4096), endless(UINT64_MAX);
   const auto refused = [](MemoryBudget& budget, size_t size) {

@@ -1,5 +1,5 @@
-// Items are committed in their order. If an item fails, all items before it are committed, and none
-// after it.
+// parallel_for_in_order() prepares items concurrently and commits them in order. If an item fails,
+// all items before it are committed, and none after it.
 #include "core/base/parallel_for.h"
 
 #include <gtest/gtest.h>

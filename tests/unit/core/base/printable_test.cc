@@ -58,7 +58,8 @@ TEST(Printable, ReplacesBytesThatAreNotUtf8) {
     EXPECT_EQ(printable_line(text), shown) << testing::PrintToString(text);
 }
 
-// In JSON, an escape keeps the value.
+// printable_json() replaces control characters by escapes, which preserve the string's value. Only
+// a byte that is not UTF-8 becomes U+FFFD.
 TEST(Printable, EscapesInJson) {
   EXPECT_EQ(printable_json("{\"a\":\"\xc2\x9b\xe2\x80\xae\x7f\xff\"}"),
             "{\"a\":\"\\u009b\\u202e\\u007f\\ufffd\"}");

@@ -21,8 +21,8 @@ TEST(AttributeSums, FindTheHeaviestOfManyMaterials) {
   for (int round = 0; round < 2; ++round) {
     for (uint32_t i = 0; i < kAdded; ++i) {
       const auto cell = static_cast<uint32_t>(random() % kCells);
-      // At a random time, a cell with an odd number becomes covered. From then on, its earlier
-      // contributions do not count.
+      // At a random time, reset() discards the contributions to a cell with an odd number, as for a
+      // cell that a triangle covers after others only touched it.
       if (cell % 2 == 1 && !is_covered[cell] && random() % 2000 == 0) {
         sums.reset(cell);
         weights[cell].clear();
@@ -33,8 +33,8 @@ TEST(AttributeSums, FindTheHeaviestOfManyMaterials) {
       sums.add(cell, facing, 1, weight);
       weights[cell][facing.material] += weight;
     }
-    // Memory is limited by the number of pairs of a cell and a material (16 bytes each), with a
-    // factor of 4 for growing tables.
+    // There is at most one entry of 16 bytes for each pair of a cell and a material. The factor of
+    // 4 is for growing tables.
     EXPECT_LE(sums.bytes(), uint64_t{4} * kCells * kMaterials * 16);
     sums.finish();
     size_t ties = 0;

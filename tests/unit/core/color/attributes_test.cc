@@ -62,8 +62,8 @@ TEST(NormalCode, DirectionsAreThoseOfTheirCodes) {
                      static_cast<double>(d[2])};
       ASSERT_NEAR(length(v), 16384, 1);
       ASSERT_LT(degrees_between(v, direction_of(code)), 0.01) << p << " " << q;
-      // Encoding the decoded direction gives the same code. Codes of equal directions, on the rim
-      // of the lower half, are the exception.
+      // Encoding a decoded direction gives the same code. The exception is directions with z <= 0,
+      // where several codes can have the same direction.
       const NormalCode again = encode_normal(d[0], d[1], d[2]);
       ASSERT_TRUE(again == code || d[2] <= 0);
       ASSERT_LT(degrees_between(v, direction_of(again)), 0.01);
@@ -97,7 +97,9 @@ TEST(ValueOfParent, FollowsTheChildren) {
   EXPECT_EQ(of(Attribute::kNormal, {0u, 0u}), 0u);
 }
 
-// The values of a cell, computed by brute force.
+// The expected values of a cell. `area` is the sum of the triangles' area vectors; in `turned`,
+// each vector points to the positive side of its dominant axis, so that the two sides of a thin
+// sheet do not cancel out.
 struct ExpectedCell {
   double weight = 0, alpha = 0;
   Vector area{}, turned{};
@@ -136,9 +138,10 @@ class BruteForce {
     return n;
   }
 
-  // Returns the number of columns through the cell, along the dominant axis, whose point on the
-  // plane is in both the cell and the triangle. The columns' positions are integers, because
-  // eighths of the cell's edge are integers.
+  // Returns the number of the cell's 16 columns that the triangle covers (docs/color.md). The
+  // columns are parallel to the dominant axis of the triangle's normal. A triangle covers a column
+  // if the column meets the triangle within the cell. Positions of columns are odd eighths of the
+  // cell's edge, which are integers.
   int columns_of(const FixedTriangle& t) const {
     int dominant;
     const Vector n = normal_of(t, dominant);
@@ -242,8 +245,9 @@ TEST(Attributes, AreThoseOfTheTriangles) {
         for (const auto& [material, other] : expected.weights)
           ASSERT_TRUE(other != weight || values[i].material <= material);
 
-        // The rule uses `turned` if `area` is less than 1/64 of it. Near this limit, both normals
-        // are accepted.
+        // The rule takes the normal from `turned` if the largest component of `area` is less than
+        // 1/64 of the largest component of `turned`. Near this limit, the normals of both are
+        // accepted, because of rounding.
         const double rest = largest_of(expected.area), turned = largest_of(expected.turned);
         const double from_rest =
             rest == 0 ? 180 : degrees_between(expected.area, direction_of(values[i].normal));
@@ -268,7 +272,8 @@ TEST(Attributes, AreThoseOfTheTriangles) {
   EXPECT_GT(mixed_cells, 500u);
 }
 
-// The values do not depend on the order of the triangles or their division into parts.
+// The normals and materials of cells do not depend on the order of the triangles or their division
+// into parts.
 TEST(Attributes, AreFunctionsOfTheCell) {
   TestLooks looks;
   for (uint32_t i = 0; i < looks.materials.size(); ++i) looks.materials[i].number = i;

@@ -15,7 +15,7 @@ namespace {
 
 using oracle::SceneKind;
 
-// Sums of cells, by position in the grid.
+// Color sums of cells, by the cells' positions in the color grid.
 using Sums = std::map<std::array<uint32_t, 3>, ColorSum>;
 
 void collect(const ColorGrid& grid, const Cube& region, const std::vector<ColoredCell>& cells,
@@ -33,7 +33,7 @@ void collect(const ColorGrid& grid, const Cube& region, const std::vector<Colore
   }
 }
 
-// Bakes all cubes of a level, one after the other.
+// Bakes a complete color grid. The baked regions are all cubes of `level`, one after the other.
 Sums bake_grid(const ColorGrid& grid, uint32_t level, const std::vector<FixedSurface>& surfaces,
                const TestLooks& looks) {
   Sums sums;
@@ -98,8 +98,8 @@ TEST(BakeRegion, SumsAreFunctionsOfTheCell) {
     }
 }
 
-// The result does not depend on the division into batches: a triangle that covers a cell may come
-// after a triangle that only touches it.
+// The sums do not depend on the division of the triangles into calls of add(): a triangle that
+// covers a cell may follow in a later call than a triangle that only touches it.
 TEST(BakeRegion, TrianglesMayComeInParts) {
   const TestLooks looks;
   for (const SceneKind kind : oracle::kAllKinds) {
@@ -120,8 +120,8 @@ TEST(BakeRegion, TrianglesMayComeInParts) {
   }
 }
 
-// RegionBaker adds triangles that cover no column at the end of the region, or earlier if they are
-// too many. The sums do not depend on this.
+// A cell that a triangle covers ignores triangles that only touch it. RegionBaker adds the latter
+// at the end of the region, or earlier if they are too many. The sums do not depend on the time.
 TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   TestLooks looks;
   const ColorGrid grid{10, 2};
@@ -129,7 +129,8 @@ TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   oracle::Triangles triangles;
   for (int i = 0; i < 150000; ++i) {
     const int64_t at = random.odd(1, 1 << 18);
-    // These triangles cover no column. Only the last triangle does, in the first cell.
+    // These triangles touch cells, but cover no column (docs/color.md). Only the last triangle
+    // covers columns, in the first cell.
     triangles.push_back({{{at, 3, 5}, {at | 2, 7, 5}, {at, 3, 9}}});
   }
   triangles.push_back({{{1, 1, 1}, {60001, 60001, 1}, {1, 60001, 1}}});
@@ -146,7 +147,7 @@ TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
 }
 
 // Sums from 64-bit and from 128-bit integers are equal. A triangle is baked twice; the second time,
-// a vertex is moved far away in the triangle's plane, so 128 bits are necessary.
+// a vertex is far away in the triangle's plane, so 128 bits are necessary.
 TEST(BakeRegion, WideTrianglesCoverWhatNarrowOnesDo) {
   TestLooks looks;
   looks.materials.assign(1, Material{});
@@ -215,7 +216,8 @@ TEST(BakeRegion, HostileCoordinates) {
 TEST(BakeRegion, GoldenDigest) {
   const TestLooks looks;
   uint64_t digest = 0, covered = 0;
-  // Only the kinds of scenes for which all compilers draw the random numbers in the same order.
+  // Uses only the kinds of scenes that call the random generator in the same order with every
+  // compiler.
   for (const SceneKind kind :
        {SceneKind::kDegenerate, SceneKind::kSliver, SceneKind::kWalls, SceneKind::kDiagonal,
         SceneKind::kSpanning, SceneKind::kThroughCorners, SceneKind::kCrossing, SceneKind::kWide})

@@ -108,7 +108,8 @@ Voxels voxels_of_patches(const VisiblePart& part) {
   return all;
 }
 
-// Returns the texel at a point of the triangle, computed without the tested code.
+// Returns the texel at a point of the triangle, computed without the tested code. `second` and
+// `third` are the barycentric weights of the second and the third corner.
 std::array<uint32_t, 2> texel_at(const FixedSurface& surface, const Cutouts& cutouts, double second,
                                  double third) {
   std::array<uint32_t, 2> texel;
@@ -132,8 +133,8 @@ std::array<uint32_t, 2> texel_at(const FixedSurface& surface, const Cutouts& cut
 
 constexpr Wrap kWraps[] = {Wrap::kRepeat, Wrap::kMirroredRepeat, Wrap::kClampToEdge};
 
-// Every point of a visible texel makes its voxel visible. Nearly every visible voxel has such a
-// point among many random ones.
+// If a random point of the triangle has a visible texel, the voxel that contains the point is
+// visible. Conversely, nearly every visible voxel contains such a point.
 TEST(Cutouts, EqualPointsOfTheTriangle) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -172,7 +173,8 @@ TEST(Cutouts, EqualPointsOfTheTriangle) {
   EXPECT_LT(unexplained, visible / 25);
 }
 
-// The search by cubes finds the same voxels as a test of each voxel.
+// The patches touch exactly the voxels that a test of each single voxel finds. is_visible_in()
+// returns true for exactly the cubes that contain such a voxel.
 TEST(Cutouts, PatchesTouchExactlyTheVisibleVoxels) {
   std::mt19937 random(2);
   size_t visible = 0, hidden = 0;
@@ -210,7 +212,8 @@ TEST(Cutouts, PatchesTouchExactlyTheVisibleVoxels) {
   EXPECT_GT(hidden, 5000u);
 }
 
-// Patches that are not visited do not appear among the patches of the next triangle.
+// If the visitor stops before the last patch, the remaining patches do not appear among the patches
+// of the next call.
 TEST(Cutouts, PatchesCanBeLeftOut) {
   std::mt19937 random(4);
   const Cutouts cutouts = cutouts_of(8, 8, {Wrap::kRepeat, Wrap::kRepeat},
@@ -236,7 +239,8 @@ TEST(Cutouts, PatchesCanBeLeftOut) {
   }
 }
 
-// A wall that fills blocks takes two patches for each layer of a block, for any direction.
+// VisiblePatches collects voxels in blocks of 64^3. A wall across blocks takes few patches (two
+// triangles per rectangle of voxels), for a wall in any direction.
 TEST(Cutouts, WallsAreFewPatches) {
   constexpr uint32_t kFine = 8;
   constexpr double kSide = 1 << kFine;
@@ -271,8 +275,9 @@ TEST(Cutouts, VisibleAndHiddenImages) {
   }
 }
 
-// A texel that ends exactly at the border of voxels is not visible beyond the border. But a voxel
-// that the triangle only touches, in a point of that border, is set.
+// A visible texel that ends exactly at a border between voxels does not make the voxels beyond the
+// border visible. The exception is a voxel that the triangle touches only in one point of that
+// border.
 TEST(Cutouts, BordersOfTexelsAtBordersOfVoxels) {
   const Cutouts cutouts = cutouts_of(2, 1, {Wrap::kClampToEdge, Wrap::kClampToEdge},
                                      [](uint32_t x, uint32_t) { return x == 0; });
@@ -287,7 +292,7 @@ TEST(Cutouts, BordersOfTexelsAtBordersOfVoxels) {
         << voxel[0] << " " << voxel[1];
 }
 
-// A triangle that is a point or a segment is visible where the texels at it are visible.
+// A triangle that is a point or a segment sets the voxels at which its texels are visible.
 TEST(Cutouts, TrianglesWithoutArea) {
   const Cutouts cutouts =
       cutouts_of(2, 1, {Wrap::kRepeat, Wrap::kRepeat}, [](uint32_t x, uint32_t) { return x == 1; });
@@ -305,7 +310,8 @@ TEST(Cutouts, TrianglesWithoutArea) {
   }
 }
 
-// A triangle that its vertex colors hide is cut out, even without an image.
+// A triangle is hidden if the alpha of its vertex colors is too low for the material's alpha mode,
+// even without an image.
 TEST(Cutouts, AlphaOfVertices) {
   for (const AlphaMode mode : {AlphaMode::kMask, AlphaMode::kBlend, AlphaMode::kOpaque})
     for (const uint16_t alpha : {0, 1000, 65535}) {

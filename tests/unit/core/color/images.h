@@ -1,4 +1,5 @@
-// Images for tests: pyramids in memory that show noise and stripes, made from a seed.
+// Images for tests: pyramids (an image and its smaller levels) in memory that show waves, noise and
+// transparent stripes, made from a seed.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +18,7 @@ struct TestLevel {
   const std::array<uint16_t, 4>& at(uint32_t x, uint32_t y) const { return texels[y * width + x]; }
 };
 
-// The images in the form that the color rule needs.
+// Images with the functions that RegionBaker calls on its images.
 class TestImages {
  public:
   // Adds an image of smooth waves with some noise. Alpha is 0 in stripes.

@@ -43,7 +43,8 @@ struct TestLooks {
     }
   }
 
-  // `widest`: largest texture coordinate, in units of 2^-24 of the image's width.
+  // Returns a surface with a random material, texture coordinates and vertex colors for each
+  // triangle. `widest` is the largest texture coordinate, in units of 2^-24 of the image's size.
   std::vector<FixedSurface> surfaces(const oracle::Triangles& triangles, uint64_t seed,
                                      int64_t widest = int64_t{3} << kTextureBits) const {
     oracle::Random random(seed);

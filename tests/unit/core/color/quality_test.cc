@@ -1,5 +1,6 @@
-// Compares the baked colors (the rule), and the colors stored in blocks, with the oracle's mean
-// color of the surface in each cell. The bounds are up to 1 dB below the measured values.
+// Compares two kinds of colors with the oracle's mean color of the surface in each cell: the baked
+// colors, which test the color rule, and the colors stored in blocks. The required signal-to-noise
+// ratios are up to 1 dB below the measured values.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +22,7 @@ namespace {
 struct Sheet {
   static constexpr int kQuads = 12;
 
-  // `images`: number of times that the texture repeats along an edge of the sheet.
+  // `images` is the number of times that the texture repeats along an edge of the grid.
   Sheet(const ColorGrid& sheet_grid, double images, const Material& m) : grid(sheet_grid) {
     material = m;
     for (int i = 0; i < kQuads; ++i)

@@ -1,4 +1,4 @@
-// Every visitor finds the described fields, and no others.
+// Tests the visitors of fields(): each finds all fields of a description, and no others.
 #include <gtest/gtest.h>
 
 #include "core/fields/json_fields.h"

@@ -22,8 +22,8 @@ std::vector<std::string> lines_of(const std::string& document) {
   return lines;
 }
 
-// Returns the cells of a row of a table, without surrounding blanks and backquotes. Returns an
-// empty list for other lines.
+// Returns the cells of a line that is a row of a Markdown table, without surrounding blanks and
+// backquotes. Returns an empty list for other lines.
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
   if (line.empty() || line[0] != '|') return cells;

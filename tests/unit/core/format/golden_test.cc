@@ -39,7 +39,7 @@ TEST(GoldenTest, SceneIsRead) {
         EXPECT_EQ(file->voxel(x, y, z), y == 0 || (x == 0 && z == 0)) << x << y << z;
 }
 
-// Each variant has one kind of damage. The error names it.
+// Each variant has one wrong byte. The error names the part of the file that contains it.
 TEST(GoldenTest, CorruptVariantsAreNamed) {
   struct Variant {
     const char* what;

@@ -1,5 +1,5 @@
-// The common part of these tests: a temporary folder, functions for complete files as bytes, random
-// voxels with structure, and global files made from the oracle's DAGs.
+// Helpers for the tests of file formats: a temporary folder, functions that read and write complete
+// files as bytes, random voxels with structure, and global files made from the oracle's DAGs.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -27,7 +27,8 @@ struct Counts {
   int crossed = 0, missed = 0, ties = 0;
 };
 
-// Compares one type of RowTest with the oracle, for the row along `axis` through p.
+// Compares one type of RowTest (core/geometry/row_crossings.h) with the oracle, for the row along
+// `axis` through p.
 template <class Test>
 void expect_right(const Triangle& t, const Point& p, int axis, Counts& counts) {
   const oracle::Crossing truth = oracle::crossing_of(t, p, axis);
@@ -55,7 +56,7 @@ void expect_beyond_right(const Triangle& t, const Point& p, int axis) {
   ASSERT_EQ(Test(fixed(t), axis).is_beyond(at), truth.is_before);
 }
 
-// Compares all types that are exact for the triangle.
+// Compares each type of RowTest whose integers are wide enough for the triangle.
 void expect_all_right(const Triangle& t, const Point& p, int axis, Counts& counts) {
   expect_right<WideRowTest>(t, p, axis, counts);
   expect_beyond_right<WideRowTest>(t, p, axis);

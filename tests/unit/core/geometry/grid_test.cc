@@ -53,7 +53,8 @@ TEST(WorldBounds, GrowByTriangles) {
   }
 }
 
-// Expected values were computed manually; all are exact in binary.
+// The expected values were computed manually. They are exact, because all numbers of this test are
+// exact in binary.
 TEST(Grid, DefaultCubeIsThatOfTheDesign) {
   const Grid grid = Grid::around(bounds({-1, 2, 10}, {7, 4, 11}), 10);
   EXPECT_EQ(grid.levels, 10u);

@@ -27,7 +27,7 @@ bool ours(const Triangle& t, const Box& box) {
   return triangle_touches_cube(fixed, low, box.edge);
 }
 bool truth(const Triangle& t, const Box& box) { return oracle::touches(t, box.low, box.edge); }
-// True if the triangle touches the cube but not its inside. A test with half-open cubes would miss
+// True if the triangle touches only the surface of the cube. A test with half-open cubes would miss
 // such triangles.
 bool grazes(const Triangle& t, const Box& box) {
   return truth(t, box) &&

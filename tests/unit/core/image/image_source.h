@@ -39,7 +39,7 @@ struct CancelingSource : StringSource {
   CancelToken cancel;
 };
 
-// Decodes a file of which `cancel_at` bytes are read before the token is canceled.
+// Decodes a file, and cancels the decoder when it reads byte `cancel_at`.
 inline void decode_canceled(const std::string& file, size_t cancel_at) {
   MemoryBudget budget(uint64_t{64} << 20);
   CancelingSource source(file, cancel_at);

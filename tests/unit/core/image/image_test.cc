@@ -76,8 +76,8 @@ TEST(Jpeg, OtherFrames) {
   EXPECT_THAT(problem_of(with(5, std::string(2, '\0'))), HasSubstr("JPEG"));  // height comes later
 }
 
-// A baseline JPEG is decoded row by row, so its height does not matter. A progressive JPEG needs
-// memory for all coefficients.
+// A baseline JPEG is decoded row by row, so its memory does not depend on its height. A progressive
+// JPEG needs memory for all coefficients.
 TEST(Jpeg, MemoryOfProgressiveImages) {
   const std::string pixels = gradient(1024, 1024, 1);
   constexpr uint64_t kMemory = 2400 << 10;
@@ -199,7 +199,7 @@ TEST(Png, HugeSizes) {
 }
 
 // Surplus rows after the image, and compressed texts, need little memory, even if they expand to
-// megabytes, a thousand times their compressed size.
+// megabytes, a thousand times their size in the file.
 TEST(Png, DecompressionBombs) {
   std::string rows = png_file({2, 512, 8, 6, ""}, std::string(4 << 20, '\0'));
   rows.replace(8, 25,
@@ -302,8 +302,8 @@ TEST(Images, DamagedAnywhere) {
   }
 }
 
-// A small file can take minutes to decode, so decoders stop when the token is canceled: also
-// between the scans and rows that need no more bytes of the file.
+// A small file can take minutes to decode, so decoders stop when the token is canceled, even while
+// they decode scans or rows for which they read no more bytes of the file.
 TEST(Images, CancellationStopsDecoders) {
   const uint32_t edge = 512;
   PngFormat plain, interlaced;

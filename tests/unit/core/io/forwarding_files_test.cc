@@ -10,7 +10,7 @@
 namespace voxdag {
 namespace {
 
-// Moves another file to the path as soon as a file was opened there.
+// Replaces the first file that is opened by the file `other`, immediately after the opening.
 class ReplacedFiles : public ForwardingFiles {
  public:
   using ForwardingFiles::ForwardingFiles;
@@ -25,8 +25,8 @@ class ReplacedFiles : public ForwardingFiles {
   int opened_ = 0;
 };
 
-// A file is opened once, so a file that replaces it cannot be mistaken for it. open_own() refuses
-// links as the other file system does.
+// open_own() opens the path only once, so the result is the original file even if another file
+// replaces it immediately after the opening. Like the wrapped file system, it refuses links.
 TEST(ForwardingFilesTest, OpensAFileOnce) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a");

@@ -85,7 +85,7 @@ TEST_F(PosixFiles, ReadingPastTheEndIsCorrupt) {
   expect_error(ErrorCode::kCorrupt, "byte 100", [&] { read(*in, 100, 1); });
 }
 
-// create() empties an existing file, open_write() does not.
+// create() empties an existing file; open_write() keeps its contents.
 TEST_F(PosixFiles, CreateEmptiesAndOpenWriteKeeps) {
   put(path_, "abcdef");
   files_.open_write(path_)->write_at(2, bytes("XX"));
@@ -165,7 +165,7 @@ TEST_F(PosixFiles, DevicesTellDisksApart) {
   EXPECT_NE(files_.device("/proc"), files_.device(folder_.path()));
 }
 
-// Renaming replaces an existing file; removing removes it.
+// rename() replaces an existing file. remove() deletes a file.
 TEST_F(PosixFiles, RenameReplaces) {
   put(path_, "new");
   put(folder_.file("old"), "old");

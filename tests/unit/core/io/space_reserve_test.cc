@@ -11,7 +11,7 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// A disk of `left` free bytes.
+// Simulates a disk with `left` free bytes. Writes reduce `left`, but store nothing.
 class CountingDisk : public ForwardingFiles {
  public:
   CountingDisk() : ForwardingFiles(system_files()) {}

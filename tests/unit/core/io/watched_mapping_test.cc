@@ -14,7 +14,7 @@
 namespace voxdag {
 namespace {
 
-// A mapped temporary file of some pages of ones.
+// A temporary file that is mapped to memory. All its bytes are 1.
 class Mapped {
  public:
   explicit Mapped(size_t pages) : bytes_(pages * sysconf(_SC_PAGESIZE)) {
@@ -58,7 +58,8 @@ TEST(WatchedMapping, WhatIsGoneReadsAsZeros) {
   EXPECT_FALSE(undamaged.is_damaged());
 }
 
-// The next mapping that is watched begins undamaged.
+// Damage of a mapping is forgotten when its WatchedMapping ends. The next watched mapping begins as
+// undamaged.
 TEST(WatchedMapping, DamageEndsWithTheWatch) {
   const Mapped file(2);
   {
@@ -72,7 +73,7 @@ TEST(WatchedMapping, DamageEndsWithTheWatch) {
 }
 
 // A fault outside watched mappings still ends the process with SIGBUS. A sanitizer would catch the
-// signal, so these tests need a build without one.
+// signal, so the next two tests exist only in builds without sanitizers.
 #if !VOXDAG_SANITIZED
 TEST(WatchedMapping, OthersStillEndTheProcess) {
   const Mapped watched_file(1), file(1);

@@ -59,7 +59,8 @@ TEST_F(Blocks, KernelsListThem) {
     }
 }
 
-// unpack() copies the non-empty bricks in order.
+// unpack() copies the non-empty bricks of a block in order. It returns the mask of these bricks and
+// the number of their voxels.
 TEST_F(Blocks, KernelsUnpackThem) {
   for (const Kernels* kernels : all_kernels())
     for (int round = 0; round < 200; ++round) {
@@ -86,8 +87,9 @@ class Memos : public Blocks {
   PooledMemory memory_{budget_, pool_};
 };
 
-// The memo returns a block's own node or nothing, even if thousands of blocks have the same key. A
-// block that was just inserted is found, even if the memo grew.
+// find() returns the node that was inserted for the block, or null. It never returns the node of
+// another block, even if thousands of blocks have the same key. A block is found immediately after
+// its insertion, even if the insertion made the memo grow.
 TEST_F(Memos, FindWholeBlocksOnly) {
   for (const bool same_key : {false, true}) {
     SCOPED_TRACE(same_key);
@@ -101,7 +103,8 @@ TEST_F(Memos, FindWholeBlocksOnly) {
       if (memo.find(key_of(block), block)) continue;
       memo.insert(key_of(block), block, {word(), i, 1, 1});
       const BlockMemo::Node* found = memo.find(key_of(block), block);
-      // If the memo grew, it moved the block to the slot of its block_key().
+      // If insert() made the memo grow, the block moved to the slot of its block_key(), so key 77
+      // does not find it.
       if (found == nullptr) found = memo.find(block_key(block), block);
       ASSERT_NE(found, nullptr) << i;
       ASSERT_EQ(found->id, i);
@@ -116,7 +119,8 @@ TEST_F(Memos, FindWholeBlocksOnly) {
   }
 }
 
-// The memo is bypassed for a while if nearly all blocks are new, but never if blocks repeat.
+// is_worthwhile() returns false for a while if nearly all blocks are new, because lookups then cost
+// more than they save. If most lookups find their block, it always returns true.
 TEST_F(Memos, RestWhereTheyDoNotPay) {
   for (const bool repeating : {false, true}) {
     SCOPED_TRACE(repeating);
@@ -136,7 +140,8 @@ TEST_F(Memos, RestWhereTheyDoNotPay) {
   }
 }
 
-// With a small budget the memo is small. After its destruction nothing is charged.
+// With a small budget, the memo stops growing and replaces blocks. After its destruction, nothing
+// is charged.
 TEST_F(Memos, FitSmallBudgets) {
   MemoryBudget small(64 << 10);
   PooledMemory memory{small, pool_};

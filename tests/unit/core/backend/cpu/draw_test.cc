@@ -24,7 +24,8 @@ void for_many_triangles(int rounds, Check check) {
     }
 }
 
-// Compares every kernel, for both rules, with the oracle.
+// Compares the voxels that every kernel sets with the oracle's, for both rules (kShell and kThin).
+// `inside`: true if the triangle covers the region (triangle_set.h).
 void expect_right(const oracle::Triangle& t, bool inside, const oracle::Region& region) {
   const Padded<int32_t> narrow(t);
   const oracle::Voxels shell = oracle::voxelize({t}, region);
@@ -36,16 +37,17 @@ void expect_right(const oracle::Triangle& t, bool inside, const oracle::Region& 
   }
 }
 
-// Every kernel sets exactly the voxels that the oracle's separating-axis test sets, and the rule
-// kThin exactly those of the oracle's crossings.
+// For the rule kShell, every kernel sets exactly the voxels that the oracle's separating-axis test
+// finds. For the rule kThin, it sets exactly the voxels in which the triangle crosses a row,
+// according to the oracle.
 TEST(Draw, KernelsEqualOracle) {
   for_many_triangles(120, [](const oracle::Triangle& t, const oracle::Region& region) {
     if (is_narrow(t)) expect_right(t, false, region);
   });
 }
 
-// draw_wide(), which uses 128-bit integers, sets exactly the oracle's voxels, both for wide
-// triangles and for narrow ones.
+// draw_wide() and draw_thin_wide(), which use 128-bit integers, set exactly the oracle's voxels,
+// both for wide triangles and for narrow ones.
 TEST(Draw, WideEqualsOracle) {
   int wide_ones = 0;
   for_many_triangles(40, [&](const oracle::Triangle& t, const oracle::Region& region) {
@@ -58,8 +60,9 @@ TEST(Draw, WideEqualsOracle) {
   EXPECT_GT(wide_ones, 50);
 }
 
-// The kernels equal the oracle even where heights in fixed point are ambiguous: for planes that
-// pass through voxel corners or just miss them. Their slopes are ratios of small numbers.
+// The kernels round the heights of the triangle's plane, but equal the oracle even if the plane
+// passes through voxel corners or just misses them, where rounding could change the result. The
+// planes' slopes are ratios of small numbers, so that this happens often.
 TEST(Draw, AmbiguousHeightsAreExact) {
   oracle::Random random(2);
   const oracle::Region region{{512, 1024, 4096}, 16};
@@ -83,9 +86,9 @@ TEST(Draw, AmbiguousHeightsAreExact) {
   }
 }
 
-// The kernels compute the bounds from edges in doubles, but equal the oracle even for edges that
-// pass through voxel corners or just miss them. The edges have every length; some are parallel to
-// an axis.
+// The kernels compute in doubles how far each edge bounds the triangle in a row. They equal the
+// oracle even if edges pass through voxel corners or just miss them, where rounding could change
+// the result. The edges have every length; some are parallel to an axis.
 TEST(Draw, AmbiguousEdgesAreExact) {
   oracle::Random random(4);
   const int64_t middle = int64_t{1} << 19;
@@ -129,7 +132,8 @@ TEST(Draw, AmbiguousCentersAreExact) {
   }
 }
 
-// If a triangle covers a cube, drawing only its plane sets the same voxels.
+// If a triangle covers a cube (triangle_set.h), its edges do not matter, and drawing only its plane
+// sets the oracle's voxels.
 TEST(Draw, InsideIsThePlaneOnly) {
   oracle::Random random(3);
   int covered = 0;

@@ -59,7 +59,8 @@ TEST(Octants, NoTouchedChildIsLeftOut) {
   }
 }
 
-// If a triangle covers a cube, it also covers the children that its plane touches.
+// If a triangle covers a cube (triangle_set.h), it also covers the cube's children that its plane
+// touches.
 TEST(Octants, InsideStaysInside) {
   const oracle::Region region{{0, 0, 0}, 64};
   const Padded<int32_t> narrow(

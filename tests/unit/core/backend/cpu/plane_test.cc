@@ -10,7 +10,7 @@
 namespace voxdag::cpu {
 namespace {
 
-// The tables of a build, with the reducer and the plane memo.
+// Everything that building nodes takes: the tables of a subvolume, the reducer, and the plane memo.
 struct Workshop {
   Workshop(const Kernels& kernels, VoxelRule its_rule)
       : tables(memory, 10),
@@ -29,7 +29,8 @@ struct Workshop {
   VoxelRule rule;
 };
 
-// Returns the node of a cube that the triangle covers, made by drawing tile by tile.
+// Returns the node of a cube that the triangle covers (triangle_set.h). Makes it without the plane
+// memo, by drawing the triangle tile by tile.
 NodeRef drawn_node(Workshop& shop, const NarrowTriangle& t, const LatticeCube& box, int size_log2,
                    TileBricks& tile) {
   if (size_log2 > kTileLog2) {
@@ -72,8 +73,9 @@ oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t
   return t;
 }
 
-// Compares the node of a cube from the memo with the drawn node, and does the same for three of the
-// cube's children, down to the smallest size. Returns the number of compared cubes.
+// Compares the node of a cube that the memo builds with the node that is drawn. Does the same for
+// three of the cube's children, recursively down to the smallest size of the memo. Returns the
+// number of compared cubes.
 int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, const LatticeCube& box,
             int size_log2, TileBricks& tile) {
   const OctreeCounts before = by_memo.tables.counts();
@@ -94,8 +96,9 @@ int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, con
   return compared;
 }
 
-// Nodes, hashes and counts from the memo equal the results of drawing the same planes: walls,
-// planes with small normals, and others.
+// The memo's nodes equal drawn nodes: they exist for the same cubes, and have the same hashes and
+// counts. A third of the normals have components of at most 1 (walls and diagonals), a third of at
+// most 12, and a third of at most 300.
 void expect_memo_equals_drawing(VoxelRule rule) {
   oracle::Random random(6);
   const auto tile = std::make_unique<TileBricks>();
@@ -116,8 +119,8 @@ void expect_memo_equals_drawing(VoxelRule rule) {
     Workshop by_drawing(portable_kernels(), rule);
     TriangleSet set(by_memo.memory);
     set.add(axis_major(oracle::fixed(t)));
-    // A triangle's plane is added once the triangle has covered enough tiles. A plane through
-    // lattice points may never be added.
+    // The memo adds a triangle's plane only after build() was called for enough cubes that the
+    // triangle covers, and it may never add the plane.
     NodeRef node;
     bool found = false;
     for (int i = 0; i < 40 && !found; ++i)
@@ -131,7 +134,8 @@ void expect_memo_equals_drawing(VoxelRule rule) {
 TEST(Planes, NodesFromTheMemoEqualDrawnOnes) { expect_memo_equals_drawing(VoxelRule::kShell); }
 TEST(Planes, ThinNodesFromTheMemoEqualDrawnOnes) { expect_memo_equals_drawing(VoxelRule::kThin); }
 
-// The memo does not use a plane for large cubes in which values of the plane exceed 62 bits.
+// Plane::fits() rejects large cubes for a plane with a huge normal, because values of the plane in
+// such cubes exceed 62 bits. The memo then does not use the plane.
 TEST(Planes, HugeNormalsAreNotUsedForLargeCubes) {
   const oracle::Triangle t{
       {{1, 1, 100000001}, {(1 << 28) - 1, 3, 7}, {5, (1 << 28) - 3, 100000007}}};

@@ -16,8 +16,8 @@ namespace {
 
 class ParallelDag : public testing::Test {
  protected:
-  // Returns an octree with `levels` levels above the bricks, and only `different_bricks` different
-  // bricks.
+  // Returns a random octree with `levels` levels above the bricks. The bricks have at most
+  // `different_bricks` different masks.
   Octree<HostSpace> random_octree(uint64_t seed, uint32_t levels, int64_t different_bricks) {
     oracle::Random random(seed);
     const uint32_t max_count = 1u << 3 * levels;
@@ -60,8 +60,9 @@ TEST_F(ParallelDag, BothConstructionsAgreeAndAreInOrder) {
     }
 }
 
-// The hashes are so short that different nodes have equal hashes in some of the octrees. The sweep
-// must reject the DAGs of such octrees; every accepted DAG must be right.
+// The hashes are so short that some octrees have different nodes with equal hashes. For such an
+// octree, make_dag_by_hashes() must return nothing, because its verification sweep finds the
+// collision. Every DAG that it returns must be right.
 TEST_F(ParallelDag, TheSweepRejectsCollisions) {
   int accepted = 0, rejected = 0;
   for (uint64_t seed = 0; seed < 600; ++seed) {

@@ -1,5 +1,5 @@
-// Compares the primitives of HostSpace with loops of the standard library, at sizes around the size
-// of a thread's part.
+// Compares the primitives of HostSpace with loops of the standard library. HostSpace divides arrays
+// into one part per thread, so the sizes are around the size of such a part.
 #include "core/backend/parallel/space/host_space.h"
 
 #include <gtest/gtest.h>
@@ -101,7 +101,8 @@ TEST_P(HostSpaceTest, CountBits) {
   }
 }
 
-// A sort by a range of bits ignores the other bits, and preserves the order of equal keys.
+// A sort by a range of bits ignores the other bits, and preserves the order of keys whose bits in
+// the range are equal.
 TEST_P(HostSpaceTest, SortsAreStableByTheBitsGiven) {
   for (const uint32_t n : kSizes)
     for (const auto& [begin, end] : {std::pair{0, 64}, {0, 0}, {3, 4}, {5, 30}, {60, 64}, {0, 9}}) {
@@ -129,8 +130,8 @@ TEST_P(HostSpaceTest, SortsAreStableByTheBitsGiven) {
     }
 }
 
-// expand() visits each output once, with its source and rank. Some sources have no outputs. Any
-// range of the sources can be expanded.
+// expand() visits each output once, and passes its source and its rank among the outputs of this
+// source. Some sources have no outputs. Any range of the sources can be expanded.
 TEST_P(HostSpaceTest, ExpandVisitsEveryOutputOfItsSource) {
   for (const uint32_t n : {1u, 2u, 100u, 5000u}) {
     std::vector<uint32_t> offsets(n + 1);

@@ -1,4 +1,5 @@
-// touched_cells() must equal the definition (core/geometry/overlap.h) in every cell.
+// touched_cells() must report a cell if and only if the triangle touches it by the definition in
+// core/geometry/overlap.h.
 #include "core/backend/parallel/voxelize/triangle_cells.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +26,8 @@ void expect_defined(const FixedTriangle& t, const int64_t (&low)[3], int shift, 
   tally.cells += static_cast<uint64_t>(popcount64(expected));
 }
 
-// Compares blocks of every possible size, at a corner of the triangle and next to it.
+// Compares touched_cells() with the definition for blocks of many sizes. The blocks are in or near
+// the triangle's bounding box.
 void expect_defined_around(const FixedTriangle& t, oracle::Random& random, Tally& tally) {
   for (int shift = 8; shift <= 27; shift += static_cast<int>(random.between(1, 3)))
     for (int i = 0; i < 4; ++i) {
@@ -57,7 +59,8 @@ TEST(TouchedCells, EqualsTheDefinitionOnAllKinds) {
 }
 
 // touched_cells() is right for triangles at, just below and just above the largest size for which
-// it uses 64-bit products. The triangles' normals are as long as possible at this size.
+// it uses 64-bit products. The triangles' normals are as long as possible at this size, so that the
+// products are as large as possible.
 TEST(TouchedCells, EqualsTheDefinitionAtTheLimitOfNarrow) {
   oracle::Random random(4);
   Tally tally;
@@ -99,7 +102,8 @@ TEST(TouchedCells, EqualsTheDefinitionNearCorners) {
   EXPECT_GT(tally.cells, tally.blocks);
 }
 
-// One TriangleOnLattice can be used for all blocks of its lattice, at any offset.
+// One TriangleOnLattice, which is made for a triangle and a size of cells, finds the touched cells
+// of blocks at any offset.
 TEST(TouchedCells, BlocksOfOneLattice) {
   oracle::Random random(6);
   Tally tally;

@@ -1,5 +1,5 @@
-// Voxelization by list and by tiles both give the oracle's bricks, with any size of batches and
-// slices.
+// Both methods of voxelization, by list and by tiles, give the oracle's bricks. The sizes of
+// batches and of their slices do not affect the result.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,8 @@ Bricks bricks_of(const oracle::Voxels& voxels) {
 
 class Voxelize : public testing::Test {
  protected:
-  // Returns the merged list's bricks. Checks that they are in order and without duplicates.
+  // Merges the list, and returns its bricks by code. Checks that the codes increase, so that none
+  // occurs twice.
   static Bricks merged(BrickList<HostSpace>& list) {
     list.merge();
     Bricks out;
@@ -64,8 +65,9 @@ TEST_F(Voxelize, ListAndTilesGiveTheOraclesBricks) {
   }
 }
 
-// With the smallest possible windows, frames are expanded in many slices, voxels are packed many
-// times, and the list is merged and grows in between. The result is the same.
+// A window is the capacity of a frame (PairExpansion) in pairs. With tiny windows, frames are
+// expanded in many slices, and voxels are packed into bricks many times, so that the brick list is
+// merged and grows in between. The bricks remain the same.
 TEST_F(Voxelize, TinyWindowsChangeNothing) {
   const auto scene = oracle::fixed(oracle::make_scene(oracle::SceneKind::kSoup, 2, region, 60));
   const uint32_t count = static_cast<uint32_t>(scene.size());
@@ -85,7 +87,8 @@ TEST_F(Voxelize, TinyWindowsChangeNothing) {
   EXPECT_GT(first.size(), 500u);
 }
 
-// The brick list combines bricks with equal codes, also from different parts that were added.
+// merge() combines all bricks with the same code into one brick that has all their voxels, even if
+// they were added in different parts.
 TEST_F(Voxelize, BrickListMergesWhatComesAgain) {
   oracle::Random random(5);
   BrickList<HostSpace> list(space, 15);

@@ -66,12 +66,13 @@ struct Node {
   auto operator<=>(const Node&) const = default;
 };
 
-// Adds nodes with few different hashes, so that slots, tags and complete hashes collide. Some
-// hashes are the highest possible ones, so that clusters of slots continue at the start of the
-// table.
+// Adds nodes with few different hashes, so that nodes collide in slots, in tags (the upper half of
+// the hash), and in complete hashes. Some hashes are the highest possible ones, so that runs of
+// used slots wrap around from the end of the table to its start.
 class NodeTables : public Tables {
  protected:
-  // The elements behind the node's children are random, because they must not affect the result.
+  // Sets the array elements after the node's last child to random values, because they must not
+  // affect the result.
   uint32_t add(NodeTable& table, const Node& node) {
     uint32_t children[8];
     for (uint32_t& child : children) child = static_cast<uint32_t>(random_.between(0, 3));
@@ -112,8 +113,9 @@ TEST_F(NodeTables, NodesAreFoundAgainWhateverTheirHashes) {
   }
 }
 
-// Slots are sorted in the total order (hash, mask, children), also ties and clusters that continue
-// at the start of the table. The same holds if hashes are changed without the table's knowledge.
+// sort_slots() sorts slots by the total order (hash, mask, children), including nodes with equal
+// hashes and runs of slots that wrap around at the end of the table. The same holds if the test
+// changes the hashes in the records and passes hashes_changed = true.
 TEST_F(NodeTables, SlotsAreInTheTotalOrder) {
   for (const int distinct : {1, 20, 100000})
     for (const bool changed : {false, true}) {

@@ -52,7 +52,8 @@ struct SpaceGrid {
   std::vector<uint8_t> voxels;
 };
 
-// Sets all voxels of `out` that walks through empty voxels of `grid` reach from `start`.
+// Sets the voxels of `out` that can be reached from `start` through empty voxels of `grid`, by
+// steps across faces.
 void flood(const SpaceGrid& grid, const SpaceCell& start, SpaceGrid& out) {
   std::vector<SpaceCell> reached;
   const auto reach = [&](const SpaceCell& c) {
@@ -81,7 +82,7 @@ SpaceGrid outside_of(const SpaceGrid& grid) {
   return out;
 }
 
-// The sub-DAG of a cubic grid, with its labels.
+// The nodes and bricks of a cubic grid, with the labels of their components of empty voxels.
 class SpaceDag {
  public:
   explicit SpaceDag(const SpaceGrid& grid) : edge_(grid.size[0]) {
@@ -107,7 +108,8 @@ class SpaceDag {
     return filled(
         [&](SubDagTables& tables) { fill_enclosed(memory_, *labels_, is_outside, tables); });
   }
-  // Fills the component of a voxel, also if it reaches the faces.
+  // Fills the component that contains the voxel, even if it reaches a face of the cube. Fills
+  // nothing if the voxel is set. Sets `place` to the result of find_seed().
   SpaceGrid fill_seed(const SpaceCell& cell) {
     CubeVoxel voxel{};
     for (size_t a = 0; a < 3; ++a) voxel[a] = static_cast<uint32_t>(cell[a]);
@@ -133,7 +135,7 @@ class SpaceDag {
     expand(dag, static_cast<int>(dag.levels.size()), 0, {0, 0, 0}, edge_, out);
     return out;
   }
-  // Returns the voxels of a component that is at the faces.
+  // Returns the voxels of component `c`, which reaches a face of the cube.
   SpaceGrid component(uint32_t c) {
     std::vector<uint8_t> is_outside(components());
     is_outside[c] = 1;
@@ -149,7 +151,8 @@ class SpaceDag {
     return {low[0] + half * (o >> 2), low[1] + half * (o >> 1 & 1), low[2] + half * (o & 1)};
   }
 
-  // Returns the row of a cube plus 1; 0 if it is empty.
+  // Adds the nodes and bricks of a cube. Returns the number of its row plus 1, or 0 if the cube is
+  // empty.
   uint32_t add(const SpaceGrid& grid, const SpaceCell& low, int edge, size_t depth) {
     std::vector<uint64_t> key;
     if (edge == kBrickEdge) {
@@ -282,7 +285,8 @@ TEST(Space, SeedFillsItsComponent) {
   for (const int count : kinds) EXPECT_GT(count, 20);
 }
 
-// The components are disjoint, each is connected, and together they are the outside.
+// The components are disjoint, each is connected, and together they are the outside: all empty
+// voxels that are connected to a face of the cube.
 TEST(Space, EachComponentIsConnected) {
   for (const int edge : {4, 8, 16})
     for_random_grids(edge, [](const SpaceGrid& grid) {
@@ -310,7 +314,7 @@ TEST(Space, EachComponentIsConnected) {
     });
 }
 
-// If all is outside, the sub-DAG remains as it is. If nothing is outside, all voxels are set.
+// If the only component counts as outside, nothing is filled. Otherwise all voxels are set.
 TEST(Space, FullCube) {
   SpaceGrid grid(64);
   grid.at({40, 3, 5}) = 1;
@@ -324,7 +328,7 @@ TEST(Space, FullCube) {
   EXPECT_EQ(dag.summary.dag_nodes, 5u);
 }
 
-// Components with more labels than the key of a filled node can hold.
+// Tests a cube with more components than the key of a filled node can hold labels.
 TEST(Space, ManyComponents) {
   SpaceGrid grid(32);
   grid.for_each([&](const SpaceCell& c) { grid.at(c) = (c[0] + c[1] + c[2]) % 2 == 0; });
@@ -349,7 +353,8 @@ SpaceGrid part_of(const SpaceGrid& grid, const SpaceCell& low, int edge) {
   return out;
 }
 
-// Two cubes with a common face: their components meet iff walks through both cubes connect them.
+// Two cubes have a common face. join_squares() must join two of their components if and only if a
+// walk through empty voxels of both cubes connects them.
 void expect_joined(const SpaceGrid& grid, int axis, int edge) {
   SpaceCell high{0, 0, 0};
   high[axis] = edge;
@@ -406,11 +411,11 @@ TEST(Space, FacesJoinNeighbors) {
     }
 }
 
-// descend() follows a path of quadrants to a square of the face. It stops earlier if a larger
-// square on the path is empty.
+// descend() follows a path of quadrants to a square of the face. If a larger square on the path is
+// empty, descend() returns this square.
 TEST(Space, FacesDescend) {
   SpaceGrid grid(16);
-  grid.at({15, 2, 14}) = 1;  // quadrant 1 of the high face along x
+  grid.at({15, 2, 14}) = 1;  // in quadrant 1 of the high face along x
   SpaceDag dag(grid);
   const auto bytes = encode_face(dag.labels(), 1, UINT64_MAX);
   const uint8_t to_brick[] = {1, 1}, to_empty[] = {2, 1};
@@ -420,7 +425,8 @@ TEST(Space, FacesDescend) {
   EXPECT_EQ(empty_face().size(), 2u);
 }
 
-// Damaged bytes in which every square is split are an error. They must not exhaust the stack.
+// The bytes claim that every square is split into quadrants, without end. Reading them is an error,
+// and must not exhaust the stack.
 TEST(Space, FacesOfAnyDepthAreRefused) {
   const std::vector<std::byte> split(1 << 20, static_cast<std::byte>(FaceReader::Kind::kSplit));
   const auto code_of = [](const auto& read) -> std::optional<ErrorCode> {

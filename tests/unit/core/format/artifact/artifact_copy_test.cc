@@ -58,14 +58,15 @@ TEST_F(ArtifactCopyTest, CubesOfAnotherSizeAreRefused) {
   EXPECT_EQ(error_of([&] { copy({8, {1, 2, 3}}); }).code(), ErrorCode::kCorrupt);
 }
 
-// An entry that was moved to the name of another key is not used.
+// A cache entry is refused if its key differs from the requested key, as after its file was
+// renamed.
 TEST_F(ArtifactCopyTest, EntriesOfOtherKeysAreRefused) {
   EXPECT_EQ(error_of([&] { read_cache_entry(system_files(), entry_path_, "other"); }).code(),
             ErrorCode::kCorrupt);
 }
 
-// Cache entries are not synced, so after a power cut they may contain anything. Reading a damaged
-// entry is an Error, and never gives a wrong artifact.
+// Cache entries are not synced, so after a power cut they may contain anything. Reading an entry
+// with one flipped bit, or a truncated entry, throws Error.
 TEST_F(ArtifactCopyTest, EveryBitFlipAndTruncationIsCaught) {
   const ByteString bytes = read_bytes(entry_path_);
   const auto file = system_files().open_write(entry_path_);

@@ -70,7 +70,8 @@ TEST(ArtifactDamageTest, EveryTruncationIsCaught) {
     EXPECT_THROW(read_all(small.bytes.substr(0, size), small.ref), Error) << size << " bytes";
 }
 
-// A reference to an artifact with any wrong field, as from a damaged job store, gives an error.
+// A reference to an artifact with a wrong field, as a damaged job store could contain, causes an
+// error.
 TEST(ArtifactDamageTest, WildReferencesAreCaught) {
   const SmallSegment small;
   oracle::Random random(1);

@@ -22,7 +22,7 @@ class ArtifactTest : public testing::Test {
   MemoryBudget budget_{uint64_t{64} << 20};
 };
 
-// A real sub-DAG, its root and all its counts are read back as they were written.
+// The sub-DAG of a voxelized scene, its root and all its counts are read back as they were written.
 TEST_F(ArtifactTest, SubDagComesBack) {
   for (const uint32_t hash_bits : {4u, 16u, 64u}) {
     SCOPED_TRACE("hash bits " + std::to_string(hash_bits));
@@ -143,7 +143,7 @@ TEST_F(ArtifactTest, ManyArtifactsShareASegment) {
     EXPECT_EQ(read_artifact(open(refs[i])), random_rows(i, 100 * i + 1, 8, 2, 64)) << i;
 }
 
-// The writer charges the memory that the header documents, and releases all of it.
+// The writer charges the memory that its header file documents, and releases all of it.
 TEST_F(ArtifactTest, WriterChargesItsMemory) {
   {
     SegmentWriter segment(system_files(), folder_.path(), 0, budget_);

@@ -102,15 +102,14 @@ TEST_F(ColorSectionTest, HasSolidRegions) {
   EXPECT_LT(check({7, 7, half, smooth_colors(7, 0)}), 20);
 }
 
-// If a block has only one or two colors, they are stored exactly, on all levels on which colors do
-// not mix.
+// If all cells have the same color, it is stored exactly on all levels.
 TEST_F(ColorSectionTest, FlatColorsAreExact) {
   const auto flat = [](uint64_t) { return sum_of_color(13, 201, 77, 5); };
   EXPECT_EQ(check({9, 8, random_codes(5, 9, 3000), flat}), 0);
 }
 
-// The sums of a scene of 10^10 cells or more do not fit in 64 bits. A cell with a negligible weight
-// keeps its color.
+// The color sums of large scenes (10^10 cells or more) do not fit in 64 bits. A cell with a
+// negligible weight keeps its color.
 TEST_F(ColorSectionTest, LargeSumsDoNotOverflow) {
   constexpr int kDust = 170, kDark = 10, kBright = 250;
   const auto gray = [](int value, uint64_t weight) {
@@ -118,8 +117,8 @@ TEST_F(ColorSectionTest, LargeSumsDoNotOverflow) {
   };
   for (const uint32_t levels : {8u, 15u}) {
     SCOPED_TRACE(levels);
-    // There is a cell in each of 57 regions of level 2. One cell is dust and alone in its octant;
-    // the others are dark or bright.
+    // There is one cell in each of 57 cubes of level 2. One cell is dust: it has a negligible
+    // weight, and is the only cell in its octant. The others are dark or bright.
     Codes codes{0};
     for (uint64_t i = 8; i < 64; ++i) codes.push_back(i << 3 * (levels - 2));
     write_colored(path_, {levels, levels, codes, [&](uint64_t code) {

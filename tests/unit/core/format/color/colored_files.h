@@ -24,8 +24,8 @@ namespace voxdag {
 
 using Codes = std::vector<uint64_t>;
 
-// Returns the color sum of the surfaces in a cell of the color grid. `code` is the cell's Morton
-// code.
+// A function that returns the color sum of the surfaces in a cell of the color grid. `code` is the
+// cell's Morton code.
 using SumOf = std::function<ColorSum(uint64_t code)>;
 
 struct ColoredScene {
@@ -66,7 +66,8 @@ inline SumOf smooth_colors(uint32_t color_levels, int noise) {
       const auto value = static_cast<int64_t>(uint64_t{v} * 255 >> color_levels);
       return static_cast<int>(std::clamp<int64_t>(value + random.between(-noise, noise), 0, 255));
     };
-    // Named variables fix the order of these calls for every compiler.
+    // Named variables fix the order of the calls of channel(): compilers may evaluate the arguments
+    // of a call in any order.
     const int r = channel(x), g = channel(y), b = channel(z);
     return sum_of_color(r, g, b, 1 + code % 7);
   };

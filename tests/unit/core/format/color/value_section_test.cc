@@ -27,7 +27,8 @@ class ValueSectionTest : public testing::Test {
     verify_global_file(*open_global_file(path), 2, budget, progress, {}, narrow_words);
   }
 
-  // Returns the stored number that a reader finds; nullopt for a cell that is not set.
+  // Returns the value that the reader finds in a cell, as the number in the file; nullopt if the
+  // cell is not set.
   static std::optional<uint32_t> value_in(const voxdag_reader::File& file, Attribute attribute,
                                           const uint32_t (&at)[3], uint32_t level) {
     uint64_t i;
@@ -115,7 +116,7 @@ TEST_F(ValueSectionTest, AreIndependent) {
   EXPECT_EQ(read_bytes(path_), read_bytes(folder_.file("colored.vdag")));
 }
 
-// A golden file: bytes that every version must write.
+// Every version of voxdag must write the same bytes for these sections.
 TEST_F(ValueSectionTest, HaveTheBytesThatTheyAlwaysHad) {
   const ColoredScene scene{4, 3, random_codes(1, 4, 40), smooth_colors(3, 4)};
   const auto digest = [&](const AttributeSet& set) {
@@ -162,9 +163,9 @@ TEST_F(ValueSectionTest, ReaderHasAllOfThem) {
   EXPECT_TRUE(colored.material_names().empty());
 }
 
-// Every byte of the sections is changed, with corrected checksums. No read leaves the file (the
-// address sanitizer checks this). `verify` finds all changes except a valid other value of a finest
-// cell, and another name of a material.
+// Every byte of the sections is changed, with corrected checksums. The reader never accesses memory
+// outside the file (the address sanitizer checks this). `verify` finds all changes, except changes
+// that are valid: another value of a finest cell, or another name of a material.
 TEST_F(ValueSectionTest, DamageIsAnError) {
   const ColoredScene scene{3, 3, random_codes(2, 3, 60), smooth_colors(3, 60)};
   write_valued(path_, scene, kValues, 3);

@@ -164,8 +164,9 @@ TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
   }
 }
 
-// Another writer resumes a file whose levels were synced, after any level, and writes the same
-// bytes. Some levels end within a checksum block, and some checksum blocks end within a level.
+// A file is synced after each number of levels. A new writer resumes the file and writes the same
+// bytes as one writer alone. Some levels end within a checksum block, and some checksum blocks end
+// within a level.
 TEST_F(GlobalWriterTest, ResumesAfterAnyLevel) {
   oracle::Random random(4);
   oracle::Voxels voxels(128);
@@ -200,8 +201,8 @@ TEST_F(GlobalWriterTest, ResumesAfterAnyLevel) {
   }
 }
 
-// The writer detects a bit that the disk flips before the checksums are written. It also detects a
-// truncated partial file.
+// The disk flips a bit of the partial file. seal() detects this anywhere in the file. resume()
+// detects it in the last, incomplete checksum block, and also detects a truncated file.
 TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(5, 32), 64);
   const auto levels = level_words(dag);
@@ -235,7 +236,7 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
     saved = writer.progress();
   }
   ByteString bytes = read_bytes(partial);
-  bytes[at - kPageBytes] ^= 1;  // in the block where the next level continues
+  bytes[at - kPageBytes] ^= 1;  // in the last, incomplete checksum block
   write_bytes(partial, bytes);
   GlobalFileWriter writer(system_files(), path_, grid_of(32), 64);
   EXPECT_EQ(error_of([&] { writer.resume(saved); }).code(), ErrorCode::kCorrupt);
@@ -243,8 +244,8 @@ TEST_F(GlobalWriterTest, NoticesWhatTheDiskChanged) {
   EXPECT_EQ(error_of([&] { writer.resume(saved); }).code(), ErrorCode::kCorrupt);
 }
 
-// A level of over 2^40 words is a limit error that names the level, at every place where the size
-// is checked.
+// A level of over 2^40 words causes a kLimit error that names the level, in each function that
+// checks the size.
 TEST_F(GlobalWriterTest, LevelsOverTheLimitAreRefused) {
   GlobalFileWriter writer(system_files(), path_, grid_of(16), 64);
   writer.begin_level(2);

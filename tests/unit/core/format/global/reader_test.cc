@@ -116,7 +116,8 @@ TEST_F(ReaderTest, APipeIsRefused) {
   }
 }
 
-// Each kind of unreadable file gives a different error: missing, other, too new, damaged.
+// Each kind of unreadable file gives a different problem: the file is missing, is not a voxdag
+// file, has a newer format version, or is damaged.
 TEST_F(ReaderTest, ProblemsAreReported) {
   using voxdag_reader::Problem;
   const auto problem = [&] {

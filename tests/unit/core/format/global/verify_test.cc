@@ -268,8 +268,8 @@ TEST_F(VerifyTest, WrongHashBitsAreCaught) {
   EXPECT_THROW(verify(path_), Error);
 }
 
-// Random changes in files with right checksums. Readers never crash. If a file passes, a walk finds
-// as many voxels as the header gives.
+// Random changes in files with corrected checksums. Readers never crash. If `verify` accepts a
+// file, a walk finds as many voxels as its header gives.
 class MutationTest : public VerifyTest, public testing::WithParamInterface<uint64_t> {};
 
 TEST_P(MutationTest, NeverCrashesAReader) {

@@ -1,4 +1,5 @@
-// Files with wide levels, version 2 of the format, and headers with wrong claims about them.
+// Files with wide levels (levels to which pointers have 64 bits; version 2 of the format), and
+// files whose headers describe such levels wrongly.
 #include <gmock/gmock.h>
 
 #include <cstring>
@@ -18,7 +19,7 @@ using testing::HasSubstr;
 using testing::MatchesRegex;
 
 constexpr int kEdge = 64;
-constexpr uint64_t kNarrowWords = 50;  // fewer than the bricks have
+constexpr uint64_t kNarrowWords = 50;  // above this, a level is wide; the bricks have more words
 constexpr uint32_t kBrickLevel = 4;
 constexpr size_t kPointerBitsAt = 24;  // in a level's entry
 
@@ -32,8 +33,8 @@ class WideFileTest : public testing::Test {
     const auto file = open_global_file(path);
     verify_global_file(*file, 2, budget, progress, {}, narrow_words);
   }
-  // Returns the error of opening or verifying the file after a change of its header. The file is at
-  // path_ and was written with narrow_words_.
+  // Replaces the header's bytes at offset `at` by `value`, and corrects the header's checksum.
+  // Returns the error of opening or verifying the changed file.
   template <class T>
   Error error_with(size_t at, T value) const {
     ByteString bytes = read_bytes(path_);
@@ -95,13 +96,14 @@ TEST_F(WideFileTest, PointersOfOtherWidthsAreRefused) {
     EXPECT_THAT(error_with(bricks, bits).message(),
                 HasSubstr("header: level 4: pointers of " + std::to_string(bits) +
                           " bits, expected 32 or 64"));
-  // If the header gives the other pointer width, the words of the parents are invalid.
+  // If the header gives the valid width that the file does not use, the words of the parents do not
+  // match it.
   EXPECT_EQ(error_with(bricks, uint32_t{32}).code(), ErrorCode::kCorrupt);
   EXPECT_EQ(error_with(kLevelsAt + kPointerBitsAt, uint32_t{33}).code(), ErrorCode::kCorrupt);
 }
 
-// The number of words determines the width of pointers, so that equal voxels give one canonical
-// file.
+// The number of a level's words determines the width of pointers to it, so that equal voxels always
+// give the same file. `verify` refuses another width.
 TEST_F(WideFileTest, OtherThresholdsAreNotCanonical) {
   EXPECT_THAT(error_of([&] { verify(path_, uint64_t{1} << 32); }).message(),
               MatchesRegex(".*level 1: pointers of 64 bits into [0-9]+ words, expected 32"));
